@@ -1,0 +1,55 @@
+# `make route` plans the demonstration route, `make test` passes all checks; both set up by themselves.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+NOJIT_TESTS := tests/test_pyramid_invariants.py tests/test_search.py
+
+.PHONY: route test test-full lint unit nojit full setup maps lock clean
+
+route: setup
+	mkdir -p out
+	$(BIN)/hybridnav plan maps/office/office.yaml --start 1.0,13.2 --goal 40.6,19.4 --compare --plot out/route.png
+	@echo "picture: out/route.png"
+
+test: lint unit nojit
+
+test-full: lint full nojit
+
+lint: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+unit: setup
+	$(BIN)/python -m pytest -m "not full"
+
+# The kernels as plain Python, on maps of at most 12 x 12 cells: a second reading of the same code.
+nojit: setup
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
+
+# Bounds checks need a cache of their own: cached code ignores the setting.
+full: setup
+	$(BIN)/python -m pytest
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-bounds $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
+
+setup: $(READY)
+
+$(READY): requirements.lock pyproject.toml
+	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'hybridnav needs Python 3.11 or newer')"
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	touch $(READY)
+
+maps: setup
+	$(BIN)/python -m hybridnav.grid.worlds maps
+
+# Needs uv (https://docs.astral.sh/uv); writes the versions that `setup` installs.
+lock:
+	uv pip compile --quiet --universal --no-header --no-annotate --python-version 3.11 --extra dev pyproject.toml --output-file requirements.lock
+
+clean:
+	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,0 +1,16 @@
+"""Names for the arrays that the layers hand to each other."""
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+BoolArray = NDArray[np.bool_]
+ByteArray = NDArray[np.uint8]
+IntArray = NDArray[np.int32]
+IndexArray = NDArray[np.intp]
+LongArray = NDArray[np.int64]
+FloatArray = NDArray[np.float64]
+AnyArray = NDArray[Any]
+PathLike = str | os.PathLike[str]

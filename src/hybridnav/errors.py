@@ -1,0 +1,33 @@
+"""Errors and warnings: every one says what was given, what was expected, and where."""
+
+
+class HybridNavError(Exception):
+    """Base of every error that hybridnav raises on purpose; its text is one line."""
+
+
+class InvalidValueError(HybridNavError, ValueError):
+    """An argument has a value that the function cannot work with."""
+
+
+class MapError(HybridNavError, ValueError):
+    """A map file, or the image it names, cannot be read as an occupancy grid."""
+
+
+class MapNotFoundError(MapError, FileNotFoundError):
+    """A map file, or the image it names, is not there."""
+
+
+class PresetError(HybridNavError, ValueError):
+    """A preset, or a setting given beside it, is not valid; the text names the key."""
+
+
+class PresetNotFoundError(PresetError, FileNotFoundError):
+    """No preset has this name and no file this path."""
+
+
+class PlanError(HybridNavError, RuntimeError):
+    """A plan ended without a path and the caller asked for one (`raise_for_status`)."""
+
+
+class MapWarning(UserWarning):
+    """A map loads, but probably does not mean what its file says."""
