@@ -1,0 +1,118 @@
+"""The map frame: the one place where cells become metres and metres become cells."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import FloatArray, LongArray
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Pose and scale of a grid in the map frame.
+
+    Parameters
+    ----------
+    resolution_m
+        Side of a cell in metres.
+    origin_m
+        The lower-left corner of cell (0, 0), `(x, y)` in metres.
+    yaw_rad
+        Rotation of the grid about that corner, counter-clockwise, in radians: columns run along
+        `(cos yaw, sin yaw)`, rows along `(-sin yaw, cos yaw)`.
+
+    Raises
+    ------
+    InvalidValueError
+        When a value is not finite or the resolution is not positive.
+    """
+
+    resolution_m: float = 1.0
+    origin_m: tuple[float, float] = (0.0, 0.0)
+    yaw_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.resolution_m) and self.resolution_m > 0):
+            raise InvalidValueError(
+                f"resolution must be a positive number of metres, got {self.resolution_m}"
+            )
+        if not all(map(math.isfinite, (*self.origin_m, self.yaw_rad))):
+            raise InvalidValueError(
+                f"origin and yaw must be finite, got {self.origin_m} and {self.yaw_rad}"
+            )
+
+    def points_of(self, cells: ArrayLike) -> FloatArray:
+        """Centres of cells in the map frame.
+
+        Parameters
+        ----------
+        cells
+            `(row, col)` along the last axis, any leading shape.
+
+        Returns
+        -------
+        FloatArray
+            `(x, y)` in metres along the last axis.
+        """
+        return self.points_of_grid(np.asarray(cells, dtype=np.float64) + 0.5)
+
+    def points_of_grid(self, positions: ArrayLike) -> FloatArray:
+        """Map points of positions in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
+
+        Parameters
+        ----------
+        positions
+            `(row, col)` along the last axis, real numbers: cell corners are integers.
+
+        Returns
+        -------
+        FloatArray
+            `(x, y)` in metres along the last axis.
+        """
+        rowcol = np.asarray(positions, dtype=np.float64) * self.resolution_m
+        along_x, along_y = rowcol[..., 1], rowcol[..., 0]
+        cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        x = self.origin_m[0] + cosine * along_x - sine * along_y
+        y = self.origin_m[1] + sine * along_x + cosine * along_y
+        return np.stack([x, y], axis=-1)
+
+    def cells_of(self, points: ArrayLike) -> LongArray:
+        """Cells that hold points of the map frame; they may lie outside the grid.
+
+        A point on the side between two cells belongs to the one with the higher index.
+
+        Parameters
+        ----------
+        points
+            `(x, y)` in metres along the last axis, finite.
+
+        Returns
+        -------
+        LongArray
+            `(row, col)` along the last axis.
+
+        Raises
+        ------
+        InvalidValueError
+            When a coordinate is not finite.
+        """
+        xy = np.asarray(points, dtype=np.float64)
+        if not np.isfinite(xy).all():
+            raise InvalidValueError(f"points need finite coordinates in metres, got {points!r:.80}")
+        offset = xy - np.asarray(self.origin_m)
+        cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        along_x = cosine * offset[..., 0] + sine * offset[..., 1]
+        along_y = cosine * offset[..., 1] - sine * offset[..., 0]
+        position = np.stack([along_y, along_x], axis=-1) / self.resolution_m
+        # A centre made by points_of must come back to its cell: 1e-9 of a cell absorbs rounding.
+        cells = np.floor(np.clip(position + 1e-9, -(2.0**40), 2.0**40))
+        return cells.astype(np.int64)

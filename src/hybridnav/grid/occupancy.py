@@ -1,0 +1,139 @@
+"""Occupancy grids: probabilities, thresholds and the classes of cells they make."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid.clearance import within_radius
+from hybridnav.grid.frame import Frame
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._typing import ByteArray
+
+MAX_CELLS = 178_956_970
+"""Cells a grid may have at most: Pillow's own limit for an image, and well inside int32."""
+
+
+class CellClass(IntEnum):
+    """What a cell is to a planner; occupied cells are no vertices of any graph."""
+
+    OCCUPIED = 0
+    FREE = 1
+    UNEXPLORED = 2
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyGrid:
+    """A grid of occupancy probabilities and the classes its two thresholds make (Moravec-Elfes).
+
+    A cell with `p <= free_threshold` (U1) is free, with `p >= occupied_threshold` (U2) occupied,
+    and unexplored between; NaN means "never measured" and is unexplored whatever the thresholds.
+    Probabilities and thresholds are compared as float32.
+
+    A cell is *blocked* when its centre lies within `robot_radius_m` of the centre of an occupied
+    cell (exact Euclidean distance); blocked cells count as occupied in `classes`. Unexplored cells
+    and the map's border do not inflate.
+
+    Parameters
+    ----------
+    probability
+        Occupancy in [0, 1] or NaN, shape `(rows, cols)`, row 0 at the lowest y; copied.
+    frame
+        Resolution and pose in the map frame.
+    free_threshold, occupied_threshold
+        U1 and U2, `0 <= U1 < U2 <= 1`.
+    robot_radius_m
+        Radius in metres by which occupied cells are inflated; 0 blocks the occupied cells alone.
+    name
+        What to call the map in messages and pictures.
+
+    Raises
+    ------
+    InvalidValueError
+        When the array is not two-dimensional, empty, too large or holds values outside [0, 1], or
+        a threshold or the radius is out of range.
+    """
+
+    probability: NDArray[np.float32]
+    frame: Frame = field(default_factory=Frame)
+    free_threshold: float = 0.196
+    occupied_threshold: float = 0.65
+    robot_radius_m: float = 0.0
+    name: str = "map"
+    measured: ByteArray = field(init=False, repr=False)
+    """Class of each cell by the thresholds alone, uint8 `CellClass`."""
+    classes: ByteArray = field(init=False, repr=False)
+    """Class of each cell after inflation, uint8 `CellClass`: what graphs and planners see."""
+
+    def __post_init__(self) -> None:
+        probability = np.array(self.probability, dtype=np.float32, order="C")
+        _check_probability(probability)
+        low, high = self.free_threshold, self.occupied_threshold
+        if not 0 <= low < high <= 1:
+            raise InvalidValueError(
+                "thresholds must satisfy 0 <= free < occupied <= 1, "
+                f"got free {low} and occupied {high}"
+            )
+        if not (math.isfinite(self.robot_radius_m) and self.robot_radius_m >= 0):
+            raise InvalidValueError(
+                f"robot radius must be a finite length in metres >= 0, got {self.robot_radius_m}"
+            )
+        measured = np.full(probability.shape, CellClass.UNEXPLORED, dtype=np.uint8)
+        measured[probability <= np.float32(low)] = CellClass.FREE
+        measured[probability >= np.float32(high)] = CellClass.OCCUPIED
+        classes = measured
+        if self.robot_radius_m > 0:
+            radius_cells = self.robot_radius_m / self.frame.resolution_m
+            blocked = within_radius(measured == CellClass.OCCUPIED, radius_cells=radius_cells)
+            classes = np.where(blocked, np.uint8(CellClass.OCCUPIED), measured)
+        for name, array in (
+            ("probability", probability),
+            ("measured", measured),
+            ("classes", classes),
+        ):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        rows, cols = self.classes.shape
+        return rows, cols
+
+    @property
+    def resolution_m(self) -> float:
+        """Side of a cell in metres."""
+        return self.frame.resolution_m
+
+    def class_counts(self) -> dict[str, int]:
+        """Cells per class; `blocked` are those that only inflation took."""
+        counts = np.bincount(self.classes.ravel(), minlength=3)
+        occupied = int((self.measured == CellClass.OCCUPIED).sum())
+        return {
+            "free": int(counts[CellClass.FREE]),
+            "unexplored": int(counts[CellClass.UNEXPLORED]),
+            "occupied": occupied,
+            "blocked": int(counts[CellClass.OCCUPIED]) - occupied,
+        }
+
+
+def _check_probability(probability: NDArray[np.float32]) -> None:
+    if probability.ndim != 2 or probability.size == 0:  # noqa: PLR2004
+        raise InvalidValueError(
+            "an occupancy grid needs at least one row and one column, "
+            f"got an array of shape {probability.shape}"
+        )
+    if probability.size > MAX_CELLS:
+        raise InvalidValueError(
+            f"an occupancy grid holds at most {MAX_CELLS} cells, got {probability.size}"
+        )
+    if (probability < 0).any() or (probability > 1).any():
+        raise InvalidValueError("occupancy probabilities must lie in [0, 1] or be NaN")

@@ -1,0 +1,20 @@
+"""Fixtures for every test."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# Time is for benchmarks: a first call that imports or compiles is no failure.
+settings.register_profile("hybridnav", deadline=None)
+settings.load_profile("hybridnav")
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """Folder of the reference data; tests that need it are skipped where there is none."""
+    folder = os.environ.get("HYBRIDNAV_DATA")
+    if not folder:
+        pytest.skip("HYBRIDNAV_DATA is not set")
+    return Path(folder)
