@@ -1,0 +1,212 @@
+"""YAML from files that nobody vouches for: small, flat, without anchors, tags or duplicate keys."""
+
+from __future__ import annotations
+
+import reprlib
+import stat
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import yaml
+from yaml.composer import ComposerError
+from yaml.constructor import ConstructorError
+
+if TYPE_CHECKING:
+    from yaml.nodes import MappingNode, Node
+
+    from hybridnav._typing import PathLike
+    from hybridnav.errors import HybridNavError
+
+MAX_BYTES = 2**20
+_MAX_DEPTH = 32
+_MAX_VALUES = 10_000
+"""PyYAML reads about 30,000 values a second, so that a hostile file costs a third of one."""
+_MAX_CHARACTERS = 2048
+"""Per value. Python refuses to print integers of more than 4300 digits; this stays below."""
+_MAX_PROBLEM = 200
+"""Characters of PyYAML's own explanation, which may quote the file at any length."""
+
+
+def read_yaml(
+    path: PathLike,
+    *,
+    what: str,
+    error: type[HybridNavError],
+    missing: type[HybridNavError] | None = None,
+) -> dict[str, Any]:
+    """Read a YAML mapping from a file that may be damaged or hostile.
+
+    Parameters
+    ----------
+    path
+        The file: UTF-8, at most 1 MiB, one document, at most 10,000 values nested at most 32 deep;
+        anchors, aliases, tags and duplicate keys are refused.
+    what
+        What the file is to its reader, as messages begin with it: "map", "preset".
+    error
+        What to raise when the file cannot be read.
+    missing
+        What to raise when there is no such file; `error` by default.
+
+    Returns
+    -------
+    dict of str to Any
+        The mapping, as PyYAML's safe loader understands it.
+
+    Raises
+    ------
+    HybridNavError
+        Of the type `error` or `missing`; one line that names the file and, where known, the line.
+    """
+    where = f"{what} {printable(path)}"
+    with open_file(path, what=what, error=error, missing=missing or error) as stream:
+        content = stream.read(MAX_BYTES + 1)
+    if len(content) > MAX_BYTES:
+        raise error(f"{where}: YAML of more than {MAX_BYTES} bytes is not read")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as failure:
+        line = content.count(b"\n", 0, failure.start) + 1
+        raise error(f"{where}, line {line}: not UTF-8 text") from None
+    try:
+        data = _construct(text)
+    except yaml.YAMLError as failure:
+        raise error(f"{where}{_explain(failure, text)}") from None
+    if not isinstance(data, dict):
+        given = "nothing" if data is None else reprlib.repr(data)
+        raise error(f"{where}: expected a mapping of keys to values, got {given}")
+    for key in data:
+        if not isinstance(key, str):
+            raise error(f"{where}: every key must be text, got {reprlib.repr(key)}")
+    return data
+
+
+def open_file(
+    path: PathLike,
+    *,
+    what: str,
+    error: type[HybridNavError],
+    missing: type[HybridNavError],
+) -> BinaryIO:
+    """Open a regular file for reading bytes.
+
+    Parameters
+    ----------
+    path
+        The file. Directories, and devices and pipes that could block or never end, are refused.
+    what
+        What the file is to its reader, as messages begin with it.
+    error, missing
+        What to raise when the file cannot be opened, and when it is not there.
+
+    Returns
+    -------
+    BinaryIO
+        The open file; the caller closes it.
+
+    Raises
+    ------
+    HybridNavError
+        Of the type `error` or `missing`; one line that names the file.
+    """
+    where = f"{what} {printable(path)}"
+    try:
+        mode = Path(path).stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        raise missing(f"{where}: no such file") from None
+    except (OSError, ValueError) as failure:  # ValueError: a NUL character in the path
+        raise error(f"{where}: {getattr(failure, 'strerror', None) or failure}") from None
+    if not stat.S_ISREG(mode):
+        kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
+        raise error(f"{where}: expected a file, this is {kind}")
+    try:
+        return Path(path).open("rb")
+    except OSError as failure:
+        raise error(f"{where}: {failure.strerror}") from None
+
+
+def printable(path: PathLike) -> str:
+    """Text of a path for a message: as it is, or escaped when it would break the line.
+
+    Parameters
+    ----------
+    path
+        Any path.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    text = str(path)
+    return text if text.isprintable() else repr(text)
+
+
+class _LimitedLoader(yaml.SafeLoader):
+    """Safe loader that refuses, while composing, what a file of settings has no use for.
+
+    The pure Python loader on purpose: libyaml's composes in C, where these limits cannot reach.
+    """
+
+    _depth = 0
+    _values = 0
+
+    def compose_node(self, parent: Node | None, index: int) -> Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        problem = None
+        self._values += 1
+        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+            problem = f"anchors and aliases are not supported, got {reprlib.repr(event.anchor)}"
+        elif event.tag is not None:
+            problem = f"tags are not supported, got {reprlib.repr(event.tag)}"
+        elif isinstance(event, yaml.ScalarEvent) and len(event.value) > _MAX_CHARACTERS:
+            problem = f"a value has more than {_MAX_CHARACTERS} characters"
+        elif self._depth >= _MAX_DEPTH:
+            problem = f"nested more than {_MAX_DEPTH} deep"
+        elif self._values > _MAX_VALUES:
+            problem = f"more than {_MAX_VALUES} values"
+        if problem is not None:
+            raise ComposerError(None, None, problem, event.start_mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def compose_mapping_node(self, anchor: Any) -> MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen = set()
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                continue
+            if (key.tag, key.value) in seen:
+                problem = f"key {reprlib.repr(key.value)} is given twice"
+                raise ComposerError(None, None, problem, key.start_mark)
+            seen.add((key.tag, key.value))
+        return node
+
+    def construct_object(self, node: Node, deep: bool = False) -> Any:  # noqa: FBT001, FBT002
+        try:
+            return super().construct_object(node, deep=deep)
+        except (ValueError, OverflowError) as failure:  # 2024-13-01, or 0x_
+            raise ConstructorError(None, None, str(failure), node.start_mark) from None
+
+
+def _construct(text: str) -> Any:
+    loader = _LimitedLoader(text)
+    try:
+        return loader.get_single_data()
+    finally:
+        loader.dispose()
+
+
+def _explain(failure: yaml.YAMLError, content: str) -> str:
+    if isinstance(failure, yaml.MarkedYAMLError):
+        mark = failure.problem_mark or failure.context_mark
+        line = f", line {mark.line + 1}" if mark else ""
+        parts = (failure.context, failure.problem)
+        text = ", ".join(part for part in parts if part)
+        return f"{line}: {text[:_MAX_PROBLEM]}"
+    if isinstance(failure, yaml.reader.ReaderError):
+        line = f", line {content.count(chr(10), 0, failure.position) + 1}"
+        return f"{line}: not a YAML text, character number {failure.character}"
+    return ": not a YAML text"

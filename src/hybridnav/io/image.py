@@ -1,0 +1,164 @@
+"""Map images: how bright and how opaque each pixel is, whatever the file format."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from hybridnav.config.yaml_file import open_file, printable
+from hybridnav.errors import MapError, MapNotFoundError
+from hybridnav.grid import MAX_CELLS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._typing import BoolArray, PathLike
+
+_FORMATS = ("PNG", "PPM", "BMP", "TIFF", "GIF", "JPEG", "WEBP", "TGA", "PCX")
+"""Raster formats; some of Pillow's others start programs (EPS) or hold whole documents."""
+_MOST_PIXELS_PER_BYTE = {"PPM": 8, "PNG": 8 * 1032}
+"""One bit per pixel; deflate packs at most 1032 to 1. More pixels than that cannot be there, and
+are refused before memory is taken for them."""
+_MOST_COMMENTS = 10_000
+"""Pillow copies up to a megabyte per comment of an ASCII PNM: a file full of them takes hours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """Brightness of an image.
+
+    Parameters
+    ----------
+    level
+        Brightness as an integer in [0, white], shape `(rows, cols)`, the top row first.
+    white
+        Level of white: 255, 3 * 255 (a colour is the sum of its channels) or 65535.
+    opaque
+        Where the image is fully opaque, same shape; None when that is everywhere.
+    """
+
+    level: NDArray[np.uint8] | NDArray[np.uint16]
+    white: int
+    opaque: BoolArray | None
+
+
+def read_raster(path: PathLike, *, what: str) -> Raster:
+    """Read an image of one to four channels.
+
+    Parameters
+    ----------
+    path
+        The image file; of an animation the first frame.
+    what
+        What the image is to its reader, as messages begin with it.
+
+    Returns
+    -------
+    Raster
+        Brightness and opacity of each pixel.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the file is not there.
+    MapError
+        When it is no image, damaged, larger than a grid may be, or has pixels of more than 16 bits.
+    """
+    where = f"{what} {printable(path)}"
+    with (
+        open_file(path, what=what, error=MapError, missing=MapNotFoundError) as stream,
+        warnings.catch_warnings(),
+    ):
+        # What Pillow warns of (size, stray metadata) is either checked here or of no consequence.
+        warnings.simplefilter("ignore")
+        image = _open(stream, where)
+        try:
+            return _decode(image)
+        except _UnsupportedPixelsError as failure:
+            raise MapError(f"{where}: {failure}") from None
+        except Exception as failure:  # noqa: BLE001 - Pillow's decoders raise anything
+            raise MapError(f"{where}: damaged or truncated ({_brief(failure)})") from None
+
+
+class _UnsupportedPixelsError(Exception):
+    pass
+
+
+def _open(stream: BinaryIO, where: str) -> Image.Image:
+    try:
+        image = Image.open(stream, formats=_FORMATS)
+    except Image.DecompressionBombError as failure:
+        raise MapError(f"{where}: too large ({_brief(failure)})") from None
+    except UnidentifiedImageError:
+        problem = "not an image of a known format, or its header is damaged or says 0 pixels"
+        raise MapError(f"{where}: {problem}") from None
+    except Exception as failure:  # noqa: BLE001 - Pillow's header parsers raise anything
+        raise MapError(f"{where}: damaged header ({_brief(failure)})") from None
+    width, height = image.size
+    if width * height > MAX_CELLS:
+        raise MapError(f"{where}: {width} x {height} pixels, a grid holds at most {MAX_CELLS}")
+    size = os.fstat(stream.fileno()).st_size
+    most = _MOST_PIXELS_PER_BYTE.get(image.format or "")
+    if most is not None and width * height > most * size:
+        raise MapError(f"{where}: truncated, {width} x {height} pixels do not fit in {size} bytes")
+    covered = max((box[3] for _, box, *_ in image.tile if box), default=height)
+    if image.format == "TIFF" and covered < height:  # Pillow leaves the other rows black
+        raise MapError(f"{where}: truncated, the file does not hold all {height} rows")
+    if image.format == "PPM":
+        _check_comments(stream, where)
+    return image
+
+
+def _check_comments(stream: BinaryIO, where: str) -> None:
+    position = stream.tell()
+    stream.seek(0)
+    if stream.read(2) in (b"P1", b"P2", b"P3"):
+        comments = 0
+        while chunk := stream.read(2**20):
+            comments += chunk.count(b"#")
+        if comments > _MOST_COMMENTS:
+            raise MapError(f"{where}: {comments} comments, at most {_MOST_COMMENTS} are read")
+    stream.seek(position)
+
+
+def _decode(image: Image.Image) -> Raster:
+    if image.mode.startswith("I"):
+        return _decode_deep(image)
+    if image.mode == "F":
+        raise _UnsupportedPixelsError("pixels are floating point, expected 8 or 16 bits")
+    transparent = image.has_transparency_data
+    if image.mode in ("1", "L", "LA", "La"):
+        if not transparent:
+            return Raster(np.asarray(image.convert("L")), white=255, opaque=None)
+        grey = np.asarray(image.convert("LA"))
+        return Raster(grey[..., 0], white=255, opaque=_opaque(grey[..., 1] == 255))  # noqa: PLR2004
+    pixels = np.asarray(image.convert("RGBA" if transparent else "RGB"))
+    level = pixels[..., 0].astype(np.uint16)
+    level += pixels[..., 1]
+    level += pixels[..., 2]
+    opaque = _opaque(pixels[..., 3] == 255) if transparent else None  # noqa: PLR2004
+    return Raster(level, white=3 * 255, opaque=opaque)
+
+
+def _decode_deep(image: Image.Image) -> Raster:
+    """Grey of 16 bits: mode I;16, or I where Pillow widened it (PNG and PGM only)."""
+    if image.mode == "I" and image.format not in ("PNG", "PPM"):
+        raise _UnsupportedPixelsError("pixels have 32 bits, expected 8 or 16")
+    level = np.asarray(image).astype(np.uint16)
+    transparent = image.info.get("transparency")
+    opaque = None if transparent is None else _opaque(level != transparent)
+    return Raster(level, white=65535, opaque=opaque)
+
+
+def _opaque(mask: BoolArray) -> BoolArray | None:
+    return None if mask.all() else mask
+
+
+def _brief(failure: Exception) -> str:
+    text = " ".join(str(failure).split())[:100]
+    return printable(text) or type(failure).__name__

@@ -1,0 +1,73 @@
+"""One function for every kind of map file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hybridnav.config.yaml_file import printable
+from hybridnav.errors import MapError
+from hybridnav.io.movingai import load_movingai_map
+from hybridnav.io.ros import load_ros_map
+
+if TYPE_CHECKING:
+    from hybridnav._typing import PathLike
+    from hybridnav.grid import OccupancyGrid
+
+_LOADERS = {".yaml": load_ros_map, ".yml": load_ros_map, ".map": load_movingai_map}
+_IMAGES = {".pgm", ".png", ".pnm", ".ppm", ".pbm", ".bmp", ".tif", ".tiff", ".gif", ".jpg", ".jpeg"}
+
+
+def load_map(
+    path: PathLike,
+    *,
+    robot_radius_m: float = 0.0,
+    free_threshold: float | None = None,
+    occupied_threshold: float | None = None,
+) -> OccupancyGrid:
+    """Load an occupancy grid from a file.
+
+    Parameters
+    ----------
+    path
+        A ROS map (.yaml or .yml, beside its image) or a MovingAI map (.map, cells of 1 m).
+    robot_radius_m
+        Radius in metres: a cell is blocked when its centre lies within it of the centre of an
+        occupied cell.
+    free_threshold, occupied_threshold
+        U1 and U2: occupancy up to U1 is free, from U2 on occupied. By default what the file says.
+
+    Returns
+    -------
+    OccupancyGrid
+        Row 0 at the lowest y, placed in the map frame.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the file, or the image that it names, is not there.
+    MapError
+        When a file cannot be read; one line that says what is wrong and where.
+    InvalidValueError
+        When the radius or a threshold is out of range.
+
+    Warns
+    -----
+    MapWarning
+        When the thresholds of a ROS map call grey 205, the usual mark of unknown cells, free.
+    """
+    suffix = Path(path).suffix.lower()
+    loader = _LOADERS.get(suffix)
+    if loader is None:
+        hint = (
+            "pass the YAML file that names this image"
+            if suffix in _IMAGES
+            else ("expected .yaml or .yml (ROS map_server) or .map (MovingAI)")
+        )
+        raise MapError(f"map {printable(path)}: {hint}")
+    return loader(
+        path,
+        robot_radius_m=robot_radius_m,
+        free_threshold=free_threshold,
+        occupied_threshold=occupied_threshold,
+    )

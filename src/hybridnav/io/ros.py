@@ -1,0 +1,224 @@
+"""ROS maps: the YAML of map_server and the image it names, read as Nav2 reads them."""
+
+from __future__ import annotations
+
+import math
+import reprlib
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.config.yaml_file import printable, read_yaml
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning
+from hybridnav.grid import Frame, OccupancyGrid
+from hybridnav.io.image import Raster, read_raster
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._typing import PathLike
+
+_MODES = ("trinary", "scale", "raw")
+_BOOLEANS = {"true": True, "yes": True, "on": True, "y": True, "1": True} | {
+    "false": False, "no": False, "off": False, "n": False, "0": False,
+}  # fmt: skip
+_UNKNOWN_GREY = 205
+"""The grey that map_saver and every SLAM tool after it writes for "unknown"."""
+
+
+def load_ros_map(
+    path: PathLike,
+    *,
+    robot_radius_m: float = 0.0,
+    free_threshold: float | None = None,
+    occupied_threshold: float | None = None,
+) -> OccupancyGrid:
+    """Load a map of ROS's map_server.
+
+    In the modes trinary and scale a pixel of brightness v in [0, 1] (the mean of its colour
+    channels) has the occupancy 1 - v, or v with `negate`; pixels that are not fully opaque were
+    never measured. In the mode raw the 8-bit values 0 to 100 are percentages, all others unknown.
+
+    Parameters
+    ----------
+    path
+        The YAML file.
+    robot_radius_m
+        Radius in metres by which occupied cells are inflated.
+    free_threshold, occupied_threshold
+        U1 and U2 instead of the file's `free_thresh` and `occupied_thresh`.
+
+    Returns
+    -------
+    OccupancyGrid
+        Named after the file, or after its folder when the file is just called map.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the YAML file or the image that it names is not there.
+    MapError
+        When one of them cannot be read; the text names the file and the key.
+    InvalidValueError
+        When the radius or a threshold that was given is out of range.
+
+    Warns
+    -----
+    MapWarning
+        When the thresholds call grey 205, the usual mark of unknown cells, free.
+    """
+    description = _read_description(Path(path), free_threshold, occupied_threshold)
+    raster = read_raster(description.image, what=f"{description.where}: image")
+    probability = _probability(raster, description)
+    grid = OccupancyGrid(
+        probability,
+        description.frame,
+        free_threshold=description.free_threshold,
+        occupied_threshold=description.occupied_threshold,
+        robot_radius_m=robot_radius_m,
+        name=_name_of(Path(path)),
+    )
+    count = _unknown_called_free(raster, description)
+    if count:
+        warnings.warn(
+            f"{description.where}: {count} cells have grey {_UNKNOWN_GREY}, the usual mark of "
+            f"unknown, and count as free at a free threshold of {description.free_threshold:g}; "
+            "to make them unexplored set free_threshold to 0.196",
+            MapWarning,
+            stacklevel=3,
+        )
+    return grid
+
+
+@dataclass(frozen=True)
+class _Description:
+    """What the YAML file says, after overrides."""
+
+    where: str
+    image: Path
+    frame: Frame
+    mode: str
+    negate: bool
+    free_threshold: float
+    occupied_threshold: float
+
+
+def _read_description(
+    path: Path, free_threshold: float | None, occupied_threshold: float | None
+) -> _Description:
+    values = read_yaml(path, what="map", error=MapError, missing=MapNotFoundError)
+    where = f"map {printable(path)}"
+    required = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+    absent = [key for key in required if key not in values]
+    if absent:
+        raise MapError(f"{where}: lacks {', '.join(absent)}")
+    low = _threshold(values, "free_thresh", where)
+    high = _threshold(values, "occupied_thresh", where)
+    low = low if free_threshold is None else free_threshold
+    high = high if occupied_threshold is None else occupied_threshold
+    if not 0 <= low < high <= 1:
+        kind = MapError if free_threshold is occupied_threshold is None else InvalidValueError
+        raise kind(
+            f"{where}: free_thresh must be less than occupied_thresh and both within [0, 1], "
+            f"got {low} and {high}"
+        )
+    return _Description(
+        where=where,
+        image=_image_path(values["image"], path, where),
+        frame=_frame(values, where),
+        mode=_mode(values.get("mode", "trinary"), where),
+        negate=_negate(values["negate"], where),
+        free_threshold=low,
+        occupied_threshold=high,
+    )
+
+
+def _number(value: Any, key: str, where: str) -> float:
+    """Finite number of a YAML value; PyYAML leaves 5e-2 a text, which Nav2 reads as a number."""
+    number = math.nan
+    if isinstance(value, int | float | str) and not isinstance(value, bool):
+        try:
+            number = float(value)
+        except (ValueError, OverflowError):
+            number = math.nan
+    if not math.isfinite(number):
+        raise MapError(f"{where}: {key} must be a finite number, got {reprlib.repr(value)}")
+    return number
+
+
+def _threshold(values: dict[str, Any], key: str, where: str) -> float:
+    number = _number(values[key], key, where)
+    if not 0 <= number <= 1:
+        raise MapError(f"{where}: {key} must be within [0, 1], got {number:g}")
+    return number
+
+
+def _frame(values: dict[str, Any], where: str) -> Frame:
+    resolution = _number(values["resolution"], "resolution", where)
+    if resolution <= 0:
+        raise MapError(f"{where}: resolution must be a positive length, got {resolution:g}")
+    origin = values["origin"]
+    if not isinstance(origin, list) or len(origin) != 3:  # noqa: PLR2004
+        raise MapError(f"{where}: origin must be [x, y, yaw], got {reprlib.repr(origin)}")
+    x, y, yaw = (_number(value, "origin", where) for value in origin)
+    return Frame(resolution, (x, y), yaw)
+
+
+def _mode(value: Any, where: str) -> str:
+    mode = value.lower() if isinstance(value, str) else value
+    if mode not in _MODES:
+        raise MapError(
+            f"{where}: mode must be one of {', '.join(_MODES)}, got {reprlib.repr(value)}"
+        )
+    return str(mode)
+
+
+def _negate(value: Any, where: str) -> bool:
+    negate = _BOOLEANS.get(value.lower()) if isinstance(value, str) else value
+    if not isinstance(negate, int):
+        raise MapError(f"{where}: negate must be 0 or 1, got {reprlib.repr(value)}")
+    return bool(negate)
+
+
+def _image_path(value: Any, path: Path, where: str) -> Path:
+    if not isinstance(value, str) or not value:
+        raise MapError(f"{where}: image must be the path of a file, got {reprlib.repr(value)}")
+    try:
+        image = Path(value).expanduser()
+    except RuntimeError:  # no such user: then it is a name like any other
+        image = Path(value)
+    return path.parent / image
+
+
+def _name_of(path: Path) -> str:
+    return (path.absolute().parent.name or path.stem) if path.stem == "map" else path.stem
+
+
+def _probability(raster: Raster, description: _Description) -> NDArray[np.float32]:
+    """Occupancy by a table over the levels, row 0 at the bottom of the image."""
+    level = np.arange(raster.white + 1)
+    if description.mode == "raw":
+        percent = np.rint(level * 255 / raster.white)
+        table = np.where(percent <= 100, percent / 100, math.nan)  # noqa: PLR2004
+    elif description.negate:
+        table = level / raster.white
+    else:
+        table = (raster.white - level) / raster.white
+    probability = table.astype(np.float32)[raster.level[::-1]]
+    if raster.opaque is not None and description.mode != "raw":  # Nav2: raw knows no opacity
+        probability[~raster.opaque[::-1]] = math.nan
+    return probability
+
+
+def _unknown_called_free(raster: Raster, description: _Description) -> int:
+    """Cells of the grey that means unknown, if the thresholds call it free."""
+    value = _UNKNOWN_GREY / 255 if description.negate else 1 - _UNKNOWN_GREY / 255
+    if description.mode == "raw" or np.float32(value) > np.float32(description.free_threshold):
+        return 0
+    unknown = raster.level == _UNKNOWN_GREY * raster.white // 255
+    if raster.opaque is not None:
+        unknown &= raster.opaque
+    return int(np.count_nonzero(unknown))
