@@ -1,0 +1,5 @@
+"""Plane graphs as permutations of darts, contraction and removal on them."""
+
+from hybridnav.combinatorial.maps import CombinatorialMap
+
+__all__ = ["CombinatorialMap"]

@@ -1,0 +1,282 @@
+"""Kernels on darts: the base map of a grid, contraction along phi, removal along sigma.
+
+Conventions: edge e has the darts 2e and 2e + 1, so alpha(d) = d ^ 1. A *base edge* has the id
+2 * cell for the step east of a flat cell and 2 * cell + 1 for the step north. The even dart of an
+edge starts at its lower cell. Compact arrays hold the edges of one level in the order of base ids.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+ALIVE = 0
+CONTRACTED = 1
+REMOVED = 2
+
+EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
+
+
+class Darts(NamedTuple):
+    """The darts of one level, indexed by dart but for `base_edge`, which is indexed by edge."""
+
+    sigma: np.ndarray
+    """int32, next dart counter-clockwise round the vertex."""
+    origin: np.ndarray
+    """int32, vertex at which the dart starts."""
+    sweep: np.ndarray
+    """int32, integral of x dy along contracted edges from the surviving cell of the vertex to the
+    cell where the dart's base edge starts, modulo 2^32: it gives the area inside a self-loop."""
+    protected: np.ndarray
+    """bool, whether the face on the right of the dart is protected."""
+    base_edge: np.ndarray
+    """int32, id of the edge in the base."""
+
+
+@njit(cache=True)
+def number_base(classes):
+    """Dense ids of vertices and base edges, -1 where there is none, and how many there are."""
+    rows, cols = classes.shape
+    vertex = np.empty(rows * cols, np.int32)
+    edge = np.empty(2 * rows * cols, np.int32)
+    n_vertices = 0
+    n_edges = 0
+    for row in range(rows):
+        for col in range(cols):
+            cell = row * cols + col
+            vertex[cell] = edge[2 * cell] = edge[2 * cell + 1] = -1
+            if classes[row, col] == 0:
+                continue
+            vertex[cell] = n_vertices
+            n_vertices += 1
+            if col + 1 < cols and classes[row, col + 1] != 0:
+                edge[2 * cell] = n_edges
+                n_edges += 1
+            if row + 1 < rows and classes[row + 1, col] != 0:
+                edge[2 * cell + 1] = n_edges
+                n_edges += 1
+    return vertex, edge, n_vertices, n_edges
+
+
+@njit(cache=True)
+def base_darts(classes, vertex, edge, n_edges):
+    """Darts of the base: sigma runs east, north, west, south.
+
+    The face on the right of a dart is ordinary when it is a full 2x2 block of vertices; every
+    other face is protected.
+    """
+    rows, cols = classes.shape
+    sigma = np.empty(2 * n_edges, np.int32)
+    origin = np.empty(2 * n_edges, np.int32)
+    sweep = np.zeros(2 * n_edges, np.int32)
+    protected = np.empty(2 * n_edges, np.bool_)
+    base_edge = np.empty(n_edges, np.int32)
+    for row in range(rows):
+        for col in range(cols):
+            cell = row * cols + col
+            v = vertex[cell]
+            if v < 0:
+                continue
+            east = edge[2 * cell]
+            north = edge[2 * cell + 1]
+            west = edge[2 * cell - 2] if col > 0 else -1
+            south = edge[2 * (cell - cols) + 1] if row > 0 else -1
+            first = -1
+            last = -1
+            if east >= 0:
+                base_edge[east] = 2 * cell
+                # Right of the step east lies the block below, right of its reverse the one above.
+                below = south >= 0 and edge[2 * (cell - cols)] >= 0
+                above = north >= 0 and edge[2 * (cell + cols)] >= 0
+                protected[2 * east] = not (below and edge[2 * (cell + 1 - cols) + 1] >= 0)
+                protected[2 * east + 1] = not (above and edge[2 * (cell + 1) + 1] >= 0)
+                first = last = 2 * east
+                origin[last] = v
+            if north >= 0:
+                base_edge[north] = 2 * cell + 1
+                right = east >= 0 and edge[2 * (cell + 1) + 1] >= 0
+                left = west >= 0 and edge[2 * (cell - 1) + 1] >= 0
+                protected[2 * north] = not (right and edge[2 * (cell + cols)] >= 0)
+                protected[2 * north + 1] = not (left and edge[2 * (cell - 1 + cols)] >= 0)
+                dart = 2 * north
+                if last >= 0:
+                    sigma[last] = dart
+                else:
+                    first = dart
+                last = dart
+                origin[last] = v
+            if west >= 0:
+                dart = 2 * west + 1
+                if last >= 0:
+                    sigma[last] = dart
+                else:
+                    first = dart
+                last = dart
+                origin[last] = v
+            if south >= 0:
+                dart = 2 * south + 1
+                if last >= 0:
+                    sigma[last] = dart
+                else:
+                    first = dart
+                last = dart
+                origin[last] = v
+            if last >= 0:
+                sigma[last] = first
+    return Darts(sigma, origin, sweep, protected, base_edge)
+
+
+@njit(cache=True)
+def step_integral(dart, base_edge, cols):
+    """Line integral of x dy along the base step of a dart: zero for steps east and west."""
+    base = base_edge[dart >> 1]
+    if base & 1 == 0:
+        return 0
+    col = (base >> 1) % cols
+    return col if dart & 1 == 0 else -col
+
+
+@njit(cache=True)
+def loop_area(dart, sweep, base_edge, cols):
+    """Signed area in cells inside a self-loop, positive where the dart runs counter-clockwise."""
+    step = step_integral(dart, base_edge, cols)
+    return np.int32(sweep[dart] + step - sweep[dart ^ 1])
+
+
+@njit(cache=True)
+def contract(darts, parent, kernel_dart, state, inverse, shift, cols):
+    """Contract the stars of a kernel, in place; fills `state` and the inverse of the new sigma.
+
+    The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the
+    dart after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
+    `kernel_dart[v]` starts at the parent of v and ends at v. `shift` is scratch, one a vertex.
+    """
+    sigma, origin, sweep, _, base_edge = darts
+    n_edges = base_edge.size
+    for e in range(n_edges):
+        state[e] = ALIVE
+    for v in range(parent.size):
+        if parent[v] != v:
+            dart = kernel_dart[v]
+            state[dart >> 1] = CONTRACTED
+            shift[v] = loop_area(dart, sweep, base_edge, cols)
+    for d in range(2 * n_edges):
+        if state[d >> 1] != ALIVE:
+            continue
+        following = sigma[d]
+        while state[following >> 1] == CONTRACTED:
+            following = sigma[following ^ 1]
+        sigma[d] = following
+        inverse[following] = d
+        v = origin[d]
+        if parent[v] != v:
+            origin[d] = parent[v]
+            sweep[d] += shift[v]
+
+
+@njit(cache=True)
+def unlink(dart, sigma, inverse):
+    """Take one dart out of its vertex's rotation."""
+    before = inverse[dart]
+    after = sigma[dart]
+    sigma[before] = after
+    inverse[after] = before
+
+
+@njit(cache=True)
+def redundant_dart(start, sigma, origin, sweep, base_edge, cols):
+    """A dart of the ordinary face of `start` whose edge is redundant, -1 if there is none.
+
+    The four rules: degree one; degree two; exactly two distinct edges between the same two
+    vertices and else self-loops; nothing but self-loops of one vertex (the enclosing one goes).
+    """
+    second = sigma[start ^ 1]
+    if second == start:
+        return start
+    if sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
+        return max(start, second) if second != start ^ 1 else -1
+    crossings = 0
+    last = -1
+    first = -1
+    enclosing = -1
+    dart = start
+    while True:
+        if origin[dart] != origin[dart ^ 1]:
+            crossings += 1
+            if crossings > 2:
+                return -1
+            first = last
+            last = dart
+        elif loop_area(dart, sweep, base_edge, cols) < 0:
+            enclosing = dart  # the face, on the right of the dart, is inside a clockwise loop
+        dart = sigma[dart ^ 1]
+        if dart == start:
+            break
+    if crossings == 0:
+        return enclosing if enclosing >= 0 else start
+    if crossings == 2 and first != last ^ 1:
+        return max(first, last)
+    return -1
+
+
+@njit(cache=True)
+def simplify(darts, state, inverse, cols):
+    """Remove redundant edges through ordinary faces until none is left, in place.
+
+    Only darts that bound an ordinary face of degree one or two, or that are self-loops, can start
+    a removal: a face with two crossings and degree above two has a self-loop among its darts. A
+    removal can make the merged face redundant, and no other one.
+    """
+    sigma, origin, sweep, protected, base_edge = darts
+    for d in range(2 * base_edge.size):
+        if state[d >> 1] != ALIVE or protected[d]:
+            continue
+        second = sigma[d ^ 1]
+        if sigma[second ^ 1] != d and second != d and origin[d] != origin[d ^ 1]:
+            continue
+        start = d
+        while start >= 0 and not protected[start]:
+            dart = redundant_dart(start, sigma, origin, sweep, base_edge, cols)
+            if dart < 0:
+                break
+            other = dart ^ 1
+            # A dart that stays in the merged face: from this side, else from the other.
+            start = sigma[other]
+            if start == dart:
+                start = sigma[dart]
+                if start == other:
+                    start = -1
+            if protected[other]:
+                follow = sigma[other]
+                while follow != dart:
+                    protected[follow] = True
+                    follow = sigma[follow ^ 1]
+            unlink(dart, sigma, inverse)
+            unlink(other, sigma, inverse)
+            state[dart >> 1] = REMOVED
+
+
+@njit(cache=True)
+def compact_darts(darts, state, new_edge, new_vertex):
+    """Close the gaps that gone edges left, in place; gives the number of edges that stay."""
+    sigma, origin, sweep, protected, base_edge = darts
+    n_edges = 0
+    for e in range(base_edge.size):
+        if state[e] == ALIVE:
+            new_edge[e] = n_edges
+            n_edges += 1
+    for e in range(base_edge.size):
+        if state[e] != ALIVE:
+            continue
+        f = new_edge[e]
+        base_edge[f] = base_edge[e]
+        for side in range(2):
+            d = 2 * e + side
+            following = sigma[d]
+            sigma[2 * f + side] = 2 * new_edge[following >> 1] + (following & 1)
+            origin[2 * f + side] = new_vertex[origin[d]]
+            sweep[2 * f + side] = sweep[d]
+            protected[2 * f + side] = protected[d]
+    return n_edges

@@ -1,0 +1,72 @@
+"""Combinatorial maps: plane graphs as permutations of darts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+
+@dataclass(frozen=True, eq=False)
+class CombinatorialMap:
+    """A plane graph and its dual, both held by one permutation of darts.
+
+    Edge e has the darts 2e and 2e + 1, each the other's half: `alpha(d) = d ^ 1`, not stored.
+    The dual needs nothing of its own: its rotation is `phi = sigma o alpha`.
+    """
+
+    sigma: IntArray
+    """int32 (2 n_edges,), next dart counter-clockwise round the vertex."""
+    origin: IntArray
+    """int32 (2 n_edges,), vertex at which each dart starts."""
+    protected: BoolArray
+    """bool (2 n_edges,), whether the face on the right of the dart is protected: anything but an
+    ordinary one, which at the base is a full 2x2 block of vertices."""
+    base_edge: IntArray
+    """int32 (n_edges,), id of each edge in the base: 2 * flat cell, plus 1 for a step north."""
+    n_vertices: int
+    """Vertices, those without an edge included."""
+
+    def __post_init__(self) -> None:
+        for array in (self.sigma, self.origin, self.protected, self.base_edge):
+            array.flags.writeable = False
+
+    @classmethod
+    def of_grid(cls, grid: OccupancyGrid) -> CombinatorialMap:
+        """Build the base map of a grid: free and unexplored cells, joined to their 4 neighbours.
+
+        Vertices and edges are numbered in the order of flat cells. Sigma runs east, north, west,
+        south, seen with y upwards.
+        """
+        from hybridnav.combinatorial import _kernels  # noqa: PLC0415 - numba loads on first use
+
+        vertex, edge, n_vertices, n_edges = _kernels.number_base(grid.classes)
+        darts = _kernels.base_darts(grid.classes, vertex, edge, n_edges)
+        return cls(darts.sigma, darts.origin, darts.protected, darts.base_edge, n_vertices)
+
+    @property
+    def n_edges(self) -> int:
+        """Edges, self-loops included."""
+        return len(self.base_edge)
+
+    @property
+    def phi(self) -> IntArray:
+        """int32 (2 n_edges,), next dart round the face, which lies on the right of its darts."""
+        phi: IntArray = self.sigma[np.arange(len(self.sigma)) ^ 1]
+        return phi
+
+    def faces(self) -> LongArray:
+        """Label the faces: for each dart the number of its orbit under phi, dense from 0."""
+        from scipy.sparse import coo_array  # noqa: PLC0415 - only who looks at the dual pays
+        from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+        n_darts = len(self.sigma)
+        ones = np.ones(n_darts, dtype=np.int8)
+        steps = coo_array((ones, (np.arange(n_darts), self.phi)), shape=(n_darts, n_darts))
+        _, label = connected_components(steps, directed=False)
+        return label.astype(np.int64)

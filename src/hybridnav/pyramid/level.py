@@ -1,0 +1,254 @@
+"""One level of a dual graph pyramid, rebuilt from the record on demand."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from hybridnav.combinatorial import CombinatorialMap
+from hybridnav.errors import InvalidValueError
+from hybridnav.pyramid import _field_kernels
+from hybridnav.pyramid.record import SURVIVES
+from hybridnav.search import _kernels as search_kernels
+from hybridnav.search._costs import STRAIGHT
+from hybridnav.search.octile import length_in_cells
+
+_Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.pyramid.record import Record
+
+
+class Level:
+    """A plane graph of connected sets of cells, and its dual; every level answers the same.
+
+    Vertices are numbered in the order of their surviving cells, arcs in the order of the base
+    edges that represent them. Everything is computed when it is first asked for and then kept;
+    arrays are not writeable.
+    """
+
+    def __init__(self, grid: OccupancyGrid, record: Record, index: int) -> None:
+        self.index = index
+        self._grid = grid
+        self._record = record
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map it was grown from."""
+        return self._grid
+
+    @cached_property
+    def _labels(self) -> tuple[IntArray, LongArray]:
+        record = self._record
+        field_of, survivors = _field_kernels.label_fields(
+            record.vertex_end, record.vertex_parent, self.index
+        )
+        return _frozen(field_of), _frozen(survivors)
+
+    @property
+    def field_of(self) -> IntArray:
+        """int32 (rows, cols), the vertex whose field holds each cell; -1 for occupied cells."""
+        return self._labels[0].reshape(self._grid.shape)
+
+    @cached_property
+    def cells(self) -> LongArray:
+        """int64 (n_vertices, 2), surviving cell of each vertex as (row, col)."""
+        return _frozen(np.stack(divmod(self._labels[1], self._grid.shape[1]), axis=1))
+
+    @property
+    def n_vertices(self) -> int:
+        """Vertices of the level."""
+        return len(self._labels[1])
+
+    @cached_property
+    def classes(self) -> ByteArray:
+        """uint8 (n_vertices,), `CellClass` of each field."""
+        return _frozen(self._grid.classes.ravel()[self._labels[1]])
+
+    @cached_property
+    def _extents(self) -> tuple[LongArray, IntArray]:
+        areas, boxes = _field_kernels.field_extents(
+            self._labels[0], self._grid.shape[1], self.n_vertices
+        )
+        return _frozen(areas), _frozen(boxes)
+
+    @property
+    def areas(self) -> LongArray:
+        """int64 (n_vertices,), cells in each receptive field."""
+        return self._extents[0]
+
+    @cached_property
+    def base_edges(self) -> LongArray:
+        """int64 (n_arcs,), base edge that represents each arc: 2 * flat cell, + 1 for north."""
+        end = self._record.edge_end
+        return _frozen(np.flatnonzero(end >= min(2 * self.index + 2, SURVIVES)))
+
+    @property
+    def n_arcs(self) -> int:
+        """Arcs of the level, self-loops included."""
+        return len(self.base_edges)
+
+    @cached_property
+    def base_pairs(self) -> LongArray:
+        """int64 (n_arcs, 2, 2), the two cells (row, col) of the base edge of each arc."""
+        return _frozen(_cell_pairs(self.base_edges, self._grid.shape[1]))
+
+    @cached_property
+    def arcs(self) -> IntArray:
+        """int32 (n_arcs, 2), the vertices that each arc joins: where darts 2a and 2a + 1 start."""
+        rows, cols = np.moveaxis(self.base_pairs, -1, 0)
+        return _frozen(self.field_of[rows, cols])
+
+    @property
+    def is_self_loop(self) -> BoolArray:
+        """bool (n_arcs,), arcs that join a vertex to itself."""
+        loops: BoolArray = self.arcs[:, 0] == self.arcs[:, 1]
+        return loops
+
+    @cached_property
+    def darts(self) -> CombinatorialMap:
+        """The graph and its dual as permutations of darts."""
+        record = self._record
+        rows, cols = self._grid.shape
+        sigma, origin, protected = _field_kernels.level_darts(
+            self.base_edges,
+            record.edge_end,
+            record.vertex_end,
+            self._labels[0],
+            self.index,
+            rows,
+            cols,
+        )
+        return CombinatorialMap(
+            sigma, origin, protected, self.base_edges.astype(np.int32), self.n_vertices
+        )
+
+    @property
+    def sigma(self) -> IntArray:
+        """int32 (2 n_arcs,), next dart counter-clockwise round the vertex."""
+        return self.darts.sigma
+
+    @property
+    def protected(self) -> BoolArray:
+        """bool (2 n_arcs,), whether the face on the right of each dart is protected."""
+        return self.darts.protected
+
+    @cached_property
+    def max_distance_m(self) -> FloatArray:
+        """float64 (n_arcs,), largest distance between the centre of a cell of one field and the
+        centre of a cell of the other; for a self-loop the diameter of its field. In metres."""
+        start, points = _field_kernels.field_hulls(
+            self._labels[0], self._grid.shape[1], self._extents[1]
+        )
+        squared = _field_kernels.hull_distances(start, points, self.arcs)
+        return _frozen(np.sqrt(squared) * self._grid.resolution_m)
+
+    @cached_property
+    def through_m(self) -> FloatArray:
+        """float64 (n_arcs,), length of the shortest path of 8-neighbour moves from one surviving
+        cell inside its field to the boundary, across it by a side, and inside the other field to
+        the other surviving cell. In metres.
+
+        Diagonals need both side cells: free ones in a free field, free or unexplored ones in an
+        unexplored field. A self-loop's is the shortest closed walk from its surviving cell across
+        one of the cell pairs of its boundary.
+        """
+        distance = search_kernels.field_distances(
+            self._grid.classes, self._labels[0], self._labels[1]
+        )
+        edges, arc = self._boundary_table
+        first, second = _ends(edges, self._grid.shape[1])
+        across = distance[first] + distance[second] + STRAIGHT
+        least = np.full(self.n_arcs, np.iinfo(np.int64).max)
+        np.minimum.at(least, arc, across)
+        return _frozen(length_in_cells(least) * self._grid.resolution_m)
+
+    def boundary(self, arc: int) -> LongArray:
+        """Cell pairs of the boundary of one arc.
+
+        Parameters
+        ----------
+        arc
+            Index of the arc, 0 <= arc < n_arcs.
+
+        Returns
+        -------
+        LongArray
+            int64 (n_cracks, 2, 2): 4-adjacent cells (row, col), the first in the field of
+            `arcs[arc, 0]`, the second in that of `arcs[arc, 1]`. For a self-loop both lie in the
+            same field: the pairs are those that the line of its dual edge passes between.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such arc.
+        """
+        if not 0 <= arc < self.n_arcs:
+            raise InvalidValueError(f"arc must be from 0 to {self.n_arcs - 1}, got {arc}")
+        edges, of_arc = self._boundary_table
+        low, high = np.searchsorted(of_arc, [arc, arc + 1])
+        pairs = _cell_pairs(edges[low:high], self._grid.shape[1])
+        row, col = pairs[:, 0, 0], pairs[:, 0, 1]
+        turned = self.field_of[row, col] != self.arcs[arc, 0]
+        pairs[turned] = pairs[turned, ::-1]
+        return pairs
+
+    @cached_property
+    def boundary_middles(self) -> FloatArray:
+        """float64 (n_arcs, 2), the point in the middle of each arc's boundary, to draw it through.
+
+        `(x, y)` in metres, map frame: the middle of the side between the two cells whose side is
+        nearest the mean of all sides of the boundary, so that it lies on the boundary.
+        """
+        edges, arc = self._boundary_table
+        sides = _cell_pairs(edges, self._grid.shape[1]).mean(axis=1) + 0.5
+        sizes = np.bincount(arc, minlength=self.n_arcs)
+        sums = [np.bincount(arc, weights=w, minlength=self.n_arcs) for w in sides.T]
+        mean = np.stack(sums, axis=1) / sizes[:, None]
+        squared = ((sides - mean[arc]) ** 2).sum(axis=1)
+        order = np.lexsort((squared, arc))
+        nearest = order[np.searchsorted(arc, np.arange(self.n_arcs))]
+        return _frozen(self._grid.frame.points_of_grid(sides[nearest]))
+
+    @cached_property
+    def _boundary_table(self) -> tuple[LongArray, LongArray]:
+        """Base edges on the boundaries of all arcs and the arc of each, sorted by arc."""
+        rows, cols = self._grid.shape
+        cracks, classes = _field_kernels.find_cracks(self._labels[0], rows, cols)
+        arc_of_class = np.full(len(cracks), -1, dtype=np.int64)
+        plain = np.flatnonzero(~self.is_self_loop)
+        arc_of_class[classes[np.searchsorted(cracks, self.base_edges[plain])]] = plain
+        edges, arcs = [cracks], [arc_of_class[classes]]
+        for loop in np.flatnonzero(self.is_self_loop):
+            line = _field_kernels.loop_line(
+                self.base_edges[loop],
+                self._labels[0],
+                self._record.edge_end,
+                self.index,
+                rows,
+                cols,
+            )
+            edges.append(line)
+            arcs.append(np.full(len(line), loop))
+        edge, arc = np.concatenate(edges), np.concatenate(arcs)
+        order = np.lexsort((edge, arc))
+        return edge[order], arc[order]
+
+
+def _frozen(array: _Array) -> _Array:
+    array.flags.writeable = False
+    return array
+
+
+def _ends(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
+    first = base_edges >> 1
+    return first, first + np.where(base_edges & 1, cols, 1)
+
+
+def _cell_pairs(base_edges: LongArray, cols: int) -> LongArray:
+    flat = np.stack(_ends(base_edges, cols), axis=1)
+    return np.stack(divmod(flat, cols), axis=-1)

@@ -1,0 +1,103 @@
+"""The dual graph pyramid of an occupancy grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, get_args, overload
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.pyramid.decimation import decimate, squared_limit
+from hybridnav.pyramid.level import Level
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.pyramid.record import BuildStats, Record
+
+Linkage = Literal["radius"]
+
+
+@dataclass(frozen=True, eq=False)
+class DualGraphPyramid:
+    """A hierarchy of plane graphs with their duals, from single cells to places.
+
+    `pyramid[0]` is the base, `pyramid[-1]` the apex; `len(pyramid)` counts the levels. Made by
+    `DualGraphPyramid.build`.
+    """
+
+    grid: OccupancyGrid
+    merge_distance_m: float
+    linkage: Linkage
+    seed: int
+    stats: BuildStats = field(repr=False)
+    """Size of each level and seconds per stage of the build."""
+    _record: Record = field(repr=False)
+    _levels: dict[int, Level] = field(repr=False, default_factory=dict)
+
+    @classmethod
+    def build(
+        cls,
+        grid: OccupancyGrid,
+        *,
+        merge_distance_m: float = 4.0,
+        linkage: Linkage = "radius",
+        seed: int = 0,
+    ) -> DualGraphPyramid:
+        """Contract the cells of a grid to places.
+
+        At each level the stars of a maximal independent edge set are contracted (MIES; Haxhimusa
+        and Kropatsch), and edges that have become redundant are removed, so that every arc of a
+        level is exactly one connected boundary between two fields of one class.
+
+        Parameters
+        ----------
+        grid
+            The map; its free and unexplored cells are the vertices of the base.
+        merge_distance_m
+            U_d in metres, positive, infinity allowed: how coarse the apex is.
+        linkage
+            What stays strictly below U_d. `"radius"`: the distance from every cell of a field to
+            its surviving cell, between cell centres.
+        seed
+            Breaks ties; equal input and seed give an equal pyramid.
+
+        Raises
+        ------
+        InvalidValueError
+            When the merge distance is not positive, or the linkage is not known.
+        """
+        if math.isnan(merge_distance_m) or merge_distance_m <= 0:
+            raise InvalidValueError(
+                f"merge distance must be a positive number of metres, got {merge_distance_m}"
+            )
+        if linkage not in get_args(Linkage):
+            raise InvalidValueError(
+                f"linkage must be one of {', '.join(get_args(Linkage))}, got {linkage!r}"
+            )
+        limit = squared_limit(merge_distance_m, grid.resolution_m)
+        record, stats = decimate(grid.classes, limit=limit, seed=seed)
+        return cls(grid, merge_distance_m, linkage, seed, stats, record)
+
+    def __len__(self) -> int:
+        return len(self.stats.sizes)
+
+    @overload
+    def __getitem__(self, index: int) -> Level: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Level]: ...
+
+    def __getitem__(self, index: int | slice) -> Level | list[Level]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        at = index + len(self) if index < 0 else index
+        if not 0 <= at < len(self):
+            raise IndexError(f"the pyramid has levels 0 to {len(self) - 1}, got {index}")
+        if at not in self._levels:
+            self._levels[at] = Level(self.grid, self._record, at)
+        return self._levels[at]
+
+    def __iter__(self) -> Iterator[Level]:
+        return (self[index] for index in range(len(self)))

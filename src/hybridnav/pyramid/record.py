@@ -1,0 +1,47 @@
+"""The record of a decimation: what every level is rebuilt from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hybridnav._typing import ByteArray, IntArray
+
+SURVIVES = 255
+"""End of what is still there at the apex."""
+
+MAX_LEVELS = 126
+"""Levels that one byte per edge can tell apart; real maps have 10 to 15."""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """When and how each vertex and edge of the base goes: 10 bytes a cell.
+
+    All arrays are flat, in the order of cells (row-major) and of base edges (two a cell).
+    """
+
+    vertex_end: ByteArray
+    """0: no vertex; SURVIVES; else the level at which the cell stops being a surviving cell."""
+    vertex_parent: IntArray
+    """The surviving cell that the vertex was contracted into, where it was."""
+    edge_end: ByteArray
+    """0: no edge; SURVIVES; else 2 * level, plus 1 where the edge is removed, not contracted."""
+
+
+@dataclass(frozen=True)
+class LevelSize:
+    """Size of one level."""
+
+    vertices: int
+    arcs: int
+    self_loops: int
+
+
+@dataclass
+class BuildStats:
+    """What a build did: sizes from the base to the apex, and seconds of processor-bound stages."""
+
+    sizes: list[LevelSize] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,1 @@
+"""Searches: A* on cells, shortest distances inside fields, cheapest arcs."""
