@@ -1,0 +1,59 @@
+"""Refinement by grid search: the optimal cell path inside a corridor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from hybridnav.grid import CellClass
+from hybridnav.result import Path
+from hybridnav.search.grid_search import Cell, GridSearch
+from hybridnav.search.octile import path_length_in_cells
+
+if TYPE_CHECKING:
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.route import Corridor
+
+
+class Refiner(Protocol):
+    """Turns a corridor into a path; the protocol of every refiner."""
+
+    def refine(self, start: Cell, goal: Cell, corridor: Corridor | None) -> tuple[Path | None, int]:
+        """Find a path between two cells that stands on cells of the corridor only.
+
+        `None` as the corridor is the whole map. Returns the path, None where there is none, and
+        the number of expansions.
+        """
+        ...
+
+
+class GridRefiner:
+    """Grid A* on the cells of a corridor: optimal there in the octile metric.
+
+    Parameters
+    ----------
+    grid
+        The map; its blocked and occupied cells are never entered.
+    allow_unexplored
+        Whether unexplored cells may be entered.
+    """
+
+    def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
+        self._grid = grid
+        enterable = grid.classes == CellClass.FREE
+        if allow_unexplored:
+            enterable |= grid.classes == CellClass.UNEXPLORED
+        self._search = GridSearch(enterable)
+
+    def refine(self, start: Cell, goal: Cell, corridor: Corridor | None) -> tuple[Path | None, int]:
+        """Find the shortest path between two cells; see `Refiner`."""
+        found = self._search.search(
+            start,
+            goal,
+            field_of=None if corridor is None else corridor.field_of,
+            in_corridor=None if corridor is None else corridor.places,
+        )
+        if found.cells is None:
+            return None, found.expanded
+        frame = self._grid.frame
+        length_m = path_length_in_cells(found.cells) * frame.resolution_m
+        return Path(found.cells, frame.points_of(found.cells), length_m), found.expanded

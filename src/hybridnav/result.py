@@ -1,0 +1,129 @@
+"""What a planner answers: statuses, routes, paths, bounds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+
+from hybridnav.errors import PlanError
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, LongArray
+
+Metric = Literal["octile"]
+
+
+class PlanStatus(StrEnum):
+    """How a plan ended; outcomes are values, not errors."""
+
+    SOLVED = "solved"
+    START_OUTSIDE = "start outside the map"
+    GOAL_OUTSIDE = "goal outside the map"
+    START_OCCUPIED = "start occupied"
+    GOAL_OCCUPIED = "goal occupied"
+    START_UNEXPLORED = "start unexplored"
+    GOAL_UNEXPLORED = "goal unexplored"
+    NO_PATH = "no path"
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A path through the grid, from the centre of the start's cell to that of the goal's."""
+
+    cells: LongArray
+    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours."""
+    points: FloatArray
+    """float64 (n, 2), their centres as (x, y) in metres, map frame."""
+    length_m: float
+    """Length in metres, counted as a + b sqrt 2 cells from the moves."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """The topological answer: the places passed and the arcs between them."""
+
+    places: tuple[int, ...]
+    """Ids of the places, from the start's to the goal's."""
+    arcs: tuple[int, ...]
+    """Ids of the arcs, one fewer than places."""
+
+
+@dataclass(frozen=True)
+class PlanStats:
+    """What a query took."""
+
+    expanded: int = 0
+    """Cells that the refiner expanded."""
+    expanded_places: int = 0
+    """Places that the coarse search expanded."""
+    corridor_cells: int = 0
+    """Cells in the corridor; 0 where the corridor is the whole map."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall-clock seconds per stage."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanResult:
+    """Outcome of one query; `path` and `route` are None unless it is solved."""
+
+    status: PlanStatus
+    metric: Metric = "octile"
+    path: Path | None = None
+    route: Route | None = None
+    """The places and arcs; None too where the preset searches the whole map."""
+    lower_bound: float = math.inf
+    """A proved bound on the optimum in the metric, metres; infinite where there is no path."""
+    stats: PlanStats = field(default_factory=PlanStats)
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Preset, and how the pyramid was built."""
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a path."""
+        return self.status is PlanStatus.SOLVED
+
+    @property
+    def cost(self) -> float:
+        """Cost in the metric, metres; infinite where there is no path."""
+        return self.path.length_m if self.path is not None else math.inf
+
+    @property
+    def gap(self) -> float:
+        """Proved distance from the optimum, cost / lower bound - 1; NaN where there is no path."""
+        if self.path is None:
+            return math.nan
+        return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
+
+    def raise_for_status(self) -> Self:
+        """Return the result itself if it is solved.
+
+        Raises
+        ------
+        PlanError
+            When it is not; the text names the status.
+        """
+        if not self.solved:
+            raise PlanError(f"no path was planned: {self.status}")
+        return self
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON: lists, numbers and strings."""
+        return {
+            "status": str(self.status),
+            "metric": self.metric,
+            "length_m": self.path.length_m if self.path else None,
+            "lower_bound_m": self.lower_bound if self.path else None,
+            "gap": self.gap if self.path else None,
+            "places": list(self.route.places) if self.route else None,
+            "arcs": list(self.route.arcs) if self.route else None,
+            "points_m": np.round(self.path.points, 6).tolist() if self.path else None,
+            "expanded": self.stats.expanded,
+            "expanded_places": self.stats.expanded_places,
+            "corridor_cells": self.stats.corridor_cells,
+            "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
+            "settings": self.settings,
+        }

@@ -1,0 +1,51 @@
+"""Corridors: the receptive fields that a refiner may stand on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav.topology import TopologicalMap
+
+
+@dataclass(frozen=True, eq=False)
+class Corridor:
+    """Union of the receptive fields of some places. Moves are judged on the whole grid: a corridor
+    limits only the cells stood on."""
+
+    field_of: IntArray
+    """int32 (rows, cols), the place of each cell."""
+    places: BoolArray
+    """bool (n_places,), those in the corridor."""
+    n_cells: int
+
+    def mask(self) -> BoolArray:
+        """bool (rows, cols), the cells in the corridor."""
+        inside: BoolArray = (self.field_of >= 0) & self.places[self.field_of]
+        return inside
+
+
+def corridor_of(
+    topology: TopologicalMap, places: LongArray, *, neighbours: bool = False
+) -> Corridor:
+    """Receptive fields of the places of a route.
+
+    Parameters
+    ----------
+    topology
+        The map the route is on.
+    places
+        Dense indices of the route's places.
+    neighbours
+        Also the places that an arc joins to one of them.
+    """
+    inside = np.zeros(topology.n_places, dtype=np.bool_)
+    inside[places] = True
+    if neighbours:
+        touched = inside[topology.arcs].any(axis=1)
+        inside[topology.arcs[touched].ravel()] = True
+    return Corridor(topology.level.field_of, inside, int(topology.level.areas[inside].sum()))
