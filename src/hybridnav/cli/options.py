@@ -1,0 +1,30 @@
+"""Arguments and options that several commands take."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+MapArgument = Annotated[
+    Path, typer.Argument(metavar="MAP", help="ROS map (.yaml) or MovingAI map (.map).")
+]
+PresetOption = Annotated[
+    str, typer.Option("--preset", metavar="NAME|FILE", help="A preset's name or its YAML file.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Override one key, e.g. planner.corridor=route."
+    ),
+]
+RadiusOption = Annotated[
+    float | None,
+    typer.Option("--robot-radius", metavar="R", help="Robot radius in metres; else the preset's."),
+]
+SeedOption = Annotated[
+    int | None, typer.Option("--seed", metavar="N", help="Seed of the pyramid; else the preset's.")
+]
+PlotOption = Annotated[
+    Path | None, typer.Option("--plot", metavar="FILE", help="Draw a picture: .png, .pdf or .svg.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
