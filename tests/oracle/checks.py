@@ -222,16 +222,15 @@ def check_attributes(level: MeasuredLevel, classes: AnyArray, *, resolution_m: f
     for dart, label in found.label_of.items():
         cracks[label].add(dart)
     expected = np.array(level.through_m, dtype=float)
-    for arc, ((u, v), dart) in enumerate(
-        zip(level.arcs.tolist(), base_darts(level.base_pairs), strict=True)
-    ):
-        pairs = np.asarray(level.boundary(arc))
-        assert (level.field_of[pairs[:, 0, 0], pairs[:, 0, 1]] == u).all()
-        assert (level.field_of[pairs[:, 1, 0], pairs[:, 1, 1]] == v).all()
-        if u == v:
+    lines = [np.asarray(level.boundary(arc)).reshape(-1, 2, 2) for arc in range(level.n_arcs)]
+    pairs = np.concatenate([*lines, np.empty((0, 2, 2), int)])
+    ends = level.field_of[pairs[:, :, 0], pairs[:, :, 1]]
+    assert (ends == np.repeat(level.arcs, [len(line) for line in lines], axis=0)).all()
+    for arc, dart in enumerate(base_darts(level.base_pairs)):
+        if dart not in found.label_of:
             continue
         label = found.label_of[dart]
-        darts = base_darts(pairs)
+        darts = base_darts(lines[arc])
         assert {*darts, *map(alpha, darts)} == cracks[label]
         assert 2 * len(darts) == len(cracks[label])
         expected[arc] = through[label]

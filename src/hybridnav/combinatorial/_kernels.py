@@ -146,34 +146,51 @@ def loop_area(dart, sweep, base_edge, cols):
 
 
 @njit(cache=True)
-def contract(darts, parent, kernel_dart, state, inverse, shift, cols):
-    """Contract the stars of a kernel, in place; fills `state` and the inverse of the new sigma.
+def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touched, cols):
+    """Contract the stars of a kernel, in place.
+
+    Returns how many darts of `touched` were filled and whether there is a self-loop.
 
     The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the
     dart after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
-    `kernel_dart[v]` starts at the parent of v and ends at v. `shift` is scratch, one a vertex.
+    `kernel_dart[v]` starts at the parent of v and ends at v; origins become the vertices of the
+    next level, `new_vertex[parent[v]]`. `touched` lists one dart of every ordinary face that lost
+    a dart or has a self-loop: no other face can have become redundant. `shift` is scratch.
     """
-    sigma, origin, sweep, _, base_edge = darts
-    n_edges = base_edge.size
-    for e in range(n_edges):
+    sigma, origin, sweep, protected, base_edge = darts
+    for e in range(base_edge.size):
         state[e] = ALIVE
     for v in range(parent.size):
+        shift[v] = 0
         if parent[v] != v:
             dart = kernel_dart[v]
             state[dart >> 1] = CONTRACTED
             shift[v] = loop_area(dart, sweep, base_edge, cols)
-    for d in range(2 * n_edges):
-        if state[d >> 1] != ALIVE:
+    count = 0
+    any_loop = False
+    for e in range(base_edge.size):
+        if state[e] != ALIVE:
             continue
-        following = sigma[d]
-        while state[following >> 1] == CONTRACTED:
-            following = sigma[following ^ 1]
-        sigma[d] = following
-        inverse[following] = d
-        v = origin[d]
-        if parent[v] != v:
-            origin[d] = parent[v]
+        for d in (2 * e, 2 * e + 1):
+            following = sigma[d]
+            if state[following >> 1] == CONTRACTED:
+                while state[following >> 1] == CONTRACTED:
+                    following = sigma[following ^ 1]
+                sigma[d] = following
+                if not protected[d ^ 1]:
+                    touched[count] = d ^ 1
+                    count += 1
+            inverse[following] = d
+            v = origin[d]
+            origin[d] = new_vertex[parent[v]]
             sweep[d] += shift[v]
+        if origin[2 * e] == origin[2 * e + 1]:
+            any_loop = True
+            for d in (2 * e, 2 * e + 1):
+                if not protected[d]:
+                    touched[count] = d
+                    count += 1
+    return count, any_loop
 
 
 @njit(cache=True)
@@ -186,17 +203,12 @@ def unlink(dart, sigma, inverse):
 
 
 @njit(cache=True)
-def redundant_dart(start, sigma, origin, sweep, base_edge, cols):
+def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
     """A dart of the ordinary face of `start` whose edge is redundant, -1 if there is none.
 
-    The four rules: degree one; degree two; exactly two distinct edges between the same two
-    vertices and else self-loops; nothing but self-loops of one vertex (the enclosing one goes).
+    Rules three and four: exactly two distinct edges between the same two vertices and else
+    self-loops; nothing but self-loops of one vertex (the one that encloses the others goes).
     """
-    second = sigma[start ^ 1]
-    if second == start:
-        return start
-    if sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
-        return max(start, second) if second != start ^ 1 else -1
     crossings = 0
     last = -1
     first = -1
@@ -222,23 +234,28 @@ def redundant_dart(start, sigma, origin, sweep, base_edge, cols):
 
 
 @njit(cache=True)
-def simplify(darts, state, inverse, cols):
-    """Remove redundant edges through ordinary faces until none is left, in place.
+def simplify(darts, touched, any_loop, state, inverse, cols):
+    """Remove redundant edges through the ordinary faces of some darts, in place.
 
-    Only darts that bound an ordinary face of degree one or two, or that are self-loops, can start
-    a removal: a face with two crossings and degree above two has a self-loop among its darts. A
-    removal can make the merged face redundant, and no other one.
+    Rules one and two: a face of degree one, a face of degree two. The others need a self-loop,
+    and the lower levels have none. A removal can make the merged face redundant, and no other
+    one, so every face is followed until it is not.
     """
     sigma, origin, sweep, protected, base_edge = darts
-    for d in range(2 * base_edge.size):
-        if state[d >> 1] != ALIVE or protected[d]:
+    for i in range(touched.size):
+        start = touched[i]
+        if state[start >> 1] != ALIVE:
             continue
-        second = sigma[d ^ 1]
-        if sigma[second ^ 1] != d and second != d and origin[d] != origin[d ^ 1]:
-            continue
-        start = d
         while start >= 0 and not protected[start]:
-            dart = redundant_dart(start, sigma, origin, sweep, base_edge, cols)
+            second = sigma[start ^ 1]
+            dart = -1
+            if second == start:
+                dart = start
+            elif sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
+                if second != start ^ 1:
+                    dart = max(start, second)
+            elif any_loop:
+                dart = redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols)
             if dart < 0:
                 break
             other = dart ^ 1
@@ -259,24 +276,30 @@ def simplify(darts, state, inverse, cols):
 
 
 @njit(cache=True)
-def compact_darts(darts, state, new_edge, new_vertex):
-    """Close the gaps that gone edges left, in place; gives the number of edges that stay."""
+def compact_darts(darts, state, new_edge, level, edge_end):
+    """Close the gaps that gone edges left, in place; gives the number of edges that stay.
+
+    `edge_end` takes down what goes, by base edge: 2 * level for a contracted edge, 2 * level + 1
+    for a removed one.
+    """
     sigma, origin, sweep, protected, base_edge = darts
     n_edges = 0
     for e in range(base_edge.size):
         if state[e] == ALIVE:
-            new_edge[e] = n_edges
+            new_edge[e] = 2 * n_edges
             n_edges += 1
+        else:
+            edge_end[base_edge[e]] = 2 * level + state[e] - CONTRACTED
     for e in range(base_edge.size):
         if state[e] != ALIVE:
             continue
         f = new_edge[e]
-        base_edge[f] = base_edge[e]
+        base_edge[f >> 1] = base_edge[e]
         for side in range(2):
             d = 2 * e + side
             following = sigma[d]
-            sigma[2 * f + side] = 2 * new_edge[following >> 1] + (following & 1)
-            origin[2 * f + side] = new_vertex[origin[d]]
-            sweep[2 * f + side] = sweep[d]
-            protected[2 * f + side] = protected[d]
+            sigma[f + side] = new_edge[following >> 1] + (following & 1)
+            origin[f + side] = origin[d]
+            sweep[f + side] = sweep[d]
+            protected[f + side] = protected[d]
     return n_edges

@@ -21,6 +21,7 @@ _NO_KEY = np.uint64(0xFFFFFFFFFFFFFFFF)
 # A key holds the attribute (13 bits), a seeded hash (21 bits) and the position (30 bits).
 _ATTRIBUTE_MAX = 8191
 _POSITION = np.uint64(0x3FFFFFFF)
+_LOW_HALF = np.uint64(0xFFFFFFFF)
 
 
 class Vertices(NamedTuple):
@@ -72,14 +73,14 @@ def base_vertices(classes, n_vertices):
 @njit(cache=True)
 def make_key(attribute, base_edge, seed, position):
     """Order of an edge: attribute, then a seeded hash of its base id (MurmurHash3's finaliser)."""
-    h = np.uint32(base_edge) ^ np.uint32(seed)
-    h ^= h >> np.uint32(16)
-    h = np.uint32(h * np.uint32(0x85EBCA6B))
-    h ^= h >> np.uint32(13)
-    h = np.uint32(h * np.uint32(0xC2B2AE35))
-    h ^= h >> np.uint32(16)
+    h = np.uint64(base_edge) ^ seed  # below 2^32, so no product overflows
+    h ^= h >> np.uint64(16)
+    h = h * np.uint64(0x85EBCA6B) & _LOW_HALF
+    h ^= h >> np.uint64(13)
+    h = h * np.uint64(0xC2B2AE35) & _LOW_HALF
+    h ^= h >> np.uint64(16)
     high = np.uint64(min(attribute, _ATTRIBUTE_MAX)) << np.uint64(51)
-    return high | np.uint64(h >> np.uint32(11)) << np.uint64(30) | np.uint64(position)
+    return high | h >> np.uint64(11) << np.uint64(30) | np.uint64(position)
 
 
 @njit(cache=True)
@@ -279,8 +280,11 @@ def select_stars(candidates, matched, vertices):
 
 
 @njit(cache=True)
-def compact_vertices(vertices, parent, new_vertex):
-    """Merge boxes into survivors and close the gaps, in place; gives the number of survivors."""
+def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vertex_parent):
+    """Merge boxes into survivors and close the gaps, in place; gives the number of survivors.
+
+    Takes down, by cell, the level at which a surviving cell goes and the one it goes into.
+    """
     cells, boxes, classes = vertices
     count = 0
     for v in range(parent.size):
@@ -293,6 +297,9 @@ def compact_vertices(vertices, parent, new_vertex):
             boxes[p, 1] = min(boxes[p, 1], boxes[v, 1])
             boxes[p, 2] = max(boxes[p, 2], boxes[v, 2])
             boxes[p, 3] = max(boxes[p, 3], boxes[v, 3])
+            cell = cells[v, 0] * cols + cells[v, 1]
+            vertex_end[cell] = level
+            vertex_parent[cell] = cells[p, 0] * cols + cells[p, 1]
     for v in range(parent.size):
         if parent[v] == v:
             w = new_vertex[v]
@@ -301,22 +308,3 @@ def compact_vertices(vertices, parent, new_vertex):
                 boxes[w, i] = boxes[v, i]
             classes[w] = classes[v]
     return count
-
-
-@njit(cache=True)
-def record(level, cols, cells, parent, base_edge, state, edge_end, vertex_end, vertex_parent):
-    """Write down what went at a level: edges by base id, vertices by surviving cell.
-
-    `edge_end` holds 2 * level for a contracted edge and 2 * level + 1 for a removed one,
-    `vertex_end` the level at which a cell stops being a surviving cell, `vertex_parent` the
-    surviving cell that it was contracted into.
-    """
-    for e in range(base_edge.size):
-        if state[e] != 0:
-            edge_end[base_edge[e]] = 2 * level + state[e] - 1
-    for v in range(parent.size):
-        p = parent[v]
-        if p != v:
-            cell = cells[v, 0] * cols + cells[v, 1]
-            vertex_end[cell] = level
-            vertex_parent[cell] = cells[p, 0] * cols + cells[p, 1]

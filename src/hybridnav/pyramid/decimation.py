@@ -19,7 +19,7 @@ from hybridnav.pyramid import _field_kernels, _kernels
 from hybridnav.pyramid.record import MAX_LEVELS, SURVIVES, BuildStats, LevelSize, Record
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, LongArray
+    from hybridnav._typing import ByteArray, IntArray
 
 _ROUNDING = 1e-9
 
@@ -56,7 +56,7 @@ class _Decimation:
         self._began = time.perf_counter()
         self._cols = classes.shape[1]
         self._limit = limit
-        self._seed = np.uint32((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
+        self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
         vertex, edge, n_vertices, n_edges = dart_kernels.number_base(classes)
         self._darts = dart_kernels.base_darts(classes, vertex, edge, n_edges)
         self._vertices = _kernels.base_vertices(classes, n_vertices)
@@ -75,7 +75,9 @@ class _Decimation:
         self._state = np.empty(n_edges, np.uint8)
         self._inverse = np.empty(2 * n_edges, np.int32)
         self._edge_scratch = np.empty(n_edges, np.int32)
-        self._vertex_scratch = np.empty(n_vertices, np.int32)
+        self._touched = np.empty(4 * n_edges, np.int32)
+        self._new_vertex = np.empty(n_vertices, np.int32)
+        self._shift = np.empty(n_vertices, np.int32)
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
         self._level = 0
         self._note_size()
@@ -95,19 +97,25 @@ class _Decimation:
         self._lap("matching")
         parent, kernel_dart = _kernels.select_stars(candidates, matched, self._vertices)
         self._lap("stars")
-        dart_kernels.contract(
+        self._merge_vertices(parent)
+        self._lap("vertices")
+        touched, any_loop = dart_kernels.contract(
             self._darts,
             parent,
+            self._new_vertex,
             kernel_dart,
             self._state,
             self._inverse,
-            self._vertex_scratch,
+            self._shift,
+            self._touched,
             self._cols,
         )
         self._lap("contraction")
-        dart_kernels.simplify(self._darts, self._state, self._inverse, self._cols)
+        dart_kernels.simplify(
+            self._darts, self._touched[:touched], any_loop, self._state, self._inverse, self._cols
+        )
         self._lap("removal")
-        self._close_gaps(parent)
+        self._close_gaps()
         self._note_size()
         self._lap("compaction")
         return True
@@ -143,26 +151,27 @@ class _Decimation:
         )
         self._lap("hulls")
 
-    def _close_gaps(self, parent: LongArray) -> None:
-        record, scratch = self.record, self._vertex_scratch
-        _kernels.record(
-            self._level,
-            self._cols,
-            self._vertices.cells,
+    def _merge_vertices(self, parent: IntArray) -> None:
+        record = self.record
+        n_vertices = _kernels.compact_vertices(
+            self._vertices,
             parent,
-            self._darts.base_edge,
-            self._state,
-            record.edge_end,
+            self._new_vertex,
+            self._cols,
+            self._level,
             record.vertex_end,
             record.vertex_parent,
         )
-        n_vertices = _kernels.compact_vertices(self._vertices, parent, scratch)
         if len(self._hulls.start):
             self._hulls = _kernels.Hulls(
-                *_field_kernels.merge_hulls(*self._hulls, parent, scratch, n_vertices)
+                *_field_kernels.merge_hulls(*self._hulls, parent, self._new_vertex, n_vertices)
             )
-        n_edges = dart_kernels.compact_darts(self._darts, self._state, self._edge_scratch, scratch)
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))
+
+    def _close_gaps(self) -> None:
+        n_edges = dart_kernels.compact_darts(
+            self._darts, self._state, self._edge_scratch, self._level, self.record.edge_end
+        )
         sigma, origin, sweep, protected, base_edge = self._darts
         self._darts = dart_kernels.Darts(
             sigma[: 2 * n_edges],
