@@ -77,8 +77,8 @@ class DualGraphPyramid:
                 f"linkage must be one of {', '.join(get_args(Linkage))}, got {linkage!r}"
             )
         limit = squared_limit(merge_distance_m, grid.resolution_m)
-        record, stats = decimate(grid.classes, limit=limit, seed=seed)
-        return cls(grid, merge_distance_m, linkage, seed, stats, record)
+        record, stats = decimate(grid.classes, limit=limit, seed=int(seed))
+        return cls(grid, float(merge_distance_m), linkage, int(seed), stats, record)
 
     def __len__(self) -> int:
         return len(self.stats.sizes)

@@ -1,0 +1,174 @@
+"""Axes in the map frame: what part of the map to show, the image of the cells, the layout."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.transforms import Affine2D
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.viz import style
+from hybridnav.viz.style import Sizes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import AnyArray, ByteArray, FloatArray
+    from hybridnav.grid import OccupancyGrid
+
+MAX_IMAGE_SIDE = 6000
+"""Cells per side beyond which an image is averaged down first: more than any page resolves."""
+MAX_HEIGHT = 1.1
+"""Height of the map's part of a new figure at most, in figure widths."""
+PAD_IN = 0.04
+
+
+@dataclass(frozen=True)
+class View:
+    """The rectangle of the map frame that a picture shows, in metres."""
+
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def size(self) -> FloatArray:
+        """Width and height."""
+        return self.high - self.low
+
+    def holding(self, points: FloatArray, margin: float) -> View:
+        """The view grown to hold points; those further off than its own size stay outside."""
+        reach = self.size.max()
+        near = ((points > self.low - reach) & (points < self.high + reach)).all(axis=1)
+        inside = points[near]
+        return View(
+            np.minimum(self.low, inside.min(axis=0, initial=np.inf) - margin),
+            np.maximum(self.high, inside.max(axis=0, initial=-np.inf) + margin),
+        )
+
+
+def known_view(grid: OccupancyGrid) -> View:
+    """The bounding box, in the map frame, of the cells that are not unexplored, and a margin."""
+    known = grid.measured != CellClass.UNEXPLORED
+    if not known.any():
+        known = np.ones(grid.shape, dtype=np.bool_)
+    rows = np.flatnonzero(known.any(axis=1))
+    first = known[rows].argmax(axis=1)
+    end = grid.shape[1] - known[rows, ::-1].argmax(axis=1)
+    # With yaw the box of the corners of all rows is tighter than that of the box of all cells.
+    corners = [(rows + up, cols) for up in (0, 1) for cols in (first, end)]
+    points = grid.frame.points_of_grid(np.concatenate([np.stack(c, axis=1) for c in corners]))
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = max(0.015 * (high - low).max(), grid.resolution_m)
+    sides = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * grid.shape
+    whole = grid.frame.points_of_grid(sides)
+    return View(
+        np.maximum(low - margin, whole.min(axis=0)), np.minimum(high + margin, whole.max(axis=0))
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """Axes that show a view of the map frame, and the sizes to draw with on them."""
+
+    ax: Axes
+    view: View
+    sizes: Sizes
+    is_new: bool
+    """Whether the axes were made here, so that their figure may be resized."""
+
+    @classmethod
+    def opened(cls, ax: Axes | None, width_in: float, view: View) -> Canvas:
+        """The axes given, or else new ones in a new figure of some width, set to a view."""
+        is_new = ax is None
+        if ax is None:
+            if not (math.isfinite(width_in) and width_in > 0):
+                raise InvalidValueError(
+                    f"width must be a positive number of inches, got {width_in}"
+                )
+            figure = Figure(figsize=(width_in, MAX_HEIGHT * width_in))
+            ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        _show(ax, view)
+        room = _room_in(ax)
+        sizes = Sizes.fitting(float(room[0]), float((72 * room / view.size).min()))
+        return cls(ax, view, sizes, is_new)
+
+    @property
+    def room(self) -> float:
+        """Width in points that the figure has for what stands round the map."""
+        return 72 * (float(_room_in(self.ax)[0]) - 2 * PAD_IN)
+
+    @property
+    def map_width(self) -> float:
+        """Width of the map in points."""
+        return float(self.view.size[0]) * self.sizes.points_per_metre
+
+
+def _show(ax: Axes, view: View) -> None:
+    ax.set_xlim(view.low[0], view.high[0])
+    ax.set_ylim(view.low[1], view.high[1])
+    ax.set_aspect("equal", adjustable="box")
+
+
+def _room_in(ax: Axes) -> FloatArray:
+    """Width and height in inches that the axes have in their figure."""
+    place, figure = ax.get_position(original=True), ax.figure
+    return (
+        np.array([place.width * figure.bbox.width, place.height * figure.bbox.height]) / figure.dpi
+    )
+
+
+def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours: ByteArray) -> None:
+    """Draw the cells inside a view, turned into the map frame.
+
+    `colours[field_of]` is the colour of a cell; occupied and blocked ones have their own.
+    """
+    ax, view = canvas.ax, canvas.view
+    (left, bottom), (right, top) = view.low, view.high
+    cells = grid.frame.cells_of([[left, bottom], [left, top], [right, bottom], [right, top]])
+    low = np.maximum(cells.min(axis=0), 0)
+    high = np.minimum(cells.max(axis=0) + 1, grid.shape)
+    window = np.s_[low[0] : high[0], low[1] : high[1]]
+    block = -(-int((high - low).max()) // MAX_IMAGE_SIDE)
+    image = _image(grid.measured[window], grid.classes[window], field_of[window], colours, block)
+    end = low + block * np.array(image.shape[:2])
+    (x, y), side = grid.frame.origin_m, grid.resolution_m
+    to_map = Affine2D().scale(side).rotate(grid.frame.yaw_rad).translate(x, y)
+    drawn = ax.imshow(
+        image,
+        origin="lower",
+        extent=(float(low[1]), float(end[1]), float(low[0]), float(end[0])),
+        transform=to_map + ax.transData,
+        # Averages where the page is coarser than the map: thin walls must not drop out.
+        interpolation="antialiased",
+        zorder=0,
+    )
+    drawn.set_gid("cells")
+    _show(ax, view)  # imshow set the limits to those of an image without yaw
+
+
+def _image(
+    measured: ByteArray, classes: ByteArray, field_of: AnyArray, colours: ByteArray, block: int
+) -> ByteArray:
+    """RGB of each cell, averaged over square blocks of cells."""
+    strips = []
+    occupied, blocked = style.rgb(style.OCCUPIED, style.BLOCKED)
+    for row in range(0, measured.shape[0], 64 * block):
+        strip = np.s_[row : row + 64 * block]
+        image = colours[field_of[strip]]
+        image[classes[strip] == CellClass.OCCUPIED] = blocked
+        image[measured[strip] == CellClass.OCCUPIED] = occupied
+        strips.append(_averaged(image, block) if block > 1 else image)
+    return np.concatenate(strips)
+
+
+def _averaged(image: ByteArray, block: int) -> ByteArray:
+    rows, cols, _ = image.shape
+    padded = np.pad(image, ((0, -rows % block), (0, -cols % block), (0, 0)), mode="edge")
+    blocks = padded.reshape(padded.shape[0] // block, block, -1, block, 3)
+    averaged: ByteArray = blocks.mean(axis=(1, 3), dtype=np.float32).astype(np.uint8)
+    return averaged

@@ -1,0 +1,179 @@
+"""Pictures of maps and of the levels that grow on them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from hybridnav.grid import CellClass
+from hybridnav.topology import TopologicalMap
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.layout import add_legend, add_title, fit_height
+from hybridnav.viz.places import Places, draw_arcs, draw_dots
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.pyramid import Level
+    from hybridnav.viz.layout import Entry
+    from hybridnav.viz.style import Sizes
+
+MAX_VERTICES_WITH_ARCS = 2000
+"""Vertices beyond which a level is drawn as fields alone: dots and arcs would cover them."""
+
+
+def plot_map(
+    grid: OccupancyGrid,
+    *,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw the cells of a map: occupied dark, blocked grey, unexplored light grey, free white.
+
+    Parameters
+    ----------
+    grid
+        The map. The picture is cropped to its known part; its axes are metres of the map frame.
+    ax
+        Where to draw; by default new axes in a new figure.
+    title
+        Replaces the title that names the map; an empty one leaves it out.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+    """
+    canvas = Canvas.opened(ax, width_in, known_view(grid))
+    # Occupied and blocked cells have colours of their own: only two classes are looked up.
+    colours = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED)
+    draw_cells(canvas, grid, grid.classes, colours)
+    entries: list[Entry] = [(Patch(fc=style.FREE, ec=style.ARC, lw=0.5), "free")]
+    if (grid.classes == CellClass.UNEXPLORED).any():
+        entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
+    entries += ground_entries(grid)
+    rows, cols = grid.shape
+    words = [grid.name, f"{cols} x {rows} cells of {grid.resolution_m:g} m"]
+    _finish(canvas, entries, words if title is None else [title])
+    return canvas.ax
+
+
+def plot_places(  # noqa: PLR0913 - all but the first have defaults
+    places: Level | TopologicalMap,
+    *,
+    ax: Axes | None = None,
+    arcs: bool = True,
+    self_loops: bool = False,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw places as coloured fields, their positions as dots, and the arcs between them.
+
+    Neighbours never have the same colour; unexplored places are grey. An arc is a line from one
+    position through the middle of its boundary to the other, so that two doors between two rooms
+    are two lines. Places under half a square metre have no dot and no arcs, and a level of more
+    than 2000 vertices is drawn as fields alone.
+
+    Parameters
+    ----------
+    places
+        The topological map, or any level of a pyramid.
+    ax
+        Where to draw; by default new axes in a new figure.
+    arcs
+        Draw the arcs.
+    self_loops
+        Draw the self-loops too, as closed curves through the middle of their boundary.
+    title
+        Replaces the title that names the map and counts places; an empty one leaves it out.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+    """
+    level = places.level if isinstance(places, TopologicalMap) else places
+    grid, drawn = level.grid, Places(level)
+    canvas = Canvas.opened(ax, width_in, known_view(grid))
+    draw_cells(canvas, grid, level.field_of, drawn.colours())
+    entries = ground_entries(grid)
+    swatches = [(drawn.free, style.PLACES, "free places")]
+    swatches.append((~drawn.free, style.UNEXPLORED_PLACES, "unexplored places"))
+    entries[:0] = [(swatch(colours), label) for mask, colours, label in swatches if mask.any()]
+    if level.n_vertices <= MAX_VERTICES_WITH_ARCS:
+        if arcs:
+            draw_arcs(canvas, drawn, self_loops=self_loops)
+            entries.insert(0, (arc_handle(canvas.sizes), "position, arc"))
+        draw_dots(canvas, drawn)
+    n_free = int(drawn.free.sum())
+    words = [grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]
+    _finish(canvas, entries, words if title is None else [title])
+    return canvas.ax
+
+
+def plot_level(
+    level: Level, *, ax: Axes | None = None, width_in: float = style.FULL_WIDTH_IN
+) -> Axes:
+    """Draw one level of a pyramid as `plot_places` does, and say which it is.
+
+    Parameters
+    ----------
+    level
+        Any level, the base included.
+    ax
+        Where to draw; by default new axes in a new figure.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+    """
+    sizes = f"{level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
+    title = f"{level.grid.name}, level {level.index}: {sizes}"
+    return plot_places(level, ax=ax, title=title, width_in=width_in)
+
+
+def ground_entries(grid: OccupancyGrid) -> list[Entry]:
+    """Legend entries for the cells that are in no place."""
+    occupied = (grid.measured == CellClass.OCCUPIED).any()
+    entries: list[Entry] = [(Patch(fc=style.OCCUPIED), "occupied")] if occupied else []
+    if occupied and grid.robot_radius_m > 0:
+        label = f"within {grid.robot_radius_m:g} m of occupied"
+        entries.append((Patch(fc=style.BLOCKED), label))
+    return entries
+
+
+def swatch(colours: Sequence[str], strength: float = 1.0) -> tuple[Patch, ...]:
+    """Legend handle for places: three of their colours side by side."""
+    return tuple(Patch(fc=rgb / 255) for rgb in style.rgb(*colours[:3], strength=strength))
+
+
+def arc_handle(sizes: Sizes) -> Line2D:
+    """Legend handle for an arc between two positions."""
+    line = 0.9 * sizes.line
+    return Line2D([], [], color=style.ARC, lw=line, marker="o", ms=3 * sizes.line, mfc=style.INK)
+
+
+def _finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
+    """Title, axes in metres, legend."""
+    ax, font = canvas.ax, canvas.sizes.font
+    add_title(canvas, words)
+    ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
+    ax.set_xlabel("x in metres", fontsize=font, labelpad=0.3 * font)
+    ax.set_ylabel("y in metres", fontsize=font, labelpad=0.3 * font)
+    for spine in ax.spines.values():
+        spine.set(linewidth=0.6, color=style.ARC)
+    fit_height(canvas, add_legend(canvas, entries, bar=0, below=3.4 * font))

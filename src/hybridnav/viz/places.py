@@ -1,0 +1,133 @@
+"""The parts of a picture that stand for a level: fields, dots, arcs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from hybridnav.grid import CellClass
+from hybridnav.viz import style
+from hybridnav.viz.colouring import colour_vertices
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import BoolArray, ByteArray, FloatArray
+    from hybridnav.pyramid import Level
+    from hybridnav.viz.canvas import Canvas
+    from hybridnav.viz.style import Sizes
+
+TINY_M2 = 0.5
+"""Area in square metres below which a place has no dot and its arcs are not drawn, unless a route
+uses them: specks of a scan's noise, which would hide the rest."""
+_LOOP_POINTS = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """A level, ready to be drawn."""
+
+    level: Level
+
+    @cached_property
+    def positions(self) -> FloatArray:
+        """Surviving cells, (x, y) in metres."""
+        return self.level.grid.frame.points_of(self.level.cells)
+
+    @cached_property
+    def free(self) -> BoolArray:
+        """Places of free cells."""
+        free: BoolArray = self.level.classes == CellClass.FREE
+        return free
+
+    @cached_property
+    def large(self) -> BoolArray:
+        """Places that are no specks; all, where all are."""
+        areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
+        large: BoolArray = areas >= min(TINY_M2, areas.max(initial=0.0))
+        return large
+
+    def colours(self, strong: BoolArray | None = None) -> ByteArray:
+        """RGB per place and one row more, for the cells of none; `strong` are not made pale."""
+        index = colour_vertices(self.level.arcs, self.level.n_vertices)
+        table = style.rgb(*style.PLACES)[index]
+        if strong is not None:
+            table[~strong] = style.rgb(*style.PLACES, strength=style.PALE)[index[~strong]]
+        table[~self.free] = style.rgb(*style.UNEXPLORED_PLACES)[index[~self.free]]
+        return np.concatenate([table, style.rgb(style.BLOCKED)])
+
+    def dot(self, sizes: Sizes) -> float:
+        """Diameter of a place's dot in points: a share of how far apart the places lie."""
+        seen = self.free & self.large
+        if not seen.any():
+            seen = self.large
+        areas = self.level.areas[seen]
+        spacing_m = np.sqrt(np.median(areas)) * self.level.grid.resolution_m if len(areas) else 0.0
+        fitting = 0.16 * spacing_m * sizes.points_per_metre
+        return float(np.clip(fitting, 0.6, 3.2 * sizes.line))
+
+    def lines(self, arcs: BoolArray) -> list[FloatArray]:
+        """From place to place through the middle of the boundary, for each arc of a mask."""
+        ends = self.positions[self.level.arcs[arcs]]
+        middles = self.level.boundary_middles[arcs]
+        return list(np.stack([ends[:, 0], middles, ends[:, 1]], axis=1))
+
+    def loops(self, arcs: BoolArray) -> list[FloatArray]:
+        """Closed curves from a place through the middle of its own boundary, for self-loops."""
+        at = self.positions[self.level.arcs[arcs, 0]][:, None]
+        to = (self.level.boundary_middles[arcs][:, None] - at) * 4 / 3
+        across = np.stack([-to[..., 1], to[..., 0]], axis=-1) / 2
+        t = np.linspace(0, 1, _LOOP_POINTS)[:, None]
+        # A cubic curve whose inner control points lie 4/3 out passes through the middle at 1/2.
+        out, back = 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t)
+        return list(at + out * (to + across) + back * (to - across))
+
+
+def draw_arcs(canvas: Canvas, places: Places, *, self_loops: bool = False) -> None:
+    """Draw the arcs between places that are no specks, the fainter the less a route can use them.
+
+    Unexplored places cover most of many a map: their arcs must not hide those between free ones.
+    """
+    ax, sizes, level = canvas.ax, canvas.sizes, places.level
+    seen = places.large[level.arcs].all(axis=1) & ~level.is_self_loop
+    n_free = places.free[level.arcs].sum(axis=1)
+    width = min(0.9 * sizes.line, 0.3 * places.dot(sizes))
+    for free_ends, colour, share, gid in (
+        (0, style.UNEXPLORED_ARC, 0.6, "unexplored-arcs"),
+        (1, style.RIM_ARC, 0.6, "rim-arcs"),
+        (2, style.ARC, 1.0, "arcs"),
+    ):
+        lines = places.lines(seen & (n_free == free_ends))
+        _add_lines(ax, lines, colour, share * width, gid=gid)
+    if self_loops:
+        loops = places.loops(level.is_self_loop)
+        _add_lines(ax, loops, style.ARC, 0.7 * width, gid="self-loops")
+
+
+def draw_dots(canvas: Canvas, places: Places) -> None:
+    """Draw the positions of the places that are no specks: free ones dark, unexplored ones grey."""
+    ax, diameter = canvas.ax, places.dot(canvas.sizes)
+    for mask, colour, share, gid in (
+        (~places.free, style.UNEXPLORED_DOT, 0.75, "unexplored-dots"),
+        (places.free, style.INK, 1.0, "free-dots"),
+    ):
+        points = places.positions[mask & places.large]
+        size = (share * diameter) ** 2
+        dots = ax.scatter(points[:, 0], points[:, 1], s=size, c=colour, linewidths=0, zorder=4)
+        dots.set_gid(gid)
+
+
+def _add_lines(
+    ax: Axes, lines: Sequence[FloatArray], colour: str, width: float, *, gid: str
+) -> None:
+    drawn = LineCollection(
+        lines, colors=colour, linewidths=width, capstyle="round", joinstyle="round", zorder=3
+    )
+    drawn.set_gid(gid)
+    ax.add_collection(drawn, autolim=False)

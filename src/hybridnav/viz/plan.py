@@ -1,0 +1,211 @@
+"""The picture of a plan."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.route import corridor_of
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.labels import Marker, draw_markers
+from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.maps import arc_handle, ground_entries, swatch
+from hybridnav.viz.places import Places, draw_arcs, draw_dots
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav.result import PlanResult, Route
+    from hybridnav.topology import TopologicalMap
+    from hybridnav.viz.layout import Entry
+    from hybridnav.viz.style import Sizes
+
+_ROUTE_WIDTH, _PATH_WIDTH, _CASING = 1.5, 2.0, 1.5
+
+
+def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
+    topology: TopologicalMap,
+    result: PlanResult,
+    *,
+    ax: Axes | None = None,
+    start: ArrayLike | None = None,
+    goal: ArrayLike | None = None,
+    title: str | None = None,
+    optimum_m: float | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw a plan: map, places, arcs, corridor, coarse route, path, start and goal, scale bar.
+
+    Arcs run through the middle of their boundaries, so that two doors are two lines. Places of the
+    corridor keep their full colours, the others are pale. Without a path the title says why;
+    without a route (a search of the whole map) no corridor is shown.
+
+    Parameters
+    ----------
+    topology
+        The topological map that was planned on. The picture is cropped to its map's known part.
+    result
+        The plan.
+    ax
+        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+    start, goal
+        `(x, y)` in metres, map frame; by default the ends of the path.
+    title
+        Replaces the title made of the map's name, length, loss and places; an empty one leaves it
+        out.
+    optimum_m
+        Length of an optimal path in metres, for the loss in the title.
+    width_in
+        Width of a new figure in inches, 3.3 for one column of a paper; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    InvalidValueError
+        When start, goal or optimum is not finite or the optimum is negative.
+    """
+    if optimum_m is not None and not (math.isfinite(optimum_m) and optimum_m >= 0):
+        raise InvalidValueError(f"optimum must be a length in metres >= 0, got {optimum_m}")
+    grid, places = topology.grid, Places(topology.level)
+    view, markers = known_view(grid), _markers(result, start, goal)
+    if markers:
+        margin = 0.015 * float(view.size.max())
+        view = view.holding(np.stack([marker.point for marker in markers]), margin)
+    canvas = Canvas.opened(ax, width_in, view)
+    strong = _corridor(topology, result)
+    draw_cells(canvas, grid, topology.level.field_of, places.colours(strong))
+    draw_arcs(canvas, places)
+    draw_dots(canvas, places)
+    path = np.empty((0, 2))
+    if result.route is not None:
+        _draw_route(canvas, topology, result.route, places)
+    if result.path is not None:
+        path = result.path.points
+        _draw_path(canvas, path)
+    draw_markers(canvas, markers, path)
+    canvas.ax.set_axis_off()
+    add_title(canvas, _words(topology, result, optimum_m) if title is None else [title])
+    bar = add_scale_bar(canvas)
+    entries = _entries(result, places, strong, canvas.sizes) + ground_entries(grid)
+    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
+    fit_height(canvas, legend)
+    return canvas.ax
+
+
+def _markers(result: PlanResult, start: ArrayLike | None, goal: ArrayLike | None) -> list[Marker]:
+    ends = result.path.points[[0, -1]] if result.path is not None else (None, None)
+    markers = []
+    for name, given, end in zip(("start", "goal"), (start, goal), ends, strict=True):
+        point = end if given is None else _checked_point(name, given)
+        if point is not None:
+            markers.append(Marker(name, point))
+    return markers
+
+
+def _checked_point(name: str, given: ArrayLike) -> FloatArray:
+    try:
+        point = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        point = np.empty(0)
+    if point.shape != (2,) or not np.isfinite(point).all():
+        raise InvalidValueError(
+            f"{name} must be two finite coordinates (x, y) in metres, got {given!r:.80}"
+        )
+    return point
+
+
+def _corridor(topology: TopologicalMap, result: PlanResult) -> BoolArray:
+    """Mask of the places to draw in full colours."""
+    if result.route is None:
+        return np.zeros(topology.n_places, dtype=np.bool_)
+    on_route = np.flatnonzero(np.isin(topology.place_ids, result.route.places))
+    neighbours = result.settings.get("planner", {}).get("corridor") == "neighbours"
+    return corridor_of(topology, on_route, neighbours=neighbours).places
+
+
+def _draw_route(canvas: Canvas, topology: TopologicalMap, route: Route, places: Places) -> None:
+    arcs = np.isin(topology.arc_ids, route.arcs)
+    width = _ROUTE_WIDTH * canvas.sizes.line
+    lines = LineCollection(
+        places.lines(arcs), colors=style.INK, linewidths=width, capstyle="round", zorder=5
+    )
+    lines.set_gid("route")
+    canvas.ax.add_collection(lines, autolim=False)
+    stops = places.positions[np.isin(topology.place_ids, route.places)]
+    dots = canvas.ax.scatter(
+        stops[:, 0],
+        stops[:, 1],
+        s=max(places.dot(canvas.sizes), 2.4 * width) ** 2,
+        c=style.FREE,
+        edgecolors=style.INK,
+        linewidths=0.7 * width,
+        zorder=6,
+    )
+    dots.set_gid("route-places")
+
+
+def _draw_path(canvas: Canvas, points: FloatArray) -> None:
+    factor = canvas.sizes.line
+    casing = patheffects.withStroke(
+        linewidth=(_PATH_WIDTH + _CASING) * factor, foreground=style.FREE, capstyle="round"
+    )
+    line = Line2D(
+        points[:, 0],
+        points[:, 1],
+        color=style.PATH,
+        linewidth=_PATH_WIDTH * factor,
+        solid_capstyle="round",
+        solid_joinstyle="round",
+        path_effects=[casing],
+        zorder=7,
+    )
+    line.set_gid("path")
+    canvas.ax.add_line(line)
+
+
+def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None) -> list[str]:
+    """Pieces of the title."""
+    words = [topology.grid.name]
+    if result.path is None:
+        return [*words, str(result.status)]
+    length = result.path.length_m
+    words.append(f"path {length:.1f} m")
+    if optimum_m is not None:
+        loss = length / optimum_m - 1 if optimum_m > 0 else 0.0
+        words.append(f"loss {round(loss, 3) + 0.0:.1%}")  # no "-0.0%" from rounding
+    if result.route is None:
+        return [*words, "searched on the whole map"]
+    n_places = len(result.route.places)
+    return [*words, f"{n_places} place{'s' if n_places > 1 else ''} on the route"]
+
+
+def _entries(result: PlanResult, places: Places, strong: BoolArray, sizes: Sizes) -> list[Entry]:
+    """Legend entries for what is drawn over the cells, and for places."""
+    entries: list[Entry] = []
+    width = sizes.line
+    if result.path is not None:
+        entries.append((Line2D([], [], color=style.PATH, lw=_PATH_WIDTH * width), "path"))
+    if result.route is not None:
+        line = Line2D([], [], color=style.INK, lw=_ROUTE_WIDTH * width, marker="o")
+        line.set(markerfacecolor=style.FREE, markersize=3.6 * width, markeredgewidth=width)
+        entries += [(line, "coarse route"), (swatch(style.PLACES), "corridor")]
+    entries.append((arc_handle(sizes), "place, arc"))
+    if (places.free & ~strong).any():
+        label = "other places" if result.route is not None else "places"
+        entries.append((swatch(style.PLACES, style.PALE), label))
+    if not places.free.all():
+        entries.append((swatch(style.UNEXPLORED_PLACES), "unexplored"))
+    return entries

@@ -1,0 +1,70 @@
+"""Pictures to files: the same bytes for the same picture."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import PathLike
+
+_METADATA: dict[str, dict[str, Any]] = {
+    ".pdf": {"CreationDate": None},
+    ".png": {"Software": None},
+    ".svg": {"Date": None},
+}
+_MAX_PIXELS = 30_000
+
+
+def save_figure(picture: Axes | Figure, path: PathLike, *, dpi: float = 200) -> None:
+    """Write a picture to a file.
+
+    It has the size of its figure in inches, and grows where something stands out of that, so that
+    nothing is cut off.
+
+    Parameters
+    ----------
+    picture
+        Axes, whose whole figure is written, or a figure.
+    path
+        Where to; the suffix says how: `.pdf`, `.png` or `.svg`. An existing file is replaced.
+    dpi
+        Pixels per inch, in PDF and SVG of the image of the cells alone.
+
+    Raises
+    ------
+    InvalidValueError
+        When the suffix is unknown, the file cannot be written or the dpi are out of range.
+    """
+    file = Path(path)
+    suffix = file.suffix.lower()
+    if suffix not in _METADATA:
+        kinds = ", ".join(_METADATA)
+        raise InvalidValueError(f"a picture's file name must end in {kinds}, got '{file}'")
+    figure = picture if isinstance(picture, Figure) else picture.figure.figure
+    limit = _MAX_PIXELS / max(figure.get_size_inches())
+    if not (math.isfinite(dpi) and 0 < dpi <= limit):
+        raise InvalidValueError(f"dpi must be above 0 and at most {limit:.0f} here, got {dpi}")
+    data = io.BytesIO()
+    with mpl.rc_context():
+        mpl.rcParams["svg.hashsalt"] = "hybridnav"
+        mpl.rcParams["pdf.fonttype"] = 42  # journals refuse Type 3 fonts
+        figure.draw_without_rendering()  # lays out, so that the box below is the one to be drawn
+        box = Bbox.union([figure.bbox_inches, figure.get_tightbbox()])
+        figure.savefig(
+            data, format=suffix[1:], dpi=dpi, bbox_inches=box, metadata=_METADATA[suffix]
+        )
+    try:
+        file.write_bytes(data.getvalue())
+    except OSError as error:
+        raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
