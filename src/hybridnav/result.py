@@ -41,6 +41,10 @@ class Path:
     length_m: float
     """Length in metres, counted as a + b sqrt 2 cells from the moves."""
 
+    def __post_init__(self) -> None:
+        self.cells.flags.writeable = False
+        self.points.flags.writeable = False
+
 
 @dataclass(frozen=True)
 class Route:
@@ -111,7 +115,7 @@ class PlanResult:
         return self
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON: lists, numbers and strings."""
+        """Plain values for strict JSON: an infinite setting, as U_d may be, is None."""
         return {
             "status": str(self.status),
             "metric": self.metric,
@@ -125,5 +129,11 @@ class PlanResult:
             "expanded_places": self.stats.expanded_places,
             "corridor_cells": self.stats.corridor_cells,
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
-            "settings": self.settings,
+            "settings": _finite(self.settings),
         }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

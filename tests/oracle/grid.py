@@ -12,14 +12,17 @@ from scipy.sparse import csgraph
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from hybridnav.grid import OccupancyGrid
+
     Bools = NDArray[np.bool_]
     Cells = NDArray[np.int64]
     Floats = NDArray[np.float64]
+    Moves = sparse.csr_array[np.float64, tuple[int, int]]
 
 Cell = tuple[int, int]
 
 
-def move_graph(enterable: Bools, standable: Bools | None = None) -> sparse.csr_array[Any]:
+def move_graph(enterable: Bools, standable: Bools | None = None) -> Moves:
     """Graph of the legal moves: nodes are flat cells, weights 1 and sqrt 2.
 
     A diagonal needs both side cells enterable, wherever they are; both its ends, and those of a
@@ -47,10 +50,10 @@ def move_graph(enterable: Bools, standable: Bools | None = None) -> sparse.csr_a
     return graph.tocsr()
 
 
-def distances(graph: sparse.csr_array[Any], shape: tuple[int, int], source: Cell) -> Floats:
+def distances(graph: Moves, shape: tuple[int, int], source: Cell) -> Floats:
     """Shortest distance from one cell to every cell, infinite where there is no path."""
-    result = csgraph.dijkstra(graph, directed=False, indices=source[0] * shape[1] + source[1])
-    return np.asarray(result, dtype=np.float64).reshape(shape)
+    flat = source[0] * shape[1] + source[1]
+    return csgraph.dijkstra(graph, directed=False, indices=[flat]).reshape(shape)
 
 
 def assert_legal(cells: Any, enterable: Bools, standable: Bools | None = None) -> None:
@@ -71,15 +74,27 @@ def assert_legal(cells: Any, enterable: Bools, standable: Bools | None = None) -
     assert enterable[there[:, 0], here[:, 1]].all(), "cuts a corner"
 
 
+def moves(cells: Any) -> tuple[int, int]:
+    """Steps along a side and along a diagonal of a path of 8-neighbour moves."""
+    turned = (np.diff(cells, axis=0) != 0).all(axis=1)
+    diagonal = int(turned.sum())
+    return len(turned) - diagonal, diagonal
+
+
 def recounted(cells: Any) -> float:
     """Length in cells of a path of 8-neighbour moves, a + b sqrt 2 with counted a and b."""
-    straight = diagonal = 0
-    for (row, col), (to_row, to_col) in zip(cells[:-1], cells[1:], strict=True):
-        if row != to_row and col != to_col:
-            diagonal += 1
-        else:
-            straight += 1
+    straight, diagonal = moves(cells)
     return straight + diagonal * math.sqrt(2)
+
+
+def centre(grid: OccupancyGrid, cell: Cell) -> tuple[float, float]:
+    """Centre of a cell in the map frame, by the definition of the frame and not by its code."""
+    y, x = ((index + 0.5) * grid.resolution_m for index in cell)
+    yaw = grid.frame.yaw_rad
+    return (
+        grid.frame.origin_m[0] + x * math.cos(yaw) - y * math.sin(yaw),
+        grid.frame.origin_m[1] + x * math.sin(yaw) + y * math.cos(yaw),
+    )
 
 
 def length_of_points(points: Floats) -> float:

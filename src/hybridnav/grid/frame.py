@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray, LongArray
 
+_FAR = 1e150
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:
@@ -108,11 +110,13 @@ class Frame:
         xy = np.asarray(points, dtype=np.float64)
         if not np.isfinite(xy).all():
             raise InvalidValueError(f"points need finite coordinates in metres, got {points!r:.80}")
-        offset = xy - np.asarray(self.origin_m)
+        # Numbers at the end of their range must come out as "outside", not overflow.
+        offset = np.clip(xy, -_FAR, _FAR) - np.clip(self.origin_m, -_FAR, _FAR)
         cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         along_x = cosine * offset[..., 0] + sine * offset[..., 1]
         along_y = cosine * offset[..., 1] - sine * offset[..., 0]
-        position = np.stack([along_y, along_x], axis=-1) / self.resolution_m
+        with np.errstate(over="ignore"):
+            position = np.stack([along_y, along_x], axis=-1) / self.resolution_m
         # A centre made by points_of must come back to its cell: 1e-9 of a cell absorbs rounding.
         cells = np.floor(np.clip(position + 1e-9, -(2.0**40), 2.0**40))
         return cells.astype(np.int64)

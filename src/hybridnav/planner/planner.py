@@ -156,7 +156,7 @@ class HybridPlanner:
         """The cell that holds a point, None where it lies outside the map."""
         try:
             xy = np.asarray(point, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             xy = np.empty(0)
         if xy.shape != (2,) or not all(map(math.isfinite, xy)):
             raise InvalidValueError(
