@@ -1,37 +1,74 @@
-"""What several commands share: reading settings and maps, and messages."""
+"""What several commands share: reading settings and maps, and talking to the user."""
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
-from rich.console import Console
+import numpy as np
 
 import hybridnav as hn
 from hybridnav.cli.errors import UsageError
 from hybridnav.config import load_preset
+from hybridnav.config.preset import is_preset_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from hybridnav.config import Preset
 
+_PICTURES = (".pdf", ".png", ".svg")
+
 
 def complain(message: str) -> None:
     """Print one line on stderr."""
-    sys.stderr.write(f"hybridnav: {message}\n")
+    sys.stderr.write(f"hybridnav: {' '.join(message.split())}\n")
+
+
+def answer(text: str) -> None:
+    """Print a result on stdout; a reader that has left, as `head` does, is no error."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # file names may hold what no encoding can
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except OSError as error:
+        # What is still buffered goes nowhere: at exit Python would try, and complain, again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            raise UsageError(f"cannot write the result: {error.strerror}") from None
 
 
 @contextmanager
 def stage(text: str, seconds: dict[str, float], key: str) -> Iterator[None]:
     """Time a stage, with a spinner on stderr while it runs where that is a terminal."""
     began = time.perf_counter()
-    with Console(stderr=True).status(text):
+    with _spinner(text) if sys.stderr.isatty() else nullcontext():
         yield
-    seconds[key] = time.perf_counter() - began
+    seconds[key] = round(time.perf_counter() - began, 6)
+
+
+def _spinner(text: str) -> AbstractContextManager[object]:
+    from rich.console import Console  # noqa: PLC0415 - on demand
+    from rich.text import Text  # noqa: PLC0415
+
+    return Console(stderr=True).status(Text(text))
+
+
+def read_preset(source: str) -> Preset:
+    """A preset by name or file: an unknown name is wrong usage, a bad file unreadable input."""
+    try:
+        return load_preset(source)
+    except hn.PresetNotFoundError as error:
+        if is_preset_name(source):
+            raise UsageError(str(error)) from None
+        raise
 
 
 def read_settings(
@@ -41,7 +78,7 @@ def read_settings(
 
     An error in a preset file is the file's; one in an override is the caller's.
     """
-    plain = load_preset(preset)
+    plain = read_preset(preset)
     settings = list(overrides or ())
     if radius_m is not None:
         settings.append(f"pyramid.robot_radius_m={radius_m!r}")
@@ -51,6 +88,22 @@ def read_settings(
         return load_preset(plain, overrides=settings)
     except hn.PresetError as error:
         raise UsageError(str(error)) from None
+
+
+def check_picture(path: Path | None) -> None:
+    """Refuse a picture that could not be saved, before anything is computed for it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in _PICTURES:
+        raise UsageError(f"--plot must end in {', '.join(_PICTURES)}, got {str(path)!r}")
+    try:
+        in_folder, is_folder = path.parent.is_dir(), path.is_dir()
+    except OSError as error:  # a name that is too long
+        raise UsageError(f"--plot {str(path)!r}: {error.strerror}") from None
+    if not in_folder:
+        raise UsageError(f"--plot: there is no folder {str(path.parent)!r}")
+    if is_folder:
+        raise UsageError(f"--plot must name a file, {str(path)!r} is a folder")
 
 
 def grow_topology(path: Path, preset: Preset, seconds: dict[str, float]) -> hn.TopologicalMap:
@@ -66,3 +119,17 @@ def grow_topology(path: Path, preset: Preset, seconds: dict[str, float]) -> hn.T
             seed=settings.seed,
         )
     return hn.TopologicalMap(pyramid)
+
+
+def extent(grid: hn.OccupancyGrid) -> str:
+    """The part of the map frame that a map covers; with yaw, its bounding box."""
+    rows, cols = grid.shape
+    corners = grid.frame.points_of_grid(np.array([[0, 0], [0, cols], [rows, 0], [rows, cols]]))
+    low, high = (np.round(c, 2) + 0.0 for c in (corners.min(axis=0), corners.max(axis=0)))  # no -0
+    return f"x {low[0]:.2f} to {high[0]:.2f} m, y {low[1]:.2f} to {high[1]:.2f} m"
+
+
+def timings(seconds: dict[str, float]) -> str:
+    """Seconds per stage on one line, and their sum."""
+    stages = ", ".join(f"{stage} {s:.3f}" for stage, s in seconds.items())
+    return f"{sum(seconds.values()):.3f}: {stages}"

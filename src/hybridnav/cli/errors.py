@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hybridnav.errors import HybridNavError, MapError, PresetError, PresetNotFoundError
+from hybridnav.errors import HybridNavError, MapError, PresetError
 
 EXIT_SOLVED = 0
 EXIT_NOT_SOLVED = 1
@@ -16,6 +16,4 @@ class UsageError(HybridNavError):
 
 def exit_code(error: HybridNavError) -> int:
     """Exit code of a command that ended in this error."""
-    if isinstance(error, PresetNotFoundError) and "no preset is called" in str(error):
-        return EXIT_USAGE
     return EXIT_UNREADABLE if isinstance(error, (MapError, PresetError)) else EXIT_USAGE

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import hybridnav as hn
-from hybridnav.cli.common import grow_topology, read_settings, stage
+from hybridnav.cli.common import (
+    answer,
+    check_picture,
+    extent,
+    grow_topology,
+    read_settings,
+    stage,
+    timings,
+)
 from hybridnav.cli.errors import EXIT_NOT_SOLVED
 from hybridnav.cli.options import (
     JsonOption,
@@ -21,17 +28,20 @@ from hybridnav.cli.options import (
     SeedOption,
     SetOption,
 )
+from hybridnav.config.yaml_file import printable
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 Point = tuple[float, float]
 
+_OPTIMAL = 1e-9
+"""Gap of a path that equals its bound, lengths being sums of rounded numbers."""
+
 
 def _point(text: str) -> Point:
-    parts = text.split(",")
     try:
-        x, y = (float(part) for part in parts)
+        x, y = (float(part) for part in text.split(","))
     except ValueError:
         raise typer.BadParameter(f"expected X,Y in metres, got {text!r}") from None
     if not (math.isfinite(x) and math.isfinite(y)):
@@ -66,22 +76,23 @@ def plan(
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
+    check_picture(plot)
     settings = read_settings(preset, overrides, robot_radius_m, seed)
     seconds: dict[str, float] = {}
     topology = grow_topology(map_file, settings, seconds)
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=settings)
-    with stage("planning", seconds, "plan"):
-        result = planner.plan(start, goal)
-    answer = result.to_dict()
-    answer["map"] = str(map_file)
-    answer["seconds"] = {**seconds, **answer["seconds"]}
-    optimum_m = None
+    result = planner.plan(start, goal)
+    figures = result.to_dict() | {"map": str(map_file)}
+    figures["seconds"] = seconds | figures["seconds"]
     if compare:
-        optimum_m = _compare(topology, settings, (start, goal), answer)
+        figures |= _compare(topology, settings, (start, goal), result)
+    if as_json:
+        answer(json.dumps(figures, allow_nan=False) + "\n")
+    else:
+        answer(_summary(topology.grid, (start, goal), figures))
     if plot is not None:
-        _draw(topology, result, (start, goal), optimum_m, plot)
-    sys.stdout.write(json.dumps(answer) + "\n" if as_json else _summary(answer))
+        _draw(topology, result, (start, goal), figures.get("optimum_m"), plot)
     if not result.solved:
         raise typer.Exit(EXIT_NOT_SOLVED)
 
@@ -90,21 +101,23 @@ def _compare(
     topology: hn.TopologicalMap,
     settings: hn.Preset,
     ends: tuple[Point, Point],
-    answer: dict[str, Any],
-) -> float | None:
-    """Plan on the whole grid too, write its figures into the answer, give the optimum."""
+    result: hn.PlanResult,
+) -> dict[str, Any]:
+    """Plan on the whole grid too and set the result against it."""
     whole = settings.planner.model_copy(update={"coarse": "none"})
     baseline = settings.model_copy(update={"name": "grid-astar", "planner": whole})
     grid_result = hn.HybridPlanner(topology, preset=baseline).plan(*ends)
-    solved = grid_result.path is not None
-    answer["optimum_m"] = grid_result.cost if solved else None
-    answer["grid_expanded"] = grid_result.stats.expanded
-    answer["grid_seconds"] = round(sum(grid_result.stats.seconds.values()), 6)
-    answer["loss"] = None
-    if grid_result.path is not None and answer["length_m"] is not None:
-        optimum = grid_result.cost
-        answer["loss"] = answer["length_m"] / optimum - 1 if optimum > 0 else 0.0
-    return grid_result.cost if solved else None
+    optimum_m, loss = None, None
+    if grid_result.solved:
+        optimum_m = grid_result.cost
+        if result.solved:
+            loss = result.cost / optimum_m - 1 if optimum_m > 0 else 0.0
+    return {
+        "optimum_m": optimum_m,
+        "loss": loss,
+        "grid_expanded": grid_result.stats.expanded,
+        "grid_seconds": round(sum(grid_result.stats.seconds.values()), 6),
+    }
 
 
 def _draw(
@@ -120,23 +133,46 @@ def _draw(
     save_figure(ax, path)
 
 
-def _summary(answer: dict[str, Any]) -> str:
-    lines = [f"status     {answer['status']}"]
-    if answer["length_m"] is not None:
-        lines.append(f"length     {answer['length_m']:.2f} m ({answer['metric']})")
-        lines.append(
-            f"bound      {answer['lower_bound_m']:.2f} m, at most {answer['gap']:.1%} too long"
-        )
-    if answer["places"] is not None:
-        lines.append(f"places     {' '.join(map(str, answer['places']))}")
-        lines.append(f"arcs       {' '.join(map(str, answer['arcs']))}")
-    lines.append(f"expanded   {answer['expanded']} cells, {answer['expanded_places']} places")
-    if answer.get("loss") is not None:
-        lines.append(f"optimum    {answer['optimum_m']:.2f} m, loss {answer['loss']:.2%}")
-    if "grid_expanded" in answer:
-        lines.append(
-            f"grid       {answer['grid_expanded']} cells expanded, {answer['grid_seconds']:.4f} s"
-        )
-    stages = ", ".join(f"{stage} {s:.3f}" for stage, s in answer["seconds"].items())
-    lines.append(f"seconds    {stages}")
+def _summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str, Any]) -> str:
+    start, goal = (f"({x:.10g}, {y:.10g})" for x, y in ends)
+    radius = f"robot radius {grid.robot_radius_m:g} m"
+    lines = [
+        f"query      {printable(grid.name)}, {start} to {goal}, {radius}",
+        f"status     {figures['status']}",
+    ]
+    if "outside" in figures["status"]:
+        lines.append(f"extent     {extent(grid)}")
+    if figures["length_m"] is not None:
+        lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
+        lines.append(f"bound      {_bound(figures['lower_bound_m'], figures['gap'])}")
+    if figures["places"] is not None:
+        for key in ("places", "arcs"):
+            ids = figures[key]
+            lines.append(f"{key:<10} {len(ids)}: {' '.join(map(str, ids))}".rstrip(": "))
+    if figures["expanded"] or figures["expanded_places"]:
+        places = f", {n:,} places" if (n := figures["expanded_places"]) else ""
+        lines.append(f"expanded   {figures['expanded']:,} cells{places}")
+    lines += _comparison(figures)
+    lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"
+
+
+def _bound(lower_bound_m: float, gap: float) -> str:
+    """The certificate, rounded to the safe side."""
+    if gap <= _OPTIMAL:
+        return f"{lower_bound_m:.2f} m, the path is optimal"
+    low = math.floor(lower_bound_m * 100) / 100
+    return f"{low:.2f} m, the path is at most {math.ceil(gap * 1000) / 10:.1f} % too long"
+
+
+def _comparison(figures: dict[str, Any]) -> list[str]:
+    if "grid_expanded" not in figures:
+        return []
+    if figures["optimum_m"] is None:
+        return ["optimum    none, the whole grid has no path either"]
+    loss = f", loss {figures['loss'] * 100:.2f} %" if figures["loss"] is not None else ""
+    cells, seconds = figures["grid_expanded"], figures["grid_seconds"]
+    return [
+        f"optimum    {figures['optimum_m']:.2f} m{loss}",
+        f"grid       {cells:,} cells expanded on the whole map, {seconds:.3f} s",
+    ]

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 
-from hybridnav.cli.common import grow_topology, read_settings
+from hybridnav.cli.common import (
+    answer,
+    check_picture,
+    extent,
+    grow_topology,
+    read_settings,
+    timings,
+)
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
     MapArgument,
@@ -17,12 +24,17 @@ from hybridnav.cli.options import (
     SeedOption,
     SetOption,
 )
+from hybridnav.config.yaml_file import printable
+from hybridnav.grid import CellClass
 
 if TYPE_CHECKING:
     import hybridnav as hn
 
 LevelOption = Annotated[
-    int, typer.Option("--level", metavar="N", help="Level to draw: 0 the base, -1 the apex.")
+    int,
+    typer.Option(
+        "--level", metavar="N", help="Level to describe and draw: 0 the base, -1 the apex."
+    ),
 ]
 
 
@@ -36,37 +48,60 @@ def show(
     plot: PlotOption = None,
 ) -> None:
     """Show the classes of MAP's cells and the levels of its pyramid."""
+    check_picture(plot)
     settings = read_settings(preset, overrides, robot_radius_m, seed)
     seconds: dict[str, float] = {}
-    topology = grow_topology(map_file, settings, seconds)
-    pyramid = topology.pyramid
+    pyramid = grow_topology(map_file, settings, seconds).pyramid
     if not -len(pyramid) <= level < len(pyramid):
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
-    sys.stdout.write(_describe(topology, pyramid[level].index, seconds))
+    seconds = {"load": seconds["load"], **pyramid.stats.seconds}
+    shown = pyramid[level]
+    parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), _describe_level(shown)]
+    answer("\n\n".join(parts) + f"\nseconds    {timings(seconds)}\n")
     if plot is not None:
         from hybridnav.viz import plot_level, save_figure  # noqa: PLC0415 - matplotlib on demand
 
-        save_figure(plot_level(pyramid[level]), plot)
+        save_figure(plot_level(shown), plot)
 
 
-def _describe(topology: hn.TopologicalMap, level: int, seconds: dict[str, float]) -> str:
-    grid, pyramid = topology.grid, topology.pyramid
+def _describe_map(pyramid: hn.DualGraphPyramid) -> str:
+    grid = pyramid.grid
     rows, cols = grid.shape
+    size = f"{cols} x {rows} cells of {grid.resolution_m:g} m"
     size_m = f"{cols * grid.resolution_m:.2f} x {rows * grid.resolution_m:.2f} m"
-    lines = [
-        f"map        {grid.name}: {rows} x {cols} cells of {grid.resolution_m:g} m, {size_m}",
-        "cells      " + ", ".join(f"{n} {name}" for name, n in grid.class_counts().items()),
-        f"pyramid    U_d {pyramid.merge_distance_m:g} m, {pyramid.linkage}, seed {pyramid.seed}",
-        "",
-        f"{'level':>5} {'vertices':>10} {'arcs':>10} {'self-loops':>10} {'factor':>7}",
-    ]
-    sizes = pyramid.stats.sizes
-    for index, size in enumerate(sizes):
-        factor = f"{sizes[index - 1].vertices / size.vertices:.2f}" if index else ""
-        mark = " <" if index == level else ""
-        counts = f"{size.vertices:>10} {size.arcs:>10} {size.self_loops:>10}"
-        lines.append(f"{index:>5} {counts} {factor:>7}{mark}")
-    lines += ["", f"parallel   {topology.parallel_arcs()} arcs that a simple graph would lose"]
-    timings = {"load": seconds["load"], **pyramid.stats.seconds}
-    lines.append("seconds    " + ", ".join(f"{key} {s:.3f}" for key, s in timings.items()))
-    return "\n".join(lines) + "\n"
+    counts = ", ".join(f"{n:,} {name}" for name, n in grid.class_counts().items())
+    built = f"linkage {pyramid.linkage}, seed {pyramid.seed}"
+    return "\n".join(
+        [
+            f"map        {printable(grid.name)}, {size}, {size_m}",
+            f"extent     {extent(grid)}",
+            f"cells      {counts} by a robot radius of {grid.robot_radius_m:g} m",
+            f"pyramid    U_d {pyramid.merge_distance_m:g} m, {built}",
+        ]
+    )
+
+
+def _describe_levels(pyramid: hn.DualGraphPyramid, shown: hn.Level) -> str:
+    """A table of all levels; `factor` is how many times fewer vertices than one level down."""
+    lines = [f"{'level':>5} {'vertices':>12} {'arcs':>12} {'self-loops':>12} {'factor':>7}"]
+    below = None
+    for index, size in enumerate(pyramid.stats.sizes):
+        factor = f"{below / size.vertices:.2f}" if below else ""
+        mark = " <" if index == shown.index else ""
+        counts = f"{size.vertices:>12,} {size.arcs:>12,} {size.self_loops:>12,}"
+        lines.append(f"{index:>5} {counts} {factor:>7}{mark}".rstrip())
+        below = size.vertices
+    return "\n".join(lines)
+
+
+def _describe_level(level: hn.Level) -> str:
+    """One line on a level; a simple graph would lose its parallel arcs: second doors."""
+    free = int(np.count_nonzero(level.classes == CellClass.FREE))
+    largest_m2 = int(level.areas.max(initial=0)) * level.grid.resolution_m**2
+    plain = np.sort(level.arcs[~level.is_self_loop], axis=1)
+    parallel = len(plain) - len(np.unique(plain, axis=0))
+    vertices = f"{free:,} free and {level.n_vertices - free:,} unexplored vertices"
+    return (
+        f"level {level.index:<4} {vertices}, "
+        f"the largest of {largest_m2:.2f} m²; {parallel:,} parallel arcs"
+    )

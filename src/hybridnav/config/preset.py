@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
+import os
+import reprlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
-from hybridnav.config.yaml_file import read_yaml
+from hybridnav.config.yaml_file import printable, read_yaml
 from hybridnav.errors import PresetError, PresetNotFoundError
 
 if TYPE_CHECKING:
@@ -21,6 +23,20 @@ _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")
 """Where presets are: inside an installed package, or beside `src` in a checkout."""
 
+_MAX_SHOWN = 80
+"""Characters of a setting that a message quotes."""
+
+
+def _no_boolean(value: Any) -> Any:
+    """Refuse a YAML `yes` or `on` where a number belongs; Python would call it 1."""
+    if isinstance(value, bool):
+        raise PydanticCustomError("number_type", "input should be a number")
+    return value
+
+
+_Float = Annotated[float, BeforeValidator(_no_boolean)]
+_Int = Annotated[int, BeforeValidator(_no_boolean)]
+
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=True)
@@ -29,13 +45,13 @@ class _Section(BaseModel):
 class PyramidSettings(_Section):
     """Section `pyramid`: how the map is inflated and contracted."""
 
-    merge_distance_m: Annotated[float, Field(gt=0)] = 4.0
+    merge_distance_m: Annotated[_Float, Field(gt=0)] = 4.0
     """U_d in metres, infinity (.inf) allowed."""
     linkage: Literal["radius"] = "radius"
     """What stays below U_d."""
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    seed: Annotated[_Int, Field(ge=0, lt=2**32)] = 0
     """Breaks ties."""
-    robot_radius_m: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.25
+    robot_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 0.25
     """Radius by which occupied cells are inflated, in metres."""
 
 
@@ -62,8 +78,10 @@ class Preset(_Section):
 
     def to_yaml(self) -> str:
         """The preset as a YAML file would give it, every key present."""
+        # Unless it escapes them, PyYAML reads back line breaks such as U+0085 as spaces.
+        plain = self.description.isprintable()
         text: str = yaml.safe_dump(
-            self.model_dump(exclude={"name"}), sort_keys=False, allow_unicode=True
+            self.model_dump(exclude={"name"}), sort_keys=False, allow_unicode=plain
         )
         return text
 
@@ -71,6 +89,24 @@ class Preset(_Section):
 def preset_names() -> list[str]:
     """Names of the presets that come with the package, in alphabetical order."""
     return sorted({file.stem for folder in _FOLDERS for file in folder.glob("*.yaml")})
+
+
+def is_preset_name(source: PathLike) -> bool:
+    """Whether this is the name of a preset; with a suffix or a separator it is a path.
+
+    Parameters
+    ----------
+    source
+        What was given for a preset.
+
+    Returns
+    -------
+    bool
+        Whether it is a name; there need not be such a preset.
+    """
+    text = os.fspath(source)
+    separators = [mark for mark in (os.sep, os.altsep) if mark is not None]
+    return not Path(text).suffix and not any(mark in text for mark in separators)
 
 
 def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> Preset:
@@ -84,6 +120,11 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     overrides
         Settings that win over the file, each `section.key=value`, the value in YAML.
 
+    Returns
+    -------
+    Preset
+        Named after its file.
+
     Raises
     ------
     PresetNotFoundError
@@ -91,34 +132,30 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     PresetError
         When a key is unknown or a value is out of range; names the key and where it stands.
     """
-    if isinstance(source, Preset):
-        tree, name, where = source.model_dump(exclude={"name"}), source.name, source.name
-    else:
-        path = _find(source)
-        tree, name, where = _read(path), path.stem, str(path)
+    preset = source if isinstance(source, Preset) else _read(_find(source))
+    tree = preset.model_dump()
     for override in overrides:
         _apply(tree, override)
+        preset = _checked(tree, where="setting ")
+    return preset
+
+
+def _read(path: Path) -> Preset:
+    tree = read_yaml(path, what="preset", error=PresetError, missing=PresetNotFoundError)
+    where = f"preset {printable(path)}: "
     if "name" in tree:
-        raise PresetError(f"{where}: name: a preset is named after its file, remove this key")
-    try:
-        return Preset.model_validate({**tree, "name": name})
-    except ValidationError as error:
-        raise PresetError(f"{where}: {_first_problem(error)}") from None
-
-
-def _read(path: Path) -> dict[str, Any]:
-    return read_yaml(path, what="preset", error=PresetError, missing=PresetNotFoundError)
+        raise PresetError(f"{where}name: a preset is named after its file, remove this key")
+    return _checked({**tree, "name": path.stem}, where=where)
 
 
 def _find(source: PathLike) -> Path:
-    path = Path(source)
-    if path.suffix or len(path.parts) != 1:
-        return path
-    for folder in _FOLDERS:
-        if (file := folder / f"{path.name}.yaml").is_file():
-            return file
+    if not is_preset_name(source):
+        return Path(source)
+    name = os.fspath(source)
+    if name in preset_names():
+        return next(file for f in _FOLDERS if (file := f / f"{name}.yaml").is_file())
     raise PresetNotFoundError(
-        f"no preset is called {path.name!r}: there are {', '.join(preset_names())}; "
+        f"no preset is called {name!r}: there are {', '.join(preset_names())}; "
         "a file is given by its path, with .yaml"
     )
 
@@ -126,27 +163,39 @@ def _find(source: PathLike) -> Path:
 def _apply(tree: dict[str, Any], override: str) -> None:
     key, equals, text = override.partition("=")
     section, dot, name = key.strip().partition(".")
-    if not (equals and dot and section and name):
-        raise PresetError(f"a setting reads section.key=value, got {override!r}")
+    if not (equals and dot and name and isinstance(tree.get(section), dict)):
+        sections = " or ".join(key for key, value in tree.items() if isinstance(value, dict))
+        raise PresetError(
+            f"setting {override[:_MAX_SHOWN]!r}: expected section.key=value, section {sections}"
+        )
     try:
-        value = yaml.safe_load(text)
+        tree[section][name] = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError):
-        raise PresetError(f"{key}: the value is not YAML: {text[:80]!r}") from None
-    target = tree.setdefault(section, {})
-    if not isinstance(target, dict):
-        raise PresetError(f"{section}: expected a section with keys, got {target!r:.80}")
-    target[name] = value
+        raise PresetError(
+            f"setting {printable(key)}: the value is not YAML: {text[:_MAX_SHOWN]!r}"
+        ) from None
+
+
+def _checked(tree: dict[str, Any], *, where: str) -> Preset:
+    try:
+        return Preset.model_validate(tree)
+    except ValidationError as error:
+        raise PresetError(f"{where}{_first_problem(error)}") from None
 
 
 def _first_problem(error: ValidationError) -> str:
     problem = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in problem["loc"]) or "preset"
-    given = problem["input"]
+    place, given = problem["loc"], problem["input"]
+    key = printable(".".join(map(str, place)))
     if problem["type"] == "extra_forbidden":
-        return f"{key}: unknown key; {_known_keys(problem['loc'][:-1])}"
-    if isinstance(given, float) and math.isnan(given):
-        given = "nan"
-    return f"{key}: {problem['msg'][0].lower()}{problem['msg'][1:]}, got {str(given)[:80]!r}"
+        return f"{key}: unknown key; {_known_keys(place[:-1])}"
+    if problem["type"] == "model_type":
+        expected = "expected a section with keys"
+    else:
+        text = problem["msg"].partition(", unable to")[0].partition(", got")[0]
+        expected = text[:1].lower() + text[1:]
+    shown = "nothing" if given is None else reprlib.repr(given)
+    return f"{key}: {expected.removeprefix('input ')}, got {shown}"
 
 
 def _known_keys(section: tuple[int | str, ...]) -> str:
