@@ -422,6 +422,19 @@ def test_a_result_is_json(build: dict[str, Any], goal: tuple[float, float]) -> N
     assert set(read["seconds"]) == {"coarse", "refine"}
 
 
+def test_numbers_of_numpy_give_the_answers_of_plain_ones() -> None:
+    answers = []
+    for number in (float, np.float32):
+        frame = hn.Frame(resolution_m=number(0.0625), origin_m=(number(0.5), number(0.0)))
+        grid = hn.OccupancyGrid(
+            np.zeros((5, 9), dtype=np.float32), frame=frame, robot_radius_m=number(0.25)
+        )
+        result = hn.HybridPlanner(map_of(grid)).plan((0.51, 0.01), (1.0, 0.2))
+        answers.append(without_seconds(result))
+        json.dumps(result.to_dict(), allow_nan=False)
+    assert answers[0] == answers[1]
+
+
 def test_results_are_values_that_nobody_can_change() -> None:
     planner = hn.HybridPlanner(map_of(SEALED))
     result = planner.plan((0.5, 0.5), (8.5, 0.5))

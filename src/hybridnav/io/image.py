@@ -81,6 +81,8 @@ def read_raster(path: PathLike, *, what: str) -> Raster:
             return _decode(image)
         except _UnsupportedPixelsError as failure:
             raise MapError(f"{where}: {failure}") from None
+        except MemoryError:
+            raise  # the machine's fault, not the file's
         except Exception as failure:  # noqa: BLE001 - Pillow's decoders raise anything
             raise MapError(f"{where}: damaged or truncated ({_brief(failure)})") from None
 
