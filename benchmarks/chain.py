@@ -70,7 +70,11 @@ def _stages(pyramid: hn.DualGraphPyramid) -> str:
 
 def search_table(maps: list[Path], pairs: int, seed: int) -> None:
     """Pure grid A* against pyastar2d, both from cells to cells, on the same pairs, interleaved."""
-    import pyastar2d  # noqa: PLC0415 - an extra
+    try:
+        import pyastar2d  # noqa: PLC0415 - an extra
+    except ModuleNotFoundError:
+        print('## Grid A*: not measured, pyastar2d is missing (pip install -e ".[bench]")\n')
+        return
 
     print(f"## Grid A* against pyastar2d, {pairs} pairs a map in the largest free component\n")
     print("| map | free cells | A*, ms median | pyastar2d, ms median | ratio, median |")

@@ -424,7 +424,8 @@ def test_a_result_is_json(build: dict[str, Any], goal: tuple[float, float]) -> N
 
 def test_numbers_of_numpy_give_the_answers_of_plain_ones() -> None:
     answers = []
-    for number in (float, np.float32):
+    kinds: tuple[Any, ...] = (float, np.float32)
+    for number in kinds:
         frame = hn.Frame(resolution_m=number(0.0625), origin_m=(number(0.5), number(0.0)))
         grid = hn.OccupancyGrid(
             np.zeros((5, 9), dtype=np.float32), frame=frame, robot_radius_m=number(0.25)

@@ -62,7 +62,7 @@ class OccupancyGrid:
         a threshold or the radius is out of range.
     """
 
-    probability: NDArray[np.float32]
+    probability: NDArray[np.float32] = field(repr=False)
     frame: Frame = field(default_factory=Frame)
     free_threshold: float = 0.196
     occupied_threshold: float = 0.65

@@ -41,6 +41,9 @@ class Level:
         """The map it was grown from."""
         return self._grid
 
+    def __repr__(self) -> str:
+        return f"Level(index={self.index}, n_vertices={self.n_vertices}, n_arcs={self.n_arcs})"
+
     @cached_property
     def _labels(self) -> tuple[IntArray, LongArray]:
         record = self._record

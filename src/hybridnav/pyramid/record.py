@@ -17,7 +17,7 @@ MAX_LEVELS = 126
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """When and how each vertex and edge of the base goes: 10 bytes a cell.
+    """When and how each vertex and edge of the base goes: 7 bytes a cell.
 
     All arrays are flat, in the order of cells (row-major) and of base edges (two a cell).
     """

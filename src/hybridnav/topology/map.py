@@ -35,6 +35,9 @@ class TopologicalMap:
         self.place_ids.flags.writeable = False
         self.arc_ids.flags.writeable = False
 
+    def __repr__(self) -> str:
+        return f"TopologicalMap(n_places={self.n_places}, n_arcs={self.n_arcs})"
+
     @property
     def grid(self) -> OccupancyGrid:
         """The map it was grown from."""

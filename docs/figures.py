@@ -1,0 +1,49 @@
+"""Draw the pictures that the pages show: `.venv/bin/python docs/figures.py`."""  # noqa: INP001 - a script
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from PIL import Image
+
+import hybridnav as hn
+from hybridnav.viz import plot_level, save_figure
+
+ROOT = Path(__file__).parents[1]
+IMAGES = ROOT / "docs" / "images"
+OFFICE = ROOT / "maps" / "office" / "office.yaml"
+LEVELS = (6, 8, 10, -1)
+
+
+def draw_route(file: Path) -> None:
+    """Draw what `make route` draws, with its command."""
+    command = [sys.executable, "-m", "hybridnav", "plan", str(OFFICE)]
+    command += ["--start", "1.0,13.2", "--goal", "40.6,19.4", "--compare", "--plot", str(file)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own command
+
+
+def draw_levels(file: Path) -> None:
+    """Draw four levels of the office's pyramid, fine to coarse."""
+    pyramid = hn.DualGraphPyramid.build(hn.load_map(OFFICE, robot_radius_m=0.25))
+    figure = Figure(figsize=(10, 7.2), layout="constrained")
+    for ax, level in zip(figure.subplots(2, 2).flat, LEVELS, strict=True):
+        plot_level(pyramid[level], ax=ax)
+        ax.set(xlabel="", ylabel="")
+    for ax in figure.axes[:2]:  # one legend under each column is enough
+        ax.get_legend().remove()
+    save_figure(figure, file, dpi=110)
+
+
+def shrink(file: Path) -> None:
+    """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
+    with Image.open(file) as image:
+        image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(file, optimize=True)
+
+
+if __name__ == "__main__":
+    for draw, name in ((draw_route, "office-route.png"), (draw_levels, "office-levels.png")):
+        draw(IMAGES / name)
+        shrink(IMAGES / name)
