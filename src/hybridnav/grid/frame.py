@@ -43,6 +43,11 @@ class Frame:
     yaw_rad: float = 0.0
 
     def __post_init__(self) -> None:
+        # Numbers of numpy may be float32, which would spoil every length made from them.
+        x, y = self.origin_m
+        object.__setattr__(self, "resolution_m", float(self.resolution_m))
+        object.__setattr__(self, "origin_m", (float(x), float(y)))
+        object.__setattr__(self, "yaw_rad", float(self.yaw_rad))
         if not (math.isfinite(self.resolution_m) and self.resolution_m > 0):
             raise InvalidValueError(
                 f"resolution must be a positive number of metres, got {self.resolution_m}"

@@ -76,6 +76,8 @@ class OccupancyGrid:
     def __post_init__(self) -> None:
         probability = np.array(self.probability, dtype=np.float32, order="C")
         _check_probability(probability)
+        for name in ("free_threshold", "occupied_threshold", "robot_radius_m"):
+            object.__setattr__(self, name, float(getattr(self, name)))
         low, high = self.free_threshold, self.occupied_threshold
         if not 0 <= low < high <= 1:
             raise InvalidValueError(

@@ -133,8 +133,8 @@ class HybridPlanner:
         route = self._coarse.search(topology.place_at(start), topology.place_at(goal))
         if route is None:
             return None, None, False
-        neighbours = self.preset.planner.corridor == "neighbours"
-        return route, corridor_of(topology, route.places, neighbours=neighbours), True
+        beside = self._coarse.enterable if self.preset.planner.corridor == "neighbours" else None
+        return route, corridor_of(topology, route.places, neighbours=beside), True
 
     def _route(self, coarse: CoarseRoute | None) -> Route | None:
         if coarse is None:

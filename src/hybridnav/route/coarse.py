@@ -51,9 +51,9 @@ class MaxDistanceSearch:
         self._arcs = level.arcs
         self._cost = level.max_distance_m
         self._tie = level.through_m
-        self._allowed: BoolArray = level.classes == CellClass.FREE
+        self.enterable: BoolArray = level.classes == CellClass.FREE
         if allow_unexplored:
-            self._allowed = np.ones_like(self._allowed)
+            self.enterable = np.ones_like(self.enterable)
 
     def search(self, start: int, goal: int) -> CoarseRoute | None:
         """Cheapest route between two places.
@@ -74,7 +74,7 @@ class MaxDistanceSearch:
             self._arc,
             self._cost,
             self._tie,
-            self._allowed,
+            self.enterable,
             start,
             goal,
         )

@@ -30,7 +30,7 @@ class Corridor:
 
 
 def corridor_of(
-    topology: TopologicalMap, places: LongArray, *, neighbours: bool = False
+    topology: TopologicalMap, places: LongArray, *, neighbours: BoolArray | None = None
 ) -> Corridor:
     """Receptive fields of the places of a route.
 
@@ -41,11 +41,14 @@ def corridor_of(
     places
         Dense indices of the route's places.
     neighbours
-        Also the places that an arc joins to one of them.
+        bool (n_places,), places to take in too where an arc joins them to the route; None for
+        the route alone.
     """
     inside = np.zeros(topology.n_places, dtype=np.bool_)
     inside[places] = True
-    if neighbours:
+    if neighbours is not None:
         touched = inside[topology.arcs].any(axis=1)
-        inside[topology.arcs[touched].ravel()] = True
+        beside = np.zeros_like(inside)
+        beside[topology.arcs[touched].ravel()] = True
+        inside |= beside & neighbours
     return Corridor(topology.level.field_of, inside, int(topology.level.areas[inside].sum()))
