@@ -26,7 +26,7 @@ from tests.oracle.pyramid import Base, Dart
 from tests.oracle.reference import PlaneMap
 from tests.strategies import MAX_SIDE, Scene, drawn, occupancy_grid, scenes
 
-LINKAGES = ("radius",)
+LINKAGES = ("radius", "survivor", "diameter")
 ORDINARY = settings(max_examples=150, deadline=None, derandomize=True)
 MANY = settings(max_examples=3000, deadline=None)
 ARRAYS = (

@@ -47,7 +47,7 @@ class PyramidSettings(_Section):
 
     merge_distance_m: Annotated[_Float, Field(gt=0)] = 4.0
     """U_d in metres, infinity (.inf) allowed."""
-    linkage: Literal["radius"] = "radius"
+    linkage: Literal["survivor", "radius", "diameter"] = "radius"
     """What stays below U_d."""
     seed: Annotated[_Int, Field(ge=0, lt=2**32)] = 0
     """Breaks ties."""

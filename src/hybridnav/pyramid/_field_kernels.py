@@ -249,27 +249,36 @@ def find_cracks(field_of, rows, cols):
 
 
 @njit(cache=True)
+def next_at_cell(cell, direction, edge_end, cols):
+    """First dart of a base cell counter-clockwise after a direction (0 east to 3 south), else -1.
+
+    Darts of the base are 2 * base edge + side; the full turn ends with the direction itself.
+    """
+    for i in range(1, 5):
+        turned = (direction + i) & 3
+        if turned == 0:
+            dart = 4 * cell
+        elif turned == 1:
+            dart = 4 * cell + 2
+        elif turned == 2:
+            dart = 4 * (cell - 1) + 1
+        else:
+            dart = 4 * (cell - cols) + 3
+        if dart >= 0 and edge_end[dart >> 1] != 0:
+            return dart
+    return -1
+
+
+@njit(cache=True)
 def base_sigma(dart, edge_end, cols):
-    """Next dart counter-clockwise in the base, where darts are 2 * base edge + side."""
+    """Next dart counter-clockwise in the base."""
     edge = dart >> 1
     cell = edge >> 1
     direction = edge & 1  # 0 east, 1 north of the lower cell
     if dart & 1:
         cell += cols if direction else 1
         direction += 2
-    for i in range(1, 5):
-        turned = (direction + i) & 3
-        if turned == 0:
-            step = 4 * cell
-        elif turned == 1:
-            step = 4 * cell + 2
-        elif turned == 2:
-            step = 4 * (cell - 1) + 1
-        else:
-            step = 4 * (cell - cols) + 3
-        if step >= 0 and edge_end[step >> 1] != 0:
-            return step
-    return dart
+    return next_at_cell(cell, direction, edge_end, cols)
 
 
 @njit(cache=True)
@@ -387,3 +396,25 @@ def loop_line(base_edge, field_of, edge_end, level, rows, cols):
             corner = parent_corner[corner]
         line = np.concatenate((line, steps[:count]))
     return np.concatenate((line, np.array([base_edge], np.int64)))
+
+
+@njit(cache=True)
+def darts_at_corners(cells, direction, edges, edge_end, level, cols):
+    """Dart of a level on whose face a direction at each cell points, -1 where there is none.
+
+    `direction` is 0 east to 3 south, and no vertex lies there: the corner it points into belongs
+    to one face of the base. The walk goes on counter-clockwise round the vertex of the level to
+    the dart that follows the corner, and that dart bounds the same face.
+    """
+    found = np.full(cells.size, np.int64(-1), np.int64)
+    for i in range(cells.size):
+        first = next_at_cell(cells[i], direction, edge_end, cols)
+        dart = first
+        while dart >= 0 and edge_end[dart >> 1] < 2 * level + 2:
+            removed = edge_end[dart >> 1] & 1
+            dart = base_sigma(dart if removed else dart ^ 1, edge_end, cols)
+            if dart == first:
+                dart = -1
+        if dart >= 0:
+            found[i] = 2 * np.searchsorted(edges, dart >> 1) + (dart & 1)
+    return found

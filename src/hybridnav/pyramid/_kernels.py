@@ -14,6 +14,9 @@ FIRST_MAY_SURVIVE = 1
 SECOND_MAY_SURVIVE = 2
 EITHER_MAY_SURVIVE = 3
 
+SURVIVOR, RADIUS, DIAMETER = 0, 1, 2
+"""Linkages: what stays below the limit."""
+
 UNDECIDED = -1
 """Count that says: a bounding box cannot decide an edge, hulls are needed."""
 
@@ -104,12 +107,34 @@ def field_within(cells, u, hull_start, hull_points, v, limit):
 
 
 @njit(cache=True)
-def ways_of(u, v, cells, boxes, hull_start, hull_points, limit):
-    """Which of two vertices may survive their merging (linkage "radius"), or UNDECIDED."""
+def near_enough(u, v, hull_start, hull_points, limit):
+    """Whether every two cells of two fields lie nearer to each other than the limit."""
+    for i in range(hull_start[u], hull_start[u + 1]):
+        for j in range(hull_start[v], hull_start[v + 1]):
+            rows = np.int64(hull_points[i, 0] - hull_points[j, 0])
+            cols = np.int64(hull_points[i, 1] - hull_points[j, 1])
+            if rows * rows + cols * cols >= limit:
+                return False
+    return True
+
+
+@njit(cache=True)
+def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
+    """Which of two vertices may survive their merging, or UNDECIDED.
+
+    For fields whose common box is too large to decide: the caller has looked at it.
+    """
     rows = np.int64(cells[u, 0] - cells[v, 0])
     cols = np.int64(cells[u, 1] - cells[v, 1])
     if rows * rows + cols * cols >= limit:
         return 0
+    if linkage == SURVIVOR:
+        return EITHER_MAY_SURVIVE
+    if linkage == DIAMETER:
+        if hull_start.size == 0:
+            return UNDECIDED
+        near = near_enough(u, v, hull_start, hull_points, limit)
+        return EITHER_MAY_SURVIVE if near else 0
     way = 0
     if far_corner(cells, u, boxes, v) < limit:
         way |= FIRST_MAY_SURVIVE
@@ -127,7 +152,7 @@ def ways_of(u, v, cells, boxes, hull_start, hull_points, limit):
 
 
 @njit(cache=True)
-def contractible(origin, base_edge, vertices, hulls, limit, seed, out):
+def contractible(origin, base_edge, vertices, hulls, linkage, limit, seed, out):
     """Fill `out` with the contractible edges; gives their number, or UNDECIDED without hulls.
 
     The attribute by which edges are matched is the longer side of the box round both fields:
@@ -138,6 +163,9 @@ def contractible(origin, base_edge, vertices, hulls, limit, seed, out):
     hull_start, hull_points = hulls
     out_first, out_second, out_edge, out_key, out_way = out
     count = 0
+    # Two leaves of a star can lie twice as far apart as a leaf and its centre: from there on hulls
+    # must decide about diameters.
+    spread = 4 if linkage == DIAMETER and hull_start.size == 0 else 1
     for e in range(base_edge.size):
         u = origin[2 * e]
         v = origin[2 * e + 1]
@@ -146,8 +174,8 @@ def contractible(origin, base_edge, vertices, hulls, limit, seed, out):
         height = np.int64(max(boxes[u, 2], boxes[v, 2]) - min(boxes[u, 0], boxes[v, 0]))
         width = np.int64(max(boxes[u, 3], boxes[v, 3]) - min(boxes[u, 1], boxes[v, 1]))
         way = EITHER_MAY_SURVIVE
-        if height * height + width * width >= limit:
-            way = ways_of(u, v, cells, boxes, hull_start, hull_points, limit)
+        if spread * (height * height + width * width) >= limit:
+            way = ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit)
             if way == UNDECIDED:
                 return UNDECIDED
             if way == 0:
@@ -231,6 +259,33 @@ def join_leaves(candidates, matched, parent, kernel_dart):
             best[u] = keys[k]
             parent[u] = v
             kernel_dart[u] = 2 * edge[k] + 1
+
+
+@njit(cache=True)
+def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
+    """Undo the joins that would make a star's field wider than the limit (linkage "diameter").
+
+    A pair of fields that fits does not make the union fit: each leaf is checked against the leaves
+    that its star already has, matched ones first, then in the order of vertices. The first leaf of
+    a star always stays.
+    """
+    hull_start, hull_points = hulls
+    last_leaf = np.full(parent.size, np.int32(-1), np.int32)
+    leaf_before = np.full(parent.size, np.int32(-1), np.int32)
+    for matched_ones in (True, False):
+        for v in range(parent.size):
+            p = parent[v]
+            if p == v or (matched[v] >= 0) != matched_ones:
+                continue
+            leaf = last_leaf[p]
+            while leaf >= 0 and near_enough(v, leaf, hull_start, hull_points, limit):
+                leaf = leaf_before[leaf]
+            if leaf >= 0:
+                parent[v] = v
+                kernel_dart[v] = -1
+            else:
+                leaf_before[v] = last_leaf[p]
+                last_leaf[p] = v
 
 
 @njit(cache=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -21,6 +21,14 @@ from hybridnav.pyramid.record import MAX_LEVELS, SURVIVES, BuildStats, LevelSize
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, IntArray
 
+Linkage = Literal["survivor", "radius", "diameter"]
+
+_LINKAGES: dict[Linkage, int] = {
+    "survivor": _kernels.SURVIVOR,
+    "radius": _kernels.RADIUS,
+    "diameter": _kernels.DIAMETER,
+}
+
 _ROUNDING = 1e-9
 
 
@@ -30,19 +38,23 @@ def squared_limit(merge_distance_m: float, resolution_m: float) -> int:
     return math.ceil(min(ratio * ratio * (1 - _ROUNDING), 2.0**62))
 
 
-def decimate(classes: ByteArray, *, limit: int, seed: int) -> tuple[Record, BuildStats]:
+def decimate(
+    classes: ByteArray, *, linkage: Linkage, limit: int, seed: int
+) -> tuple[Record, BuildStats]:
     """Contract stars level by level until no edge may be contracted.
 
     Parameters
     ----------
     classes
         uint8 `CellClass`, shape `(rows, cols)`.
+    linkage
+        What stays below the limit.
     limit
         See `squared_limit`.
     seed
         Breaks ties between edges of equal attribute.
     """
-    run = _Decimation(classes, limit, seed)
+    run = _Decimation(classes, _LINKAGES[linkage], limit, seed)
     while run.step():
         pass
     return run.record, run.stats
@@ -51,10 +63,11 @@ def decimate(classes: ByteArray, *, limit: int, seed: int) -> tuple[Record, Buil
 class _Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
-    def __init__(self, classes: ByteArray, limit: int, seed: int) -> None:
+    def __init__(self, classes: ByteArray, linkage: int, limit: int, seed: int) -> None:
         self.stats = BuildStats()
         self._began = time.perf_counter()
         self._cols = classes.shape[1]
+        self._linkage = linkage
         self._limit = limit
         self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
         vertex, edge, n_vertices, n_edges = dart_kernels.number_base(classes)
@@ -96,6 +109,8 @@ class _Decimation:
         matched = _kernels.match(candidates, len(self._vertices.cells))
         self._lap("matching")
         parent, kernel_dart = _kernels.select_stars(candidates, matched, self._vertices)
+        if self._linkage == _kernels.DIAMETER and len(self._hulls.start):
+            _kernels.refuse_leaves(parent, kernel_dart, matched, self._hulls, self._limit)
         self._lap("stars")
         self._merge_vertices(parent)
         self._lap("vertices")
@@ -128,6 +143,7 @@ class _Decimation:
                     self._darts.base_edge,
                     self._vertices,
                     self._hulls,
+                    self._linkage,
                     self._limit,
                     self._seed,
                     self._candidates,

@@ -10,16 +10,22 @@ import numpy as np
 from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels
+from hybridnav.pyramid.dual import DualGraph
 from hybridnav.pyramid.record import SURVIVES
 from hybridnav.search import _kernels as search_kernels
 from hybridnav.search._costs import STRAIGHT
 from hybridnav.search.octile import length_in_cells
 
+_SOUTH = 3
+
 _Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import Record
 
 
@@ -31,10 +37,13 @@ class Level:
     arrays are not writeable.
     """
 
-    def __init__(self, grid: OccupancyGrid, record: Record, index: int) -> None:
+    def __init__(
+        self, grid: OccupancyGrid, record: Record, index: int, islands: Callable[[], Islands]
+    ) -> None:
         self.index = index
         self._grid = grid
         self._record = record
+        self._islands = islands
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -139,6 +148,38 @@ class Level:
     def protected(self) -> BoolArray:
         """bool (2 n_arcs,), whether the face on the right of each dart is protected."""
         return self.darts.protected
+
+    def face_darts(self, cells: LongArray, direction: int) -> LongArray:
+        """One dart on the face that a direction at each cell points into.
+
+        Parameters
+        ----------
+        cells
+            int64 (n,), flat cells that are vertices of the base.
+        direction
+            0 east, 1 north, 2 west, 3 south; no vertex lies there.
+
+        Returns
+        -------
+        LongArray
+            int64 (n,), -1 where the vertex that holds the cell has no arc.
+        """
+        found: LongArray = _field_kernels.darts_at_corners(
+            cells,
+            direction,
+            self.base_edges,
+            self._record.edge_end,
+            self.index,
+            self._grid.shape[1],
+        )
+        return found
+
+    @cached_property
+    def dual(self) -> DualGraph:
+        """The dual graph: faces, their kinds, and the dual edge of each arc."""
+        # South of the first cell of a component, in the order of rows, lies what surrounds it.
+        outer = self.face_darts(self._islands().component_cell, _SOUTH)
+        return DualGraph.of_map(self.darts, outer[outer >= 0])
 
     @cached_property
     def max_distance_m(self) -> FloatArray:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, get_args, overload
+from functools import cached_property
+from typing import TYPE_CHECKING, get_args, overload
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid.decimation import decimate, squared_limit
+from hybridnav.pyramid.decimation import Linkage, decimate, squared_limit
 from hybridnav.pyramid.level import Level
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Record
-
-Linkage = Literal["radius"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,11 @@ class DualGraphPyramid:
         merge_distance_m
             U_d in metres, positive, infinity allowed: how coarse the apex is.
         linkage
-            What stays strictly below U_d. `"radius"`: the distance from every cell of a field to
-            its surviving cell, between cell centres.
+            What stays strictly below U_d, between cell centres, to 1e-9 of its square.
+            `"survivor"`: the distance between the two surviving cells when one is contracted into
+            the other; it holds for each such link, not for the field. `"radius"`: the distance
+            from every cell of a field to its surviving cell. `"diameter"`: the distance between
+            every two cells of a field (complete linkage).
         seed
             Breaks ties; equal input and seed give an equal pyramid.
 
@@ -77,8 +80,7 @@ class DualGraphPyramid:
                 f"linkage must be one of {', '.join(get_args(Linkage))}, got {linkage!r}"
             )
         limit = squared_limit(merge_distance_m, grid.resolution_m)
-        record, stats = decimate(grid.classes, limit=limit, seed=int(seed))
-        return cls(grid, float(merge_distance_m), linkage, int(seed), stats, record)
+        record, stats = decimate(grid.classes, linkage=linkage, limit=limit, seed=int(seed))
 
     def __len__(self) -> int:
         return len(self.stats.sizes)
@@ -96,8 +98,18 @@ class DualGraphPyramid:
         if not 0 <= at < len(self):
             raise IndexError(f"the pyramid has levels 0 to {len(self) - 1}, got {index}")
         if at not in self._levels:
-            self._levels[at] = Level(self.grid, self._record, at)
+            self._levels[at] = Level(self.grid, self._record, at, self._find_islands)
         return self._levels[at]
+
+    @cached_property
+    def islands(self) -> Islands:
+        """Obstacles and components of the grid, and which lies in which."""
+        from hybridnav.pyramid.islands import Islands  # noqa: PLC0415 - loads scipy.ndimage
+
+        return Islands.of_classes(self.grid.classes)
+
+    def _find_islands(self) -> Islands:
+        return self.islands
 
     def __iter__(self) -> Iterator[Level]:
         return (self[index] for index in range(len(self)))

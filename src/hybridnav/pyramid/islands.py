@@ -1,0 +1,67 @@
+"""Obstacles and components of a grid, and which lies in which: what the graph leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+
+from hybridnav.grid import CellClass
+
+if TYPE_CHECKING:
+    from hybridnav._typing import ByteArray, IntArray, LongArray
+
+RIM = 0
+"""Label of the occupied ring round the map and of every obstacle that touches it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Islands:
+    """Obstacles (8-connected sets of occupied cells, the map padded with an occupied ring) and
+    components (4-connected sets of other cells) of a grid.
+
+    Obstacle 0 is the rim. Each other obstacle is surrounded by one component, each component by
+    one obstacle: together a tree rooted at the rim.
+    """
+
+    obstacle_of: IntArray
+    """int32 (rows, cols), obstacle of each cell, -1 elsewhere."""
+    obstacle_cell: LongArray
+    """int64 (n_obstacles,), flat cell west of the first cell of each obstacle, in the component
+    that surrounds it; -1 for the rim."""
+    component_of: IntArray
+    """int32 (rows, cols), component of each cell, -1 elsewhere."""
+    component_cell: LongArray
+    """int64 (n_components,), first flat cell of each component."""
+    surrounding_obstacle: LongArray
+    """int64 (n_components,), the obstacle that each component lies in."""
+
+    @classmethod
+    def of_classes(cls, classes: ByteArray) -> Islands:
+        """Find the islands of a grid of `CellClass`, shape (rows, cols)."""
+        occupied = classes == CellClass.OCCUPIED
+        padded = np.pad(occupied, 1, constant_values=True)
+        label, n_obstacles = ndimage.label(padded, structure=np.ones((3, 3)))
+        obstacle_of = (label[1:-1, 1:-1] - 1).astype(np.int32)  # the ring is met first: label 1
+        component_of = (ndimage.label(~occupied)[0] - 1).astype(np.int32)
+        west = _first_cells(obstacle_of, n_obstacles) - 1
+        west[RIM] = -1
+        first = _first_cells(component_of, int(component_of.max(initial=-1)) + 1)
+        rows, cols = np.divmod(first, classes.shape[1])
+        return cls(
+            obstacle_of,
+            west,
+            component_of,
+            first,
+            label[rows + 1, cols].astype(np.int64) - 1,
+        )
+
+
+def _first_cells(labels: IntArray, count: int) -> LongArray:
+    """First flat cell of each label from 0, -1 where it has none."""
+    found, at = np.unique(labels.ravel(), return_index=True)
+    first = np.full(count, -1, dtype=np.int64)
+    first[found[found >= 0]] = at[found >= 0]
+    return first

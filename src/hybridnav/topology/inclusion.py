@@ -1,0 +1,295 @@
+"""Inclusion: what lies inside a place, and which places lie round a thing.
+
+A self-loop of the graph is a bridge of its dual: it cuts the faces in two, and its place encloses
+the part that does not hold the outside. Faces joined by the dual edges of other arcs make a block;
+blocks and self-loops make a tree for each component, and obstacles hang the trees of walled-off
+components below the face of the component that surrounds them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+from hybridnav.pyramid.dual import FaceKind
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.pyramid import Level
+    from hybridnav.pyramid.islands import Islands
+
+_EAST = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosed:
+    """What lies inside the self-loops of a place, at any depth."""
+
+    places: LongArray
+    """Dense indices of places."""
+    obstacles: LongArray
+    """Indices of obstacles."""
+    components: LongArray
+    """Indices of components walled off by those obstacles."""
+    ignored: int
+    """Obstacles left out, with all inside them, because their area is below the least one."""
+
+
+class Inclusion:
+    """Inclusion on one level of a pyramid.
+
+    Parameters
+    ----------
+    level
+        The level whose vertices are the places.
+    islands
+        Obstacles and components of its grid.
+    """
+
+    def __init__(self, level: Level, islands: Islands) -> None:
+        self._level = level
+        self._islands = islands
+        self._origin = level.arcs.ravel().astype(np.int64)
+        self._n_obstacles = len(islands.obstacle_cell)
+        cells = islands.component_cell
+        self._component_of_place = islands.component_of[tuple(level.cells.T)].astype(np.int64)
+        self._obstacle_component = islands.component_of.ravel()[islands.obstacle_cell]
+        self._n_components = len(cells)
+        self._loop_above, self._block_of_face = _loop_tree(level)
+        self._face_of_obstacle = self._find_obstacle_faces()
+
+    def _find_obstacle_faces(self) -> LongArray:
+        """Face that holds each obstacle, -1 for the rim."""
+        face = np.full(self._n_obstacles, -1, dtype=np.int64)
+        darts = self._level.face_darts(self._islands.obstacle_cell[1:], _EAST)
+        face[1:] = self._level.dual.face_of[darts]
+        return face
+
+    @cached_property
+    def _depth_of_block(self) -> LongArray:
+        """Self-loops round each block, within its component."""
+        depth = np.zeros(len(self._loop_above), dtype=np.int64)
+        parent = self._parent_block
+        at = np.arange(len(depth))
+        while (inside := self._loop_above[at] >= 0).any():
+            depth += inside
+            at = np.where(inside, parent[at], at)
+        return depth
+
+    @property
+    def _parent_block(self) -> LongArray:
+        """The block on the outer side of the self-loop above each block, itself for a root."""
+        loop = self._loop_above
+        sides = self._block_of_face[self._level.dual.edges[loop]]
+        blocks = np.arange(len(loop))
+        outer = np.where(sides[:, 0] == blocks, sides[:, 1], sides[:, 0])
+        return np.where(loop >= 0, outer, blocks)
+
+    @cached_property
+    def _block_of_place(self) -> LongArray:
+        """The outermost block that each place bounds, -1 for a place without an arc."""
+        block = self._block_of_face[self._level.dual.face_of]
+        order = np.lexsort((self._depth_of_block[block], self._origin))
+        found, first = np.unique(self._origin[order], return_index=True)
+        outermost = np.full(self._level.n_vertices, -1, dtype=np.int64)
+        outermost[found] = block[order][first]
+        return outermost
+
+    @cached_property
+    def _place_round_block(self) -> LongArray:
+        """The place whose self-loop is the one above each block, -1 for a root."""
+        loop = self._loop_above
+        return np.where(loop >= 0, self._level.arcs[loop, 0], -1)
+
+    @cached_property
+    def place_round_component(self) -> LongArray:
+        """int64 (n_components,), the place inside whose self-loop each component lies, -1: none."""
+        obstacle = self._islands.surrounding_obstacle
+        face = self._face_of_obstacle[obstacle]
+        own = np.where(face >= 0, self._place_round_block[self._block_of_face[face]], -1)
+        above = np.where(obstacle > 0, self._obstacle_component[obstacle], -1)
+        while ((own < 0) & (above >= 0)).any():
+            own = np.where((own < 0) & (above >= 0), own[above], own)
+            above = np.where(above >= 0, above[above], -1)
+        return own
+
+    @cached_property
+    def place_round_obstacle(self) -> LongArray:
+        """int64 (n_obstacles,), the place inside whose self-loop each obstacle lies, -1: none."""
+        face = self._face_of_obstacle
+        own = np.where(face >= 0, self._place_round_block[self._block_of_face[face]], -1)
+        outer = self.place_round_component[self._obstacle_component]
+        return np.where((own < 0) & (face >= 0), outer, own)
+
+    @cached_property
+    def place_round_place(self) -> LongArray:
+        """int64 (n_places,), the place inside whose self-loop each place lies, -1: none."""
+        block = self._block_of_place
+        own = np.where(block >= 0, self._place_round_block[block], -1)
+        return np.where(own < 0, self.place_round_component[self._component_of_place], own)
+
+    @cached_property
+    def obstacle_cells(self) -> LongArray:
+        """int64 (n_obstacles,), cells of each obstacle and of all that it surrounds."""
+        islands = self._islands
+        own = np.bincount(islands.obstacle_of[islands.obstacle_of >= 0], minlength=self._n_obstacles)
+        inner = np.bincount(
+            islands.component_of[islands.component_of >= 0], minlength=self._n_components
+        )
+        outer_obstacle = islands.surrounding_obstacle[self._obstacle_component]
+        outer_obstacle[0] = 0
+        total = own + np.bincount(
+            islands.surrounding_obstacle, weights=inner, minlength=self._n_obstacles
+        ).astype(np.int64)
+        filled = total.copy()
+        above = outer_obstacle
+        while (above > 0).any():
+            np.add.at(filled, above[above > 0], total[above > 0])
+            above = np.where(above > 0, outer_obstacle[above], 0)
+        return filled
+
+    def encloses(self, place: int, *, least_area_cells: float = 0.0) -> Enclosed:
+        """Find what lies inside the self-loops of a place.
+
+        Parameters
+        ----------
+        place
+            Dense index.
+        least_area_cells
+            Obstacles smaller than this, with all they surround, are left out and counted.
+        """
+        small = self.obstacle_cells < least_area_cells
+        small[0] = False
+        inside = self._inside(place)
+        obstacle_in = np.where(
+            self.place_round_obstacle >= 0, inside[self.place_round_obstacle], False
+        )
+        component_in = np.where(
+            self.place_round_component >= 0, inside[self.place_round_component], False
+        )
+        walled_by_small = small[self._islands.surrounding_obstacle]
+        while True:
+            spread = walled_by_small | (
+                walled_by_small[self._obstacle_component] & (np.arange(self._n_obstacles) > 0)
+            )[self._islands.surrounding_obstacle]
+            if (spread == walled_by_small).all():
+                break
+            walled_by_small = spread
+        places = inside.copy()
+        places[place] = False
+        return Enclosed(
+            np.flatnonzero(places & ~walled_by_small[self._component_of_place]),
+            np.flatnonzero(obstacle_in & ~small),
+            np.flatnonzero(component_in & ~walled_by_small),
+            int((obstacle_in & small).sum()),
+        )
+
+    def _inside(self, place: int) -> BoolArray:
+        """Places that are the place itself or lie inside it at any depth."""
+        parent = self.place_round_place
+        inside = np.zeros(len(parent), dtype=np.bool_)
+        inside[place] = True
+        while True:
+            more = inside | (np.where(parent >= 0, inside[parent], False))
+            if (more == inside).all():
+                return inside
+            inside = more
+
+    def ring_round_places(self, places: LongArray) -> LongArray:
+        """The cycle of places round a connected set of places, counter-clockwise.
+
+        Parameters
+        ----------
+        places
+            Dense indices of places that arcs connect.
+
+        Returns
+        -------
+        LongArray
+            Places, the smallest index first; empty where the set touches the outside or the rim.
+            Obstacles that the set touches count as part of it. A set that is a whole component is
+            ringed by the places round the obstacle that surrounds it.
+        """
+        level, dual = self._level, self._level.dual
+        inside = np.zeros(level.n_vertices, dtype=np.bool_)
+        inside[places] = True
+        component = self._component_of_place[places[0]]
+        if inside[self._component_of_place == component].all():
+            return self.ring_round_component(int(component))
+        gone = inside[level.arcs].any(axis=1)
+        opened = np.unique(dual.edges[gone])
+        if (dual.kinds[opened] == FaceKind.OUTSIDE).any():
+            return np.empty(0, dtype=np.int64)
+        left = np.flatnonzero(~gone)
+        outer = np.flatnonzero(dual.kinds == FaceKind.OUTSIDE)
+        group = _groups(level.arcs[left], level.n_vertices)
+        on_outside = self._origin[np.isin(dual.face_of, outer)]
+        mine = on_outside[self._component_of_place[on_outside] == component][0]
+        darts = np.flatnonzero(np.isin(dual.face_of, opened) & ~np.repeat(gone, 2))
+        start = darts[group[self._origin[darts]] == group[mine]][0]
+        return self._walk(int(start), gone)
+
+    def ring_round_obstacle(self, obstacle: int) -> LongArray:
+        """The cycle of places round an obstacle, counter-clockwise; empty for the rim."""
+        face = self._face_of_obstacle[obstacle]
+        if face < 0:
+            return np.empty(0, dtype=np.int64)
+        start = np.flatnonzero(self._level.dual.face_of == face)[0]
+        return self._walk(int(start), np.zeros(self._level.n_arcs, dtype=np.bool_))
+
+    def ring_round_component(self, component: int) -> LongArray:
+        """The cycle of places round a walled-off component; empty where only the rim is."""
+        return self.ring_round_obstacle(int(self._islands.surrounding_obstacle[component]))
+
+    def _walk(self, start: int, gone: BoolArray) -> LongArray:
+        """Places along the face on the right of a dart, in a map without some arcs."""
+        sigma = self._level.sigma
+        places: list[int] = []
+        dart = start
+        while True:
+            place = int(self._origin[dart])
+            if not places or places[-1] != place:
+                places.append(place)
+            dart = int(sigma[dart ^ 1])
+            while gone[dart >> 1]:
+                dart = int(sigma[dart])
+            if dart == start:
+                break
+        if len(places) > 1 and places[0] == places[-1]:
+            places.pop()
+        places.reverse()  # a face on the right is walked clockwise
+        at = places.index(min(places))
+        return np.array(places[at:] + places[:at], dtype=np.int64)
+
+
+def _groups(arcs: LongArray, n_vertices: int) -> LongArray:
+    ones = np.ones(len(arcs), dtype=np.int8)
+    graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))
+    label: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)
+    return label
+
+
+def _loop_tree(level: Level) -> tuple[LongArray, LongArray]:
+    """The self-loop above each block of faces (-1: a root), and the block of each face."""
+    dual = level.dual
+    loops = np.flatnonzero(level.is_self_loop)
+    block_of_face = _groups(dual.edges[~level.is_self_loop].astype(np.int64), dual.n_faces)
+    n_blocks = int(block_of_face.max(initial=-1)) + 1
+    sides = block_of_face[dual.edges[loops]]
+    roots = np.unique(block_of_face[dual.kinds == FaceKind.OUTSIDE])
+    top = np.full(len(roots), n_blocks)
+    tail = np.concatenate([sides[:, 0], top])
+    head = np.concatenate([sides[:, 1], roots])
+    tree = coo_array(
+        (np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(n_blocks + 1, n_blocks + 1)
+    )
+    _, above = breadth_first_order(tree.tocsr(), n_blocks, directed=False)
+    loop_above = np.full(n_blocks, -1, dtype=np.int64)
+    first_is_inside = above[sides[:, 0]] == sides[:, 1]
+    loop_above[np.where(first_is_inside, sides[:, 0], sides[:, 1])] = loops
+    return loop_above, block_of_face
