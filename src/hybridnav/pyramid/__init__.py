@@ -1,6 +1,8 @@
 """The dual graph pyramid: selection of stars (MIES), contraction, simplification, levels."""
 
+from hybridnav.pyramid.decimation import Linkage
+from hybridnav.pyramid.dual import DualGraph, FaceKind
 from hybridnav.pyramid.level import Level
-from hybridnav.pyramid.pyramid import DualGraphPyramid, Linkage
+from hybridnav.pyramid.pyramid import DualGraphPyramid
 
-__all__ = ["DualGraphPyramid", "Level", "Linkage"]
+__all__ = ["DualGraph", "DualGraphPyramid", "FaceKind", "Level", "Linkage"]

@@ -81,6 +81,7 @@ class DualGraphPyramid:
             )
         limit = squared_limit(merge_distance_m, grid.resolution_m)
         record, stats = decimate(grid.classes, linkage=linkage, limit=limit, seed=int(seed))
+        return cls(grid, float(merge_distance_m), linkage, int(seed), stats, record)
 
     def __len__(self) -> int:
         return len(self.stats.sizes)

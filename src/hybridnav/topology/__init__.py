@@ -1,5 +1,5 @@
 """The topological map: places and boundaries."""
 
-from hybridnav.topology.map import TopologicalMap
+from hybridnav.topology.map import Component, Obstacle, TopologicalMap
 
-__all__ = ["TopologicalMap"]
+__all__ = ["Component", "Obstacle", "TopologicalMap"]

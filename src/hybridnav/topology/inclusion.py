@@ -17,9 +17,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from hybridnav.pyramid.dual import FaceKind
+from hybridnav.pyramid.islands import RIM
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._typing import BoolArray, IntArray, LongArray
     from hybridnav.pyramid import Level
     from hybridnav.pyramid.islands import Islands
 
@@ -56,10 +57,8 @@ class Inclusion:
         self._islands = islands
         self._origin = level.arcs.ravel().astype(np.int64)
         self._n_obstacles = len(islands.obstacle_cell)
-        cells = islands.component_cell
         self._component_of_place = islands.component_of[tuple(level.cells.T)].astype(np.int64)
         self._obstacle_component = islands.component_of.ravel()[islands.obstacle_cell]
-        self._n_components = len(cells)
         self._loop_above, self._block_of_face = _loop_tree(level)
         self._face_of_obstacle = self._find_obstacle_faces()
 
@@ -109,13 +108,12 @@ class Inclusion:
     @cached_property
     def place_round_component(self) -> LongArray:
         """int64 (n_components,), the place inside whose self-loop each component lies, -1: none."""
-        obstacle = self._islands.surrounding_obstacle
-        face = self._face_of_obstacle[obstacle]
+        face = self._face_of_obstacle[self._islands.surrounding_obstacle]
         own = np.where(face >= 0, self._place_round_block[self._block_of_face[face]], -1)
-        above = np.where(obstacle > 0, self._obstacle_component[obstacle], -1)
-        while ((own < 0) & (above >= 0)).any():
-            own = np.where((own < 0) & (above >= 0), own[above], own)
-            above = np.where(above >= 0, above[above], -1)
+        at = self._component_above
+        while (further := (own < 0) & (at >= 0)).any():
+            own = np.where(further, own[at], own)
+            at = np.where(further, self._component_above[at], -1)
         return own
 
     @cached_property
@@ -137,20 +135,17 @@ class Inclusion:
     def obstacle_cells(self) -> LongArray:
         """int64 (n_obstacles,), cells of each obstacle and of all that it surrounds."""
         islands = self._islands
-        own = np.bincount(islands.obstacle_of[islands.obstacle_of >= 0], minlength=self._n_obstacles)
-        inner = np.bincount(
-            islands.component_of[islands.component_of >= 0], minlength=self._n_components
+        cells = np.bincount(
+            islands.obstacle_of[islands.obstacle_of >= 0], minlength=self._n_obstacles
         )
-        outer_obstacle = islands.surrounding_obstacle[self._obstacle_component]
-        outer_obstacle[0] = 0
-        total = own + np.bincount(
-            islands.surrounding_obstacle, weights=inner, minlength=self._n_obstacles
-        ).astype(np.int64)
-        filled = total.copy()
-        above = outer_obstacle
-        while (above > 0).any():
-            np.add.at(filled, above[above > 0], total[above > 0])
-            above = np.where(above > 0, outer_obstacle[above], 0)
+        inner = np.bincount(islands.component_of[islands.component_of >= 0])
+        np.add.at(cells, islands.surrounding_obstacle, inner)
+        above = islands.surrounding_obstacle[self._obstacle_component]
+        above[RIM] = -1
+        filled, at = cells.copy(), above
+        while (further := at >= 0).any():
+            np.add.at(filled, at[further], cells[further])
+            at = np.where(further, above[at], -1)
         return filled
 
     def encloses(self, place: int, *, least_area_cells: float = 0.0) -> Enclosed:
@@ -163,42 +158,28 @@ class Inclusion:
         least_area_cells
             Obstacles smaller than this, with all they surround, are left out and counted.
         """
+        islands = self._islands
         small = self.obstacle_cells < least_area_cells
-        small[0] = False
-        inside = self._inside(place)
-        obstacle_in = np.where(
-            self.place_round_obstacle >= 0, inside[self.place_round_obstacle], False
-        )
-        component_in = np.where(
-            self.place_round_component >= 0, inside[self.place_round_component], False
-        )
-        walled_by_small = small[self._islands.surrounding_obstacle]
-        while True:
-            spread = walled_by_small | (
-                walled_by_small[self._obstacle_component] & (np.arange(self._n_obstacles) > 0)
-            )[self._islands.surrounding_obstacle]
-            if (spread == walled_by_small).all():
-                break
-            walled_by_small = spread
-        places = inside.copy()
-        places[place] = False
+        small[RIM] = False
+        ignored = _inherited(small[islands.surrounding_obstacle], self._component_above)
+        inside = np.zeros(self._level.n_vertices, dtype=np.bool_)
+        inside[place] = True
+        inside = _inherited(inside, self.place_round_place)
+        obstacles = _at(inside, self.place_round_obstacle) & ~ignored[self._obstacle_component]
+        components = _at(inside, self.place_round_component) & ~ignored
+        inside[place] = False
         return Enclosed(
-            np.flatnonzero(places & ~walled_by_small[self._component_of_place]),
-            np.flatnonzero(obstacle_in & ~small),
-            np.flatnonzero(component_in & ~walled_by_small),
-            int((obstacle_in & small).sum()),
+            np.flatnonzero(inside & ~ignored[self._component_of_place]),
+            np.flatnonzero(obstacles & ~small),
+            np.flatnonzero(components),
+            int((obstacles & small).sum()),
         )
 
-    def _inside(self, place: int) -> BoolArray:
-        """Places that are the place itself or lie inside it at any depth."""
-        parent = self.place_round_place
-        inside = np.zeros(len(parent), dtype=np.bool_)
-        inside[place] = True
-        while True:
-            more = inside | (np.where(parent >= 0, inside[parent], False))
-            if (more == inside).all():
-                return inside
-            inside = more
+    @cached_property
+    def _component_above(self) -> LongArray:
+        """The component round the obstacle round each component, -1 where that is the rim."""
+        obstacle = self._islands.surrounding_obstacle
+        return np.where(obstacle != RIM, self._obstacle_component[obstacle], -1)
 
     def ring_round_places(self, places: LongArray) -> LongArray:
         """The cycle of places round a connected set of places, counter-clockwise.
@@ -221,7 +202,7 @@ class Inclusion:
         component = self._component_of_place[places[0]]
         if inside[self._component_of_place == component].all():
             return self.ring_round_component(int(component))
-        gone = inside[level.arcs].any(axis=1)
+        gone: BoolArray = np.asarray(inside[level.arcs].any(axis=1))
         opened = np.unique(dual.edges[gone])
         if (dual.kinds[opened] == FaceKind.OUTSIDE).any():
             return np.empty(0, dtype=np.int64)
@@ -267,7 +248,21 @@ class Inclusion:
         return np.array(places[at:] + places[:at], dtype=np.int64)
 
 
-def _groups(arcs: LongArray, n_vertices: int) -> LongArray:
+def _inherited(flag: BoolArray, parent: LongArray) -> BoolArray:
+    """Flags of a forest handed down from every parent to all below it."""
+    while True:
+        more = flag | _at(flag, parent)
+        if (more == flag).all():
+            return flag
+        flag = more
+
+
+def _at(flag: BoolArray, index: LongArray) -> BoolArray:
+    """The flag at each index, False at -1."""
+    return (index >= 0) & flag[index]
+
+
+def _groups(arcs: LongArray | IntArray, n_vertices: int) -> LongArray:
     ones = np.ones(len(arcs), dtype=np.int8)
     graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))
     label: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)
@@ -278,7 +273,7 @@ def _loop_tree(level: Level) -> tuple[LongArray, LongArray]:
     """The self-loop above each block of faces (-1: a root), and the block of each face."""
     dual = level.dual
     loops = np.flatnonzero(level.is_self_loop)
-    block_of_face = _groups(dual.edges[~level.is_self_loop].astype(np.int64), dual.n_faces)
+    block_of_face = _groups(dual.edges[~level.is_self_loop], dual.n_faces)
     n_blocks = int(block_of_face.max(initial=-1)) + 1
     sides = block_of_face[dual.edges[loops]]
     roots = np.unique(block_of_face[dual.kinds == FaceKind.OUTSIDE])

@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import networkx as nx
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from hybridnav._typing import ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
+    from hybridnav.topology.inclusion import Enclosed, Inclusion
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """An 8-connected set of occupied cells, by its index in `pyramid.islands`; 0 is the rim."""
+
+    index: int
+
+
+@dataclass(frozen=True)
+class Component:
+    """A 4-connected set of cells that are not occupied, by its index in `pyramid.islands`."""
+
+    index: int
 
 
 class TopologicalMap:
@@ -102,7 +122,92 @@ class TopologicalMap:
         middle: FloatArray = self.level.boundary_middles[arc]
         return middle
 
+    @cached_property
+    def inclusion(self) -> Inclusion:
+        """Which places, obstacles and components lie inside which places."""
+        from hybridnav.topology.inclusion import Inclusion  # noqa: PLC0415 - loads scipy.sparse
+
+        return Inclusion(self.level, self.pyramid.islands)
+
+    def encloses(self, place: int, *, least_area_m2: float = 0.0) -> Enclosed:
+        """Find what a place encloses all by itself: what lies inside its self-loops, at any depth.
+
+        Parameters
+        ----------
+        place
+            Dense index of the place.
+        least_area_m2
+            Obstacles of a smaller area, with all that they surround, are left out and counted.
+
+        Returns
+        -------
+        Enclosed
+            Places (unexplored islands are places too), obstacles, and walled-off components.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such place.
+        """
+        self._check_places([place])
+        cells = least_area_m2 / self.grid.resolution_m**2
+        return self.inclusion.encloses(place, least_area_cells=cells)
+
+    def enclosed_by(self, thing: int | Sequence[int] | Obstacle | Component) -> tuple[int, ...]:
+        """Find the cycle of places that goes round a thing.
+
+        Parameters
+        ----------
+        thing
+            The dense index of a place, those of several connected places (an unexplored island),
+            an `Obstacle` or a `Component`.
+
+        Returns
+        -------
+        tuple of int
+            Dense indices of the places, counter-clockwise, the smallest first; one place where a
+            single one encloses the thing; none where it reaches the outside. Obstacles that a place
+            touches count as part of it; an obstacle or a boundary point that is met twice makes a
+            place occur twice.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such thing.
+        """
+        if isinstance(thing, Obstacle):
+            _check_index("obstacle", thing.index, len(self.pyramid.islands.obstacle_cell))
+            ring = self.inclusion.ring_round_obstacle(thing.index)
+        elif isinstance(thing, Component):
+            _check_index("component", thing.index, len(self.pyramid.islands.component_cell))
+            ring = self.inclusion.ring_round_component(thing.index)
+        else:
+            places = [thing] if isinstance(thing, int) else list(thing)
+            self._check_places(places)
+            ring = self.inclusion.ring_round_places(np.array(places, dtype=np.int64))
+        return tuple(ring.tolist())
+
+    def _check_places(self, places: Sequence[int]) -> None:
+        if not places:
+            raise InvalidValueError("expected at least one place, got none")
+        for place in places:
+            _check_index("place", place, self.n_places)
+
+    def unexplored_islands(self) -> list[tuple[int, ...]]:
+        """Sets of connected unexplored places that other places enclose, as dense indices."""
+        unexplored = self.classes == CellClass.UNEXPLORED
+        kept = self.arcs[unexplored[self.arcs].all(axis=1)]
+        graph: nx.Graph[int] = nx.Graph(kept.tolist())
+        graph.add_nodes_from(np.flatnonzero(unexplored).tolist())
+        islands = (tuple(sorted(group)) for group in nx.connected_components(graph))
+        return sorted(island for island in islands if self.enclosed_by(island))
+
     def parallel_arcs(self) -> int:
         """Arcs beyond the first between the same two places: doors that a simple graph loses."""
         plain = np.sort(self.arcs[~self.level.is_self_loop], axis=1)
         return len(plain) - len(np.unique(plain, axis=0))
+
+
+def _check_index(what: str, index: int, count: int) -> None:
+    if not 0 <= index < count:
+        raise InvalidValueError(f"{what} must be from 0 to {count - 1}, got {index}")
