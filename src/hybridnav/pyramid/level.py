@@ -88,6 +88,37 @@ class Level:
         )
         return _frozen(areas), _frozen(boxes)
 
+    @cached_property
+    def _cells_by_field(self) -> tuple[LongArray, LongArray]:
+        """Flat cells sorted by field, and where each field starts among them."""
+        order = np.argsort(self._labels[0], kind="stable")
+        order = order[len(order) - int(self.areas.sum()) :]  # the cells of no field come first
+        return order, np.concatenate([[0], np.cumsum(self.areas)])
+
+    def receptive_field(self, vertex: int) -> LongArray:
+        """Cells of the receptive field of a vertex, in the order of rows.
+
+        Parameters
+        ----------
+        vertex
+            Index of the vertex, 0 <= vertex < n_vertices.
+
+        Returns
+        -------
+        LongArray
+            int64 (n, 2), (row, col).
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such vertex.
+        """
+        if not 0 <= vertex < self.n_vertices:
+            raise InvalidValueError(f"vertex must be from 0 to {self.n_vertices - 1}, got {vertex}")
+        order, start = self._cells_by_field
+        flat = order[start[vertex] : start[vertex + 1]]
+        return np.stack(np.divmod(flat, self._grid.shape[1]), axis=1)
+
     @property
     def areas(self) -> LongArray:
         """int64 (n_vertices,), cells in each receptive field."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, get_args, overload
 
+import numpy as np
+
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid.decimation import Linkage, decimate, squared_limit
 from hybridnav.pyramid.level import Level
@@ -14,6 +16,9 @@ from hybridnav.pyramid.level import Level
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Record
@@ -101,6 +106,87 @@ class DualGraphPyramid:
         if at not in self._levels:
             self._levels[at] = Level(self.grid, self._record, at, self._find_islands)
         return self._levels[at]
+
+    def ancestor(self, vertices: ArrayLike, *, level: int, to: int) -> IntArray:
+        """Vertices of a higher level whose fields hold those of vertices of a lower one.
+
+        Parameters
+        ----------
+        vertices
+            Indices at `level`, any shape.
+        level, to
+            `to >= level`; negative ones count from the apex.
+
+        Returns
+        -------
+        IntArray
+            int32, indices at `to`, same shape.
+
+        Raises
+        ------
+        InvalidValueError
+            When `to` is below `level`.
+        """
+        lower, upper = self._in_order(level, to)
+        rows, cols = np.moveaxis(lower.cells[np.asarray(vertices)], -1, 0)
+        found: IntArray = upper.field_of[rows, cols]
+        return found
+
+    def descendants(self, vertex: int, *, level: int, to: int) -> LongArray:
+        """Vertices of a lower level whose fields lie in that of a vertex of a higher one.
+
+        Parameters
+        ----------
+        vertex
+            Index at `level`.
+        level, to
+            `to <= level`; negative ones count from the apex.
+
+        Returns
+        -------
+        LongArray
+            int64, indices at `to`, ascending.
+
+        Raises
+        ------
+        InvalidValueError
+            When `to` is above `level`.
+        """
+        lower, upper = self._in_order(to, level)
+        return np.flatnonzero(upper.field_of[tuple(lower.cells.T)] == vertex)
+
+    def parent(self, level: int) -> IntArray:
+        """int32 (n_vertices of `level`,), the vertex of the next level above each."""
+        below = self[level]
+        return self.ancestor(np.arange(below.n_vertices), level=below.index, to=below.index + 1)
+
+    def children(self, level: int, vertex: int) -> LongArray:
+        """int64, the reduction window of a vertex of `level`: its sons one level down."""
+        above = self[level].index
+        return self.descendants(vertex, level=above, to=above - 1)
+
+    def contraction_kernel(self, level: int) -> LongArray:
+        """int64, arcs of `level` that are contracted on the way to the next level: a forest of
+        stars, one for each reduction window."""
+        return self._kernel(level, removed=False)
+
+    def removal_kernel(self, level: int) -> LongArray:
+        """int64, arcs of `level` that are removed as redundant on the way to the next level."""
+        return self._kernel(level, removed=True)
+
+    def _kernel(self, level: int, *, removed: bool) -> LongArray:
+        below = self[level]
+        self[below.index + 1]  # the apex has no kernels: the index error says so
+        end = self._record.edge_end[below.base_edges]
+        return np.flatnonzero(end == 2 * (below.index + 1) + removed)
+
+    def _in_order(self, low: int, high: int) -> tuple[Level, Level]:
+        lower, upper = self[low], self[high]
+        if lower.index > upper.index:
+            raise InvalidValueError(
+                f"level {lower.index} is not below level {upper.index}: ask the other way round"
+            )
+        return lower, upper
 
     @cached_property
     def islands(self) -> Islands:
