@@ -1,0 +1,87 @@
+"""Golden hashes: an optimisation must not change what a pyramid is.
+
+Ten maps from seeded generators; for each the SHA-256 of the apex, over the receptive field of each
+cell, the arcs, their rotation (sigma) and which faces are protected, as little-endian bytes. A
+change of a hash is a change of results: the seeded hash that breaks ties, the attribute by which
+edges are matched, who survives, or which of two parallel edges stays. If that is meant, say so in
+the changelog and renew the hashes with `python -m tests.test_golden`; otherwise it is a bug.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+
+import numpy as np
+import pytest
+
+from hybridnav.grid import Frame, OccupancyGrid
+from hybridnav.grid.worlds import figure1_world, office_world, tiled
+from hybridnav.pyramid import DualGraphPyramid
+
+GOLDEN = {
+    "figure1": "8a43fb5cd1e4bc4c",
+    "no-limit": "3fbe80b047747e29",
+    "office": "8f1cd88888161ed5",
+    "office-diameter": "0e975976c8102ff5",
+    "office-seed-7": "1f56837e37f1e204",
+    "office-survivor": "ee95b53749de6563",
+    "office-tiled": "70d2bd806b656508",
+    "one-column": "f141607881650635",
+    "speckle": "69faf747bf8c86d1",
+    "three-classes": "d6f5d8685886938d",
+}
+
+
+def noise(seed, shape, unexplored, occupied):
+    """Map of independent cells; Generator.random of PCG64 is a stable stream."""
+    value = np.random.Generator(np.random.PCG64(seed)).random(shape)
+    probability = np.where(value < occupied, 1.0, np.where(value < occupied + unexplored, 0.5, 0.0))
+    return OccupancyGrid(probability, Frame(0.05))
+
+
+def office(seed=0, radius_m=0.25, **settings):
+    world = office_world(seed=seed)
+    return DualGraphPyramid.build(world.grid(robot_radius_m=radius_m), seed=seed, **settings)
+
+
+def noisy(*world, **settings):
+    return DualGraphPyramid.build(noise(*world), **settings)
+
+
+def two_offices():
+    grid = tiled(office_world(), rows=2, cols=1).grid(robot_radius_m=0.1)
+    return DualGraphPyramid.build(grid)
+
+
+PYRAMIDS = {
+    "figure1": lambda: DualGraphPyramid.build(figure1_world().grid(), merge_distance_m=10.0),
+    "no-limit": lambda: noisy(4, (120, 120), 0.0, 0.35, merge_distance_m=float("inf")),
+    "office": office,
+    "office-diameter": lambda: office(linkage="diameter"),
+    "office-seed-7": lambda: office(seed=7),
+    "office-survivor": lambda: office(linkage="survivor"),
+    "office-tiled": two_offices,
+    "one-column": lambda: noisy(3, (5000, 1), 0.02, 0.01, merge_distance_m=1.0),
+    "speckle": lambda: noisy(1, (300, 400), 0.01, 0.01),
+    "three-classes": lambda: noisy(2, (200, 150), 0.3, 0.2, merge_distance_m=0.4),
+}
+
+
+def hash_of(pyramid):
+    apex = pyramid[-1]
+    digest = hashlib.sha256()
+    for array in (apex.field_of, apex.arcs, apex.sigma):
+        digest.update(array.astype("<i4").tobytes())
+    digest.update(apex.protected.astype(np.uint8).tobytes())
+    return digest.hexdigest()[:16]
+
+
+@pytest.mark.parametrize("name", sorted(GOLDEN))
+def test_the_apex_is_what_it_was(name):
+    assert hash_of(PYRAMIDS[name]()) == GOLDEN[name]
+
+
+if __name__ == "__main__":
+    for name in GOLDEN:
+        sys.stdout.write(f'    "{name}": "{hash_of(PYRAMIDS[name]())}",\n')
