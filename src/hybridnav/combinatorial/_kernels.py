@@ -155,9 +155,11 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     dart after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
     `kernel_dart[v]` starts at the parent of v and ends at v; origins become the vertices of the
     next level, `new_vertex[parent[v]]`. `touched` lists one dart of every ordinary face that lost
-    a dart or has a self-loop: no other face can have become redundant. `shift` is scratch.
+    a dart: no other face can have become redundant, but for those with a self-loop. `shift` is
+    scratch.
     """
     sigma, origin, sweep, protected, base_edge = darts
+    one = np.uint32(1)
     for e in range(base_edge.size):
         state[e] = ALIVE
     for v in range(parent.size):
@@ -172,24 +174,20 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
         if state[e] != ALIVE:
             continue
         for d in (2 * e, 2 * e + 1):
-            following = sigma[d]
-            if state[following >> 1] == CONTRACTED:
-                while state[following >> 1] == CONTRACTED:
-                    following = sigma[following ^ 1]
+            following = np.uint32(sigma[d])
+            if state[following >> one] == CONTRACTED:
+                while state[following >> one] == CONTRACTED:
+                    following = np.uint32(sigma[following ^ one])
                 sigma[d] = following
                 if not protected[d ^ 1]:
                     touched[count] = d ^ 1
                     count += 1
             inverse[following] = d
-            v = origin[d]
-            origin[d] = new_vertex[parent[v]]
+            v = np.uint32(origin[d])
+            origin[d] = new_vertex[np.uint32(parent[v])]
             sweep[d] += shift[v]
         if origin[2 * e] == origin[2 * e + 1]:
             any_loop = True
-            for d in (2 * e, 2 * e + 1):
-                if not protected[d]:
-                    touched[count] = d
-                    count += 1
     return count, any_loop
 
 
@@ -235,20 +233,26 @@ def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
 
 @njit(cache=True)
 def simplify(darts, touched, any_loop, state, inverse, cols):
-    """Remove redundant edges through the ordinary faces of some darts, in place.
+    """Remove redundant edges through ordinary faces until none is left, in place.
 
     Rules one and two: a face of degree one, a face of degree two. The others need a self-loop,
     and the lower levels have none. A removal can make the merged face redundant, and no other
     one, so every face is followed until it is not.
     """
     sigma, origin, sweep, protected, base_edge = darts
-    for i in range(touched.size):
-        start = touched[i]
+    n_darts = 2 * base_edge.size if any_loop else 0
+    for i in range(touched.size + n_darts):
+        if i < touched.size:
+            start = touched[i]
+        else:
+            start = np.int32(i - touched.size)
+            if origin[start] != origin[start ^ 1]:
+                continue
         if state[start >> 1] != ALIVE:
             continue
         while start >= 0 and not protected[start]:
             second = sigma[start ^ 1]
-            dart = -1
+            dart = np.int32(-1)
             if second == start:
                 dart = start
             elif sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
@@ -264,7 +268,7 @@ def simplify(darts, touched, any_loop, state, inverse, cols):
             if start == dart:
                 start = sigma[dart]
                 if start == other:
-                    start = -1
+                    start = np.int32(-1)
             if protected[other]:
                 follow = sigma[other]
                 while follow != dart:
@@ -283,6 +287,7 @@ def compact_darts(darts, state, new_edge, level, edge_end):
     for a removed one.
     """
     sigma, origin, sweep, protected, base_edge = darts
+    one = np.uint32(1)
     n_edges = 0
     for e in range(base_edge.size):
         if state[e] == ALIVE:
@@ -297,8 +302,8 @@ def compact_darts(darts, state, new_edge, level, edge_end):
         base_edge[f >> 1] = base_edge[e]
         for side in range(2):
             d = 2 * e + side
-            following = sigma[d]
-            sigma[f + side] = new_edge[following >> 1] + (following & 1)
+            following = np.uint32(sigma[d])
+            sigma[f + side] = new_edge[following >> one] + np.int32(following & one)
             origin[f + side] = origin[d]
             sweep[f + side] = sweep[d]
             protected[f + side] = protected[d]

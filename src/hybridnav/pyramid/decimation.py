@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from hybridnav.combinatorial import _kernels as dart_kernels
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid import _field_kernels, _kernels
-from hybridnav.pyramid.record import MAX_LEVELS, SURVIVES, BuildStats, LevelSize, Record
+from hybridnav.pyramid import _base_kernels, _field_kernels, _kernels
+from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Record
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, IntArray
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, KeyArray
 
 Linkage = Literal["survivor", "radius", "diameter"]
 
@@ -60,6 +61,69 @@ def decimate(
     return run.record, run.stats
 
 
+@dataclass
+class _Scratch:
+    """Work space of all levels. Passes that follow each other share memory: 17 bytes an edge and
+    21 a vertex."""
+
+    keys: KeyArray
+    rest: KeyArray
+    state: ByteArray
+    best: KeyArray
+    matched: IntArray
+    parent: IntArray
+    kernel_dart: IntArray
+    has_leaf: BoolArray
+
+    @classmethod
+    def of_size(cls, n_vertices: int, n_edges: int) -> _Scratch:
+        return cls(
+            np.empty(n_edges, np.uint64),
+            np.empty(n_edges, np.uint64),
+            np.empty(n_edges, np.uint8),
+            np.empty(n_vertices, np.uint64),
+            np.empty(n_vertices, np.int32),
+            np.empty(n_vertices, np.int32),
+            np.empty(n_vertices, np.int32),
+            np.empty(n_vertices, np.bool_),
+        )
+
+    def for_level(self, n_vertices: int, n_edges: int) -> _Scratch:
+        """Views as long as a level."""
+        return _Scratch(
+            self.keys[:n_edges],
+            self.rest[:n_edges],
+            self.state[:n_edges],
+            self.best[:n_vertices],
+            self.matched[:n_vertices],
+            self.parent[:n_vertices],
+            self.kernel_dart[:n_vertices],
+            self.has_leaf[:n_vertices],
+        )
+
+    # Once the stars are chosen, keys and matching are done with.
+
+    @property
+    def inverse(self) -> IntArray:
+        return self.rest.view(np.int32)
+
+    @property
+    def touched(self) -> IntArray:
+        return self.keys.view(np.int32)
+
+    @property
+    def new_edge(self) -> IntArray:
+        return self.keys.view(np.int32)
+
+    @property
+    def new_vertex(self) -> IntArray:
+        return self.matched
+
+    @property
+    def shift(self) -> IntArray:
+        return self.best.view(np.int32)
+
+
 class _Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
@@ -70,31 +134,42 @@ class _Decimation:
         self._linkage = linkage
         self._limit = limit
         self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
-        vertex, edge, n_vertices, n_edges = dart_kernels.number_base(classes)
-        self._darts = dart_kernels.base_darts(classes, vertex, edge, n_edges)
-        self._vertices = _kernels.base_vertices(classes, n_vertices)
-        self.record = Record(
-            np.where(classes.ravel() > 0, np.uint8(SURVIVES), np.uint8(0)),
-            np.full(classes.size, -1, np.int32),
-            np.where(edge >= 0, np.uint8(SURVIVES), np.uint8(0)),
-        )
-        self._candidates = _kernels.Candidates(
-            np.empty(n_edges, np.int32),
-            np.empty(n_edges, np.int32),
-            np.empty(n_edges, np.int32),
-            np.empty(n_edges, np.uint64),
-            np.empty(n_edges, np.uint8),
-        )
-        self._state = np.empty(n_edges, np.uint8)
-        self._inverse = np.empty(2 * n_edges, np.int32)
-        self._edge_scratch = np.empty(n_edges, np.int32)
-        self._touched = np.empty(4 * n_edges, np.int32)
-        self._new_vertex = np.empty(n_vertices, np.int32)
-        self._shift = np.empty(n_vertices, np.int32)
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
-        self._level = 0
-        self._note_size()
+        self.record = Record(
+            np.empty(classes.size, np.uint8),
+            np.full(classes.size, -1, np.int32),
+            np.empty(2 * classes.size, np.uint8),
+        )
+        n_vertices, n_edges = _base_kernels.mark_base(
+            classes, self.record.vertex_end, self.record.edge_end
+        )
+        self.stats.sizes.append(LevelSize(n_vertices, n_edges, 0))
+        if self._first_step_is_closed(classes):
+            self._level = 1
+            self._darts, self._vertices = _base_kernels.first_level(
+                classes,
+                self._seed,
+                self.record.vertex_end,
+                self.record.vertex_parent,
+                self.record.edge_end,
+            )
+            self._note_size()
+        else:
+            self._level = 0
+            vertex, edge, _, _ = dart_kernels.number_base(classes)
+            self._darts = dart_kernels.base_darts(classes, vertex, edge, n_edges)
+            self._vertices = _kernels.base_vertices(classes, n_vertices)
+        self._scratch = _Scratch.of_size(len(self._vertices.cells), len(self._darts.base_edge))
         self._lap("base")
+
+    def _first_step_is_closed(self, classes: ByteArray) -> bool:
+        """Whether any two cells of a class may merge, and any star of them, so that level 1 has a
+        closed form; there must be such cells, for every level contracts at least once."""
+        far_leaves = 4 if self._linkage == _kernels.DIAMETER else 1
+        return self._limit > far_leaves and bool(
+            (classes[:, 1:] * (classes[:, 1:] == classes[:, :-1])).any()
+            or (classes[1:] * (classes[1:] == classes[:-1])).any()
+        )
 
     def step(self) -> bool:
         """Go from this level to the next one; False when this one is the apex."""
@@ -105,56 +180,81 @@ class _Decimation:
         self._level += 1
         if self._level > MAX_LEVELS:
             raise InvalidValueError(f"the map needs more than {MAX_LEVELS} levels")
-        candidates = _kernels.Candidates(*(array[:count] for array in self._candidates))
-        matched = _kernels.match(candidates, len(self._vertices.cells))
-        self._lap("matching")
-        parent, kernel_dart = _kernels.select_stars(candidates, matched, self._vertices)
-        if self._linkage == _kernels.DIAMETER and len(self._hulls.start):
-            _kernels.refuse_leaves(parent, kernel_dart, matched, self._hulls, self._limit)
-        self._lap("stars")
-        self._merge_vertices(parent)
+        scratch = self._scratch.for_level(len(self._vertices.cells), len(self._darts.base_edge))
+        self._select(scratch, count)
+        self._merge_vertices(scratch)
         self._lap("vertices")
         touched, any_loop = dart_kernels.contract(
             self._darts,
-            parent,
-            self._new_vertex,
-            kernel_dart,
-            self._state,
-            self._inverse,
-            self._shift,
-            self._touched,
+            scratch.parent,
+            scratch.new_vertex,
+            scratch.kernel_dart,
+            scratch.state,
+            scratch.inverse,
+            scratch.shift,
+            scratch.touched,
             self._cols,
         )
         self._lap("contraction")
         dart_kernels.simplify(
-            self._darts, self._touched[:touched], any_loop, self._state, self._inverse, self._cols
+            self._darts,
+            scratch.touched[:touched],
+            any_loop,
+            scratch.state,
+            scratch.inverse,
+            self._cols,
         )
         self._lap("removal")
-        self._close_gaps()
+        self._close_gaps(scratch)
         self._note_size()
         self._lap("compaction")
         return True
 
-    def _find_candidates(self) -> int:
-        def find() -> int:
-            return int(
-                _kernels.contractible(
-                    self._darts.origin,
-                    self._darts.base_edge,
-                    self._vertices,
-                    self._hulls,
-                    self._linkage,
-                    self._limit,
-                    self._seed,
-                    self._candidates,
-                )
+    def _select(self, scratch: _Scratch, count: int) -> None:
+        """Choose the stars of this level from its first `count` candidates."""
+        darts, keys = self._darts, scratch.keys[:count]
+        _kernels.match(darts.origin, keys, scratch.best, scratch.matched, scratch.rest)
+        self._lap("matching")
+        stars = (scratch.parent, scratch.kernel_dart, scratch.has_leaf)
+        _kernels.select_stars(
+            darts.origin,
+            darts.base_edge,
+            keys,
+            scratch.state,
+            scratch.matched,
+            scratch.best,
+            self._vertices,
+            self._seed,
+            stars,
+        )
+        if self._linkage == _kernels.DIAMETER and len(self._hulls.start):
+            _kernels.refuse_leaves(
+                scratch.parent, scratch.kernel_dart, scratch.matched, self._hulls, self._limit
             )
+        self._lap("stars")
 
-        count = find()
+    def _find_candidates(self) -> int:
+        count = self._try_candidates()
         if count == _kernels.UNDECIDED:
             self._start_hulls()
-            count = find()
+            count = self._try_candidates()
         return count
+
+    def _try_candidates(self) -> int:
+        return int(
+            _kernels.contractible(
+                self._darts.origin,
+                self._darts.base_edge,
+                self._vertices,
+                self._hulls,
+                self._linkage,
+                self._limit,
+                self._seed,
+                self._scratch.keys,
+                self._scratch.state,
+                self._scratch.best,
+            )
+        )
 
     def _start_hulls(self) -> None:
         """Give every vertex its hull: bounding boxes have stopped deciding every edge."""
@@ -167,12 +267,12 @@ class _Decimation:
         )
         self._lap("hulls")
 
-    def _merge_vertices(self, parent: IntArray) -> None:
+    def _merge_vertices(self, scratch: _Scratch) -> None:
         record = self.record
         n_vertices = _kernels.compact_vertices(
             self._vertices,
-            parent,
-            self._new_vertex,
+            scratch.parent,
+            scratch.new_vertex,
             self._cols,
             self._level,
             record.vertex_end,
@@ -180,13 +280,15 @@ class _Decimation:
         )
         if len(self._hulls.start):
             self._hulls = _kernels.Hulls(
-                *_field_kernels.merge_hulls(*self._hulls, parent, self._new_vertex, n_vertices)
+                *_field_kernels.merge_hulls(
+                    *self._hulls, scratch.parent, scratch.new_vertex, n_vertices
+                )
             )
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))
 
-    def _close_gaps(self) -> None:
+    def _close_gaps(self, scratch: _Scratch) -> None:
         n_edges = dart_kernels.compact_darts(
-            self._darts, self._state, self._edge_scratch, self._level, self.record.edge_end
+            self._darts, scratch.state, scratch.new_edge, self._level, self.record.edge_end
         )
         sigma, origin, sweep, protected, base_edge = self._darts
         self._darts = dart_kernels.Darts(
