@@ -28,7 +28,7 @@ from tests.strategies import MAX_SIDE, Scene, drawn, occupancy_grid, scenes
 
 LINKAGES = ("radius", "survivor", "diameter")
 ORDINARY = settings(max_examples=150, deadline=None, derandomize=True)
-MANY = settings(max_examples=3000, deadline=None)
+MANY = settings(max_examples=1000, deadline=None)
 ARRAYS = (
     "field_of",
     "cells",
