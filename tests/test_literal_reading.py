@@ -24,7 +24,7 @@ def literal_apex(classes):
     """Contract by the literal rule: the places left, and all attributes that ever occurred."""
     graph = nx.grid_2d_graph(*classes.shape)
     graph.remove_nodes_from([tuple(cell) for cell in np.argwhere(classes == 0).tolist()])
-    nx.set_edge_attributes(graph, 1.0, "attribute")
+    graph.add_edges_from(list(graph.edges), attribute=1.0)
     seen = {1.0}
     queue = list(graph.nodes)
     for node in queue:
