@@ -34,6 +34,10 @@ class DualGraph:
     kinds: ByteArray
     """uint8 (n_faces,), `FaceKind`."""
 
+    def __post_init__(self) -> None:
+        self.face_of.flags.writeable = False
+        self.kinds.flags.writeable = False
+
     @property
     def n_faces(self) -> int:
         """Faces; those of vertices without an arc are not counted."""

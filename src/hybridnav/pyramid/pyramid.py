@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, get_args, overload
@@ -74,7 +75,8 @@ class DualGraphPyramid:
         Raises
         ------
         InvalidValueError
-            When the merge distance is not positive, or the linkage is not known.
+            When the merge distance is not positive, the linkage is not known, or the seed is no
+            whole number.
         """
         if math.isnan(merge_distance_m) or merge_distance_m <= 0:
             raise InvalidValueError(
@@ -84,9 +86,13 @@ class DualGraphPyramid:
             raise InvalidValueError(
                 f"linkage must be one of {', '.join(get_args(Linkage))}, got {linkage!r}"
             )
+        try:
+            seed = operator.index(seed)
+        except TypeError:
+            raise InvalidValueError(f"seed must be a whole number, got {seed!r:.80}") from None
         limit = squared_limit(merge_distance_m, grid.resolution_m)
-        record, stats = decimate(grid.classes, linkage=linkage, limit=limit, seed=int(seed))
-        return cls(grid, float(merge_distance_m), linkage, int(seed), stats, record)
+        record, stats = decimate(grid.classes, linkage=linkage, limit=limit, seed=seed)
+        return cls(grid, float(merge_distance_m), linkage, seed, stats, record)
 
     def __len__(self) -> int:
         return len(self.stats.sizes)

@@ -58,7 +58,11 @@ class Inclusion:
         self._origin = level.arcs.ravel().astype(np.int64)
         self._n_obstacles = len(islands.obstacle_cell)
         self._component_of_place = islands.component_of[tuple(level.cells.T)].astype(np.int64)
-        self._obstacle_component = islands.component_of.ravel()[islands.obstacle_cell]
+        # The component that surrounds each obstacle, none for the rim.
+        self._obstacle_component = islands.component_of.ravel()[islands.obstacle_cell].astype(
+            np.int64
+        )
+        self._obstacle_component[RIM] = -1
         self._loop_above, self._block_of_face = _loop_tree(level)
         self._face_of_obstacle = self._find_obstacle_faces()
 
@@ -109,7 +113,7 @@ class Inclusion:
     def place_round_component(self) -> LongArray:
         """int64 (n_components,), the place inside whose self-loop each component lies, -1: none."""
         face = self._face_of_obstacle[self._islands.surrounding_obstacle]
-        own = np.where(face >= 0, self._place_round_block[self._block_of_face[face]], -1)
+        own = _value_at(self._place_round_block, _value_at(self._block_of_face, face))
         at = self._component_above
         while (further := (own < 0) & (at >= 0)).any():
             own = np.where(further, own[at], own)
@@ -120,15 +124,15 @@ class Inclusion:
     def place_round_obstacle(self) -> LongArray:
         """int64 (n_obstacles,), the place inside whose self-loop each obstacle lies, -1: none."""
         face = self._face_of_obstacle
-        own = np.where(face >= 0, self._place_round_block[self._block_of_face[face]], -1)
-        outer = self.place_round_component[self._obstacle_component]
+        own = _value_at(self._place_round_block, _value_at(self._block_of_face, face))
+        outer = _value_at(self.place_round_component, self._obstacle_component)
         return np.where((own < 0) & (face >= 0), outer, own)
 
     @cached_property
     def place_round_place(self) -> LongArray:
         """int64 (n_places,), the place inside whose self-loop each place lies, -1: none."""
         block = self._block_of_place
-        own = np.where(block >= 0, self._place_round_block[block], -1)
+        own = _value_at(self._place_round_block, block)
         return np.where(own < 0, self.place_round_component[self._component_of_place], own)
 
     @cached_property
@@ -140,8 +144,7 @@ class Inclusion:
         )
         inner = np.bincount(islands.component_of[islands.component_of >= 0])
         np.add.at(cells, islands.surrounding_obstacle, inner)
-        above = islands.surrounding_obstacle[self._obstacle_component]
-        above[RIM] = -1
+        above = _value_at(islands.surrounding_obstacle, self._obstacle_component)
         filled, at = cells.copy(), above
         while (further := at >= 0).any():
             np.add.at(filled, at[further], cells[further])
@@ -159,13 +162,13 @@ class Inclusion:
             Obstacles smaller than this, with all they surround, are left out and counted.
         """
         islands = self._islands
-        small = self.obstacle_cells < least_area_cells
-        small[RIM] = False
-        ignored = _inherited(small[islands.surrounding_obstacle], self._component_above)
         inside = np.zeros(self._level.n_vertices, dtype=np.bool_)
         inside[place] = True
         inside = _inherited(inside, self.place_round_place)
-        obstacles = _at(inside, self.place_round_obstacle) & ~ignored[self._obstacle_component]
+        obstacles = _at(inside, self.place_round_obstacle)
+        small = obstacles & (self.obstacle_cells < least_area_cells)
+        ignored = _inherited(small[islands.surrounding_obstacle], self._component_above)
+        obstacles &= ~_at(ignored, self._obstacle_component)
         components = _at(inside, self.place_round_component) & ~ignored
         inside[place] = False
         return Enclosed(
@@ -179,7 +182,7 @@ class Inclusion:
     def _component_above(self) -> LongArray:
         """The component round the obstacle round each component, -1 where that is the rim."""
         obstacle = self._islands.surrounding_obstacle
-        return np.where(obstacle != RIM, self._obstacle_component[obstacle], -1)
+        return self._obstacle_component[obstacle]
 
     def ring_round_places(self, places: LongArray) -> LongArray:
         """The cycle of places round a connected set of places, counter-clockwise.
@@ -192,9 +195,9 @@ class Inclusion:
         Returns
         -------
         LongArray
-            Places, the smallest index first; empty where the set touches the outside or the rim.
-            Obstacles that the set touches count as part of it. A set that is a whole component is
-            ringed by the places round the obstacle that surrounds it.
+            Places, the smallest index first; empty where the set touches the rim. Obstacles that
+            the set touches count as part of it; where one of them surrounds its component, these
+            are the places round that obstacle.
         """
         level, dual = self._level, self._level.dual
         inside = np.zeros(level.n_vertices, dtype=np.bool_)
@@ -205,7 +208,7 @@ class Inclusion:
         gone: BoolArray = np.asarray(inside[level.arcs].any(axis=1))
         opened = np.unique(dual.edges[gone])
         if (dual.kinds[opened] == FaceKind.OUTSIDE).any():
-            return np.empty(0, dtype=np.int64)
+            return self.ring_round_component(int(component))
         left = np.flatnonzero(~gone)
         outer = np.flatnonzero(dual.kinds == FaceKind.OUTSIDE)
         group = _groups(level.arcs[left], level.n_vertices)
@@ -259,7 +262,12 @@ def _inherited(flag: BoolArray, parent: LongArray) -> BoolArray:
 
 def _at(flag: BoolArray, index: LongArray) -> BoolArray:
     """The flag at each index, False at -1."""
-    return (index >= 0) & flag[index]
+    return np.append(flag, False)[index]
+
+
+def _value_at(values: LongArray, index: LongArray) -> LongArray:
+    """The value at each index, -1 at -1."""
+    return np.append(values, -1)[index]
 
 
 def _groups(arcs: LongArray | IntArray, n_vertices: int) -> LongArray:

@@ -150,6 +150,10 @@ class TopologicalMap:
             When there is no such place.
         """
         self._check_places([place])
+        if not least_area_m2 >= 0:
+            raise InvalidValueError(
+                f"least area must be a number of square metres >= 0, got {least_area_m2}"
+            )
         cells = least_area_m2 / self.grid.resolution_m**2
         return self.inclusion.encloses(place, least_area_cells=cells)
 
@@ -166,14 +170,14 @@ class TopologicalMap:
         -------
         tuple of int
             Dense indices of the places, counter-clockwise, the smallest first; one place where a
-            single one encloses the thing; none where it reaches the outside. Obstacles that a place
-            touches count as part of it; an obstacle or a boundary point that is met twice makes a
-            place occur twice.
+            single one encloses the thing; none where it reaches the rim. Obstacles that a place
+            touches, or that surround its component, count as part of it; a place that the tour
+            round the thing meets twice occurs twice.
 
         Raises
         ------
         InvalidValueError
-            When there is no such thing.
+            When there is no such thing, or several places are not connected.
         """
         if isinstance(thing, Obstacle):
             _check_index("obstacle", thing.index, len(self.pyramid.islands.obstacle_cell))
@@ -182,8 +186,9 @@ class TopologicalMap:
             _check_index("component", thing.index, len(self.pyramid.islands.component_cell))
             ring = self.inclusion.ring_round_component(thing.index)
         else:
-            places = [thing] if isinstance(thing, int) else list(thing)
+            places = [int(thing)] if isinstance(thing, (int, np.integer)) else list(thing)
             self._check_places(places)
+            self._check_connected(places)
             ring = self.inclusion.ring_round_places(np.array(places, dtype=np.int64))
         return tuple(ring.tolist())
 
@@ -192,6 +197,14 @@ class TopologicalMap:
             raise InvalidValueError("expected at least one place, got none")
         for place in places:
             _check_index("place", place, self.n_places)
+
+    def _check_connected(self, places: Sequence[int]) -> None:
+        inside = np.zeros(self.n_places, dtype=np.bool_)
+        inside[list(places)] = True
+        graph: nx.Graph[int] = nx.Graph(self.arcs[inside[self.arcs].all(axis=1)].tolist())
+        graph.add_nodes_from(places)
+        if not nx.is_connected(graph):
+            raise InvalidValueError(f"places must be connected by arcs, got {places!s:.80}")
 
     def unexplored_islands(self) -> list[tuple[int, ...]]:
         """Sets of connected unexplored places that other places enclose, as dense indices."""
@@ -204,8 +217,9 @@ class TopologicalMap:
 
     def parallel_arcs(self) -> int:
         """Arcs beyond the first between the same two places: doors that a simple graph loses."""
-        plain = np.sort(self.arcs[~self.level.is_self_loop], axis=1)
-        return len(plain) - len(np.unique(plain, axis=0))
+        from hybridnav.pyramid.simple import report_of  # noqa: PLC0415 - most maps are never asked
+
+        return report_of(self.arcs, self.n_places).n_parallel_dropped
 
 
 def _check_index(what: str, index: int, count: int) -> None:
