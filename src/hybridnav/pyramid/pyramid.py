@@ -131,10 +131,10 @@ class DualGraphPyramid:
         Raises
         ------
         InvalidValueError
-            When `to` is below `level`.
+            When `to` is below `level`, or there is no such vertex.
         """
         lower, upper = self._in_order(level, to)
-        rows, cols = np.moveaxis(lower.cells[np.asarray(vertices)], -1, 0)
+        rows, cols = np.moveaxis(lower.cells[_checked(vertices, lower)], -1, 0)
         found: IntArray = upper.field_of[rows, cols]
         return found
 
@@ -156,10 +156,10 @@ class DualGraphPyramid:
         Raises
         ------
         InvalidValueError
-            When `to` is above `level`.
+            When `to` is above `level`, or there is no such vertex.
         """
         lower, upper = self._in_order(to, level)
-        return np.flatnonzero(upper.field_of[tuple(lower.cells.T)] == vertex)
+        return np.flatnonzero(upper.field_of[tuple(lower.cells.T)] == _checked(vertex, upper))
 
     def parent(self, level: int) -> IntArray:
         """int32 (n_vertices of `level`,), the vertex of the next level above each."""
@@ -169,6 +169,8 @@ class DualGraphPyramid:
     def children(self, level: int, vertex: int) -> LongArray:
         """int64, the reduction window of a vertex of `level`: its sons one level down."""
         above = self[level].index
+        if above == 0:
+            raise InvalidValueError("nothing lies below level 0, the base")
         return self.descendants(vertex, level=above, to=above - 1)
 
     def contraction_kernel(self, level: int) -> LongArray:
@@ -206,3 +208,17 @@ class DualGraphPyramid:
 
     def __iter__(self) -> Iterator[Level]:
         return (self[index] for index in range(len(self)))
+
+
+def _checked(vertices: ArrayLike, level: Level) -> LongArray:
+    """Indices of vertices of a level, whole numbers in range."""
+    found = np.asarray(vertices)
+    if found.size == 0:
+        return found.astype(np.int64)
+    if not np.issubdtype(found.dtype, np.integer):
+        raise InvalidValueError(f"vertices must be whole numbers, got {vertices!s:.80}")
+    if found.min() < 0 or found.max() >= level.n_vertices:
+        raise InvalidValueError(
+            f"vertices of level {level.index} are 0 to {level.n_vertices - 1}, got {vertices!s:.80}"
+        )
+    return found.astype(np.int64)
