@@ -23,10 +23,13 @@ _Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import networkx as nx
+
     from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import Record
+    from hybridnav.pyramid.simple import SimpleGraph
 
 
 class Level:
@@ -212,6 +215,25 @@ class Level:
         outer = self.face_darts(self._islands().component_cell, _SOUTH)
         return DualGraph.of_map(self.darts, outer[outer >= 0])
 
+    def to_networkx(self) -> nx.MultiGraph[int]:
+        """The level as a multigraph: see `hybridnav.pyramid.export.to_networkx`."""
+        from hybridnav.pyramid.export import to_networkx  # noqa: PLC0415 - loads networkx
+
+        return to_networkx(self)
+
+    def dual_to_networkx(self) -> nx.MultiGraph[int]:
+        """The dual as a multigraph: see `hybridnav.pyramid.export.dual_to_networkx`."""
+        from hybridnav.pyramid.export import dual_to_networkx  # noqa: PLC0415 - loads networkx
+
+        return dual_to_networkx(self)
+
+    def to_simple_graph(self) -> SimpleGraph:
+        """What a simple graph keeps of the level, and a report of what it drops: see
+        `hybridnav.pyramid.simple.to_simple_graph`."""
+        from hybridnav.pyramid.simple import to_simple_graph  # noqa: PLC0415 - loads networkx
+
+        return to_simple_graph(self)
+
     @cached_property
     def max_distance_m(self) -> FloatArray:
         """float64 (n_arcs,), largest distance between the centre of a cell of one field and the
@@ -235,7 +257,7 @@ class Level:
         distance = search_kernels.field_distances(
             self._grid.classes, self._labels[0], self._labels[1]
         )
-        edges, arc = self._boundary_table
+        edges, arc = self.boundary_table
         first, second = _ends(edges, self._grid.shape[1])
         across = distance[first] + distance[second] + STRAIGHT
         least = np.full(self.n_arcs, np.iinfo(np.int64).max)
@@ -264,7 +286,7 @@ class Level:
         """
         if not 0 <= arc < self.n_arcs:
             raise InvalidValueError(f"arc must be from 0 to {self.n_arcs - 1}, got {arc}")
-        edges, of_arc = self._boundary_table
+        edges, of_arc = self.boundary_table
         low, high = np.searchsorted(of_arc, [arc, arc + 1])
         pairs = _cell_pairs(edges[low:high], self._grid.shape[1])
         row, col = pairs[:, 0, 0], pairs[:, 0, 1]
@@ -279,7 +301,7 @@ class Level:
         `(x, y)` in metres, map frame: the middle of the side between the two cells whose side is
         nearest the mean of all sides of the boundary, so that it lies on the boundary.
         """
-        edges, arc = self._boundary_table
+        edges, arc = self.boundary_table
         sides = _cell_pairs(edges, self._grid.shape[1]).mean(axis=1) + 0.5
         sizes = np.bincount(arc, minlength=self.n_arcs)
         sums = [np.bincount(arc, weights=w, minlength=self.n_arcs) for w in sides.T]
@@ -290,8 +312,8 @@ class Level:
         return _frozen(self._grid.frame.points_of_grid(sides[nearest]))
 
     @cached_property
-    def _boundary_table(self) -> tuple[LongArray, LongArray]:
-        """Base edges on the boundaries of all arcs and the arc of each, sorted by arc."""
+    def boundary_table(self) -> tuple[LongArray, LongArray]:
+        """All boundaries at once: int64 base edges, and the arc of each, sorted by arc."""
         rows, cols = self._grid.shape
         cracks, classes = _field_kernels.find_cracks(self._labels[0], rows, cols)
         arc_of_class = np.full(len(cracks), -1, dtype=np.int64)

@@ -1,0 +1,162 @@
+"""What a simple graph keeps of a level, and what it loses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import networkx as nx
+import numpy as np
+
+from hybridnav.pyramid.export import vertices_with_attributes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav.pyramid.level import Level
+
+_LISTED = 8
+
+
+@dataclass(frozen=True)
+class ArcGroup:
+    """All arcs between the same two vertices, or all self-loops of one."""
+
+    vertices: tuple[int, int]
+    """The two vertices, the smaller index first; twice the same for self-loops."""
+    arcs: tuple[int, ...]
+    """Indices of the arcs, ascending."""
+
+
+@dataclass(frozen=True)
+class SimpleGraphReport:
+    """What a simple graph drops: arcs beyond the first between two vertices, and self-loops."""
+
+    n_vertices: int
+    """Vertices; a simple graph keeps them all."""
+    n_arcs: int
+    """Arcs of the level, self-loops included."""
+    parallel: tuple[ArcGroup, ...]
+    """Pairs of vertices joined by two arcs or more, with all of these."""
+    self_loops: tuple[ArcGroup, ...]
+    """Vertices with self-loops, with all of these."""
+
+    @property
+    def n_parallel_dropped(self) -> int:
+        """Arcs beyond the first between the same two vertices."""
+        return sum(len(group.arcs) - 1 for group in self.parallel)
+
+    @property
+    def n_self_loops_dropped(self) -> int:
+        """Self-loops: a simple graph has none."""
+        return sum(len(group.arcs) for group in self.self_loops)
+
+    @property
+    def n_edges(self) -> int:
+        """Edges that are left."""
+        return self.n_arcs - self.n_parallel_dropped - self.n_self_loops_dropped
+
+    def __str__(self) -> str:
+        head = (
+            f"{self.n_vertices} vertices, {self.n_arcs} arcs; a simple graph keeps "
+            f"{self.n_edges} and drops {_counted(self.n_parallel_dropped, 'parallel arc')} and "
+            f"{_counted(self.n_self_loops_dropped, 'self-loop')}"
+        )
+        pairs = [
+            f"  between {low} and {high}: arcs {_joined(group.arcs)}, one of them is kept"
+            for group in self.parallel
+            for low, high in [group.vertices]
+        ]
+        loops = [
+            f"  at {group.vertices[0]}: {'self-loops' if len(group.arcs) > 1 else 'self-loop'} "
+            f"{_joined(group.arcs)}"
+            for group in self.self_loops
+        ]
+        return "\n".join([head, *_listed(pairs), *_listed(loops)])
+
+
+@dataclass(frozen=True, eq=False)
+class SimpleGraph:
+    """A simple graph of a level, beside what was dropped to get there."""
+
+    graph: nx.Graph[int]
+    """Nodes are the vertices, with the attributes of `to_networkx`. Edges join adjacent vertices:
+    `max_distance_m`, the same for all arcs that an edge stands for, and `through_m` and the index
+    (`arc`) of the one with the least `through_m`."""
+    dropped: SimpleGraphReport
+
+
+def to_simple_graph(level: Level) -> SimpleGraph:
+    """What a level looks like to a simple graph: at most one edge for two vertices, no self-loop.
+
+    Parameters
+    ----------
+    level
+        Any level of a pyramid.
+
+    Returns
+    -------
+    SimpleGraph
+        The graph, and a report of the arcs that it has no room for.
+    """
+    graph: nx.Graph[int] = nx.Graph(
+        name=level.grid.name, level=level.index, resolution_m=level.grid.resolution_m
+    )
+    graph.add_nodes_from(vertices_with_attributes(level))
+    loops = level.is_self_loop
+    plain = np.flatnonzero(~loops)
+    # Stable: of arcs with an equal through_m the one with the lowest index is kept.
+    by_length = plain[np.argsort(level.through_m[plain], kind="stable")]
+    pairs, first = np.unique(np.sort(level.arcs[by_length], axis=1), axis=0, return_index=True)
+    for (low, high), arc in zip(pairs.tolist(), by_length[first].tolist(), strict=True):
+        graph.add_edge(
+            low,
+            high,
+            arc=arc,
+            max_distance_m=float(level.max_distance_m[arc]),
+            through_m=float(level.through_m[arc]),
+        )
+    return SimpleGraph(graph, report_of(level.arcs, level.n_vertices))
+
+
+def report_of(arcs: IntArray, n_vertices: int) -> SimpleGraphReport:
+    """Report what a simple graph drops of a graph.
+
+    Parameters
+    ----------
+    arcs
+        int (n_arcs, 2), the vertices that each arc joins.
+    n_vertices
+        Vertices of the graph.
+    """
+    loops: BoolArray = arcs[:, 0] == arcs[:, 1]
+    parallel = tuple(group for group in _groups(arcs, ~loops) if len(group.arcs) > 1)
+    return SimpleGraphReport(n_vertices, len(arcs), parallel, tuple(_groups(arcs, loops)))
+
+
+def _groups(arcs: IntArray, mask: BoolArray) -> list[ArcGroup]:
+    """Arcs of a mask, those with the same two ends together, in the order of the ends."""
+    index: LongArray = np.flatnonzero(mask)
+    pairs, group_of = np.unique(np.sort(arcs[index], axis=1), axis=0, return_inverse=True)
+    order = np.argsort(group_of.ravel(), kind="stable")
+    bounds = np.cumsum(np.bincount(group_of.ravel(), minlength=len(pairs)))[:-1]
+    members = np.split(index[order], bounds) if len(pairs) else []
+    return [
+        ArcGroup((low, high), tuple(group.tolist()))
+        for (low, high), group in zip(pairs.tolist(), members, strict=True)
+    ]
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def _joined(arcs: Sequence[int]) -> str:
+    return ", ".join(map(str, arcs))
+
+
+def _listed(lines: list[str]) -> list[str]:
+    """The first lines, and how many more there are."""
+    more = len(lines) - _LISTED
+    return [*lines[:_LISTED], f"  and {more} more"] if more > 0 else lines
