@@ -1,0 +1,88 @@
+"""Build time and memory of the pyramid, from 1 M to 64 M vertices.
+
+    python -m benchmarks.pyramid [--most MILLIONS]
+
+Each size runs in a process of its own (one core, kernels compiled, second build timed): the office
+tiled, its copies joined by doors, grid in memory to apex. Memory is the peak of the resident set
+during the build above what it was before, with the grid loaded (Linux only).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+TILINGS = ((1, 2), (2, 4), (4, 8), (8, 9), (10, 12))
+VERTICES_PER_TILE = 531_450
+
+_STATUS = Path("/proc/self/status")
+_CLEAR = Path("/proc/self/clear_refs")
+
+
+def _resident(key: str) -> int:
+    """Bytes of VmRSS (now) or VmHWM (peak)."""
+    for line in _STATUS.read_text().splitlines():
+        if line.startswith(key):
+            return int(line.split()[1]) * 1024
+    raise ValueError(key)
+
+
+def measure(rows: int, cols: int) -> dict[str, object]:
+    """Build one size twice and take the figures of the second build."""
+    import hybridnav as hn  # noqa: PLC0415 - in the child only
+    from hybridnav.grid.worlds import office_world, tiled  # noqa: PLC0415
+
+    grid = tiled(office_world(), rows=rows, cols=cols).grid()
+    vertices = int((grid.classes != hn.CellClass.OCCUPIED).sum())
+    hn.DualGraphPyramid.build(grid)
+    before = _resident("VmRSS")
+    _CLEAR.write_text("5")
+    began, began_cpu = time.perf_counter(), time.process_time()
+    pyramid = hn.DualGraphPyramid.build(grid)
+    seconds, cpu = time.perf_counter() - began, time.process_time() - began_cpu
+    return {
+        "vertices": vertices,
+        "levels": len(pyramid),
+        "places": pyramid.stats.sizes[-1].vertices,
+        "seconds": seconds,
+        "cpu": cpu,
+        "bytes": (_resident("VmHWM") - before) / vertices,
+        "stages": pyramid.stats.seconds,
+    }
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--most", type=float, default=64.0, help="largest size, million vertices")
+    parser.add_argument("--one", type=int, nargs=2, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.one:
+        sys.stdout.write(json.dumps(measure(*arguments.one)))
+        return
+    print("| vertices | levels | places | s | M vertices/s | ns a vertex | bytes a vertex |")
+    print("|---|---|---|---|---|---|---|")
+    stages = {}
+    for rows, cols in TILINGS:
+        if rows * cols * VERTICES_PER_TILE > arguments.most * 1e6:
+            continue
+        command = [sys.executable, "-m", "benchmarks.pyramid", "--one", str(rows), str(cols)]
+        run = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603
+        figures = json.loads(run.stdout)
+        n, seconds = figures["vertices"], figures["seconds"]
+        print(
+            f"| {n:,} | {figures['levels']} | {figures['places']:,} | {seconds:.2f} "
+            f"| {n / seconds / 1e6:.2f} | {seconds / n * 1e9:.0f} | {figures['bytes']:.0f} |"
+        )
+        stages[n] = figures["stages"]
+    print("\nns a vertex by stage\n")
+    for n, times in stages.items():
+        print(f"- {n:,}: " + ", ".join(f"{key} {s / n * 1e9:.0f}" for key, s in times.items()))
+
+
+if __name__ == "__main__":
+    main()
