@@ -1,7 +1,19 @@
-"""Pictures: maps, places, plans. Drawn on matplotlib figures without pyplot or a display."""
+"""Pictures: maps, places, graphs, plans. Drawn on matplotlib figures without pyplot or display."""
 
+from hybridnav.viz.dual import plot_dual
 from hybridnav.viz.maps import plot_level, plot_map, plot_places
+from hybridnav.viz.paper import plot_figure1
 from hybridnav.viz.plan import plot_plan
 from hybridnav.viz.save import save_figure
+from hybridnav.viz.topology import plot_topology
 
-__all__ = ["plot_level", "plot_map", "plot_places", "plot_plan", "save_figure"]
+__all__ = [
+    "plot_dual",
+    "plot_figure1",
+    "plot_level",
+    "plot_map",
+    "plot_places",
+    "plot_plan",
+    "plot_topology",
+    "save_figure",
+]

@@ -187,8 +187,8 @@ def fit_height(canvas: Canvas, legend: Legend) -> None:
     if ax.axison:
         # Of what stands left and right only ticks take room from the map: a title may be wider.
         ticks = [t for axis in (ax.xaxis, ax.yaxis) if (t := axis.get_tightbbox()) is not None]
-        left = max(box.x0 - tick.x0 for tick in ticks)
-        right = max(tick.x1 - box.x1 for tick in ticks)
+        left = max((box.x0 - tick.x0 for tick in ticks), default=0.0)
+        right = max((tick.x1 - box.x1 for tick in ticks), default=0.0)
     outside = np.array([left, right, box.y0 - lowest, around.y1 - box.y1])
     left, right, bottom, top = outside.clip(0) / figure.dpi + PAD_IN
     map_width = width - left - right

@@ -20,6 +20,11 @@ RIM_ARC = "#868686"
 UNEXPLORED_ARC = "#c9c9c9"
 UNEXPLORED_DOT = "#a8a8a8"
 PATH = "#c4122f"
+PARALLEL = "#0077bb"
+SELF_LOOP = "#cc3311"
+HOLE = "#d55e00"
+OUTSIDE = "#882255"
+UNEXPLORED_NODE = "#8a8a8a"
 
 PLACES = ("#77aadd", "#eedd88", "#44bb99", "#ffaabb", "#bbcc33", "#99ddff")
 """From Paul Tol's "light" scheme: made for filling areas, told apart by the colour-blind. Its

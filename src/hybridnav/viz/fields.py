@@ -1,0 +1,212 @@
+"""Walks inside the field of a place, and how they become smooth curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+if TYPE_CHECKING:
+    from hybridnav._typing import AnyArray, BoolArray, FloatArray, LongArray
+    from hybridnav.pyramid import Level
+
+_NEAR_RIM = 4.0
+"""What a step at the rim of a field costs more than one far from it, in steps."""
+_STEPS, _LAST_STEPS = 100, 8
+"""Steps in which a curve is made smooth, and those of them that no longer push."""
+_PUSH = 0.3
+"""Share of the missing clearance that a curve is moved in one step."""
+_SPACING, _LEAST_SPACING = 0.3, 0.5
+"""Distance of a curve's points while it is made smooth, in clearances, and in cells at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """The field of one place in a window of the grid, with a margin of one cell.
+
+    Cells are (row, col) in the window, as real numbers the middles of cells are integers.
+    """
+
+    level: Level
+    vertex: int
+    clearance: float
+    """How far curves keep from the rim of the field where there is room, in cells."""
+
+    @cached_property
+    def corner(self) -> LongArray:
+        """(row, col) of the window's first cell in the grid."""
+        corner: LongArray = self.level.receptive_field(self.vertex).min(axis=0) - 1
+        return corner
+
+    @cached_property
+    def cells(self) -> LongArray:
+        """int64 (n, 2), cells of the field."""
+        return self.level.receptive_field(self.vertex) - self.corner
+
+    @cached_property
+    def mask(self) -> BoolArray:
+        """Cells of the field."""
+        mask = np.zeros(self.cells.max(axis=0) + 2, dtype=np.bool_)
+        mask[tuple(self.cells.T)] = True
+        return mask
+
+    @cached_property
+    def distance(self) -> FloatArray:
+        """Distance of each cell to the nearest cell that is not in the field."""
+        return distance_to_rim(self.mask)
+
+    @cached_property
+    def number(self) -> LongArray:
+        """Index of each cell in `cells`, -1 for those of other fields."""
+        number = np.full(self.mask.shape, -1, dtype=np.int64)
+        number[tuple(self.cells.T)] = np.arange(len(self.cells))
+        return number
+
+    def graph(self, lines: LongArray | None = None) -> Any:
+        """Moves between the cells of copies of the field, dearer at the rim.
+
+        Parameters
+        ----------
+        lines
+            int64 (2, rows, cols), a set of bits for the side between each cell and its neighbour
+            north, and that between it and its neighbour east. Walks with different sets of sides
+            crossed an odd number of times are told apart: each set has a copy of the field, and
+            a walk across a side goes on in another copy. By default there is one.
+        """
+        if lines is None:
+            lines = np.zeros((2, *self.mask.shape), dtype=np.int64)
+        n, copies = len(self.cells), 1 << int(lines.max()).bit_length()
+        tail, head, flip = _moves(self.number, lines)
+        near = 1 + _NEAR_RIM * np.clip(1 - self.distance[self.mask] / self.clearance, 0, 1)
+        cost = np.hypot(*(self.cells[tail] - self.cells[head]).T) * (near[tail] + near[head])
+        copy = np.arange(copies)[:, None]
+        ends = (tail + n * copy).ravel(), (head + n * (copy ^ flip)).ravel()
+        size = n * copies
+        return coo_array((np.tile(cost, copies), ends), shape=(size, size)).tocsr()
+
+    def walks_from(self, cells: LongArray, lines: LongArray | None = None) -> Walks:
+        """Shortest walks from the nearest of some cells, by their number, to all cells."""
+        length, before, _ = dijkstra(
+            self.graph(lines),
+            directed=False,
+            indices=cells,
+            return_predecessors=True,
+            min_only=True,
+        )
+        return Walks(self.cells, length, before)
+
+    @property
+    def start(self) -> LongArray:
+        """The number of the surviving cell, as an array of one."""
+        start: LongArray = self.number[tuple((self.level.cells[[self.vertex]] - self.corner).T)]
+        return start
+
+    @cached_property
+    def walks(self) -> Walks:
+        """Shortest walks from the surviving cell to all cells."""
+        return self.walks_from(self.start)
+
+
+@dataclass(frozen=True, eq=False)
+class Walks:
+    """Shortest walks from one cell."""
+
+    cells: LongArray
+    length: AnyArray
+    before: AnyArray
+
+    def to(self, cell: int, copy: int = 0) -> FloatArray:
+        """The walk to a cell of a copy of the field, as float64 (n, 2)."""
+        at = cell + copy * len(self.cells)
+        walk = [at]
+        while (at := int(self.before[at])) >= 0:
+            walk.append(at)
+        cells: FloatArray = self.cells[np.array(walk[::-1]) % len(self.cells)].astype(np.float64)
+        return cells
+
+
+def distance_to_rim(mask: BoolArray) -> FloatArray:
+    """Distance of each cell of a mask to the nearest cell outside it, in cells."""
+    distance: FloatArray = np.asarray(ndimage.distance_transform_edt(mask), dtype=np.float64)
+    return distance
+
+
+def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatArray:
+    """A walk as a rubber band held at its ends and pushed off what it may not touch.
+
+    Parameters
+    ----------
+    walk
+        float64 (n, 2), cells.
+    distance
+        Distance of each cell to what the band keeps off.
+    clearance
+        How far it keeps off where there is room.
+
+    Returns
+    -------
+    FloatArray
+        float64 (n, 2), a smooth curve; it may slip over things of a cell or two.
+    """
+    slope = [np.gradient(distance, axis=axis) for axis in (0, 1)]
+    field = np.stack([distance, *slope], axis=-1)
+    band = walk
+    for step in range(_STEPS):
+        if step % 25 == 0:
+            band = _evenly(band, max(_SPACING * clearance, _LEAST_SPACING))
+        inner = band[1:-1]
+        pull = (band[:-2] + band[2:]) / 2 - inner
+        push = np.zeros_like(inner)
+        if step < _STEPS - _LAST_STEPS:  # the last ones take out the steps of the cells
+            at = _between(field, inner)
+            push = _PUSH * at[:, 1:] * np.maximum(clearance - at[:, :1], 0)
+        band = np.concatenate([band[:1], inner + 0.5 * pull + push, band[-1:]])
+    return rounded(band)
+
+
+def _between(values: FloatArray, points: FloatArray) -> FloatArray:
+    """Values between cells, bilinear: a third of the time of `ndimage.map_coordinates`."""
+    low = np.minimum(points.astype(np.int64), np.array(values.shape[:2]) - 2)
+    row, col = low.T
+    up, right = (points - low).T[..., None]
+    lower = values[row, col] * (1 - right) + values[row, col + 1] * right
+    upper = values[row + 1, col] * (1 - right) + values[row + 1, col + 1] * right
+    between: FloatArray = lower * (1 - up) + upper * up
+    return between
+
+
+def _evenly(line: FloatArray, spacing: float) -> FloatArray:
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    at = np.linspace(0, length[-1], max(round(length[-1] / spacing), 12) + 1)
+    return np.stack([np.interp(at, length, part) for part in line.T], axis=1)
+
+
+def rounded(line: FloatArray) -> FloatArray:
+    """Chaikin's corner cutting, ends kept."""
+    for _ in range(2):
+        early, late = line[:-1] * 0.75 + line[1:] * 0.25, line[:-1] * 0.25 + line[1:] * 0.75
+        cut = np.stack([early, late], axis=1).reshape(-1, 2)
+        line = np.concatenate([line[:1], cut, line[-1:]])
+    return line
+
+
+def _moves(number: LongArray, crossed: LongArray) -> tuple[LongArray, LongArray, LongArray]:
+    """Moves between 8-neighbours, both cells beside a diagonal in the field; what each crosses."""
+    north, east = crossed
+    # The window has a margin: rolled arrays wrap round outside the field.
+    north_east = north ^ np.roll(east, -1, axis=0)
+    north_west = north ^ np.roll(east, (-1, 1), axis=(0, 1))
+    steps = (((1, 0), north), ((0, 1), east), ((1, 1), north_east), ((1, -1), north_west))
+    moves = []
+    for (up, right), across in steps:
+        beyond = np.roll(number, (-up, -right), axis=(0, 1))
+        beside = (np.roll(number, -up, axis=0), np.roll(number, -right, axis=1))
+        legal = np.minimum.reduce([number, beyond, *beside]) >= 0
+        moves.append((number[legal], beyond[legal], across[legal]))
+    tail, head, crossing = (np.concatenate(part) for part in zip(*moves, strict=True))
+    return tail, head, crossing

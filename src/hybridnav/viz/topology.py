@@ -1,0 +1,278 @@
+"""Pictures of graphs over their map: the topological map, and what a simple graph leaves of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.pyramid.simple import report_of
+from hybridnav.topology import TopologicalMap
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.curves import Arc
+from hybridnav.viz.fields import Field
+from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.loops import Loops
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import AnyArray, BoolArray, ByteArray, FloatArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.pyramid import Level
+    from hybridnav.viz.layout import Entry
+    from hybridnav.viz.style import Sizes
+
+MAX_VERTICES = 20_000
+"""Vertices of a level beyond which its graph is not drawn: it would be one grey area."""
+LEAST_AREA_M2 = 0.1
+"""Area in square metres below which a place, and what a self-loop goes round, are noise."""
+FAINT = 0.4
+"""Share of its colour that the map keeps under a graph."""
+_CLASSES = (style.BLOCKED, style.FREE, style.UNEXPLORED)
+_CLEARANCE = 3.2  # points on a picture of full width
+_LEAST_CLEARANCE = 1.5  # cells: less would follow their steps
+
+
+@dataclass(frozen=True, eq=False)
+class Graph:
+    """What of a level is drawn: places and arcs that are no noise."""
+
+    level: Level
+    least_area_m2: float
+
+    @cached_property
+    def positions(self) -> FloatArray:
+        """float64 (n_vertices, 2), surviving cells, `(x, y)` in metres."""
+        return self.level.grid.frame.points_of(self.level.cells)
+
+    @cached_property
+    def seen(self) -> BoolArray:
+        """Vertices drawn; the largest is, however small."""
+        areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
+        seen: BoolArray = areas >= min(self.least_area_m2, areas.max(initial=0.0))
+        return seen
+
+    @cached_property
+    def plain(self) -> BoolArray:
+        """Arcs drawn between two vertices."""
+        plain: BoolArray = self.seen[self.level.arcs].all(axis=1) & ~self.level.is_self_loop
+        return plain
+
+    @cached_property
+    def parallel(self) -> BoolArray:
+        """Arcs of which there are more between the same two vertices."""
+        groups = report_of(self.level.arcs, self.level.n_vertices).parallel
+        parallel = np.zeros(self.level.n_arcs, dtype=np.bool_)
+        parallel[[arc for group in groups for arc in group.arcs]] = True
+        return parallel & self.plain
+
+    def kinds(self) -> list[tuple[BoolArray, str, str]]:
+        """Masks of arcs, their colours and names, those to see best last."""
+        explored = (self.level.classes == CellClass.FREE)[self.level.arcs].all(axis=1)
+        single = self.plain & ~self.parallel
+        return [
+            (single & ~explored, style.RIM_ARC, "unexplored-arcs"),
+            (single & explored, style.INK, "arcs"),
+            (self.parallel, style.PARALLEL, "parallel-arcs"),
+            (self.level.is_self_loop, style.SELF_LOOP, "self-loops"),
+        ]
+
+    def curves(self, clearance_m: float) -> dict[int, FloatArray]:
+        """A curve for each arc and self-loop drawn, `(x, y)` in metres.
+
+        Parameters
+        ----------
+        clearance_m
+            How far curves keep from what they pass, where there is room.
+        """
+        level, side = self.level, self.level.grid.resolution_m
+        least = self.least_area_m2 / side**2
+        ends = level.arcs[self.plain | level.is_self_loop]
+        wide = max(clearance_m / side, _LEAST_CLEARANCE)
+        fields = {vertex: Field(level, vertex, wide) for vertex in np.unique(ends).tolist()}
+        curves = {}
+        for arc in np.flatnonzero(self.plain).tolist():
+            one, other = (fields[vertex] for vertex in level.arcs[arc].tolist())
+            curves[arc] = Arc(one, other, level.boundary(arc)).curve()
+        looped = level.arcs[level.is_self_loop, 0]
+        for vertex in np.unique(looped[self.seen[looped]]).tolist():
+            loops = Loops(fields[vertex])
+            large = [arc for arc, inside in loops.enclosed.items() if inside.sum() >= least]
+            curves |= {arc: loops.curve(arc) for arc in large}
+        return {arc: level.grid.frame.points_of_grid(curve) for arc, curve in curves.items()}
+
+
+def plot_topology(  # noqa: PLR0913 - all but the first have defaults
+    places: Level | TopologicalMap,
+    *,
+    ax: Axes | None = None,
+    simple: bool = False,
+    least_area_m2: float = LEAST_AREA_M2,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw the graph of places over a faint map: free places black, unexplored ones grey.
+
+    An arc runs from one position to the other inside its two places and across its own boundary,
+    straight where there is room: parallel arcs go round the two sides of what parts them. A
+    self-loop is a closed curve inside its place round what it encloses, or a petal towards that
+    where it is too small to go round. Arcs to unexplored places are lighter.
+
+    Parameters
+    ----------
+    places
+        The topological map, or any level of a pyramid.
+    ax
+        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+    simple
+        Draw what a simple graph keeps: one straight line for two adjacent places, no self-loops.
+    least_area_m2
+        Places under this area in square metres, their arcs, and self-loops round less than it are
+        not drawn; the title counts such places.
+    title
+        Replaces the title that names the map and counts; an empty one leaves it out.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    InvalidValueError
+        When the level has more than 20,000 vertices.
+    """
+    level = drawable(places)
+    canvas = Canvas.opened(ax, width_in, known_view(level.grid))
+    draw_ground(canvas, level.grid, level.grid.classes, style.rgb(*_CLASSES))
+    graph = Graph(level, least_area_m2)
+    draw_graph(canvas, graph, simple=simple)
+    words = _words(graph, simple=simple) if title is None else [title]
+    finish(canvas, graph_entries(graph, canvas.sizes, simple=simple), words)
+    return canvas.ax
+
+
+def drawable(places: Level | TopologicalMap) -> Level:
+    """The level to draw, unless it has too many vertices for a picture of a graph."""
+    level = places.level if isinstance(places, TopologicalMap) else places
+    if level.n_vertices > MAX_VERTICES:
+        raise InvalidValueError(
+            f"a graph is drawn up to {MAX_VERTICES} vertices, level {level.index} has "
+            f"{level.n_vertices}: draw a higher level, or plot_level, which draws fields"
+        )
+    return level
+
+
+def draw_ground(
+    canvas: Canvas, grid: OccupancyGrid, index: AnyArray, colours: ByteArray, share: float = FAINT
+) -> None:
+    """Draw the cells, `colours[index]` each, with a share of their colour."""
+    draw_cells(canvas, grid, index, colours)
+    canvas.ax.images[-1].set_alpha(share)
+
+
+def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
+    """Draw arcs, self-loops and places."""
+    sizes, level = canvas.sizes, graph.level
+    width, metre = 1.1 * sizes.line, sizes.points_per_metre
+    if simple:
+        lines = list(graph.positions[np.unique(np.sort(level.arcs[graph.plain], axis=1), axis=0)])
+        _add_lines(canvas, lines, style.INK, width, gid="edges")
+    else:
+        curves = graph.curves(_CLEARANCE * sizes.line / metre)
+        for mask, colour, gid in graph.kinds():
+            lines = [curves[arc] for arc in np.flatnonzero(mask).tolist() if arc in curves]
+            _add_lines(canvas, lines, colour, width, gid=gid)
+    free = level.classes == CellClass.FREE
+    for mask, colour, size, gid in (
+        (~free, style.UNEXPLORED_NODE, 4.2, "unexplored-dots"),
+        (free, style.INK, 5.2, "free-dots"),
+    ):
+        at = graph.positions[mask & graph.seen]
+        dots = canvas.ax.scatter(
+            at[:, 0],
+            at[:, 1],
+            s=(size * sizes.line) ** 2,
+            c=colour,
+            edgecolors=style.FREE,
+            linewidths=0.5 * sizes.line,
+            zorder=4,
+        )
+        dots.set_gid(gid)
+
+
+def _add_lines(
+    canvas: Canvas, lines: Sequence[FloatArray], colour: str, width: float, *, gid: str
+) -> None:
+    drawn = LineCollection(
+        list(lines), colors=colour, linewidths=width, capstyle="round", joinstyle="round", zorder=3
+    )
+    drawn.set_gid(gid)
+    canvas.ax.add_collection(drawn, autolim=False)
+
+
+def _words(graph: Graph, *, simple: bool) -> list[str]:
+    """Pieces of the title."""
+    level = graph.level
+    n_free = int((level.classes == CellClass.FREE).sum())
+    words = [level.grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]
+    report = report_of(level.arcs, level.n_vertices)
+    if simple:
+        words.append(f"{report.n_edges} edges")
+        words.append(f"parallel arcs dropped: {report.n_parallel_dropped}")
+        words.append(f"self-loops dropped: {report.n_self_loops_dropped}")
+    else:
+        words.append(f"{level.n_arcs} arcs")
+    hidden = int((~graph.seen).sum())
+    if hidden:
+        words.append(f"places under {graph.least_area_m2:g} m² not drawn: {hidden}")
+    return words
+
+
+def graph_entries(graph: Graph, sizes: Sizes, *, simple: bool) -> list[Entry]:
+    """Legend entries for places and arcs."""
+    free = graph.level.classes == CellClass.FREE
+    entries: list[Entry] = []
+    for mask, colour, label in (
+        (free, style.INK, "free place"),
+        (~free, style.UNEXPLORED_NODE, "unexplored place"),
+    ):
+        if (mask & graph.seen).any():
+            dot = Line2D([], [], ls="", marker="o", ms=5.0 * sizes.line, color=colour, mec="none")
+            entries.append((dot, label))
+    lines = [(graph.plain & ~graph.parallel | simple, style.INK, "edge" if simple else "arc")]
+    if not simple:
+        lines.append((graph.parallel, style.PARALLEL, "parallel arcs"))
+        lines.append((graph.level.is_self_loop, style.SELF_LOOP, "self-loop"))
+    for mask, colour, label in lines:
+        if mask.any():
+            entries.append((Line2D([], [], color=colour, lw=1.4 * sizes.line), label))
+    return entries
+
+
+def frame_axes(canvas: Canvas) -> None:
+    """Leave a thin frame round the map, without ticks."""
+    canvas.ax.set(xticks=[], yticks=[])
+    for spine in canvas.ax.spines.values():
+        spine.set(linewidth=0.6, color=style.ARC)
+
+
+def finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
+    """Title, frame, scale bar, legend."""
+    add_title(canvas, words)
+    frame_axes(canvas)
+    bar = add_scale_bar(canvas)
+    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
+    fit_height(canvas, legend)
