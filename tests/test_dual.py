@@ -20,7 +20,7 @@ from tests.strategies import MAX_SIDE, drawn, occupancy_grid
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(20, MAX_SIDE)
 ORDINARY = settings(max_examples=40, deadline=None, derandomize=True)
-MANY = settings(max_examples=500, deadline=None)
+MANY = settings(max_examples=300, deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
@@ -141,7 +141,7 @@ def test_the_dual_of_the_dual_is_the_graph(scene, linkage):
 
 @pytest.mark.full
 @each_linkage
-@given(scene=nested_scenes(MAX_SIDE))
+@given(scene=nested_scenes(min(24, MAX_SIDE)))
 @MANY
 def test_many_maps_have_the_dual_that_their_cells_say(scene, linkage):
     base = Base.of(scene.classes)

@@ -20,7 +20,7 @@ from tests.strategies import MAX_SIDE, drawn, occupancy_grid
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(20, MAX_SIDE)
 ORDINARY = settings(max_examples=60, deadline=None, derandomize=True)
-MANY = settings(max_examples=500, deadline=None)
+MANY = settings(max_examples=300, deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
