@@ -17,7 +17,8 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.simple import ArcGroup, report_of
 from tests.strategies import drawn, occupancy_grid, scenes
 
-MAPS = Path(__file__).parents[1] / "maps"
+ROOT = Path(__file__).parents[1]
+MAPS = ROOT / "maps"
 SOME = settings(max_examples=60, deadline=None)
 
 
@@ -66,12 +67,15 @@ def test_figure_1_loses_one_parallel_arc_and_one_self_loop(figure1):
     assert len(dropped.parallel[0].arcs) == 2
 
 
-def test_the_topological_map_counts_alike(figure1):
+def test_the_topological_map_and_the_page_count_alike(figure1):
     assert figure1.parallel_arcs() == 1
     grid = hn.load_map(MAPS / "office" / "office.yaml", robot_radius_m=0.25)
     office = hn.TopologicalMap(DualGraphPyramid.build(grid))
     dropped = office.level.to_simple_graph().dropped
     assert office.parallel_arcs() == dropped.n_parallel_dropped > 20
+    page = " ".join((ROOT / "docs" / "pyramid.md").read_text(encoding="utf-8").split())
+    loops = f"{dropped.n_self_loops_dropped} self-loops of {dropped.n_arcs}"
+    assert f"drops {dropped.n_parallel_dropped} arcs and {loops}" in page
 
 
 def test_the_report_is_for_people(figure1):
