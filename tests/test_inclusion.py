@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,51 +81,61 @@ def place_sets(topology, rng):
         yield found
 
 
-def check_encloses(topology):
-    masks = masks_of(topology)
-    for place in range(topology.n_places):
-        inside = kept_inside(masks[place])
+def insides(topology):
+    """Cells that each place encloses, bool (n_places, rows, cols)."""
+    field_of = topology.level.field_of
+    masks = [kept_inside(field_of == place) for place in range(topology.n_places)]
+    return np.array(masks, dtype=bool).reshape(-1, *field_of.shape)
+
+
+def check_encloses(topology, inside):
+    expected: list[list[Any]] = [[] for _ in inside]
+    for thing, mask in masks_of(topology).items():
+        for place in np.flatnonzero(inside[:, mask].all(axis=1)).tolist():
+            expected[place].append(thing)
+    for place, things in enumerate(expected):
         enclosed = topology.encloses(place)
+        assert enclosed_things(enclosed) == things
         assert enclosed.ignored == 0
-        assert enclosed_things(enclosed) == [x for x, mask in masks.items() if inside[mask].all()]
 
 
-def check_ring(topology, surroundings, thing, mask):
+def check_ring(topology, thing, mask):
     """The answer is the tour, written with its smallest place first."""
+    surroundings = Surroundings(topology.grid.classes, topology.level.field_of)
     ring = topology.enclosed_by(thing)
     assert ring in rotations(surroundings.ring(mask)), thing
     assert not ring or ring[0] == min(ring)
 
 
-def check_meaning(topology, surroundings, thing, mask):
+def check_meaning(topology, inside, thing, mask):
     """What the answer promises, whichever way it was found."""
     field_of = topology.level.field_of
     ring = topology.enclosed_by(thing)
-    whole, at_rim = surroundings.with_obstacles(mask)
+    whole, at_rim = Surroundings(topology.grid.classes, field_of).with_obstacles(mask)
     assert (not ring) == at_rim, thing
     wall = np.isin(field_of, ring)
     assert not (wall & mask).any()
     assert kept_inside(wall)[mask].all() == bool(ring)
     assert all(grown(whole)[field_of == place].any() for place in ring)
-    beside = {frozenset(ends) for ends in topology.arcs.tolist()}
     if len(ring) > 1:
-        assert all(frozenset(step) in beside for step in itertools.pairwise((*ring, ring[0])))
-    inner = {place: kept_inside(field_of == place) for place in range(topology.n_places)}
-    enclosing = [place for place in inner if inner[place][mask].all()]
+        steps = np.sort(np.stack([ring, np.roll(ring, -1)], axis=1), axis=1)
+        code = np.array([topology.n_places, 1])
+        assert np.isin(steps @ code, np.sort(topology.arcs, axis=1) @ code).all()
+    enclosing = np.flatnonzero(inside[:, mask].all(axis=1)).tolist()
     assert ring or not enclosing
     for place in enclosing:
         # The ring lies inside whatever place encloses the thing alone, or passes through it.
-        assert all(one == place or inner[place][field_of == one].all() for one in ring), thing
+        assert all(one == place or inside[place][field_of == one].all() for one in ring), thing
     if len(ring) == 1:
         assert ring[0] in enclosing
-        assert all(one == ring[0] or inner[one][field_of == ring[0]].all() for one in enclosing)
 
 
 @each_linkage
 @given(scene=nested_scenes(SIDE))
 @ORDINARY
 def test_a_place_encloses_what_no_walk_round_it_joins_to_the_outside(scene, linkage):
-    check_encloses(topology_of(scene, linkage))
+    topology = topology_of(scene, linkage)
+    check_encloses(topology, insides(topology))
 
 
 @each_linkage
@@ -133,20 +143,19 @@ def test_a_place_encloses_what_no_walk_round_it_joins_to_the_outside(scene, link
 @ORDINARY
 def test_what_goes_round_a_thing_is_a_tour_along_its_edge(scene, linkage):
     topology = topology_of(scene, linkage)
-    surroundings = Surroundings(scene.classes, topology.level.field_of)
     for thing, mask in masks_of(topology).items():
-        check_ring(topology, surroundings, thing, mask)
+        check_ring(topology, thing, mask)
 
 
 @given(scene=nested_scenes(min(16, SIDE)), seed=st.integers(0, 2**32 - 1))
 @ORDINARY
 def test_several_connected_places_are_one_thing(scene, seed):
     topology = topology_of(scene, "radius")
-    surroundings = Surroundings(scene.classes, topology.level.field_of)
+    inside = insides(topology)
     for places in place_sets(topology, np.random.default_rng(seed)):
         mask = np.isin(topology.level.field_of, places)
-        check_ring(topology, surroundings, places, mask)
-        check_meaning(topology, surroundings, places, mask)
+        check_ring(topology, places, mask)
+        check_meaning(topology, inside, places, mask)
 
 
 @each_linkage
@@ -154,9 +163,9 @@ def test_several_connected_places_are_one_thing(scene, seed):
 @settings(ORDINARY, max_examples=25)
 def test_the_places_round_a_thing_part_it_from_the_outside(scene, linkage):
     topology = topology_of(scene, linkage)
-    surroundings = Surroundings(scene.classes, topology.level.field_of)
+    inside = insides(topology)
     for thing, mask in masks_of(topology).items():
-        check_meaning(topology, surroundings, thing, mask)
+        check_meaning(topology, inside, thing, mask)
 
 
 @given(scene=nested_scenes(SIDE))
@@ -221,13 +230,13 @@ def test_obstacles_and_components_are_the_connected_sets_of_the_grid(classes):
 @MANY
 def test_many_maps_tell_what_lies_inside_what(scene, linkage, seed):
     topology = topology_of(scene, linkage)
-    surroundings = Surroundings(scene.classes, topology.level.field_of)
-    check_encloses(topology)
+    inside = insides(topology)
+    check_encloses(topology, inside)
     sets = place_sets(topology, np.random.default_rng(seed))
     things = [(places, np.isin(topology.level.field_of, places)) for places in sets]
     for thing, mask in [*masks_of(topology).items(), *things]:
-        check_ring(topology, surroundings, thing, mask)
-        check_meaning(topology, surroundings, thing, mask)
+        check_ring(topology, thing, mask)
+        check_meaning(topology, inside, thing, mask)
 
 
 @each_linkage
