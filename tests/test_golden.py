@@ -20,16 +20,16 @@ from hybridnav.grid.worlds import figure1_world, office_world, tiled
 from hybridnav.pyramid import DualGraphPyramid
 
 GOLDEN = {
-    "figure1": "8a43fb5cd1e4bc4c",
-    "no-limit": "3fbe80b047747e29",
-    "office": "8f1cd88888161ed5",
-    "office-diameter": "0e975976c8102ff5",
-    "office-seed-7": "1f56837e37f1e204",
-    "office-survivor": "ee95b53749de6563",
-    "office-tiled": "70d2bd806b656508",
+    "figure1": "da12ec6638d37903",
+    "no-limit": "a5268a66ea16f02b",
+    "office": "e840e6bf22c069c4",
+    "office-diameter": "65c2fcfe78850446",
+    "office-seed-7": "d1e00ac7239ad5da",
+    "office-survivor": "2367c63df9536f7f",
+    "office-tiled": "61f7686c175e5253",
     "one-column": "f141607881650635",
-    "speckle": "69faf747bf8c86d1",
-    "three-classes": "d6f5d8685886938d",
+    "speckle": "777779e75269640e",
+    "three-classes": "8460df6b15a3385f",
 }
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 from hybridnav.pyramid import DualGraphPyramid
+from tests.oracle.blocks import in_pieces
 from tests.oracle.checks import (
     base_darts,
     check_attributes,
@@ -67,9 +68,11 @@ def check_topology(levels, scene):
 def check_merging(levels, scene, linkage):
     cap = {"limit_m": scene.merge_distance_m, "resolution_m": scene.resolution_m}
     for lower, upper in itertools.pairwise(levels):
-        parent = check_step(lower, upper)
+        check_step(lower, upper)
         if linkage == "survivor":
-            check_links(lower, parent, upper, **cap)
+            distance = scene.merge_distance_m / scene.resolution_m
+            waiting = in_pieces(scene.classes, distance, lower.index)
+            check_links(lower, upper, waiting, **cap)
     if linkage != "survivor":
         for level in levels:
             check_cap(level, linkage=linkage, **cap)

@@ -287,11 +287,21 @@ def check_cap(level: LevelLike, *, linkage: str, limit_m: float, resolution_m: f
 
 
 def check_links(
-    lower: LevelLike, parent: AnyArray, upper: LevelLike, *, limit_m: float, resolution_m: float
+    lower: LevelLike,
+    upper: LevelLike,
+    waiting: AnyArray,
+    *,
+    limit_m: float,
+    resolution_m: float,
 ) -> None:
-    """`survivor`: parent links are shorter than the cap, and all that can merge do."""
+    """`survivor`: parent links are shorter than the cap, and all that can merge do.
+
+    `waiting` is a mask of the cells whose blocks are in pieces: nothing else merges with those.
+    """
+    parent = upper.field_of[lower.cells[:, 0], lower.cells[:, 1]]
     squared = ((lower.cells - upper.cells[parent]) ** 2).sum(axis=1)
     assert below(squared, limit_m=limit_m, resolution_m=resolution_m).all()
     passing = passes(lower, linkage="survivor", limit_m=limit_m, resolution_m=resolution_m)
-    busy = np.unique(lower.arcs[passing])
+    waits = waiting[lower.cells[:, 0], lower.cells[:, 1]]
+    busy = np.unique(lower.arcs[passing & ~waits[lower.arcs].any(axis=1)])
     assert (np.bincount(parent, minlength=upper.n_vertices)[parent[busy]] >= 2).all()

@@ -202,21 +202,20 @@ def unlink(dart, sigma, inverse):
 
 @njit(cache=True)
 def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
-    """A dart of the ordinary face of `start` whose edge is redundant, -1 if there is none.
+    """A dart of the ordinary face of `start` whose edge is redundant, -1 if there is none, and one
+    of the edge that runs beside it.
 
     Rules three and four: exactly two distinct edges between the same two vertices and else
     self-loops; nothing but self-loops of one vertex (the one that encloses the others goes).
     """
     crossings = 0
-    last = -1
-    first = -1
-    enclosing = -1
+    last = first = enclosing = np.int32(-1)
     dart = start
     while True:
         if origin[dart] != origin[dart ^ 1]:
             crossings += 1
             if crossings > 2:
-                return -1
+                return np.int32(-1), np.int32(-1)
             first = last
             last = dart
         elif loop_area(dart, sweep, base_edge, cols) < 0:
@@ -225,42 +224,79 @@ def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
         if dart == start:
             break
     if crossings == 0:
-        return enclosing if enclosing >= 0 else start
+        dart = enclosing if enclosing >= 0 else start
+        return dart, dart
     if crossings == 2 and first != last ^ 1:
-        return max(first, last)
-    return -1
+        return max(first, last), min(first, last)
+    return np.int32(-1), np.int32(-1)
 
 
 @njit(cache=True)
-def simplify(darts, touched, any_loop, state, inverse, cols):
+def start_cell(dart, base_edge, cols):
+    """Row and column of the cell where the base edge of a dart starts."""
+    base = base_edge[dart >> 1]
+    cell = base >> 1
+    if dart & 1:
+        cell += cols if base & 1 else 1
+    return cell // cols, cell % cols
+
+
+@njit(cache=True)
+def start_together(dart, partner, darts, whole_at, level, cols):
+    """Whether two edges between the same vertices start in the same fields.
+
+    They do not where an end is a block in pieces: its cells merge along a quadtree, columns of side
+    2^j at level 2j - 1 and rows at level 2j.
+    """
+    for d in (np.int64(dart), np.int64(dart) ^ 1):
+        v = darts.origin[d]
+        if whole_at[v] <= level:
+            continue
+        beside = partner if darts.origin[partner] == v else partner ^ 1
+        row, col = start_cell(d, darts.base_edge, cols)
+        other_row, other_col = start_cell(beside, darts.base_edge, cols)
+        by_row, by_col = level >> 1, (level + 1) >> 1
+        if row >> by_row != other_row >> by_row or col >> by_col != other_col >> by_col:
+            return False
+    return True
+
+
+@njit(cache=True)
+def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, all_whole):
     """Remove redundant edges through ordinary faces until none is left, in place.
+
+    An edge that ends at a block in pieces (`whole_at` above `level`, unless `all_whole`) waits for
+    the pieces to merge, so all of those are looked at again.
 
     Rules one and two: a face of degree one, a face of degree two. The others need a self-loop,
     and the lower levels have none. A removal can make the merged face redundant, and no other
     one, so every face is followed until it is not.
     """
     sigma, origin, sweep, protected, base_edge = darts
-    n_darts = 2 * base_edge.size if any_loop else 0
+    n_darts = 2 * base_edge.size if any_loop or not all_whole else 0
     for i in range(touched.size + n_darts):
         if i < touched.size:
             start = touched[i]
         else:
             start = np.int32(i - touched.size)
-            if origin[start] != origin[start ^ 1]:
+            v = origin[start]
+            if v != origin[start ^ 1] and (all_whole or whole_at[v] < level):
                 continue
         if state[start >> 1] != ALIVE:
             continue
         while start >= 0 and not protected[start]:
             second = sigma[start ^ 1]
-            dart = np.int32(-1)
+            dart = partner = np.int32(-1)
             if second == start:
-                dart = start
+                dart = partner = start
             elif sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
                 if second != start ^ 1:
-                    dart = max(start, second)
+                    dart, partner = max(start, second), min(start, second)
             elif any_loop:
-                dart = redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols)
+                dart, partner = redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols)
             if dart < 0:
+                break
+            if not all_whole and not start_together(dart, partner, darts, whole_at, level, cols):
                 break
             other = dart ^ 1
             # A dart that stays in the merged face: from this side, else from the other.

@@ -36,6 +36,8 @@ class Vertices(NamedTuple):
     """int32 (n, 4), the field's least row and column and greatest row and column."""
     classes: np.ndarray
     """uint8 (n,), `CellClass`."""
+    whole_at: np.ndarray
+    """uint8 (n,), the level from which the vertex is there: until then its block is in pieces."""
 
 
 class Hulls(NamedTuple):
@@ -43,24 +45,6 @@ class Hulls(NamedTuple):
 
     start: np.ndarray
     points: np.ndarray
-
-
-@njit(cache=True)
-def base_vertices(classes, n_vertices):
-    """Vertices of the base: each cell that is not occupied survives for itself."""
-    rows, cols = classes.shape
-    cells = np.empty((n_vertices, 2), np.int32)
-    boxes = np.empty((n_vertices, 4), np.int32)
-    of_class = np.empty(n_vertices, np.uint8)
-    v = 0
-    for row in range(rows):
-        for col in range(cols):
-            if classes[row, col] != 0:
-                cells[v, 0] = boxes[v, 0] = boxes[v, 2] = row
-                cells[v, 1] = boxes[v, 1] = boxes[v, 3] = col
-                of_class[v] = classes[row, col]
-                v += 1
-    return Vertices(cells, boxes, of_class)
 
 
 @njit(cache=True)
@@ -142,7 +126,7 @@ def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
 
 
 @njit(cache=True)
-def contractible(origin, base_edge, vertices, hulls, linkage, limit, seed, keys, ways, best):
+def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed, keys, ways, best):
     """Fill `keys` with the contractible edges; gives their number, or UNDECIDED without hulls.
 
     The attribute by which edges are matched is the longer side of the box round both fields:
@@ -150,7 +134,7 @@ def contractible(origin, base_edge, vertices, hulls, linkage, limit, seed, keys,
     than the distance between the surviving cells or the merged radius). `ways`, by edge, says who
     may survive; `best`, by vertex, is the least key.
     """
-    cells, boxes, classes = vertices
+    cells, boxes, classes, whole_at = vertices
     hull_start, hull_points = hulls
     for v in range(classes.size):
         best[v] = _NO_KEY
@@ -161,7 +145,7 @@ def contractible(origin, base_edge, vertices, hulls, linkage, limit, seed, keys,
     for e in range(base_edge.size):
         u = np.uint32(origin[2 * e])
         v = np.uint32(origin[2 * e + 1])
-        if u == v or classes[u] != classes[v]:
+        if u == v or classes[u] != classes[v] or max(whole_at[u], whole_at[v]) > level:
             continue
         height = np.int64(max(boxes[u, 2], boxes[v, 2]) - min(boxes[u, 0], boxes[v, 0]))
         width = np.int64(max(boxes[u, 3], boxes[v, 3]) - min(boxes[u, 1], boxes[v, 1]))
@@ -279,7 +263,7 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
     Of a pair without leaves the vertex with the smaller merged radius survives, ties broken by
     the hash. `kernel_dart[v]` starts at the parent of v and ends at v.
     """
-    cells, boxes, _ = vertices
+    cells, boxes, _, _ = vertices
     parent, kernel_dart, has_leaf = stars
     for v in range(matched.size):
         parent[v] = v
@@ -325,7 +309,7 @@ def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vert
 
     Takes down, by cell, the level at which a surviving cell goes and the one it goes into.
     """
-    cells, boxes, classes = vertices
+    cells, boxes, classes, whole_at = vertices
     count = 0
     for v in range(parent.size):
         p = parent[v]
@@ -347,4 +331,5 @@ def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vert
             for i in range(4):
                 boxes[w, i] = boxes[v, i]
             classes[w] = classes[v]
+            whole_at[w] = whole_at[v]
     return count

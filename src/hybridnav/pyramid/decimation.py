@@ -17,6 +17,7 @@ import numpy as np
 from hybridnav.combinatorial import _kernels as dart_kernels
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _base_kernels, _field_kernels, _kernels
+from hybridnav.pyramid.blocks import TEMPLATES, max_power
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Record
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def decimate(
     run = _Decimation(classes, _LINKAGES[linkage], limit, seed)
     while run.step():
         pass
+    run.finish()
     return run.record, run.stats
 
 
@@ -137,45 +139,38 @@ class _Decimation:
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
         self.record = Record(
             np.empty(classes.size, np.uint8),
-            np.full(classes.size, -1, np.int32),
+            np.empty(classes.size, np.int32),
             np.empty(2 * classes.size, np.uint8),
         )
-        n_vertices, n_edges = _base_kernels.mark_base(
-            classes, self.record.vertex_end, self.record.edge_end
-        )
-        self.stats.sizes.append(LevelSize(n_vertices, n_edges, 0))
-        if self._first_step_is_closed(classes):
-            self._level = 1
-            self._darts, self._vertices = _base_kernels.first_level(
-                classes,
-                self._seed,
-                self.record.vertex_end,
-                self.record.vertex_parent,
-                self.record.edge_end,
-            )
-            self._note_size()
-        else:
-            self._level = 0
-            vertex, edge, _, _ = dart_kernels.number_base(classes)
-            self._darts = dart_kernels.base_darts(classes, vertex, edge, n_edges)
-            self._vertices = _kernels.base_vertices(classes, n_vertices)
+        self._level = 0
+        self._loops = [0]
+        self._darts, self._vertices = self._base(classes)
+        self._whole_at = int(self._vertices.whole_at.max(initial=0))
         self._scratch = _Scratch.of_size(len(self._vertices.cells), len(self._darts.base_edge))
         self._lap("base")
 
-    def _first_step_is_closed(self, classes: ByteArray) -> bool:
-        """Whether any two cells of a class may merge, and any star of them, so that level 1 has a
-        closed form; there must be such cells, for every level contracts at least once."""
-        far_leaves = 4 if self._linkage == _kernels.DIAMETER else 1
-        return self._limit > far_leaves and bool(
-            (classes[:, 1:] * (classes[:, 1:] == classes[:, :-1])).any()
-            or (classes[1:] * (classes[1:] == classes[:-1])).any()
+    def _base(self, classes: ByteArray) -> tuple[dart_kernels.Darts, _kernels.Vertices]:
+        record = self.record
+        power = _base_kernels.block_powers(classes, max_power(self._limit))
+        new_edge = np.empty(2 * classes.size, np.int32)
+        n_vertices, n_edges = _base_kernels.mark_base(
+            classes,
+            power,
+            TEMPLATES,
+            record.vertex_end,
+            record.vertex_parent,
+            record.edge_end,
+            new_edge,
         )
+        vertices = _base_kernels.block_vertices(classes, power, record.vertex_end, n_vertices)
+        darts = _base_kernels.block_darts(classes, power, vertices, new_edge, n_edges)
+        return darts, vertices
 
     def step(self) -> bool:
         """Go from this level to the next one; False when this one is the apex."""
         count = self._find_candidates()
         self._lap("candidates")
-        if count == 0:
+        if count == 0 and self._level >= self._whole_at:
             return False
         self._level += 1
         if self._level > MAX_LEVELS:
@@ -203,10 +198,13 @@ class _Decimation:
             scratch.state,
             scratch.inverse,
             self._cols,
+            self._vertices.whole_at,
+            self._level,
+            self._level > self._whole_at,
         )
         self._lap("removal")
         self._close_gaps(scratch)
-        self._note_size()
+        self._note_loops()
         self._lap("compaction")
         return True
 
@@ -247,6 +245,7 @@ class _Decimation:
                 self._darts.base_edge,
                 self._vertices,
                 self._hulls,
+                self._level,
                 self._linkage,
                 self._limit,
                 self._seed,
@@ -260,7 +259,7 @@ class _Decimation:
         """Give every vertex its hull: bounding boxes have stopped deciding every edge."""
         record = self.record
         field_of, _ = _field_kernels.label_fields(
-            record.vertex_end, record.vertex_parent, self._level
+            record.vertex_end, record.vertex_parent, MAX_LEVELS
         )
         self._hulls = _kernels.Hulls(
             *_field_kernels.field_hulls(field_of, self._cols, self._vertices.boxes)
@@ -299,12 +298,21 @@ class _Decimation:
             base_edge[:n_edges],
         )
 
-    def _note_size(self) -> None:
+    def _note_loops(self) -> None:
         origin = self._darts.origin
-        loops = int((origin[::2] == origin[1::2]).sum())
-        self.stats.sizes.append(
-            LevelSize(len(self._vertices.cells), len(self._darts.base_edge), loops)
+        self._loops.append(int((origin[::2] == origin[1::2]).sum()))
+
+    def finish(self) -> None:
+        """Take down the sizes of all levels."""
+        vertex_ends = _base_kernels.count_bytes(self.record.vertex_end)
+        edge_ends = _base_kernels.count_bytes(self.record.edge_end).reshape(-1, 2).sum(axis=1)
+        vertices, edges = (
+            ends[::-1].cumsum()[::-1][1:].tolist() for ends in (vertex_ends, edge_ends)
         )
+        self.stats.sizes = [
+            LevelSize(*size) for size in zip(vertices, edges, self._loops, strict=False)
+        ]
+        self._lap("sizes")
 
     def _lap(self, stage: str) -> None:
         now = time.perf_counter()

@@ -1,0 +1,139 @@
+"""The lower levels of open ground in closed form: blocks.
+
+A *block* is an aligned square of 2, 4 or 8 cells a side, all of one class, in the middle of more of
+its class. Its cells are contracted along a quadtree, first pairs along rows (levels 1, 3, 5), then
+pairs of those along columns (levels 2, 4, 6), and until it is whole no other vertex joins it: a
+block of side 2^p is one vertex from level 2p on. When and how each of its cells and edges goes is a
+matter of its place in the block alone, so the darts inside a block are never built.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav.pyramid.record import SURVIVES
+
+if TYPE_CHECKING:
+    from hybridnav._typing import ByteArray, LongArray
+
+MAX_POWER = 3
+"""The largest block has 2^3 cells a side: larger ones gain no time."""
+
+_PERIOD = 2 << MAX_POWER  # a block's survivor depends on whether its block number is odd
+
+
+class Templates(NamedTuple):
+    """What becomes of a cell or an edge by the power p of its block (side 2^p) and its place.
+
+    `vertex_end` and the steps to the parent, (p, row mod 16, col mod 16); the other arrays end of
+    edges as `Record.edge_end`: `inside_*` by (p, row mod 8, col mod 8), 0 for an edge that leaves
+    the block; `across_*` of those by (lesser power, row or column mod 8).
+    """
+
+    vertex_end: ByteArray
+    parent_rows: LongArray
+    parent_cols: LongArray
+    inside_east: ByteArray
+    inside_north: ByteArray
+    across_east: ByteArray
+    across_north: ByteArray
+
+
+def survivor_offset(power: int, number: int) -> int:
+    """Row or column in a block of the cell that survives: near the middle, on the side where the
+    middle of the next larger block is.
+
+    `number` is the row or column of the block among blocks of its size.
+    """
+    if power == 0:
+        return 0
+    if number % 2 == 0:
+        return (1 << power - 1) + survivor_offset(power - 1, 1)
+    return survivor_offset(power - 1, 0)
+
+
+def survivor_at(power: int, position: int) -> int:
+    """Row or column of the surviving cell of the block over a row or column."""
+    number = position >> power
+    return (number << power) + survivor_offset(power, number)
+
+
+def _death(position: int) -> int:
+    """Least power of a block over this row or column with another surviving one."""
+    for power in range(1, MAX_POWER + 1):
+        if survivor_at(power, position) != position:
+            return power
+    return MAX_POWER + 1
+
+
+def _twos(number: int) -> int:
+    """How often two divides a positive number."""
+    return (number & -number).bit_length() - 1
+
+
+def _across(power: int, position: int, *, upright: bool) -> int:
+    """End of an edge between two blocks by its place along the border: parallel edges go when the
+    cells beside each other are merged on both sides."""
+    place = position % (1 << power)
+    if place == 0:
+        return SURVIVES
+    level = 2 * _twos(place) + (2 if upright else 1)
+    return 2 * level + 1
+
+
+def _inside(power: int, along: int, across: int, *, upright: bool) -> int:
+    """End of an edge that runs from `along` to the next inside a block, at `across`: that of an
+    edge between the two halves that it joins, or contracted where those keep it."""
+    if (along + 1) % (1 << power) == 0:
+        return 0
+    halves = _twos(along + 1)
+    end = _across(halves if upright else halves + 1, across, upright=upright)
+    return 2 * (2 * halves + (1 if upright else 2)) if end == SURVIVES else end
+
+
+def make_templates() -> Templates:
+    """Fill the tables."""
+    powers, side = MAX_POWER + 1, 1 << MAX_POWER
+    vertex_end = np.full((powers, _PERIOD, _PERIOD), SURVIVES, np.uint8)
+    parent_rows = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
+    parent_cols = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
+    inside_east = np.zeros((powers, side, side), np.uint8)
+    inside_north = np.zeros((powers, side, side), np.uint8)
+    for power, row, col in np.ndindex(powers, _PERIOD, _PERIOD):
+        by_row, by_col = _death(row), _death(col)
+        if by_col <= min(power, by_row):
+            vertex_end[power, row, col] = 2 * by_col - 1
+            parent_cols[power, row, col] = survivor_at(by_col, col) - col
+        elif by_row <= power:
+            vertex_end[power, row, col] = 2 * by_row
+            parent_rows[power, row, col] = survivor_at(by_row, row) - row
+    for power, row, col in np.ndindex(powers, side, side):
+        inside_east[power, row, col] = _inside(power, col, row, upright=True)
+        inside_north[power, row, col] = _inside(power, row, col, upright=False)
+    across_east, across_north = (
+        np.array([[_across(p, i, upright=u) for i in range(side)] for p in range(powers)], np.uint8)
+        for u in (True, False)
+    )
+    return Templates(
+        vertex_end,
+        parent_rows,
+        parent_cols,
+        inside_east,
+        inside_north,
+        across_east,
+        across_north,
+    )
+
+
+TEMPLATES = make_templates()
+
+
+def max_power(limit: int) -> int:
+    """Power of the largest blocks: at most half the merge distance a side.
+
+    Every linkage allows those, and they leave room for fields of other shapes. `limit` is the
+    squared distance in cells.
+    """
+    return sum(4 << 2 * power <= limit for power in range(1, MAX_POWER + 1))
