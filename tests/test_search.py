@@ -172,6 +172,28 @@ def test_one_blocked_side_forbids_the_diagonal() -> None:
     assert found.cells.tolist() == [[0, 0], [0, 1], [1, 1]]
 
 
+@given(class_grids(), seeds)
+def test_with_corner_cutting_a_path_has_the_length_of_the_graph_of_all_neighbours(
+    classes: Any, seed: int
+) -> None:
+    enterable = classes == CellClass.FREE
+    assume(enterable.any())
+    graph: nx.Graph[tuple[int, int]] = nx.Graph()
+    graph.add_nodes_from((row, col) for row, col in np.argwhere(enterable).tolist())
+    for row, col in list(graph):
+        for rows, cols in ((0, 1), (1, -1), (1, 0), (1, 1)):
+            if (row + rows, col + cols) in graph:
+                graph.add_edge((row, col), (row + rows, col + cols), length=math.hypot(rows, cols))
+    rng = np.random.default_rng(seed)
+    start, goal = random_cell(enterable, rng), random_cell(enterable, rng)
+    found = GridSearch(enterable, corner_cutting=True).search(start, goal)
+    if found.cells is None:
+        assert not nx.has_path(graph, start, goal)
+    else:
+        optimum = nx.dijkstra_path_length(graph, start, goal, weight="length")
+        assert path_length_in_cells(found.cells) == pytest.approx(optimum)
+
+
 def test_diagonals_along_the_rim_of_a_corridor_are_legal() -> None:
     # The corridor is a diagonal of single cells: every move leaves both its sides outside.
     field_of = (1 - np.eye(5)).astype(np.int32)

@@ -52,6 +52,9 @@ class OccupancyGrid:
         U1 and U2, `0 <= U1 < U2 <= 1`.
     robot_radius_m
         Radius in metres by which occupied cells are inflated; 0 blocks the occupied cells alone.
+    corner_cutting
+        Whether a diagonal move may pass between two cells of which one, or both, are not free. With
+        it the grid and the topological map are no longer consistent.
     name
         What to call the map in messages and pictures.
 
@@ -67,6 +70,7 @@ class OccupancyGrid:
     free_threshold: float = 0.196
     occupied_threshold: float = 0.65
     robot_radius_m: float = 0.0
+    corner_cutting: bool = False
     name: str = "map"
     measured: ByteArray = field(init=False, repr=False)
     """Class of each cell by the thresholds alone, uint8 `CellClass`."""

@@ -42,7 +42,7 @@ class GridRefiner:
         enterable = grid.classes == CellClass.FREE
         if allow_unexplored:
             enterable |= grid.classes == CellClass.UNEXPLORED
-        self._search = GridSearch(enterable)
+        self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
 
     def refine(self, start: Cell, goal: Cell, corridor: Corridor | None) -> tuple[Path | None, int]:
         """Find the shortest path between two cells; see `Refiner`."""

@@ -39,10 +39,11 @@ def octile_cost(rows, cols):
 
 
 @njit(cache=True)
-def legal_moves(enterable):
+def legal_moves(enterable, corner_cutting):
     """Byte mask of the legal moves of each cell, bit k for direction k.
 
-    A diagonal needs both side cells enterable. Moves are judged on the whole grid, once.
+    A diagonal needs both side cells enterable, unless corners may be cut. Moves are judged on the
+    whole grid, once.
     """
     rows, cols = enterable.shape
     moves = np.zeros((rows, cols), np.uint8)
@@ -50,27 +51,21 @@ def legal_moves(enterable):
         for col in range(cols):
             if not enterable[row, col]:
                 continue
-            east = col + 1 < cols and enterable[row, col + 1]
-            west = col > 0 and enterable[row, col - 1]
-            north = row + 1 < rows and enterable[row + 1, col]
-            south = row > 0 and enterable[row - 1, col]
-            mask = 0
-            if east:
-                mask |= 1
-                if north and enterable[row + 1, col + 1]:
-                    mask |= 2
-                if south and enterable[row - 1, col + 1]:
-                    mask |= 128
-            if north:
-                mask |= 4
-            if west:
-                mask |= 16
-                if north and enterable[row + 1, col - 1]:
-                    mask |= 8
-                if south and enterable[row - 1, col - 1]:
-                    mask |= 32
-            if south:
-                mask |= 64
+            to_east, to_west = col + 1 < cols, col > 0
+            to_north, to_south = row + 1 < rows, row > 0
+            east = to_east and enterable[row, col + 1]
+            west = to_west and enterable[row, col - 1]
+            north = to_north and enterable[row + 1, col]
+            south = to_south and enterable[row - 1, col]
+            mask = east | north << 2 | west << 4 | south << 6
+            if to_north and to_east and (corner_cutting or (north and east)):
+                mask |= enterable[row + 1, col + 1] << 1
+            if to_north and to_west and (corner_cutting or (north and west)):
+                mask |= enterable[row + 1, col - 1] << 3
+            if to_south and to_west and (corner_cutting or (south and west)):
+                mask |= enterable[row - 1, col - 1] << 5
+            if to_south and to_east and (corner_cutting or (south and east)):
+                mask |= enterable[row - 1, col + 1] << 7
             moves[row, col] = mask
     return moves
 

@@ -37,11 +37,14 @@ class GridSearch:
     ----------
     enterable
         bool (rows, cols), cells that paths may use; start and goal must be among them.
+    corner_cutting
+        Whether a diagonal needs no side cell enterable.
     """
 
-    def __init__(self, enterable: BoolArray) -> None:
+    def __init__(self, enterable: BoolArray, *, corner_cutting: bool = False) -> None:
         self._cols = enterable.shape[1]
-        self._moves = _kernels.legal_moves(np.ascontiguousarray(enterable)).ravel()
+        moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting)
+        self._moves = moves.ravel()
         self._best = np.full(enterable.size, np.iinfo(np.int64).max)
         self._came = np.zeros(enterable.size, dtype=np.uint8)
         self._generation = 0
