@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-NOJIT_TESTS := tests/test_pyramid_invariants.py tests/test_search.py
+NOJIT_TESTS := tests/test_blocks.py tests/test_pyramid_invariants.py tests/test_search.py
 
 .PHONY: route test test-full lint unit nojit full setup maps lock clean
 
@@ -50,7 +50,7 @@ maps: setup
 
 # Needs uv (https://docs.astral.sh/uv); writes the versions that `setup` installs.
 lock:
-	uv pip compile --quiet --universal --no-header --no-annotate --python-version 3.11 --extra dev pyproject.toml --output-file requirements.lock
+	uv pip compile --quiet --universal --no-header --no-annotate --python-version 3.11 --extra dev --extra cluster --extra study pyproject.toml --output-file requirements.lock
 
 clean:
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,0 +1,40 @@
+"""The judges: paths, optima and losses, by code that shares nothing with the planners."""
+
+from hybridnav.metrics.anyangle import (
+    MAX_CORNERS,
+    AnyAnglePath,
+    VisibilityGraph,
+    anyangle_optimum,
+    shorten,
+)
+from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
+from hybridnav.metrics.optimum import ScipyOptimum, scipy_optimum
+from hybridnav.metrics.statistics import (
+    Buckets,
+    PairedDifference,
+    Summary,
+    distance_buckets,
+    paired_difference,
+    summarise,
+    thrun_count,
+)
+
+__all__ = [
+    "MAX_CORNERS",
+    "AnyAnglePath",
+    "Buckets",
+    "PairedDifference",
+    "ScipyOptimum",
+    "Summary",
+    "Verdict",
+    "VisibilityGraph",
+    "anyangle_optimum",
+    "distance_buckets",
+    "judge_path",
+    "paired_difference",
+    "scipy_optimum",
+    "segment_faults",
+    "shorten",
+    "summarise",
+    "thrun_count",
+]

@@ -1,0 +1,399 @@
+"""Kernels of the judge: exact tests of segments against the cells of a grid, and shortest paths.
+
+Positions are (row, col) in grid units: cell (r, c) spans [r, r + 1] x [c, c + 1], its corners are
+whole numbers. `free_of` says for each cell class whether it is free; no kernel needs a copy of the
+map. The tests are exact for coordinates that are multiples of 2^-24 below 2^28: differences of such
+numbers fit a float64, and products are compared with their rounding errors.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import numpy as np
+from numba import njit
+
+CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
+"""What a segment does: stays in the free space, leaves the map, enters a cell that is not free,
+passes between two that meet at a corner, runs along the side that two of them share."""
+
+
+@njit(cache=True)
+def _rounding_error(first, second, product):
+    """What rounding took from a product (T. J. Dekker: A floating-point technique, 1971)."""
+    scaled = 134217729.0 * first
+    first_high = scaled - (scaled - first)
+    first_low = first - first_high
+    scaled = 134217729.0 * second
+    second_high = scaled - (scaled - second)
+    second_low = second - second_high
+    error = product - first_high * second_high - first_low * second_high
+    return first_low * second_low - (error - first_high * second_low)
+
+
+@njit(cache=True)
+def compare_products(first, second, third, fourth):
+    """Sign of first * second - third * fourth, exact."""
+    left, right = first * second, third * fourth
+    # Rounding keeps order: only equal rounded products need their errors.
+    if left == right:
+        left = _rounding_error(first, second, left)
+        right = _rounding_error(third, fourth, right)
+    return int(left > right) - int(left < right)
+
+
+@njit(cache=True)
+def _is_free(classes, free_of, row, col):
+    """Whether a cell is in the map and free."""
+    if row < 0 or col < 0 or row >= classes.shape[0] or col >= classes.shape[1]:
+        return False
+    return free_of[classes[row, col]]
+
+
+@njit(cache=True)
+def crossing_at(classes, free_of, row, col):
+    """Whether two free and two blocked cells face each other across a corner of the lattice.
+
+    Returns 0 for no, 1 where the free cells are the ones with both or neither index lower (south-
+    west and north-east), -1 where they are the other two.
+    """
+    south_west = _is_free(classes, free_of, row - 1, col - 1)
+    south_east = _is_free(classes, free_of, row - 1, col)
+    if south_west == south_east:
+        return 0
+    if south_west != _is_free(classes, free_of, row, col):
+        return 0
+    if south_east != _is_free(classes, free_of, row, col - 1):
+        return 0
+    return 1 if south_west else -1
+
+
+@njit(cache=True)
+def _point_code(classes, free_of, row, col):
+    for r in range(math.ceil(row) - 1, math.floor(row) + 1):
+        for c in range(math.ceil(col) - 1, math.floor(col) + 1):
+            if _is_free(classes, free_of, r, c):
+                return CLEAR
+    return BLOCKED
+
+
+@njit(cache=True)
+def _level_code(classes, free_of, fixed, low, high, along_row):
+    """Judge a segment along a row (or column) of the lattice at `fixed`, from `low` to `high`."""
+    line = math.floor(fixed)
+    on_line = line == fixed
+    first = math.floor(low)
+    for step in range(first, math.ceil(high)):
+        if along_row:
+            upper = _is_free(classes, free_of, line, step)
+            lower = on_line and _is_free(classes, free_of, line - 1, step)
+            crossing = on_line and step > low and crossing_at(classes, free_of, line, step) != 0
+        else:
+            upper = _is_free(classes, free_of, step, line)
+            lower = on_line and _is_free(classes, free_of, step, line - 1)
+            crossing = on_line and step > low and crossing_at(classes, free_of, step, line) != 0
+        if not upper and not lower:
+            return SEAM if on_line else BLOCKED
+        if crossing:
+            return BETWEEN
+    return CLEAR
+
+
+@njit(cache=True)
+def segment_code(classes, free_of, row0, col0, row1, col1):
+    """First thing that a segment does wrong, 0 for nothing; the ends count as touched only.
+
+    Walks the cells whose interior the segment enters (J. Amanatides, A. Woo: A fast voxel traversal
+    algorithm for ray tracing, 1987) with exact comparisons of the crossings.
+    """
+    rows, cols = classes.shape
+    if min(row0, row1) < 0 or max(row0, row1) > rows or min(col0, col1) < 0:
+        return OUTSIDE
+    if max(col0, col1) > cols:
+        return OUTSIDE
+    if row0 == row1:
+        if col0 == col1:
+            return _point_code(classes, free_of, row0, col0)
+        return _level_code(classes, free_of, row0, min(col0, col1), max(col0, col1), True)
+    if col0 == col1:
+        return _level_code(classes, free_of, col0, min(row0, row1), max(row0, row1), False)
+    if col1 < col0:
+        row0, col0, row1, col1 = row1, col1, row0, col0
+    width, height = col1 - col0, abs(row1 - row0)
+    up = row1 > row0
+    col = math.floor(col0)
+    row = math.floor(row0) if up else math.ceil(row0) - 1
+    last_col = math.ceil(col1) - 1
+    last_row = math.ceil(row1) - 1 if up else math.floor(row1)
+    turn = 1 if up else -1
+    while True:
+        if not free_of[classes[row, col]]:
+            return BLOCKED
+        if row == last_row and col == last_col:
+            return CLEAR
+        to_line = row + 1 - row0 if up else row0 - row
+        order = compare_products(col + 1 - col0, height, to_line, width)
+        if order == 0:
+            # Through a corner: never through one of the ends, since a cell is still to come.
+            if not free_of[classes[row, col + 1]] and not free_of[classes[row + turn, col]]:
+                return BETWEEN
+            row += turn
+            col += 1
+        elif order < 0:
+            col += 1
+        else:
+            row += turn
+
+
+@njit(cache=True)
+def segment_codes(classes, free_of, positions):
+    """Code of each segment of a polyline; of a single point, its own."""
+    n = positions.shape[0]
+    codes = np.zeros(max(n - 1, 1), np.int8)
+    for i in range(codes.size):
+        j = min(i + 1, n - 1)
+        codes[i] = segment_code(
+            classes, free_of, positions[i, 0], positions[i, 1], positions[j, 0], positions[j, 1]
+        )
+    return codes
+
+
+@njit(cache=True)
+def crossed_joints(classes, free_of, positions):
+    """Whether a polyline turns at each point from one free cell into another across a corner.
+
+    Points that repeat count once, as the last of them.
+    """
+    n = positions.shape[0]
+    crossed = np.zeros(n, np.bool_)
+    before = 0
+    for i in range(1, n - 1):
+        row, col = positions[i]
+        if positions[i + 1, 0] == row and positions[i + 1, 1] == col:
+            continue
+        came_row, came_col = positions[before, 0] - row, positions[before, 1] - col
+        before = i
+        if row != math.floor(row) or col != math.floor(col) or (came_row == 0 and came_col == 0):
+            continue
+        crossing = crossing_at(classes, free_of, int(row), int(col))
+        if crossing == 0:
+            continue
+        # The two free cells lie on opposite sides of the other diagonal through the corner.
+        came = came_row + crossing * came_col
+        goes = positions[i + 1, 0] - row + crossing * (positions[i + 1, 1] - col)
+        crossed[i] = (came > 0) != (goes > 0)
+    return crossed
+
+
+@njit(cache=True)
+def _sees(classes, free_of, positions, i, j):
+    """Whether a segment between two of some positions is legal."""
+    return (
+        segment_code(
+            classes, free_of, positions[i, 0], positions[i, 1], positions[j, 0], positions[j, 1]
+        )
+        == CLEAR
+    )
+
+
+@njit(cache=True)
+def visible_pairs(classes, free_of, corners, slopes):
+    """Pairs i < j of corners that see each other and may follow each other on a shortest path.
+
+    A shortest path bends round a corner, so no segment of it points into the blocked cell there
+    or straight away from it: `slopes` is the sign of (row offset * col offset) of that cell.
+    """
+    n = corners.shape[0]
+    pairs = np.empty((1024, 2), np.int32)
+    n_pairs = 0
+    for i in range(n):
+        for j in range(i + 1, n):
+            row, col = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
+            if row * col * slopes[i] > 0 or row * col * slopes[j] > 0:
+                continue
+            if not _sees(classes, free_of, corners, i, j):
+                continue
+            if n_pairs == pairs.shape[0]:
+                larger = np.empty((2 * n_pairs, 2), np.int32)
+                larger[:n_pairs] = pairs
+                pairs = larger
+            pairs[n_pairs, 0], pairs[n_pairs, 1] = i, j
+            n_pairs += 1
+    return pairs[:n_pairs]
+
+
+@njit(cache=True)
+def visible_from(classes, free_of, row, col, corners, slopes):
+    """Distance from a position to each corner that it sees, infinite to the others."""
+    distances = np.full(corners.shape[0], np.inf)
+    for i in range(corners.shape[0]):
+        there_row, there_col = corners[i]
+        if (there_row - row) * (there_col - col) * slopes[i] > 0:
+            continue
+        if segment_code(classes, free_of, row, col, there_row, there_col) == CLEAR:
+            distances[i] = math.hypot(there_row - row, there_col - col)
+    return distances
+
+
+@njit(cache=True)
+def cheapest_corners(offsets, heads, lengths, from_start, to_goal, to_goal_bound):
+    """Corners on a shortest path between two positions, in order; empty where there is no path.
+
+    A* with the straight distance to the goal as its bound.
+    """
+    n = from_start.size
+    best = from_start.copy()
+    came = np.full(n, -1, np.int32)
+    done = np.zeros(n, np.bool_)
+    heap = [(np.inf, np.int32(-1))]
+    for i in range(n):
+        if best[i] < np.inf:
+            heapq.heappush(heap, (best[i] + to_goal_bound[i], np.int32(i)))
+    total, last = np.inf, np.int32(-1)
+    while heap:
+        bound, node = heapq.heappop(heap)
+        if bound >= total or node < 0:
+            break
+        if done[node]:
+            continue
+        done[node] = True
+        if best[node] + to_goal[node] < total:
+            total, last = best[node] + to_goal[node], node
+        for k in range(offsets[node], offsets[node + 1]):
+            head = heads[k]
+            length = best[node] + lengths[k]
+            if length < best[head]:
+                best[head], came[head] = length, node
+                heapq.heappush(heap, (length + to_goal_bound[head], head))
+    path = np.empty(n, np.int32)
+    size = 0
+    while last >= 0:
+        path[size] = last
+        size += 1
+        last = came[last]
+    return path[:size][::-1]
+
+
+@njit(cache=True)
+def pull(classes, free_of, positions):
+    """Indices of a polyline's points that are left when each sees the next, greedily far on."""
+    n = positions.shape[0]
+    kept = np.empty(n, np.int64)
+    kept[0] = 0
+    size, here = 1, 0
+    while here < n - 1:
+        # Doubling, then halving: a far point costs a few tests, not one for each point before it.
+        reached, stride = here + 1, 1
+        while reached + stride < n and _sees(classes, free_of, positions, here, reached + stride):
+            reached += stride
+            stride *= 2
+        while stride > 0:
+            if reached + stride < n and _sees(classes, free_of, positions, here, reached + stride):
+                reached += stride
+            stride //= 2
+        here = reached
+        kept[size] = here
+        size += 1
+    return kept[:size]
+
+
+@njit(cache=True)
+def shortcut(classes, free_of, positions):
+    """Indices of the points on the shortest way along a polyline that may skip points."""
+    n = positions.shape[0]
+    best = np.full(n, np.inf)
+    came = np.zeros(n, np.int64)
+    best[0] = 0.0
+    for j in range(1, n):
+        for i in range(j):
+            length = best[i] + math.hypot(
+                positions[j, 0] - positions[i, 0], positions[j, 1] - positions[i, 1]
+            )
+            if length < best[j] and (j == i + 1 or _sees(classes, free_of, positions, i, j)):
+                best[j], came[j] = length, i
+    kept = np.empty(n, np.int64)
+    size, here = 0, n - 1
+    while here > 0:
+        kept[size] = here
+        size += 1
+        here = came[here]
+    kept[size] = 0
+    return kept[: size + 1][::-1]
+
+
+@njit(cache=True)
+def _turn(a_row, a_col, b_row, b_col, c_row, c_col):
+    """Twice the signed area of a triangle."""
+    return (b_row - a_row) * (c_col - a_col) - (b_col - a_col) * (c_row - a_row)
+
+
+@njit(cache=True)
+def taut_chain(classes, free_of, first, bend, last):
+    """Corners that a string from `first` over `bend` to `last` touches when it is pulled tight.
+
+    Points are in doubled grid units, whole numbers. The string is held by the convex corners of
+    blocked cells inside the triangle: it takes the hull of these and the two ends.
+    """
+    a_row, a_col = first
+    p_row, p_col = bend
+    b_row, b_col = last
+    side = _turn(a_row, a_col, b_row, b_col, p_row, p_col)
+    sign = 1 if side > 0 else -1
+    found = np.empty((16, 2), np.int64)
+    n = 0
+    ends = (
+        (a_row, a_col, b_row, b_col),
+        (a_row, a_col, p_row, p_col),
+        (p_row, p_col, b_row, b_col),
+    )
+    low, high = min(a_row, b_row, p_row), max(a_row, b_row, p_row)
+    for row in range((low + 1) // 2, high // 2 + 1 if side != 0 else 0):
+        left, right = np.inf, -np.inf
+        for r0, c0, r1, c1 in ends:
+            if min(r0, r1) <= 2 * row <= max(r0, r1):
+                start = float(c0) if r0 == r1 else c0 + (2 * row - r0) * (c1 - c0) / (r1 - r0)
+                left, right = min(left, start), max(right, start)
+                if r0 == r1:
+                    left, right = min(left, c1), max(right, c1)
+        for col in range(math.floor(left / 2), math.ceil(right / 2) + 1):
+            free = 0
+            for r in range(row - 1, row + 1):
+                for c in range(col - 1, col + 1):
+                    free += int(_is_free(classes, free_of, r, c))
+            r, c = 2 * row, 2 * col
+            if (
+                free != 3
+                or sign * _turn(a_row, a_col, b_row, b_col, r, c) <= 0
+                or sign * _turn(a_row, a_col, p_row, p_col, r, c) > 0
+                or sign * _turn(p_row, p_col, b_row, b_col, r, c) > 0
+            ):
+                continue
+            if n == found.shape[0]:
+                larger = np.empty((2 * n, 2), np.int64)
+                larger[:n] = found
+                found = larger
+            found[n, 0], found[n, 1] = r, c
+            n += 1
+    # Gift wrapping from the first point: the next is the one with all others on the inner side.
+    chain = np.empty((n, 2), np.int64)
+    size = 0
+    row, col = a_row, a_col
+    while size < n:
+        next_row, next_col = b_row, b_col
+        for k in range(n):
+            r, c = found[k]
+            if r == row and c == col:
+                continue
+            turn = sign * _turn(row, col, next_row, next_col, r, c)
+            if turn > 0 or (
+                turn == 0
+                and abs(r - row) + abs(c - col) > abs(next_row - row) + abs(next_col - col)
+            ):
+                next_row, next_col = r, c
+        if next_row == b_row and next_col == b_col:
+            break
+        row, col = next_row, next_col
+        chain[size, 0], chain[size, 1] = row, col
+        size += 1
+    return chain[:size]

@@ -1,0 +1,275 @@
+"""Any-angle paths: the exact shortest on small maps, and the best known on large ones."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.metrics import _segment_kernels as kernels
+from hybridnav.metrics.judge import Cell, free_classes, judge_path
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, ByteArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+MAX_CORNERS = 2000
+"""Corners up to which a visibility graph is built unless more are asked for."""
+
+Point = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class AnyAnglePath:
+    """A shortest path that may run at any angle."""
+
+    points: FloatArray | None
+    """float64 (n, 2), `(x, y)` in metres, map frame; None where there is no path. A path from a
+    cell to itself has one point."""
+    length_m: float
+    """Length in metres, infinite where there is no path."""
+
+
+class VisibilityGraph:
+    """Exact Euclidean shortest paths between the centres of cells.
+
+    Free space is the union of the closed squares of the free cells, without the passages between
+    two blocked cells that meet at a corner (see `segment_faults`). A shortest path there bends at
+    convex corners of blocked cells only: lattice corners with exactly one blocked cell of four.
+    Visibility is tested exactly.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    allow_unexplored
+        Whether unexplored cells may be entered.
+    max_corners
+        Corners that the map may have at most; time and memory grow with their square.
+
+    Raises
+    ------
+    InvalidValueError
+        When the map has more corners.
+
+    Notes
+    -----
+    T. Lozano-Perez, M. A. Wesley: An algorithm for planning collision-free paths among polyhedral
+    obstacles, 1979.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        *,
+        allow_unexplored: bool = False,
+        max_corners: int = MAX_CORNERS,
+    ) -> None:
+        self._grid = grid
+        self._free_of = free_classes(allow_unexplored=allow_unexplored)
+        self.corners, self._slopes = _convex_corners(self._free_of[grid.classes])
+        """float64 (n, 2), (row, col) of the corners in grid units, whole numbers."""
+        n = len(self.corners)
+        if n > max_corners:
+            raise InvalidValueError(
+                f"a visibility graph of map {grid.name!r} would have {n} corners, "
+                f"more than the limit of {max_corners}"
+            )
+        pairs = kernels.visible_pairs(grid.classes, self._free_of, self.corners, self._slopes)
+        offset = self.corners[pairs[:, 0]] - self.corners[pairs[:, 1]]
+        lengths = np.hypot(offset[:, 0], offset[:, 1])
+        tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
+        # Corners of one place do not exist twice, so no length is 0 and every entry is kept.
+        graph = sparse.coo_array((np.tile(lengths, 2), (tails, heads)), shape=(n, n)).tocsr()
+        self._offsets = graph.indptr.astype(np.int64)
+        self._heads = graph.indices.astype(np.int32)
+        self._lengths = graph.data
+
+    def shortest(self, start_cell: Cell, goal_cell: Cell) -> AnyAnglePath:
+        """Find a shortest path between the centres of two cells.
+
+        Parameters
+        ----------
+        start_cell, goal_cell
+            (row, col), inside the map.
+
+        Returns
+        -------
+        AnyAnglePath
+            Without points where there is no path, also when a cell is not free.
+
+        Raises
+        ------
+        InvalidValueError
+            When a cell lies outside the map.
+        """
+        classes = self._grid.classes
+        start, goal = (_centre(self._grid, cell) for cell in (start_cell, goal_cell))
+        if not all(self._free_of[classes[tuple(cell)]] for cell in (start_cell, goal_cell)):
+            return AnyAnglePath(None, math.inf)
+        ends = np.array([start, goal])
+        if start == goal:
+            return self._path(ends[:1])
+        if kernels.segment_code(classes, self._free_of, *start, *goal) == kernels.CLEAR:
+            return self._path(ends)
+        from_start, to_goal = (
+            kernels.visible_from(classes, self._free_of, *end, self.corners, self._slopes)
+            for end in (start, goal)
+        )
+        offset = self.corners - ends[1]
+        chain = kernels.cheapest_corners(
+            self._offsets,
+            self._heads,
+            self._lengths,
+            from_start,
+            to_goal,
+            np.hypot(offset[:, 0], offset[:, 1]),
+        )
+        if not len(chain):
+            return AnyAnglePath(None, math.inf)
+        return self._path(np.concatenate([ends[:1], self.corners[chain], ends[1:]]))
+
+    def _path(self, positions: FloatArray) -> AnyAnglePath:
+        steps = np.diff(positions, axis=0)
+        length = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
+        frame = self._grid.frame
+        return AnyAnglePath(frame.points_of_grid(positions), length * frame.resolution_m)
+
+
+def anyangle_optimum(
+    grid: OccupancyGrid, start_cell: Cell, goal_cell: Cell, *, allow_unexplored: bool = False
+) -> AnyAnglePath:
+    """Find the exact Euclidean shortest path between the centres of two cells.
+
+    Parameters
+    ----------
+    grid
+        A map with at most `MAX_CORNERS` convex corners; for several queries on one map build a
+        `VisibilityGraph`.
+    start_cell, goal_cell
+        (row, col), inside the map.
+    allow_unexplored
+        Whether unexplored cells may be entered.
+
+    Returns
+    -------
+    AnyAnglePath
+        Without points where there is no path.
+
+    Raises
+    ------
+    InvalidValueError
+        When a cell lies outside the map or the map has too many corners.
+    """
+    graph = VisibilityGraph(grid, allow_unexplored=allow_unexplored)
+    return graph.shortest(start_cell, goal_cell)
+
+
+def shorten(grid: OccupancyGrid, cells: ArrayLike, *, allow_unexplored: bool = False) -> FloatArray:
+    """Shorten a legal grid path to the best any-angle path known from it.
+
+    Points that see each other are joined, then the string is pulled tight: each bend moves to the
+    convex corners that hold it, until none gives way (the shortest path among those that pass the
+    obstacles on the same sides). Short cuts between its points and further tightening alternate
+    until nothing is gained. The result is legal, no longer than the grid path, and an upper bound
+    on the any-angle optimum, not a proof of it.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    cells
+        A legal path, whole numbers (n, 2) of (row, col), n >= 1.
+    allow_unexplored
+        Whether unexplored cells count as free.
+
+    Returns
+    -------
+    FloatArray
+        float64 (m, 2), `(x, y)` in metres, map frame, from the first centre to the last.
+
+    Raises
+    ------
+    InvalidValueError
+        When the path is not legal.
+
+    Notes
+    -----
+    Tightening is the triangle step of J. Hershberger, J. Snoeyink: Computing minimum length paths
+    of a given homotopy class, 1994.
+    """
+    path = np.asarray(cells)
+    ends = {"start": tuple(path[0]), "goal": tuple(path[-1])} if len(path) else {}
+    verdict = judge_path(
+        grid,
+        path,
+        start=ends.get("start", (0, 0)),
+        goal=ends.get("goal", (0, 0)),
+        allow_unexplored=allow_unexplored,
+    )
+    if not verdict.ok:
+        raise InvalidValueError(f"only a legal path can be shortened: {verdict.faults[0]}")
+    free_of = free_classes(allow_unexplored=allow_unexplored)
+    positions = path + 0.5
+    string = positions[kernels.pull(grid.classes, free_of, positions)]
+    length = math.inf
+    while True:
+        string = _tighten(grid.classes, free_of, string)
+        steps = np.diff(string, axis=0)
+        now = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+        if now >= length - 1e-9:
+            return grid.frame.points_of_grid(string)
+        length = now
+        string = string[kernels.shortcut(grid.classes, free_of, string)]
+
+
+def _tighten(classes: ByteArray, free_of: BoolArray, string: FloatArray) -> FloatArray:
+    """Pull a legal polyline tight; bends are put on whole numbers, in doubled grid units."""
+    doubled = np.rint(2 * string).astype(np.int64)
+    done, ahead = [doubled[0]], list(doubled[:0:-1])
+    while len(ahead) > 1:
+        bend = ahead.pop()
+        chain = _held(classes, free_of, done[-1], bend, ahead[-1])
+        if len(chain) == 1 and (chain[0] == bend).all():
+            done.append(bend)
+            continue
+        ahead.extend(chain[::-1])
+        # The bend before may give way now that the string leaves it in another direction.
+        if len(done) > 1:
+            ahead.append(done.pop())
+    return np.array([*done, *ahead]) / 2
+
+
+def _held(
+    classes: ByteArray, free_of: BoolArray, before: LongArray, bend: LongArray, after: LongArray
+) -> LongArray:
+    """Points that hold the string between two others: the bend itself where it cannot give way."""
+    chain = kernels.taut_chain(classes, free_of, before, bend, after)
+    string = np.concatenate([before[None], chain, after[None]]) / 2
+    if kernels.segment_codes(classes, free_of, string).any():
+        return bend[None]
+    return np.asarray(chain, dtype=np.int64)
+
+
+def _convex_corners(free: BoolArray) -> tuple[FloatArray, LongArray]:
+    """Lattice corners with one blocked cell of four, and the sign of the diagonal it lies on."""
+    blocked = ~free
+    here = blocked[:-1, :-1], blocked[:-1, 1:], blocked[1:, :-1], blocked[1:, 1:]
+    row, col = np.nonzero(np.sum(here, axis=0, dtype=np.int8) == 1)
+    slopes = np.where(here[0][row, col] | here[3][row, col], 1, -1).astype(np.int64)
+    return np.stack([row, col], axis=1).astype(np.float64) + 1, slopes
+
+
+def _centre(grid: OccupancyGrid, cell: Cell) -> tuple[float, float]:
+    row, col = int(cell[0]), int(cell[1])
+    if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+        raise InvalidValueError(
+            f"cell ({row}, {col}) lies outside the map of {grid.shape[0]} x {grid.shape[1]} cells"
+        )
+    return row + 0.5, col + 0.5

@@ -1,0 +1,258 @@
+"""Paths judged by code that no planner shares: legal cells, legal segments, lengths by Euclid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass, Frame
+from hybridnav.metrics import _segment_kernels as kernels
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+Cell = tuple[int, int]
+
+_BETWEEN = "passes between two blocked cells that meet at a corner"
+_WORDS = {
+    kernels.OUTSIDE: "leaves the map",
+    kernels.BLOCKED: "enters a blocked cell",
+    kernels.BETWEEN: _BETWEEN,
+    kernels.SEAM: "runs along the side between two blocked cells",
+}
+_QUANTUM = 2.0**-24
+_FAR = 2.0**28
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the judge found on a path."""
+
+    faults: tuple[str, ...]
+    """One line for each kind of fault, naming the first place and how many there are."""
+    length_m: float
+    """Length of the polyline through the centres of the cells, in metres."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the path has no fault."""
+        return not self.faults
+
+
+def judge_path(
+    grid: OccupancyGrid,
+    cells: ArrayLike,
+    *,
+    start: Cell,
+    goal: Cell,
+    allow_unexplored: bool = False,
+) -> Verdict:
+    """Judge a cell path by the rules of the octile grid and by exact geometry.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    cells
+        The path, whole numbers (n, 2) of (row, col).
+    start, goal
+        The cells it should run between.
+    allow_unexplored
+        Whether unexplored cells count as free.
+
+    Returns
+    -------
+    Verdict
+        Faults: wrong first or last cell; cells outside the map or not free; a step that does not
+        go to one of the 8 neighbours; a segment between centres that enters a blocked cell or
+        passes between two that meet at a corner; a diagonal step with one blocked side cell
+        ("cuts a corner": legal for a line, not for a move of the octile grid). A cell that is not
+        free counts as blocked in all of these.
+
+    Raises
+    ------
+    InvalidValueError
+        When the cells are no integer array of shape (n, 2).
+    """
+    path = _checked_cells(cells)
+    if not len(path):
+        return Verdict(("the path has no cells",), 0.0)
+    rows, cols = grid.shape
+    free_of = free_classes(allow_unexplored=allow_unexplored)
+    inside: BoolArray = np.all((path >= 0) & (path < (rows, cols)), axis=1)
+    free = inside.copy()
+    free[inside] = free_of[grid.classes[path[inside, 0], path[inside, 1]]]
+    # As floats: whatever numbers a faulty planner hands out, nothing overflows.
+    steps = np.diff(path.astype(np.float64), axis=0)
+    near = np.abs(steps).max(axis=1, initial=0.0) == 1
+    # Halves are exact in float64, so are the tests of segments between centres.
+    centres = np.clip(path.astype(np.float64), -_FAR, _FAR) + 0.5
+    codes = kernels.segment_codes(grid.classes, free_of, centres)[: len(steps)]
+    return Verdict(
+        (
+            *_wrong_ends(path, start, goal),
+            *_about_cells(path, ~inside, "outside the map"),
+            *_about_cells(path, inside & ~free, "not free"),
+            *_about_steps(path, ~near, "does not go to a neighbour"),
+            *_about_steps(path, codes == kernels.BLOCKED, _WORDS[kernels.BLOCKED]),
+            *_about_steps(path, codes == kernels.BETWEEN, _BETWEEN),
+            *_about_steps(
+                path, _cut_corners(grid, path, near & inside[1:], free_of), "cuts a corner"
+            ),
+        ),
+        _length_in_cells(steps) * grid.resolution_m,
+    )
+
+
+def segment_faults(
+    grid: OccupancyGrid, points: ArrayLike, *, allow_unexplored: bool = False
+) -> tuple[str, ...]:
+    """Faults of any polyline against the free space of a map.
+
+    Free space is the union of the closed squares of the free cells; outside the map nothing is
+    free. A segment may touch the side or corner of a blocked cell, not enter it, not run along a
+    side that two blocked cells share, and not pass between two blocked cells that meet at a
+    corner, neither straight nor with a bend there.
+
+    Points are brought to grid units and rounded to 2^-24 of a cell, so that corners and centres
+    of cells, the bends of shortest paths, come back exactly; from there on every test is exact.
+    A point put by interpolation on a segment that grazes a corner can come to lie on its wrong
+    side: judge a path before it is resampled.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    points
+        `(x, y)` in metres, map frame, shape (n, 2), n >= 1, finite.
+    allow_unexplored
+        Whether unexplored cells count as free.
+
+    Returns
+    -------
+    tuple of str
+        One line for each faulty segment and each faulty bend, in order; empty for a legal line.
+
+    Raises
+    ------
+    InvalidValueError
+        When the points are no finite array of shape (n, 2) or there is none.
+    """
+    xy = np.asarray(points, dtype=np.float64)
+    if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy):  # noqa: PLR2004
+        raise InvalidValueError(f"points must have the shape (n, 2), n >= 1, got {xy.shape}")
+    if not np.isfinite(xy).all():
+        raise InvalidValueError("points need finite coordinates in metres")
+    positions = _grid_positions(grid.frame, xy)
+    free_of = free_classes(allow_unexplored=allow_unexplored)
+    codes = kernels.segment_codes(grid.classes, free_of, positions)
+    crossed = kernels.crossed_joints(grid.classes, free_of, positions)
+    ends = np.stack([xy[: len(codes)], xy[-len(codes) :]], axis=1)
+    faults = []
+    for i in np.flatnonzero(codes).tolist():
+        start, end = ends[i]
+        what = _WORDS[int(codes[i])]
+        faults.append((i, 1, f"the segment from {_at(start)} to {_at(end)} m {what}"))
+    bends = np.flatnonzero(crossed).tolist()
+    faults.extend((i, 0, f"the bend at {_at(xy[i])} m {_BETWEEN}") for i in bends)
+    return tuple(text for _, _, text in sorted(faults))
+
+
+def free_classes(*, allow_unexplored: bool) -> BoolArray:
+    """Whether a cell of each `CellClass` is free.
+
+    Parameters
+    ----------
+    allow_unexplored
+        Whether unexplored cells count as free.
+
+    Returns
+    -------
+    BoolArray
+        bool (3,), indexed by class.
+    """
+    free_of = np.zeros(len(CellClass), dtype=np.bool_)
+    free_of[CellClass.FREE] = True
+    free_of[CellClass.UNEXPLORED] = allow_unexplored
+    return free_of
+
+
+def _checked_cells(cells: ArrayLike) -> LongArray:
+    path = np.asarray(cells)
+    if path.ndim != 2 or path.shape[1] != 2 or path.dtype.kind not in "iu":  # noqa: PLR2004
+        raise InvalidValueError(
+            f"cells must be whole numbers of shape (n, 2), got {path.dtype} of shape {path.shape}"
+        )
+    return path.astype(np.int64)
+
+
+def _grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
+    """Positions (row, col) of points, rounded to 2^-24 of a cell and held near the map."""
+    # The frame at the origin gives the two axes without the rounding of a far origin.
+    axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
+    positions = (xy - frame.origin_m) @ axes.T / frame.resolution_m**2
+    rounded: FloatArray = np.rint(np.clip(positions, -_FAR, _FAR) / _QUANTUM) * _QUANTUM
+    return rounded
+
+
+def _wrong_ends(path: LongArray, start: Cell, goal: Cell) -> list[str]:
+    return [
+        f"the {which} cell is {_cell(cell)}, not {_cell(wanted)}"
+        for which, cell, wanted in (("first", path[0], start), ("last", path[-1], goal))
+        if tuple(cell) != tuple(wanted)
+    ]
+
+
+def _about_cells(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
+    where = np.flatnonzero(wrong)
+    if not len(where):
+        return []
+    return [f"cell {_cell(path[where[0]])} is {what}{_more(len(where))}"]
+
+
+def _about_steps(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
+    where = np.flatnonzero(wrong)
+    if not len(where):
+        return []
+    tail, head = path[where[0]], path[where[0] + 1]
+    return [f"the step from {_cell(tail)} to {_cell(head)} {what}{_more(len(where))}"]
+
+
+def _cut_corners(
+    grid: OccupancyGrid, path: LongArray, judged: BoolArray, free_of: BoolArray
+) -> BoolArray:
+    """Steps to a neighbour, diagonal, with exactly one of the two side cells blocked."""
+    cut = np.zeros(len(path) - 1, dtype=np.bool_)
+    diagonal = np.flatnonzero(judged & (path[1:] != path[:-1]).all(axis=1))
+    tail, head = path[diagonal], path[diagonal + 1]
+    within = ((tail >= 0) & (tail < grid.shape)).all(axis=1)
+    diagonal, tail, head = diagonal[within], tail[within], head[within]
+    one = free_of[grid.classes[tail[:, 0], head[:, 1]]]
+    other = free_of[grid.classes[head[:, 0], tail[:, 1]]]
+    cut[diagonal] = one != other
+    return cut
+
+
+def _length_in_cells(steps: FloatArray) -> float:
+    # Equal steps are counted, not added up: a + b sqrt 2, rounded once for each kind of step.
+    lengths, counts = np.unique(np.hypot(steps[:, 0], steps[:, 1]), return_counts=True)
+    return math.fsum((lengths * counts).tolist())
+
+
+def _cell(cell: LongArray | Cell) -> str:
+    return f"({int(cell[0])}, {int(cell[1])})"
+
+
+def _at(point: FloatArray) -> str:
+    return f"({point[0]:.3f}, {point[1]:.3f})"
+
+
+def _more(count: int) -> str:
+    return "" if count == 1 else f" (and {count - 1} more)"
