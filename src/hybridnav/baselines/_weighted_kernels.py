@@ -1,0 +1,161 @@
+"""Kernels of the searches on the whole grid: Dijkstra, weighted A*; and the heap of open cells.
+
+Marks instead of clearing: `mark` holds 2 * generation for a cell that is open in the search of this
+generation, 2 * generation + 1 for one that is closed, anything less for one not yet seen.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._kernels import grow, octile_cost
+
+# Directions counter-clockwise from east, as in the masks of `legal_moves`; odd ones are diagonal.
+ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
+COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
+
+
+@njit(cache=True)
+def push(keys, items, size, key, item):
+    """Put an item into a heap of `size` items, four below each, that has room for one more."""
+    at = size
+    while at > 0:
+        above = (at - 1) >> 2
+        if keys[above] <= key:
+            break
+        keys[at], items[at] = keys[above], items[above]
+        at = above
+    keys[at], items[at] = key, item
+
+
+@njit(cache=True)
+def drop_least(keys, items, size):
+    """Remove the first item, the one of the least key, from a heap of `size` items."""
+    size -= 1
+    key, item = keys[size], items[size]
+    at, below = 0, 1
+    while below < size:
+        least, least_key = below, keys[below]
+        for other in range(below + 1, min(below + 4, size)):
+            if keys[other] < least_key:
+                least, least_key = other, keys[other]
+        if key <= least_key:
+            break
+        keys[at], items[at] = least_key, items[least]
+        at, below = least, 4 * least + 1
+    keys[at], items[at] = key, item
+
+
+@njit(cache=True)
+def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
+    """Whether there is a path between two flat cells, and the expansions up to the goal's.
+
+    Leaves in `came` the direction by which a shortest path reaches each closed cell. Buckets as
+    wide as a straight step make the search label-setting (Dinic 1978): no cell can be improved
+    from its own bucket, and three buckets that take turns hold all open cells.
+    """
+    is_open, is_closed = 2 * generation, 2 * generation + 1
+    waiting = np.empty((3, 1024), np.int32)
+    count = np.zeros(3, np.int64)
+    cost_of[start] = 0
+    mark[start] = is_open
+    waiting[0, 0] = start
+    count[0] = 1
+    turn = expanded = 0
+    while count[0] + count[1] + count[2] > 0:
+        slot = turn % 3
+        while count[slot] > 0:
+            count[slot] -= 1
+            cell = np.int64(waiting[slot, count[slot]])
+            if mark[cell] == is_closed:
+                continue
+            if cell == goal:
+                return True, expanded
+            mark[cell] = is_closed
+            expanded += 1
+            mask = moves[cell]
+            for k in range(8):
+                if not mask >> k & 1:
+                    continue
+                to = cell + ROW_STEP[k] * cols + COL_STEP[k]
+                cost = cost_of[cell] + (DIAGONAL if k & 1 else STRAIGHT)
+                if mark[to] >= is_open and cost_of[to] <= cost:
+                    continue
+                cost_of[to] = cost
+                came[to] = k
+                mark[to] = is_open
+                into = cost // STRAIGHT % 3
+                if count[into] == waiting.shape[1]:
+                    larger = np.empty((3, 2 * waiting.shape[1]), np.int32)
+                    larger[:, : waiting.shape[1]] = waiting
+                    waiting = larger
+                waiting[into, count[into]] = to
+                count[into] += 1
+        turn += 1
+    return False, expanded
+
+
+@njit(cache=True)
+def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, generation):
+    """Lower bound on the cost of a shortest path, -1 where there is none, and the expansions.
+
+    Expands in order of g + weight * h, each cell once. A closed cell that is reached at less cost
+    keeps the better way, which its successors get to know only through `came`, and is put aside.
+    The first cell of a shortest path that was not expanded at its least cost was reached at its
+    least cost, and is open, put aside, or the goal: the least g + h of these bounds the optimum.
+    """
+    is_open, is_closed = 2 * generation, 2 * generation + 1
+    goal_row, goal_col = goal // cols, goal % cols
+    keys = np.empty(1024, np.float64)
+    items = np.empty(1024, np.int32)
+    aside = np.empty(256, np.int32)
+    n_aside = expanded = 0
+    keys[0], items[0] = 0.0, start
+    size = 1
+    cost_of[start] = 0
+    mark[start] = is_open
+    while size > 0:
+        cell = np.int64(items[0])
+        if cell == goal:
+            break
+        drop_least(keys, items, size)
+        size -= 1
+        if mark[cell] == is_closed:
+            continue
+        mark[cell] = is_closed
+        expanded += 1
+        row, col = cell // cols, cell % cols
+        mask = moves[cell]
+        for k in range(8):
+            if not mask >> k & 1:
+                continue
+            to = cell + ROW_STEP[k] * cols + COL_STEP[k]
+            cost = cost_of[cell] + (DIAGONAL if k & 1 else STRAIGHT)
+            if mark[to] >= is_open and cost_of[to] <= cost:
+                continue
+            cost_of[to] = cost
+            came[to] = k
+            if mark[to] == is_closed:
+                if n_aside == aside.size:
+                    aside = grow(aside)
+                aside[n_aside] = to
+                n_aside += 1
+                continue
+            mark[to] = is_open
+            if size == keys.size:
+                keys, items = grow(keys), grow(items)
+            estimate = octile_cost(row + ROW_STEP[k] - goal_row, col + COL_STEP[k] - goal_col)
+            push(keys, items, size, cost + weight * estimate, to)
+            size += 1
+    if mark[goal] < is_open:
+        return np.int64(-1), expanded
+    bound = cost_of[goal]
+    for i in range(size + n_aside):
+        cell = np.int64(items[i] if i < size else aside[i - size])
+        if i < size and mark[cell] == is_closed:
+            continue
+        estimate = octile_cost(cell // cols - goal_row, cell % cols - goal_col)
+        bound = min(bound, cost_of[cell] + estimate)
+    return bound, expanded

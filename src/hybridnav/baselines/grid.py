@@ -1,0 +1,187 @@
+"""Planning on the grid alone: A*, Dijkstra, weighted A*."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.baselines import _weighted_kernels
+from hybridnav.baselines.protocol import Answer, Cell
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.search import _kernels
+from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.octile import length_in_cells, path_length_in_cells
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+
+class GridAstar:
+    """A* on all free cells, the reference of every comparison: its paths are shortest ones.
+
+    P. E. Hart, N. J. Nilsson, B. Raphael: A formal basis for the heuristic determination of minimum
+    cost paths, 1968.
+
+    Parameters
+    ----------
+    grid
+        The map; free cells are entered, all others not.
+    """
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self.name = "grid-astar"
+        self.region_of: IntArray | None = None
+        enterable = grid.classes == CellClass.FREE
+        self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
+        moves = _kernels.legal_moves(enterable, grid.corner_cutting)
+        self.n_nodes, self.n_edges = _graph_size(enterable, moves)
+        self.memory_bytes = _array_bytes(self._search)
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Find a shortest path between two free cells; the bound is 1."""
+        began = time.perf_counter()
+        found = self._search.search(start, goal)
+        seconds = {"refine": time.perf_counter() - began}
+        bound = math.inf if found.cells is None else 1.0
+        return Answer(found.cells, bound=bound, expanded=found.expanded, seconds=seconds)
+
+
+class GridDijkstra:
+    """Dijkstra's algorithm on all free cells, up to the goal.
+
+    E. W. Dijkstra: A note on two problems in connexion with graphs, 1959. Open cells are kept in
+    buckets as wide as a straight step (E. A. Dinic, 1978), so that some of those in the goal's own
+    bucket are expanded, some not.
+
+    Parameters
+    ----------
+    grid
+        The map; free cells are entered, all others not.
+    """
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self.name = "grid-dijkstra"
+        self.region_of: IntArray | None = None
+        self._work = _Workspace(grid)
+        self.n_nodes, self.n_edges = self._work.graph_size
+        self.memory_bytes = _array_bytes(self._work)
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Find a shortest path between two free cells; the bound is 1."""
+        began = time.perf_counter()
+        work = self._work
+        first, last = work.flat(start), work.flat(goal)
+        found, expanded = _weighted_kernels.dijkstra(
+            work.moves, work.cols, first, last, work.cost_of, work.came, work.mark, work.turn()
+        )
+        cells = work.path(first, last) if found else None
+        seconds = {"refine": time.perf_counter() - began}
+        bound = 1.0 if found else math.inf
+        return Answer(cells, bound=bound, expanded=int(expanded), seconds=seconds)
+
+
+class WeightedAstar:
+    """Weighted A* on all free cells: no cell is expanded twice, and the path is at most `weight`
+    times as long as the shortest, because the octile distance is a consistent estimate.
+
+    I. Pohl: Heuristic search viewed as path finding in a graph, 1970. The bound that an answer
+    carries is the weight or, where that is less, the path's length over the least g + h of the
+    cells that were still open or that would have had to be expanded again (E. A. Hansen, R. Zhou:
+    Anytime heuristic search, 2007; M. Likhachev, G. Gordon, S. Thrun: ARA*, 2003).
+
+    Parameters
+    ----------
+    grid
+        The map; free cells are entered, all others not.
+    weight
+        Factor on the estimate, >= 1.
+
+    Raises
+    ------
+    InvalidValueError
+        When the weight is less than 1 or not finite.
+    """
+
+    def __init__(self, grid: OccupancyGrid, *, weight: float = 1.5) -> None:
+        if not (math.isfinite(weight) and weight >= 1):
+            raise InvalidValueError(f"weight must be a finite number >= 1, got {weight}")
+        self.name = f"weighted-astar-{weight:g}"
+        self.region_of: IntArray | None = None
+        self._weight = float(weight)
+        self._work = _Workspace(grid)
+        self.n_nodes, self.n_edges = self._work.graph_size
+        self.memory_bytes = _array_bytes(self._work)
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Find a path between two free cells, and prove how much longer than the shortest it is."""
+        began = time.perf_counter()
+        work = self._work
+        first, last = work.flat(start), work.flat(goal)
+        lower, expanded = _weighted_kernels.weighted_astar(
+            work.moves,
+            work.cols,
+            first,
+            last,
+            self._weight,
+            work.cost_of,
+            work.came,
+            work.mark,
+            work.turn(),
+        )
+        cells = work.path(first, last) if lower >= 0 else None
+        bound = math.inf if cells is None else self._bound(cells, int(lower))
+        seconds = {"refine": time.perf_counter() - began}
+        return Answer(cells, bound=bound, expanded=int(expanded), seconds=seconds)
+
+    def _bound(self, cells: LongArray, lower: int) -> float:
+        """The weight, or what the search proved beyond it."""
+        if lower == 0:
+            return 1.0
+        ratio = path_length_in_cells(cells) / float(length_in_cells(lower))
+        return max(1.0, min(self._weight, ratio))
+
+
+class _Workspace:
+    """Legal moves of a grid and the arrays that its searches share: 18 bytes a cell.
+
+    Searches are told apart by their turn, so nothing is cleared between them.
+    """
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        enterable = grid.classes == CellClass.FREE
+        self.cols = grid.shape[1]
+        moves: ByteArray = _kernels.legal_moves(enterable, grid.corner_cutting)
+        self.graph_size = _graph_size(enterable, moves)
+        self.moves: ByteArray = moves.ravel()
+        self.cost_of = np.zeros(enterable.size, dtype=np.int64)
+        self.came = np.zeros(enterable.size, dtype=np.uint8)
+        self.mark = np.zeros(enterable.size, dtype=np.int64)
+        self._turn = 0
+
+    def turn(self) -> int:
+        """Number of the search that begins now, from 1."""
+        self._turn += 1
+        return self._turn
+
+    def flat(self, cell: Cell) -> int:
+        """Index of a cell in the flat arrays."""
+        return cell[0] * self.cols + cell[1]
+
+    def path(self, start: int, goal: int) -> LongArray:
+        """Cells of the path that the last search left behind."""
+        flat = _kernels.trace(self.came, self.cols, start, goal)
+        return np.stack(divmod(flat, self.cols), axis=1)
+
+
+def _graph_size(enterable: BoolArray, moves: ByteArray) -> tuple[int, int]:
+    """Cells that may be entered, and moves between them, both ways counted once."""
+    return int(enterable.sum()), int(np.bitwise_count(moves).sum(dtype=np.int64)) // 2
+
+
+def _array_bytes(holder: object) -> int:
+    return sum(array.nbytes for array in vars(holder).values() if isinstance(array, np.ndarray))

@@ -1,0 +1,162 @@
+"""HPA*: a graph of transitions between square clusters, refined and smoothed."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.baselines import _hpa_kernels
+from hybridnav.baselines._hpa_kernels import AbstractGraph
+from hybridnav.baselines.protocol import Answer, Cell
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.search._costs import STRAIGHT
+from hybridnav.search._kernels import legal_moves
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+
+class HpaStar:
+    """HPA* with one abstract level.
+
+    A. Botea, M. Mueller, J. Schaeffer: Near optimal hierarchical path-finding, 2004. Clusters are
+    squares; a maximal run of facing free cells along a common side of two clusters is an entrance,
+    with one transition in its middle where it is shorter than 6 cells, else one at either end. The
+    cells of the transitions are the nodes of the abstract graph, joined across the side and, inside
+    a cluster, by shortest paths that stay in it. A query joins start and goal to the nodes of their
+    clusters, searches, fills each edge in inside its cluster and replaces parts of the path by
+    straight lines, no longer than the side of a cluster, as the authors' program does.
+
+    Regions are the connected pieces of the clusters. The path before smoothing stays inside the
+    regions of `Answer.nodes`, in that order; **the smoothed path may leave them**. Nothing is
+    proved of its length. `n_nodes` and `n_edges` are those of the abstract graph.
+
+    Transitions lie between facing cells only. On a grid that allows cutting corners, paths that
+    pass from cluster to cluster only between two occupied cells are therefore not found.
+
+    Parameters
+    ----------
+    grid
+        The map; free cells are entered, all others not.
+    cluster_cells
+        Side of a cluster in cells, >= 2.
+    smooth
+        Whether paths are smoothed.
+    line_cells
+        Moves in the longest straight line that smoothing tries, >= 1; None for the side of a
+        cluster. Long lines make paths three to five times nearer to the shortest.
+
+    Raises
+    ------
+    InvalidValueError
+        When the side of the clusters is less than 2, or lines are shorter than 1.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        *,
+        cluster_cells: int = 10,
+        smooth: bool = True,
+        line_cells: int | None = None,
+    ) -> None:
+        if cluster_cells < 2:  # noqa: PLR2004 - the least square that is no single cell
+            raise InvalidValueError(f"clusters must be at least 2 cells wide, got {cluster_cells}")
+        if line_cells is not None and line_cells < 1:
+            raise InvalidValueError(f"lines must be at least 1 move long, got {line_cells}")
+        self.name = _name(smooth=smooth, line_cells=line_cells)
+        self._smooth = smooth
+        self._side = min(cluster_cells, max(2, *grid.shape))
+        self._reach = cluster_cells if line_cells is None else line_cells
+        enterable = grid.classes == CellClass.FREE
+        self._moves: ByteArray = legal_moves(enterable, grid.corner_cutting)
+        self.region_of: IntArray = _hpa_kernels.label_regions(enterable, self._moves, self._side)
+        self._graph = _abstract_graph(enterable, self._moves, self._side)
+        self.n_nodes = len(self._graph.cells)
+        self.n_edges = len(self._graph.ends) // 2
+        self._cost_of = np.zeros(self.n_nodes, dtype=np.int64)
+        self._previous = np.zeros(self.n_nodes, dtype=np.int32)
+        self._mark = np.zeros(self.n_nodes, dtype=np.int64)
+        self._position = np.full(enterable.size if smooth else 0, -1, dtype=np.int32)
+        self._turn = 0
+        arrays = (
+            *(self.region_of, self._moves, self._cost_of, self._previous, self._mark),
+            *(self._position, *self._graph),
+        )
+        self.memory_bytes = sum(array.nbytes for array in arrays)
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Plan between two free cells."""
+        began = time.perf_counter()
+        self._turn += 1
+        cols = self._moves.shape[1]
+        passed, expanded_nodes, expanded = _hpa_kernels.abstract_search(
+            self._moves,
+            self._side,
+            self._graph,
+            start[0] * cols + start[1],
+            goal[0] * cols + goal[1],
+            self._cost_of,
+            self._previous,
+            self._mark,
+            self._turn,
+        )
+        seconds = {"coarse": time.perf_counter() - began, "refine": 0.0}
+        if passed.size == 0:
+            return Answer(
+                None,
+                expanded=int(expanded),
+                expanded_nodes=int(expanded_nodes),
+                seconds=seconds,
+            )
+        began = time.perf_counter()
+        path, refined = _hpa_kernels.refine(self._moves, self._side, passed)
+        nodes = self._regions_along(path)
+        if self._smooth:
+            path = _hpa_kernels.smooth(self._moves, path, self._reach, self._position)
+        cells = np.stack(divmod(path, cols), axis=1)
+        seconds["refine"] = time.perf_counter() - began
+        return Answer(
+            cells,
+            nodes,
+            expanded=int(expanded + refined),
+            expanded_nodes=int(expanded_nodes),
+            seconds=seconds,
+        )
+
+    def _regions_along(self, path: LongArray) -> tuple[int, ...]:
+        """Regions that a path of flat cells passes, in order."""
+        regions = self.region_of.ravel()[path]
+        entered = np.concatenate([[True], regions[1:] != regions[:-1]])
+        return tuple(regions[entered].tolist())
+
+
+def _name(*, smooth: bool, line_cells: int | None) -> str:
+    if not smooth:
+        return "hpa-star-raw"
+    return "hpa-star" if line_cells is None else f"hpa-star-lines-{line_cells}"
+
+
+def _abstract_graph(enterable: BoolArray, moves: ByteArray, side: int) -> AbstractGraph:
+    rows, cols = enterable.shape
+    pairs = _hpa_kernels.transitions(enterable, side)
+    cells = np.unique(pairs)
+    order = np.argsort(_hpa_kernels.cluster_at(cols, side, cells), kind="stable")
+    node_at = np.empty(len(cells), dtype=np.int32)
+    node_at[order] = np.arange(len(cells), dtype=np.int32)
+    inter = node_at[np.searchsorted(cells, pairs)]
+    cells = cells[order]
+    n_clusters = -(-rows // side) * -(-cols // side)
+    clusters = _hpa_kernels.cluster_at(cols, side, cells)
+    cluster_first = np.searchsorted(clusters, np.arange(n_clusters + 1))
+    tails, heads, costs = _hpa_kernels.intra_edges(moves, side, cells, cluster_first)
+    tails = np.concatenate([tails, inter[:, 0], inter[:, 1]])
+    heads = np.concatenate([heads, inter[:, 1], inter[:, 0]])
+    costs = np.concatenate([costs, np.full(2 * len(inter), STRAIGHT, dtype=np.int64)])
+    by_tail = np.argsort(tails, kind="stable")
+    first = np.searchsorted(tails[by_tail], np.arange(len(cells) + 1))
+    return AbstractGraph(cells, cluster_first, first, heads[by_tail], costs[by_tail])
