@@ -275,15 +275,13 @@ def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, al
     sigma, origin, sweep, protected, base_edge = darts
     n_darts = 2 * base_edge.size if any_loop or not all_whole else 0
     for i in range(touched.size + n_darts):
-        if i < touched.size:
-            start = touched[i]
-        else:
-            start = np.int32(i - touched.size)
+        start = touched[i] if i < touched.size else np.int32(i - touched.size)
+        if state[start >> 1] != ALIVE:
+            continue
+        if i >= touched.size:
             v = origin[start]
             if v != origin[start ^ 1] and (all_whole or whole_at[v] < level):
                 continue
-        if state[start >> 1] != ALIVE:
-            continue
         while start >= 0 and not protected[start]:
             second = sigma[start ^ 1]
             dart = partner = np.int32(-1)
