@@ -126,7 +126,7 @@ def block_vertices(classes, power, vertex_end, n_vertices):
         if vertex_end[cell] != _SURVIVES:
             continue
         row, col = cell // cols, cell % cols
-        p = power[row >> 1, col >> 1]
+        p = np.int64(power[row >> 1, col >> 1])
         cells[v, 0], cells[v, 1] = row, col
         boxes[v, 0], boxes[v, 1] = row >> p << p, col >> p << p
         boxes[v, 2], boxes[v, 3] = row | (1 << p) - 1, col | (1 << p) - 1
@@ -150,7 +150,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
     protected = np.zeros(2 * n_edges, np.bool_)
     base_edge = np.empty(n_edges, np.int32)
     for v in range(whole_at.size):
-        p = whole_at[v] >> 1
+        p = np.int64(whole_at[v] >> 1)
         first = -1
         last = -1
         open_corner = False
@@ -168,7 +168,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
                 beside = across
                 run = 1
                 if across:
-                    run = 1 << min(p, power[(row + out_row) >> 1, (col + out_col) >> 1])
+                    run = 1 << min(p, np.int64(power[(row + out_row) >> 1, (col + out_col) >> 1]))
                     low_row = row + min(step_row, 0) * (run - 1)
                     low_col = col + min(step_col, 0) * (run - 1)
                     cell = low_row * cols + low_col

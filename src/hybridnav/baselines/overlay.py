@@ -1,0 +1,213 @@
+"""Exact overlay: all boundary cells of the places, joined by exact distances inside them."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from hybridnav.baselines import _overlay_kernels as kernels
+from hybridnav.baselines.protocol import Answer
+from hybridnav.baselines.regions import GRID_SEARCH_BYTES, region_at
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.search._kernels import legal_moves
+from hybridnav.search.grid_search import GridSearch
+
+if TYPE_CHECKING:
+    from hybridnav._typing import AnyArray, BoolArray, IntArray, LongArray
+    from hybridnav.baselines.protocol import Cell
+    from hybridnav.topology import TopologicalMap
+
+MAX_CLIQUE_BYTES = 1_500_000_000
+"""What the distances between boundary cells may take at most."""
+
+
+class ExactOverlay:
+    """Customizable route planning on the places of a topological map: exact, one level.
+
+    D. Delling, A. V. Goldberg, T. Pajor, R. F. Werneck: Customizable route planning in road
+    networks, 2015. The nodes are all boundary cells, free cells with a legal move into another
+    field; the edges are these moves (those of fields that meet only in a corner, too) and, inside
+    each field, a clique of exact distances between its boundary cells. A query joins start and
+    goal to the boundary cells of their fields, searches the overlay (A*, octile distances as the
+    heuristic) and unpacks the cliques' edges by searches inside single fields. The path is as
+    short as the shortest on the whole grid.
+
+    Parameters
+    ----------
+    topology
+        The map whose free places are planned on.
+
+    Raises
+    ------
+    InvalidValueError
+        When the cliques' distances would take more than 1.5 GB.
+    """
+
+    def __init__(self, topology: TopologicalMap) -> None:
+        grid, level = topology.grid, topology.level
+        free = grid.classes == CellClass.FREE
+        region_of = np.where(free, level.field_of, np.int32(-1))
+        region_of.flags.writeable = False
+        self.name = "exact-overlay"
+        self.region_of: IntArray | None = region_of
+        self._labels = region_of
+        self._cols = grid.shape[1]
+        self._moves = legal_moves(free, grid.corner_cutting).ravel()
+        self._boxes = kernels.field_boxes(region_of.ravel(), self._cols, level.n_vertices)
+        cells = kernels.boundary_cells(region_of.ravel(), self._moves, self._cols)
+        order = np.argsort(region_of.ravel()[cells], kind="stable")
+        self._node_cell = cells[order].astype(np.int32)
+        self._node_field = region_of.ravel()[self._node_cell]
+        self._node_first = np.searchsorted(self._node_field, np.arange(level.n_vertices + 1))
+        self._cross_first, self._cross_head, self._cross_cost = kernels.cross_edges(
+            region_of.ravel(), self._moves, self._cols, self._node_cell
+        )
+        sizes = np.diff(self._node_first)
+        self._clique_first = np.concatenate([[0], np.cumsum(sizes**2)])
+        self._clique = self._distances_inside()
+        self._component_of = self._components()
+        low, high = np.sort(level.arcs, axis=1).astype(np.int64).T
+        self._arcs = np.unique(low * level.n_vertices + high)
+        self._search = GridSearch(free, corner_cutting=grid.corner_cutting)
+        self._in_field = np.zeros(level.n_vertices, dtype=np.bool_)
+        self.n_nodes = len(self._node_cell)
+        self.n_edges = int((sizes * (sizes - 1) // 2).sum()) + len(self._cross_head) // 2
+        held = [value for value in vars(self).values() if isinstance(value, np.ndarray)]
+        self.memory_bytes = sum(array.nbytes for array in held)
+        self.memory_bytes += GRID_SEARCH_BYTES * free.size - region_of.nbytes  # it has two names
+
+    def _distances_inside(self) -> AnyArray:
+        """Matrices of all cliques in a row; of 32 bits where that is enough."""
+        for dtype in (np.dtype(np.int32), np.dtype(np.int64)):
+            n_entries = int(self._clique_first[-1])
+            n_bytes = n_entries * dtype.itemsize
+            if n_bytes > MAX_CLIQUE_BYTES:
+                raise InvalidValueError(
+                    f"an exact overlay may hold {MAX_CLIQUE_BYTES / 1e9:.1f} GB of distances, this "
+                    f"map's {len(self._node_cell)} boundary cells need {n_bytes / 1e9:.1f} GB"
+                )
+            clique: AnyArray = np.empty(n_entries, dtype=dtype)
+            if kernels.fill_cliques(
+                self._labels.ravel(),
+                self._moves,
+                self._cols,
+                self._boxes,
+                self._node_cell,
+                self._node_first,
+                self._clique_first,
+                clique,
+            ):
+                break
+        return clique
+
+    def _components(self) -> IntArray:
+        """Label of the set of fields that each field is connected with by legal moves."""
+        tail = np.repeat(self._node_field, np.diff(self._cross_first))
+        head = self._node_field[self._cross_head]
+        shape = (len(self._boxes), len(self._boxes))
+        joined = sparse.coo_array((np.ones(len(head)), (tail, head)), shape=shape)
+        labels: IntArray = csgraph.connected_components(joined, directed=False)[1]
+        return labels
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Plan between two free cells.
+
+        Parameters
+        ----------
+        start, goal
+            Free cells as (row, col).
+
+        Returns
+        -------
+        Answer
+            A shortest path, its bound 1. The nodes are dense indices of the places that it passes;
+            None where it goes from a place to one that no arc joins it with, by a corner.
+
+        Raises
+        ------
+        InvalidValueError
+            When a cell lies outside the map or is not free.
+        """
+        first, last = region_at(self._labels, start), region_at(self._labels, goal)
+        if self._component_of[first] != self._component_of[last]:
+            return Answer(None)
+        began = time.perf_counter()
+        flat_goal = goal[0] * self._cols + goal[1]
+        flat_start = start[0] * self._cols + start[1]
+        from_start, direct, reached = self._to_boundary(flat_start, flat_goal)
+        to_goal, _, reached_too = self._to_boundary(flat_goal, flat_start)
+        _, nodes, by_cross, expanded_nodes = kernels.overlay_search(
+            self._node_field,
+            self._node_cell,
+            self._cols,
+            self._node_first,
+            self._clique_first,
+            self._clique,
+            self._cross_first,
+            self._cross_head,
+            self._cross_cost,
+            first,
+            from_start,
+            last,
+            to_goal,
+            flat_goal,
+            direct,
+        )
+        searched = time.perf_counter()
+        cells, expanded = self._unpacked(start, goal, nodes, by_cross)
+        return Answer(
+            cells,
+            nodes=self._passed(cells),
+            bound=1.0,
+            expanded=expanded + reached + reached_too,
+            expanded_nodes=expanded_nodes,
+            seconds={"coarse": searched - began, "refine": time.perf_counter() - searched},
+        )
+
+    def _to_boundary(self, cell: int, other: int) -> tuple[LongArray, int, int]:
+        distances, direct, reached = kernels.distances_to_nodes(
+            self._labels.ravel(),
+            self._moves,
+            self._cols,
+            self._boxes,
+            self._node_cell,
+            self._node_first,
+            cell,
+            other,
+        )
+        return distances, int(direct), int(reached)
+
+    def _unpacked(
+        self, start: Cell, goal: Cell, nodes: LongArray, by_cross: BoolArray
+    ) -> tuple[LongArray, int]:
+        """Cells of a path through some nodes, and the cells expanded inside the fields."""
+        rows, cols = np.divmod(self._node_cell[nodes].astype(np.int64), self._cols)
+        stops = [start, *zip(rows.tolist(), cols.tolist(), strict=True), goal]
+        crossed = [*by_cross.tolist(), False]
+        pieces, expanded = [np.array([start], dtype=np.int64)], 0
+        for here, there, across in zip(stops[:-1], stops[1:], crossed, strict=True):
+            if across:
+                pieces.append(np.array([there], dtype=np.int64))
+                continue
+            field = self._labels[here]
+            self._in_field[field] = True
+            leg = self._search.search(
+                here, there, field_of=self._labels, in_corridor=self._in_field
+            )
+            self._in_field[field] = False
+            expanded += leg.expanded
+            if leg.cells is not None:
+                pieces.append(leg.cells[1:])
+        return np.concatenate(pieces), expanded
+
+    def _passed(self, cells: LongArray) -> tuple[int, ...] | None:
+        fields = self._labels[cells[:, 0], cells[:, 1]].astype(np.int64)
+        fields = fields[np.concatenate([[True], fields[1:] != fields[:-1]])]
+        low, high = np.minimum(fields[1:], fields[:-1]), np.maximum(fields[1:], fields[:-1])
+        joined = np.isin(low * len(self._boxes) + high, self._arcs)
+        return tuple(fields.tolist()) if joined.all() else None

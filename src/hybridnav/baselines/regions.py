@@ -1,0 +1,191 @@
+"""Planning on regions: a coarse search on their graph, then the best path inside them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.baselines.protocol import Answer
+from hybridnav.errors import InvalidValueError
+from hybridnav.search import _kernels
+from hybridnav.search.grid_search import GridSearch
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, IntArray, LongArray
+    from hybridnav.baselines.protocol import Cell
+
+GRID_SEARCH_BYTES = 10
+"""Bytes that a `GridSearch` holds for each cell."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegionPlan:
+    """Regions that a coarse search passes, the start's first; None where there is no way."""
+
+    regions: LongArray | None
+    expanded: int
+
+
+class RegionGraph:
+    """An undirected graph on regions, searched for the cheapest walk by Dijkstra's algorithm.
+
+    Parameters
+    ----------
+    n_regions
+        Regions, labelled from 0; those without an edge can only be start and goal at once.
+    edges
+        int (n_edges, 2), the regions that each edge joins.
+    costs, ties
+        float64 (n_edges,), what an edge costs, and a second cost that decides between walks of
+        equal cost; >= 0, any unit.
+    """
+
+    def __init__(
+        self, n_regions: int, edges: IntArray | LongArray, costs: FloatArray, ties: FloatArray
+    ) -> None:
+        self.n_regions = n_regions
+        tail = np.concatenate([edges[:, 0], edges[:, 1]])
+        order = np.argsort(tail, kind="stable")
+        self._first = np.searchsorted(tail[order], np.arange(n_regions + 1))
+        self._neighbour = np.concatenate([edges[:, 1], edges[:, 0]])[order].astype(np.int64)
+        self._edge = np.tile(np.arange(len(edges)), 2)[order]
+        self._ends = np.asarray(edges, dtype=np.int64)
+        self._costs, self._ties = costs, ties
+        self._allowed = np.ones(n_regions, dtype=np.bool_)
+        arrays = (self._first, self._neighbour, self._edge, self._ends, costs, ties, self._allowed)
+        self.memory_bytes = sum(array.nbytes for array in arrays)
+
+    def search(self, start: int, goal: int) -> RegionPlan:
+        """Find the cheapest walk between two regions."""
+        edges, reached, expanded = _kernels.cheapest_arcs(
+            self._first,
+            self._neighbour,
+            self._edge,
+            self._costs,
+            self._ties,
+            self._allowed,
+            start,
+            goal,
+        )
+        if not reached:
+            return RegionPlan(None, int(expanded))
+        regions = [start]
+        for u, v in self._ends[edges].tolist():
+            regions.append(v if u == regions[-1] else u)
+        return RegionPlan(np.array(regions, dtype=np.int64), int(expanded))
+
+
+class RegionPlanner:
+    """A coarse search on a graph of regions, then grid A* on the cells of the regions it passes.
+
+    Parameters
+    ----------
+    region_of
+        int32 (rows, cols), the region of each free cell, -1 elsewhere.
+    graph
+        The graph of the regions.
+    corner_cutting
+        Whether diagonals may cut corners.
+    """
+
+    def __init__(
+        self, region_of: IntArray, graph: RegionGraph, *, corner_cutting: bool = False
+    ) -> None:
+        self._region_of = region_of
+        self._graph = graph
+        self._grid_search = GridSearch(region_of >= 0, corner_cutting=corner_cutting)
+        self._in_corridor = np.zeros(graph.n_regions, dtype=np.bool_)
+        self.memory_bytes = (
+            region_of.nbytes
+            + graph.memory_bytes
+            + self._in_corridor.nbytes
+            + GRID_SEARCH_BYTES * region_of.size
+        )
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Plan between two free cells; see `hybridnav.baselines.Method`."""
+        first = region_at(self._region_of, start)
+        last = region_at(self._region_of, goal)
+        began = time.perf_counter()
+        plan = self._graph.search(first, last)
+        seconds = {"coarse": time.perf_counter() - began}
+        if plan.regions is None:
+            return Answer(None, expanded_nodes=plan.expanded, seconds=seconds)
+        began = time.perf_counter()
+        self._in_corridor[:] = False
+        self._in_corridor[plan.regions] = True
+        found = self._grid_search.search(
+            start, goal, field_of=self._region_of, in_corridor=self._in_corridor
+        )
+        seconds["refine"] = time.perf_counter() - began
+        return Answer(
+            found.cells,
+            nodes=tuple(plan.regions.tolist()),
+            expanded=found.expanded,
+            expanded_nodes=plan.expanded,
+            seconds=seconds,
+        )
+
+
+def region_at(region_of: IntArray, cell: Cell) -> int:
+    """Region of a free cell.
+
+    Raises
+    ------
+    InvalidValueError
+        When the cell lies outside the map or is not free.
+    """
+    rows, cols = region_of.shape
+    row, col = cell
+    region = int(region_of[row, col]) if 0 <= row < rows and 0 <= col < cols else -1
+    if region < 0:
+        raise InvalidValueError(
+            f"expected a free cell (row, col) of a map of {rows} x {cols} cells, got ({row}, {col})"
+        )
+    return region
+
+
+def joined_regions(
+    region_of: IntArray, *, corner_cutting: bool = False
+) -> tuple[LongArray, FloatArray]:
+    """Pairs of regions with a legal move from one to the other.
+
+    Parameters
+    ----------
+    region_of
+        int32 (rows, cols), the region of each free cell, -1 elsewhere.
+    corner_cutting
+        Whether diagonals may cut corners.
+
+    Returns
+    -------
+    tuple of LongArray and FloatArray
+        int64 (n_pairs, 2), the lower label first, sorted; float64 (n_pairs, 2), the mean of the
+        middles of the moves between the two, (row, col) with cells at whole numbers.
+    """
+    n_regions = int(region_of.max(initial=-1)) + 1
+    free = region_of >= 0
+    up, down = free[:-1, :-1] & free[1:, 1:], free[:-1, 1:] & free[1:, :-1]
+    if not corner_cutting:
+        up = down = up & down
+    keys, rows, cols = [], [], []
+    for tail, head, legal, offset in (
+        (np.s_[:, :-1], np.s_[:, 1:], free[:, :-1] & free[:, 1:], (0.0, 0.5)),
+        (np.s_[:-1, :], np.s_[1:, :], free[:-1] & free[1:], (0.5, 0.0)),
+        (np.s_[:-1, :-1], np.s_[1:, 1:], up, (0.5, 0.5)),
+        (np.s_[:-1, 1:], np.s_[1:, :-1], down, (0.5, 0.5)),
+    ):
+        row, col = np.nonzero(legal & (region_of[tail] != region_of[head]))
+        ends = np.stack([region_of[tail][row, col], region_of[head][row, col]]).astype(np.int64)
+        keys.append(ends.min(axis=0) * n_regions + ends.max(axis=0))
+        rows.append(row + offset[0])
+        cols.append(col + offset[1])
+    found, pair_of, count = np.unique(np.concatenate(keys), return_inverse=True, return_counts=True)
+    sums = [
+        np.bincount(pair_of, weights=np.concatenate(w), minlength=len(found)) for w in (rows, cols)
+    ]
+    pairs = np.stack(np.divmod(found, max(n_regions, 1)), axis=1)
+    return pairs, np.stack(sums, axis=1) / count[:, None]

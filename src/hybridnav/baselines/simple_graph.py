@@ -1,0 +1,80 @@
+"""The pyramid's places on a simple graph: parallel arcs merged, self-loops dropped."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.baselines.regions import RegionGraph, RegionPlanner
+from hybridnav.grid import CellClass
+
+if TYPE_CHECKING:
+    from hybridnav._typing import IntArray, LongArray
+    from hybridnav.baselines.protocol import Answer, Cell
+    from hybridnav.pyramid import Level
+    from hybridnav.topology import TopologicalMap
+
+
+class SimpleGraphPyramid:
+    """What is left of the topological map when two places share at most one edge.
+
+    Regular and irregular pyramids of simple graphs (P. Meer: Stochastic image pyramids, 1989;
+    J.-M. Jolion, A. Montanvert: The adaptive pyramid, 1992) keep one edge for two regions however
+    many boundaries they share. The places are those of the topological map. An edge costs the
+    `max_distance_m` of its arcs, which is the same for all of them; ties are decided by the
+    `through_m` of the arc with the lowest index, since a simple graph keeps whichever it meets
+    first and cannot know that there are others. (`Level.to_simple_graph` is kinder: it keeps the
+    shortest.) The path is the shortest inside the fields of the route.
+
+    Parameters
+    ----------
+    topology
+        The map whose free places are planned on.
+    """
+
+    def __init__(self, topology: TopologicalMap) -> None:
+        level = topology.level
+        free = level.classes == CellClass.FREE
+        kept = first_arcs(level)
+        kept = kept[free[level.arcs[kept, 0]]]  # arcs join places of two classes, too
+        kept = kept[free[level.arcs[kept, 1]]]
+        self.name = "simple-graph"
+        region_of = np.where(topology.grid.classes == CellClass.FREE, level.field_of, np.int32(-1))
+        region_of.flags.writeable = False
+        self.region_of: IntArray | None = region_of
+        self.n_nodes = int(free.sum())
+        self.n_edges = len(kept)
+        graph = RegionGraph(
+            level.n_vertices, level.arcs[kept], level.max_distance_m[kept], level.through_m[kept]
+        )
+        self._planner = RegionPlanner(region_of, graph, corner_cutting=topology.grid.corner_cutting)
+        self.memory_bytes = self._planner.memory_bytes
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Plan between two free cells.
+
+        Parameters
+        ----------
+        start, goal
+            Free cells as (row, col).
+
+        Returns
+        -------
+        Answer
+            The nodes are dense indices of places.
+
+        Raises
+        ------
+        InvalidValueError
+            When a cell lies outside the map or is not free.
+        """
+        return self._planner.solve(start, goal)
+
+
+def first_arcs(level: Level) -> LongArray:
+    """Arcs that a simple graph keeps: of each two vertices the one with the lowest index."""
+    plain = np.flatnonzero(~level.is_self_loop)
+    ends = np.sort(level.arcs[plain], axis=1)
+    _, first = np.unique(ends, axis=0, return_index=True)
+    return np.sort(plain[first])
