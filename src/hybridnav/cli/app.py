@@ -10,6 +10,7 @@ import typer
 
 from hybridnav.cli.common import complain
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
+from hybridnav.cli.evaluate import compare, evaluate
 from hybridnav.cli.plan import plan
 from hybridnav.cli.presets import preset_app
 from hybridnav.cli.show import show
@@ -27,6 +28,8 @@ app = typer.Typer(
 )
 app.command()(plan)
 app.command()(show)
+app.command()(evaluate)
+app.command()(compare)
 app.add_typer(preset_app, name="preset")
 
 

@@ -1,0 +1,170 @@
+"""`hybridnav evaluate` and `hybridnav compare`: the harness on the command line."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hybridnav.cli.common import answer, complain, read_settings
+from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav.harness.run import RunSettings
+
+MapsArgument = Annotated[
+    list[Path], typer.Argument(metavar="MAP...", help="ROS maps (.yaml) or MovingAI maps (.map).")
+]
+PresetsOption = Annotated[
+    list[str] | None,
+    typer.Option("--preset", metavar="NAME|FILE", help="A preset; may be given several times."),
+]
+BaselinesOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--baseline",
+        metavar="NAME",
+        help="A baseline, or module:class; may be given several times.",
+    ),
+]
+PairsOption = Annotated[
+    int | None,
+    typer.Option("--pairs", metavar="N", min=1, help="Pairs a map: 100 sampled, or all of --scen."),
+]
+LatticeOption = Annotated[
+    float | None,
+    typer.Option("--all-pairs", metavar="STEP", help="All pairs of cells STEP metres apart."),
+]
+ScenariosOption = Annotated[
+    Path | None, typer.Option("--scen", metavar="FILE", help="The pairs of a scenario file.")
+]
+SeedOption = Annotated[int, typer.Option("--seed", metavar="S", help="Seed of the sampler.")]
+WorkersOption = Annotated[
+    int, typer.Option("--workers", metavar="W", help="Processes on this machine.")
+]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler instead."),
+]
+OutOption = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Where records go.")]
+RadiusOption = Annotated[
+    float | None,
+    typer.Option(
+        "--robot-radius", metavar="R", help="In metres; else 0.25, and 0 for MovingAI maps."
+    ),
+]
+DistanceOption = Annotated[
+    float | None,
+    typer.Option(
+        "--merge-distance", metavar="U", help="U_d in metres; else the preset's, 40 for MovingAI."
+    ),
+]
+CornersOption = Annotated[
+    bool, typer.Option("--corner-cutting", help="Let diagonals cut corners: breaks consistency.")
+]
+TimeoutOption = Annotated[
+    float, typer.Option("--timeout", metavar="S", help="Longest silence of a process, seconds.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Override one key of every preset."),
+]
+
+
+def evaluate(
+    map_files: MapsArgument,
+    out: OutOption,
+    preset: PresetsOption = None,
+    baseline: BaselinesOption = None,
+    pairs: PairsOption = None,
+    all_pairs: LatticeOption = None,
+    scen: ScenariosOption = None,
+    seed: SeedOption = 0,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
+    overrides: SetOption = None,
+    robot_radius_m: RadiusOption = None,
+    merge_distance_m: DistanceOption = None,
+    corner_cutting: CornersOption = False,
+    timeout_s: TimeoutOption = 600.0,
+) -> None:
+    """Measure consistency, loss and efficiency of methods on maps, pair by pair.
+
+    Records go to DIR/records.jsonl; a run that was stopped goes on where it was. Exits with 1 when
+    a counter-example was found.
+    """
+    if all_pairs is not None and scen is not None:
+        raise UsageError("--all-pairs and --scen are two ways to say which pairs: give one")
+    from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
+    from hybridnav.harness.run import RunSettings  # noqa: PLC0415
+
+    names = preset if preset is not None else ([] if baseline else ["paper"])
+    settings = RunSettings(
+        maps=tuple(map(str, map_files)),
+        presets=tuple(read_settings(name, overrides, None, None) for name in names),
+        baselines=tuple(baseline or ()),
+        pairs=pairs,
+        lattice_step_m=all_pairs,
+        scenarios=None if scen is None else str(scen),
+        seed=seed,
+        robot_radius_m=robot_radius_m,
+        merge_distance_m=merge_distance_m,
+        corner_cutting=corner_cutting,
+        workers=workers,
+        scheduler=scheduler,
+        timeout_s=timeout_s,
+    )
+    _run(settings, out)
+    study = write_outputs(out)
+    answer((out / "summary.md").read_text(encoding="utf-8") + f"\nreport: {out / 'report.html'}\n")
+    faults = study.faults
+    if faults:
+        outcome, _, fault = faults[0]
+        first = f"{outcome.map_name}, {outcome.label}: {fault}"
+        complain(f"{len(faults)} counter-examples, the first: {first}")
+        raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _run(settings: RunSettings, out: Path) -> None:
+    from hybridnav.harness.run import evaluate as run  # noqa: PLC0415
+
+    if not sys.stderr.isatty():
+        run(settings, out)
+        return
+    from rich.console import Console  # noqa: PLC0415 - on demand
+    from rich.progress import (  # noqa: PLC0415
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    bar = Progress(
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )
+    with bar:
+        task = bar.add_task("records", total=None)
+        advance: Callable[[int, int], None] = lambda done, total: bar.update(  # noqa: E731
+            task, completed=done, total=total
+        )
+        run(settings, out, progress=advance)
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="DIR", help="A run.")],
+    second: Annotated[Path, typer.Argument(metavar="DIR", help="Another run.")],
+) -> None:
+    """Set two runs side by side, pair by pair, with the significance of the difference."""
+    from hybridnav.harness.compare import compare_runs  # noqa: PLC0415 - loads scipy.stats
+    from hybridnav.harness.tables import to_markdown  # noqa: PLC0415
+
+    answer(to_markdown(compare_runs(first, second)))

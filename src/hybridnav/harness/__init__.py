@@ -1,0 +1,11 @@
+"""The harness: consistency, loss and efficiency of topological and metric layers, measured.
+
+S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, 1998.
+"""
+
+from hybridnav.harness.analysis import Study, load_study
+from hybridnav.harness.compare import compare_runs
+from hybridnav.harness.output import write_outputs
+from hybridnav.harness.run import RunSettings, evaluate
+
+__all__ = ["RunSettings", "Study", "compare_runs", "evaluate", "load_study", "write_outputs"]

@@ -1,0 +1,277 @@
+"""From records to figures: losses, times, counts, faults, for every map and method."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.harness.methods import BASELINES, REFERENCE
+from hybridnav.harness.records import read_records
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray
+    from hybridnav.harness.records import Record
+
+SLACK = 1e-9
+"""Relative difference of lengths that is rounding."""
+
+QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
+
+
+def query_key(record: Record) -> QueryKey:
+    """What makes two records answers to one query on a map."""
+    return record["kind"], tuple(record["start"]), tuple(record["goal"])
+
+
+@dataclass
+class Outcome:
+    """All that one method did on one map.
+
+    Arrays have one entry for each pair that the reference solved between two different cells, in
+    the reference's order; NaN where the method has no such figure.
+    """
+
+    map_name: str
+    label: str
+    """The method's name, with its hash where a run holds it with several settings."""
+    preparation: Record
+    records: list[Record]
+    """Of the pairs, all kinds."""
+    optimum: dict[QueryKey, Record] = field(repr=False)
+    """The reference's records on this map."""
+
+    @cached_property
+    def _matched(self) -> list[Record | None]:
+        own = {query_key(record): record for record in self.records}
+        return [own.get(query_key(record)) for record in self.references]
+
+    @cached_property
+    def references(self) -> list[Record]:
+        """The reference's records of the pairs that arrays are about."""
+        return [record for record in self.optimum.values() if (record.get("length_m") or 0) > 0]
+
+    def figure(self, key: str) -> FloatArray:
+        """One number of each record."""
+        values = (record and record.get(key) for record in self._matched)
+        return np.array([math.nan if value is None else value for value in values], dtype=float)
+
+    @cached_property
+    def optima_m(self) -> FloatArray:
+        """Lengths of the optimum."""
+        return np.array([record["length_m"] for record in self.references], dtype=float)
+
+    @cached_property
+    def losses(self) -> FloatArray:
+        """Length over the optimum's, minus one."""
+        return self._loss(self.figure("length_m"), self.optima_m)
+
+    @cached_property
+    def plan_losses(self) -> FloatArray:
+        """Thrun's loss of the plan: the best path inside its regions, over the optimum."""
+        return self._loss(self.figure("plan_optimum_m"), self.optima_m)
+
+    @cached_property
+    def any_angle_losses(self) -> FloatArray:
+        """Length over the any-angle optimum or the best any-angle path known, minus one."""
+        known = [record.get("any_angle_m") or math.nan for record in self.references]
+        return self._loss(self.figure("length_m"), np.array(known, dtype=float))
+
+    @staticmethod
+    def _loss(lengths: FloatArray, optima: FloatArray) -> FloatArray:
+        loss = lengths / optima - 1
+        rounded: FloatArray = np.where(np.abs(loss) <= SLACK, 0.0, loss)
+        return rounded
+
+    @property
+    def solved(self) -> int:
+        """Pairs of arrays that the method solved."""
+        return int(np.isfinite(self.losses).sum())
+
+    @cached_property
+    def seconds(self) -> FloatArray:
+        """Wall-clock seconds of each query."""
+        return self.figure("seconds")
+
+    @cached_property
+    def refine_seconds(self) -> FloatArray:
+        """Of these, seconds in the metric layer."""
+        stages = ((record or {}).get("stages") or {} for record in self._matched)
+        return np.array([stage.get("refine", math.nan) for stage in stages], dtype=float)
+
+    @property
+    def preparation_seconds(self) -> float:
+        """Seconds from the loaded map to the first query; NaN where it failed."""
+        record = self.preparation
+        return float(record.get("pyramid_seconds", math.nan)) + float(
+            record.get("method_seconds", math.nan)
+        )
+
+    @cached_property
+    def thrun_count(self) -> float:
+        """Nodes times mean length of a plan, in value-iteration backups: nodes of the topological
+        plan, or cells of the path where there is no topological layer."""
+        nodes = self.preparation.get("n_nodes", math.nan)
+        lengths = self.figure("plan")
+        if not np.isfinite(lengths).any():
+            lengths = self._path_cells
+        return float(nodes * nanmean(lengths))
+
+    @cached_property
+    def _path_cells(self) -> FloatArray:
+        """Cells of each path: its length in cells is close enough to count steps."""
+        return self.figure("length_m") / np.float64(self.preparation.get("resolution_m", math.nan))
+
+    @cached_property
+    def faults(self) -> list[tuple[Record, str]]:
+        """Every contradiction: what the judge found, lengths below the optimum, broken bounds."""
+        found = [(self.preparation, fault) for fault in self.preparation.get("faults", ())]
+        for record in self.records:
+            found += [(record, fault) for fault in record.get("faults", ())]
+            reference = self.optimum.get(query_key(record))
+            wrong = None if reference is None else _against(record, reference)
+            if wrong:
+                found.append((record, wrong))
+        return found
+
+    @property
+    def checks(self) -> int:
+        """Answers that were judged."""
+        return sum(record["status"] in ("solved", "no path") for record in self.records)
+
+    @property
+    def failures(self) -> int:
+        """Queries without an answer: errors, time-outs, lost workers."""
+        return sum(record["status"] not in ("solved", "no path") for record in self.records)
+
+
+def nanmean(values: FloatArray) -> float:
+    """Mean of the finite values, NaN where there is none."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else math.nan
+
+
+def nanquantile(values: FloatArray, share: float) -> float:
+    """Quantile of the finite values, NaN where there is none."""
+    finite = values[np.isfinite(values)]
+    return float(np.quantile(finite, share)) if finite.size else math.nan
+
+
+def _against(record: Record, reference: Record) -> str | None:
+    """What the optimum says against an answer."""
+    statuses = {record["status"], reference["status"]}
+    if statuses == {"solved", "no path"}:
+        return f"solvability: {record['status']}, the whole grid says {reference['status']}"
+    length, optimum = record.get("length_m"), reference.get("length_m")
+    if length is None or optimum is None:
+        return None
+    if length < optimum * (1 - SLACK):
+        return f"length {length:.6f} m is below the optimum {optimum:.6f} m"
+    bound = record.get("bound")
+    if bound is not None and length > optimum * bound * (1 + SLACK) + SLACK:
+        return f"length {length:.6f} m breaks its bound, {bound:.6f} x optimum {optimum:.6f} m"
+    return None
+
+
+@dataclass
+class Study:
+    """The outcomes of a run, maps in the order of the records, the reference first on each."""
+
+    outcomes: list[Outcome]
+
+    @property
+    def maps(self) -> list[str]:
+        """Labels of the maps."""
+        return list(dict.fromkeys(outcome.map_name for outcome in self.outcomes))
+
+    @property
+    def labels(self) -> list[str]:
+        """Labels of the methods."""
+        return list(dict.fromkeys(outcome.label for outcome in self.outcomes))
+
+    def of_map(self, name: str) -> list[Outcome]:
+        """Outcomes on one map."""
+        return [outcome for outcome in self.outcomes if outcome.map_name == name]
+
+    def of_method(self, label: str) -> list[Outcome]:
+        """Outcomes of one method."""
+        return [outcome for outcome in self.outcomes if outcome.label == label]
+
+    @property
+    def faults(self) -> list[tuple[Outcome, Record, str]]:
+        """Every contradiction found."""
+        return [(outcome, *fault) for outcome in self.outcomes for fault in outcome.faults]
+
+
+def load_study(folder: Path, *, root: Path | None = None) -> Study:
+    """Read the records of a run.
+
+    Parameters
+    ----------
+    folder
+        The run's.
+    root
+        Folder by whose paths maps below it are called; else by their names.
+
+    Raises
+    ------
+    InvalidValueError
+        When a line is no record.
+    """
+    preparations: dict[tuple[str, str], Record] = {}
+    pairs: dict[tuple[str, str], list[Record]] = {}
+    for record in read_records(folder):
+        key = record["map_sha"], record["method_sha"]
+        if record["type"] == "preparation":
+            preparations[key] = record
+        else:
+            pairs.setdefault(key, []).append(record)
+    names = _map_labels(preparations, root)
+    digests: dict[str, set[tuple[str, str]]] = {}
+    for record in preparations.values():
+        settings = record["method_sha"], names[record["map_sha"]]
+        digests.setdefault(f"{record['method']}@{settings[1]}", set()).add(settings)
+    optima = {
+        sha: {query_key(record): record for record in pairs.get((sha, method), ())}
+        for (sha, method), record in preparations.items()
+        if record["method"] == REFERENCE
+    }
+    outcomes = []
+    for (sha, method), record in preparations.items():
+        name = names[sha]
+        several = len(digests[f"{record['method']}@{name}"]) > 1
+        label = f"{record['method']} {method[:4]}" if several else record["method"]
+        known = optima.get(sha, {})
+        outcomes.append(Outcome(name, label, record, pairs.get((sha, method), []), known))
+    order = {name: at for at, name in enumerate(dict.fromkeys(names.values()))}
+    place = {name: at for at, name in enumerate(BASELINES)}
+    outcomes.sort(
+        key=lambda outcome: (
+            order[outcome.map_name],
+            place.get(outcome.preparation["method"], len(place)),
+            outcome.label,
+        )
+    )
+    return Study(outcomes)
+
+
+def _map_labels(preparations: dict[tuple[str, str], Record], root: Path | None) -> dict[str, str]:
+    """Name of each map, with a part of its hash where two maps have one name."""
+    named = {sha: _map_label(record, root) for (sha, _), record in preparations.items()}
+    taken: dict[str, list[str]] = {}
+    for sha, name in named.items():
+        taken.setdefault(name, []).append(sha)
+    return {
+        sha: name if len(taken[name]) == 1 else f"{name} {sha[:6]}" for sha, name in named.items()
+    }
+
+
+def _map_label(record: Record, root: Path | None) -> str:
+    file = Path(record.get("file", ""))
+    if root is None or not file.is_relative_to(root.resolve()):
+        return str(record["map"])
+    return file.relative_to(root.resolve()).with_suffix("").as_posix()

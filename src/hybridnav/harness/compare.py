@@ -1,0 +1,111 @@
+"""Two runs side by side, pair by pair, with the significance of their difference."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.harness.analysis import load_study, nanmean, query_key
+from hybridnav.harness.methods import REFERENCE
+from hybridnav.metrics import paired_difference
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from hybridnav._typing import FloatArray
+    from hybridnav.harness.analysis import Outcome, Study
+    from hybridnav.harness.tables import Row
+
+_Sample = tuple["FloatArray", "FloatArray", "FloatArray", "FloatArray"]
+
+
+def compare_runs(first: Path, second: Path) -> list[Row]:
+    """Compare the methods that two runs have in common, on the maps and pairs that they share.
+
+    Parameters
+    ----------
+    first, second
+        Folders of runs. Where each has a single method beside the reference, those two are
+        compared even under different names.
+
+    Returns
+    -------
+    list of dict
+        One row for each method and map, and one for all maps. Differences are second minus first:
+        of the loss in percentage points with its 95 % bootstrap interval and the p-value of
+        Wilcoxon's signed-rank test, and of the time as the median ratio, with the same test.
+
+    Raises
+    ------
+    InvalidValueError
+        When a run has no records, or the two share no method, map and pair.
+    """
+    studies = _loaded(first), _loaded(second)
+    rows: list[Row] = []
+    for labels in _methods(*studies):
+        samples: list[_Sample] = []
+        for one in studies[0].of_method(labels[0]):
+            for other in studies[1].of_method(labels[1]):
+                if one.preparation["map_sha"] == other.preparation["map_sha"]:
+                    sample = _paired(one, other)
+                    if len(sample[0]):
+                        rows.append(_row(labels, one.map_name, sample))
+                        samples.append(sample)
+        if len(samples) > 1:
+            pooled = tuple(np.concatenate(part) for part in zip(*samples, strict=True))
+            rows.append(_row(labels, "all maps", (pooled[0], pooled[1], pooled[2], pooled[3])))
+    if not rows:
+        raise InvalidValueError(f"runs {first} and {second} share no method, map and pair")
+    return rows
+
+
+def _loaded(folder: Path) -> Study:
+    study = load_study(folder)
+    if not study.outcomes:
+        raise InvalidValueError(f"run {folder}: no records there")
+    return study
+
+
+def _methods(first: Study, second: Study) -> list[tuple[str, str]]:
+    common = [label for label in first.labels if label in second.labels and label != REFERENCE]
+    alone = [[label for label in study.labels if label != REFERENCE] for study in (first, second)]
+    if not common and all(len(labels) == 1 for labels in alone):
+        return [(alone[0][0], alone[1][0])]
+    return [(label, label) for label in common or [REFERENCE]]
+
+
+def _paired(first: Outcome, second: Outcome) -> _Sample:
+    """Losses and seconds of the pairs that both runs have: first, second, first, second."""
+    places = [
+        {query_key(record): at for at, record in enumerate(outcome.references)}
+        for outcome in (first, second)
+    ]
+    shared = [key for key in places[0] if key in places[1]]
+    one, other = (np.array([place[key] for key in shared], dtype=np.int64) for place in places)
+    return first.losses[one], second.losses[other], first.seconds[one], second.seconds[other]
+
+
+def _row(labels: tuple[str, str], map_name: str, sample: _Sample) -> Row:
+    losses, others, seconds, other_seconds = sample
+    loss = paired_difference(100 * others, 100 * losses)
+    time = paired_difference(1e3 * other_seconds, 1e3 * seconds)
+    solved = np.isfinite(losses), np.isfinite(others)
+    ratio = other_seconds / seconds
+    ratio = ratio[np.isfinite(ratio)]
+    return {
+        "method": labels[0] if labels[0] == labels[1] else f"{labels[1]} against {labels[0]}",
+        "map": map_name,
+        "pairs": len(losses),
+        "solved by the first only": int((solved[0] & ~solved[1]).sum()),
+        "solved by the second only": int((solved[1] & ~solved[0]).sum()),
+        "loss of the first %": 100 * nanmean(losses),
+        "loss of the second %": 100 * nanmean(others),
+        "difference, points": loss.mean,
+        "95 % interval": f"{loss.interval[0]:+.3f} to {loss.interval[1]:+.3f}",
+        "p of the loss": loss.p_value,
+        "time, second / first": float(np.median(ratio)) if ratio.size else math.nan,
+        "p of the time": time.p_value,
+    }

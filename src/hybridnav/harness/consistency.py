@@ -1,0 +1,241 @@
+"""Consistency of a topological and a metric layer, checked by its definition.
+
+S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, 1998: the two layers
+are consistent when each path of one has its counterpart in the other. Nothing here is the planners'
+own code: connectivity comes from scipy.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from hybridnav.grid import CellClass
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.topology import TopologicalMap
+
+Cell = tuple[int, int]
+
+_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
+
+
+class Consistency:
+    """The two layers of one method on one map, and the three questions to them.
+
+    Parameters
+    ----------
+    grid
+        The map; its free cells are the metric layer.
+    region_of
+        int32 (rows, cols), the region of each cell, -1 for none.
+    topology
+        The topological map whose places the regions are, with its arcs; None takes as the edges
+        of the topological layer all pairs of regions that a legal move joins.
+    """
+
+    def __init__(
+        self, grid: OccupancyGrid, region_of: IntArray, *, topology: TopologicalMap | None = None
+    ) -> None:
+        self._shape = grid.shape
+        self._cols = grid.shape[1]
+        self._region = region_of.ravel()
+        self._free = grid.classes == CellClass.FREE
+        self._count = int(region_of.max(initial=-1)) + 1
+        moves = self._legal_moves(corner_cutting=grid.corner_cutting)
+        region = self._region[moves]
+        same = (region[:, 0] == region[:, 1]) & (region[:, 0] >= 0)
+        self._piece = _components(moves[same], grid.classes.size)
+        self._whole = _components(moves, grid.classes.size)
+        if topology is None:
+            crossings = moves[~same & (region >= 0).all(axis=1)]
+            arcs = np.zeros(len(crossings), dtype=np.int64)
+        else:
+            crossings, arcs = self._arc_crossings(topology)
+        keys = self._keys(self._region[crossings])
+        pieces = np.sort(self._piece[crossings], axis=1)
+        _, one = np.unique(np.column_stack([keys, arcs, pieces]), axis=0, return_index=True)
+        # One crossing for each arc and pair of pieces, sorted by pair of regions, then arc.
+        self._arc, self._crossings, crossing_keys = arcs[one], crossings[one], keys[one]
+        self._key = crossing_keys
+        self._links = np.unique(crossing_keys)
+
+    def _arc_crossings(self, topology: TopologicalMap) -> tuple[LongArray, LongArray]:
+        """Cell pairs on the boundaries between free places, and the arc of each."""
+        base, arc = topology.level.boundary_table
+        cell = base >> 1
+        crossings = np.stack([cell, cell + np.where(base & 1, self._cols, 1)], axis=1)
+        kept = self._free.ravel()[crossings].all(axis=1) & ~topology.level.is_self_loop[arc]
+        return crossings[kept], arc[kept]
+
+    def _legal_moves(self, *, corner_cutting: bool) -> LongArray:
+        """All moves between free cells, each in one direction, as flat cells (n, 2)."""
+        free = self._free
+        rows, cols = free.shape
+        flat = np.arange(free.size).reshape(free.shape)
+        found = []
+        for down, right in _STEPS:
+            high, low = slice(down, rows), slice(0, rows - down)
+            left = slice(max(0, -right), cols - max(0, right))
+            ahead = slice(max(0, right), cols + min(0, right))
+            legal = free[low, left] & free[high, ahead]
+            if down and right and not corner_cutting:
+                legal &= free[low, ahead] & free[high, left]
+            found.append(np.stack([flat[low, left][legal], flat[high, ahead][legal]], axis=1))
+        return np.concatenate(found)
+
+    def _keys(self, regions: IntArray) -> LongArray:
+        """One number for each unordered pair of regions."""
+        low, high = regions.min(axis=1), regions.max(axis=1)
+        keys: LongArray = low.astype(np.int64) * self._count + high
+        return keys
+
+    def check_regions(self) -> list[tuple[str, tuple[Cell, Cell]]]:
+        """Every region is connected, and solvability agrees for every pair of free cells.
+
+        Returns
+        -------
+        list
+            What is wrong, and two cells that show it.
+        """
+        free = np.flatnonzero(self._free)
+        region, piece, whole = self._region[free], self._piece[free], self._whole[free]
+        homeless = np.flatnonzero(region < 0)
+        if homeless.size:
+            shown = self._cells(free[homeless[0]], free[homeless[-1]])
+            return [(f"{homeless.size} free cells are in no region", shown)]
+        faults = []
+        first = np.zeros(self._count, dtype=np.int64)
+        first[region[::-1]] = np.arange(len(free))[::-1]
+        torn = np.flatnonzero(piece[first[region]] != piece)
+        if torn.size:
+            name = region[torn[0]]
+            shown = self._cells(free[first[name]], free[torn[0]])
+            faults.append((f"region {name}, and maybe others, is not connected", shown))
+        ends = np.stack(divmod(self._links, self._count), axis=1)
+        joined = _components(ends, self._count)[region]
+        for one, other, text in (
+            (whole, joined, "moves join two cells, regions do not"),
+            (joined, whole, "regions join two cells, moves do not"),
+        ):
+            leader = np.zeros(int(one.max(initial=0)) + 1, dtype=np.int64)
+            leader[one[::-1]] = np.arange(len(free))[::-1]
+            apart = np.flatnonzero(other[leader[one]] != other)
+            if apart.size:
+                shown = self._cells(free[leader[one[apart[0]]]], free[apart[0]])
+                faults.append((f"solvability: {text}", shown))
+        return faults
+
+    def _cells(self, *flat: int) -> tuple[Cell, Cell]:
+        first, second = (divmod(int(cell), self._cols) for cell in flat)
+        return first, second
+
+    def check_plan(
+        self, start: Cell, goal: Cell, nodes: Sequence[int], arcs: Sequence[int] | None
+    ) -> str | None:
+        """Whether a topological plan has a metric path inside its regions, in order.
+
+        Parameters
+        ----------
+        start, goal
+            Cells (row, col).
+        nodes
+            Regions in the order passed.
+        arcs
+            Dense indices of the arcs between them; None allows any legal crossing.
+
+        Returns
+        -------
+        str or None
+            What is wrong.
+        """
+        unknown = [node for node in nodes if not 0 <= node < self._count]
+        if unknown:
+            return f"the plan names region {unknown[0]}, which there is not"
+        first, last = start[0] * self._cols + start[1], goal[0] * self._cols + goal[1]
+        if self._region[first] != nodes[0] or self._region[last] != nodes[-1]:
+            return "the plan does not start and end in the regions of start and goal"
+        reached = {int(self._piece[first])}
+        for step, (here, there) in enumerate(itertools.pairwise(nodes)):
+            reached = self._cross(reached, here, there, None if arcs is None else arcs[step])
+            if not reached:
+                return f"no metric path inside regions {here} and {there}, step {step} of the plan"
+        if int(self._piece[last]) not in reached:
+            return f"the goal cannot be reached inside its region {nodes[-1]}"
+        return None
+
+    def _cross(self, reached: set[int], here: int, there: int, arc: int | None) -> set[int]:
+        """Pieces of a region that a crossing from the reached pieces of another leads to."""
+        key = min(here, there) * self._count + max(here, there)
+        rows = slice(*np.searchsorted(self._key, [key, key + 1]))
+        crossings, piece = self._crossings[rows], self._piece
+        if arc is not None:
+            crossings = crossings[self._arc[rows] == arc]
+        # A crossing is stored in one direction only.
+        turned = self._region[crossings[:, 0]] != here
+        tails = np.where(turned, crossings[:, 1], crossings[:, 0])
+        heads = np.where(turned, crossings[:, 0], crossings[:, 1])
+        return {
+            int(piece[b]) for a, b in zip(tails, heads, strict=True) if int(piece[a]) in reached
+        }
+
+    def check_walk(self, cells: LongArray) -> str | None:
+        """Whether a metric path maps to a walk in the topological layer.
+
+        A diagonal between two regions passes one of its side cells, whichever gives a walk.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), the path.
+
+        Returns
+        -------
+        str or None
+            What is wrong.
+        """
+        flat = cells[:, 0] * self._cols + cells[:, 1]
+        region = self._region[flat]
+        if (region < 0).any():
+            return "the path leaves the regions"
+        pairs = np.stack([region[:-1], region[1:]], axis=1)
+        for step in np.flatnonzero(~self._linked(pairs)):
+            sides = np.array(
+                [[cells[step, 0], cells[step + 1, 1]], [cells[step + 1, 0], cells[step, 1]]]
+            )
+            inside = self._free[sides[:, 0], sides[:, 1]]
+            via = self._region[sides @ [self._cols, 1]][inside]
+            ends = np.broadcast_to(pairs[step], (len(via), 2))
+            there = np.stack([ends[:, 0], via], axis=1), np.stack([via, ends[:, 1]], axis=1)
+            if not (self._linked(there[0]) & self._linked(there[1])).any():
+                a, b = pairs[step]
+                row, col = cells[step]
+                return f"the path passes from region {a} to {b} at cell ({row}, {col}): no edge"
+        return None
+
+    def _linked(self, pairs: IntArray) -> BoolArray:
+        keys = self._keys(pairs)
+        at = np.minimum(np.searchsorted(self._links, keys), max(len(self._links) - 1, 0))
+        found = self._links[at] == keys if len(self._links) else np.zeros(len(keys), np.bool_)
+        linked: BoolArray = found | (pairs[:, 0] == pairs[:, 1])
+        return linked
+
+    def joined(self, start: Cell, goal: Cell) -> bool:
+        """Whether the metric layer joins two cells, by scipy's connected components."""
+        first, last = start[0] * self._cols + start[1], goal[0] * self._cols + goal[1]
+        return bool(self._whole[first] == self._whole[last])
+
+
+def _components(links: LongArray, count: int) -> LongArray:
+    """Label of the connected component of each of some things, by the pairs that are linked."""
+    ones = np.ones(len(links), dtype=np.int8)
+    graph = sparse.coo_array((ones, (links[:, 0], links[:, 1])), (count, count))
+    return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)

@@ -1,0 +1,156 @@
+"""Judging answers: consistency, collisions, lengths, and the reference against other optima."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.harness.consistency import Consistency
+from hybridnav.harness.methods import HybridMethod, Prepared
+from hybridnav.metrics import ScipyOptimum, VisibilityGraph, judge_path, shorten
+from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.octile import path_length_in_cells
+
+if TYPE_CHECKING:
+    from hybridnav._typing import LongArray
+    from hybridnav.baselines import Answer
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.pairs import Pair
+    from hybridnav.harness.records import Record
+
+Cell = tuple[int, int]
+
+SCIPY_SAMPLE = 3
+"""Pairs of a task whose optimum scipy computes too."""
+
+EXACT_CORNERS = 6000
+"""Convex corners up to which any-angle optima are exact: about a second to prepare."""
+
+SLACK = 1e-9
+"""Relative difference that two sums of the same moves may have."""
+
+STATED_SLACK, STATED_SLACK_CELLS = 1e-5, 0.0051
+"""Scenario files round lengths to two decimals or six digits."""
+
+
+class Judge:
+    """Looks at answers on one map with code that the planners do not share.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    prepared
+        The method.
+    reference
+        Whether this is the method whose lengths are the optimum: then they are checked against
+        other optima too, and any-angle lengths are noted.
+    """
+
+    def __init__(self, grid: OccupancyGrid, prepared: Prepared, *, reference: bool) -> None:
+        self._grid = grid
+        self._oracles = Oracles(grid) if reference else None
+        self._region_of = prepared.method.region_of
+        self._consistency: Consistency | None = None
+        self._search: GridSearch | None = None
+        self.region_faults: list[tuple[str, tuple[Cell, Cell]]] = []
+        if self._region_of is not None:
+            own = prepared.topology if isinstance(prepared.method, HybridMethod) else None
+            self._consistency = Consistency(grid, self._region_of, topology=own)
+            self._has_arcs = own is not None
+            self.region_faults = self._consistency.check_regions()
+            free = grid.classes == CellClass.FREE
+            self._search = GridSearch(free, corner_cutting=grid.corner_cutting)
+            self._regions = np.zeros(int(self._region_of.max(initial=-1)) + 1, dtype=np.bool_)
+
+    def faults(self, pair: Pair, answer: Answer) -> tuple[float | None, list[str]]:
+        """Length of the path, counted anew, and all that is wrong with the answer."""
+        faults: list[str] = []
+        length_m = None
+        if answer.cells is not None:
+            verdict = judge_path(self._grid, answer.cells, start=pair.start, goal=pair.goal)
+            length_m = verdict.length_m
+            faults += verdict.faults
+        checks = self._consistency
+        if checks is None:
+            return length_m, faults
+        if answer.nodes is not None:
+            arcs = answer.arcs if self._has_arcs else None  # of what other map is not known here
+            wrong = checks.check_plan(pair.start, pair.goal, answer.nodes, arcs)
+            faults += [wrong] if wrong else []
+        if (answer.cells is not None) != checks.joined(pair.start, pair.goal):
+            found = "a path" if answer.cells is not None else "no path"
+            faults.append(f"solvability: {found} was found, moves on the grid say otherwise")
+        if answer.cells is not None and not faults:
+            wrong = checks.check_walk(answer.cells)
+            faults += [wrong] if wrong else []
+        return length_m, faults
+
+    def oracles(
+        self, answer: Answer, pair: Pair, length_m: float | None
+    ) -> tuple[Record, list[str]]:
+        """What else is known about a pair, and how the reference's answer contradicts it."""
+        if self._oracles is None:
+            return {}, []
+        return self._oracles.ask(answer, pair, length_m)
+
+    def plan_optimum_m(self, pair: Pair, answer: Answer) -> float | None:
+        """Length of the best path inside the regions of the plan; None without plan or path."""
+        if answer.nodes is None or self._search is None:
+            return None
+        self._regions[list(answer.nodes)] = True
+        found = self._search.search(
+            pair.start, pair.goal, field_of=self._region_of, in_corridor=self._regions
+        )
+        self._regions[list(answer.nodes)] = False
+        if found.cells is None:
+            return None
+        return path_length_in_cells(found.cells) * self._grid.resolution_m
+
+
+class Oracles:
+    """What is known of pairs from elsewhere: scipy's optimum on a sample, the optimum that a
+    scenario states, any-angle lengths."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self._grid = grid
+        self._left = 0 if grid.corner_cutting else SCIPY_SAMPLE
+        self._scipy: ScipyOptimum | None = None
+        self._visibility: VisibilityGraph | None = None
+        with suppress(InvalidValueError):  # too many corners: best known instead of exact
+            self._visibility = VisibilityGraph(grid, max_corners=EXACT_CORNERS)
+
+    def ask(self, answer: Answer, pair: Pair, length_m: float | None) -> tuple[Record, list[str]]:
+        """Fields of the record, and faults."""
+        known: Record = {}
+        faults = []
+        length = math.inf if length_m is None else length_m
+        if self._left > 0:
+            self._left -= 1
+            self._scipy = self._scipy or ScipyOptimum(self._grid)
+            optimum = float(self._scipy.lengths_from(pair.start)[pair.goal])
+            known["scipy_optimum_m"] = optimum if math.isfinite(optimum) else None
+            if not (length == optimum or abs(length - optimum) <= SLACK * optimum):
+                faults.append(f"the optimum by scipy is {optimum:.6f} m, not {length:.6f} m")
+        if pair.stated_optimum_cells is not None:
+            stated = pair.stated_optimum_cells * self._grid.resolution_m
+            off = STATED_SLACK_CELLS * self._grid.resolution_m + STATED_SLACK * stated
+            if not abs(length - stated) <= off:
+                faults.append(f"the scenario states {stated:.6f} m, not {length:.6f} m")
+        if answer.cells is not None and not faults:
+            known |= self._any_angle(answer.cells, pair)
+        return known, faults
+
+    def _any_angle(self, cells: LongArray, pair: Pair) -> Record:
+        exact = self._visibility is not None
+        if self._visibility is not None:
+            length = self._visibility.shortest(pair.start, pair.goal).length_m
+        else:
+            points = shorten(self._grid, cells)
+            length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        return {"any_angle_m": length, "any_angle_exact": exact}

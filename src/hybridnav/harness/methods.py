@@ -1,0 +1,205 @@
+"""Every method that the harness knows, by name: presets of our planner, and baselines."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import time
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.baselines import Answer
+from hybridnav.config import Preset, load_preset
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.planner import HybridPlanner
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from hybridnav._typing import IntArray
+    from hybridnav.baselines import Method
+    from hybridnav.grid import OccupancyGrid
+
+Cell = tuple[int, int]
+
+REFERENCE = "grid-astar"
+"""The baseline whose lengths are the optimum; part of every run."""
+
+BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
+    "grid-astar": ("hybridnav.baselines.grid:GridAstar", {}),
+    "grid-dijkstra": ("hybridnav.baselines.grid:GridDijkstra", {}),
+    "weighted-astar": ("hybridnav.baselines.grid:WeightedAstar", {}),
+    "hpa-star": ("hybridnav.baselines.hpa:HpaStar", {}),
+    "hpa-star-raw": ("hybridnav.baselines.hpa:HpaStar", {"smooth": False}),
+    "hpa-star-lines": ("hybridnav.baselines.hpa:HpaStar", {"line_cells": 1000}),
+    "simple-graph": ("hybridnav.baselines.simple_graph:SimpleGraphPyramid", {}),
+    "exact-overlay": ("hybridnav.baselines.overlay:ExactOverlay", {}),
+    "thrun": ("hybridnav.baselines.thrun:ThrunMap", {}),
+}
+"""Class of each baseline and its options; those named in `ON_PLACES` are made from a
+`TopologicalMap`, the others from an `OccupancyGrid`. Work outside this package names its own class
+as `module:class`."""
+
+ON_PLACES = frozenset({"simple-graph", "exact-overlay"})
+
+
+@dataclass(frozen=True)
+class MethodSpec:
+    """What to build: a preset or a baseline, and the pyramid under it. Plain values, so that it
+    can go to another process."""
+
+    name: str
+    preset: dict[str, Any] | None
+    """The preset's sections; None for a baseline."""
+    pyramid: dict[str, Any] = field(default_factory=dict)
+    """merge_distance_m, linkage, seed: of the places that it plans on."""
+
+    @property
+    def digest(self) -> str:
+        """Short hash of all settings, part of every record's id."""
+        text = json.dumps([self.name, self.preset, self.pyramid], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def preset_spec(
+    source: str | Preset, *, merge_distance_m: float | None = None, seed: int | None = None
+) -> MethodSpec:
+    """Method of a preset, its merge distance and seed overridden where given."""
+    preset = load_preset(source)
+    pyramid = preset.pyramid.model_dump(exclude={"robot_radius_m"})
+    return MethodSpec(
+        preset.name,
+        preset.model_dump(exclude={"description"}),
+        pyramid | _given(merge_distance_m, seed),
+    )
+
+
+def baseline_spec(
+    name: str, *, merge_distance_m: float | None = None, seed: int | None = None
+) -> MethodSpec:
+    """Method of a baseline.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is none of that name.
+    """
+    if name not in BASELINES and ":" not in name:
+        raise InvalidValueError(
+            f"no baseline is called {name!r}: there are {', '.join(BASELINES)}, or module:class"
+        )
+    if name not in ON_PLACES:
+        return MethodSpec(name, None)
+    pyramid = Preset().pyramid.model_dump(exclude={"robot_radius_m"})
+    return MethodSpec(name, None, pyramid | _given(merge_distance_m, seed))
+
+
+def _given(merge_distance_m: float | None, seed: int | None) -> dict[str, Any]:
+    settings = {"merge_distance_m": merge_distance_m, "seed": seed}
+    return {key: value for key, value in settings.items() if value is not None}
+
+
+class HybridMethod:
+    """A preset of `HybridPlanner` as a method; see `baselines.Method`."""
+
+    def __init__(self, topology: TopologicalMap, preset: Preset) -> None:
+        self.topology = topology
+        self.name = preset.name
+        self._planner = HybridPlanner(topology, preset=preset)
+        self._frame = topology.grid.frame
+        free = topology.classes == CellClass.FREE
+        self.region_of: IntArray | None = None
+        self.n_nodes = int((topology.grid.classes == CellClass.FREE).sum())
+        self.n_edges = 0
+        if preset.planner.coarse != "none":
+            self.region_of = topology.level.field_of
+            self.n_nodes = int(free.sum())
+            plain = ~topology.level.is_self_loop & free[topology.arcs].all(axis=1)
+            self.n_edges = int(plain.sum())
+
+    @cached_property
+    def memory_bytes(self) -> int:
+        """What planner, topological map and record hold, as the sum of their arrays."""
+        return _nbytes(self._planner, set())
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        """Plan between two free cells."""
+        ends = self._frame.points_of(np.array([start, goal]))
+        result = self._planner.plan(ends[0], ends[1])
+        route, stats = result.route, result.stats
+        return Answer(
+            None if result.path is None else result.path.cells,
+            nodes=None if route is None else _dense(self.topology.place_ids, route.places),
+            arcs=None if route is None else _dense(self.topology.arc_ids, route.arcs),
+            bound=1 + result.gap if result.solved else np.inf,
+            expanded=stats.expanded,
+            expanded_nodes=stats.expanded_places,
+            seconds=dict(stats.seconds),
+        )
+
+
+def _dense(ids: Any, named: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(np.searchsorted(ids, np.array(named, dtype=np.int64)).tolist())
+
+
+def _nbytes(thing: Any, seen: set[int]) -> int:
+    """Bytes of all arrays that a thing of this package holds, each counted once."""
+    if id(thing) in seen:
+        return 0
+    seen.add(id(thing))
+    if isinstance(thing, np.ndarray):
+        owner = thing
+        while isinstance(owner.base, np.ndarray):
+            owner = owner.base
+        counted = id(owner) in seen and owner is not thing
+        seen.add(id(owner))
+        return 0 if counted else owner.nbytes
+    if isinstance(thing, (list, tuple)):
+        return sum(_nbytes(item, seen) for item in thing)
+    if isinstance(thing, dict):
+        return sum(_nbytes(item, seen) for item in thing.values())
+    module = type(thing).__module__
+    if not module.startswith("hybridnav.") or module.startswith("hybridnav.grid"):
+        return 0
+    return _nbytes(getattr(thing, "__dict__", {}), seen)
+
+
+@dataclass
+class Prepared:
+    """A method ready for one map, and what that took."""
+
+    method: Method
+    topology: TopologicalMap | None
+    """The places that it plans on, None for methods that need none."""
+    pyramid_seconds: float
+    method_seconds: float
+
+
+def prepare(spec: MethodSpec, grid: OccupancyGrid) -> Prepared:
+    """Build a method for a map."""
+    began = time.perf_counter()
+    topology = None
+    if spec.pyramid:
+        topology = TopologicalMap(DualGraphPyramid.build(grid, **spec.pyramid))
+    built = time.perf_counter()
+    method: Method
+    if spec.preset is not None and topology is not None:
+        method = HybridMethod(topology, Preset.model_validate(spec.preset))
+    else:
+        made_of, options = _class_of(spec.name)
+        method = made_of(grid if topology is None else topology, **options)
+    return Prepared(method, topology, built - began, time.perf_counter() - built)
+
+
+def _class_of(name: str) -> tuple[Any, dict[str, Any]]:
+    path, options = BASELINES.get(name, (name, {}))
+    module, _, attribute = path.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute), options
+    except (ImportError, AttributeError) as error:
+        raise InvalidValueError(f"baseline {name}: {error}") from None

@@ -1,0 +1,203 @@
+"""What a run leaves beside its records: tables, the report, pictures of counter-examples."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.harness.analysis import Outcome, Study, load_study, query_key
+from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.paths import decode_path
+from hybridnav.harness.records import environment
+from hybridnav.harness.report_html import MapSection, ReportData, Table, WorstCase, render_report
+from hybridnav.harness.tables import (
+    EFFICIENCY_COLUMNS,
+    LOSS_COLUMNS,
+    Row,
+    rows_by_distance,
+    rows_of_map,
+    rows_of_study,
+    text_of,
+    to_csv,
+    to_markdown,
+)
+from hybridnav.harness.task import MapSpec, read_map
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from hybridnav._typing import LongArray
+    from hybridnav.harness.records import Record
+
+MAX_FAULTS_SHOWN = 50
+WORST_CASES = 2
+
+
+def write_outputs(
+    folder: Path, *, title: str = "hybridnav evaluation", root: Path | None = None
+) -> Study:
+    """Write `summary.csv`, `maps.csv`, `summary.md` and `report.html` into the folder of a run.
+
+    Parameters
+    ----------
+    folder
+        The run's.
+    title
+        Of the report.
+    root
+        Folder by whose paths maps below it are called; else by their names.
+
+    Returns
+    -------
+    Study
+        What was found; `faults` lists every counter-example.
+    """
+    study = load_study(folder, root=root)
+    overall = rows_of_study(study)
+    by_map = {name: rows_of_map(study, name) for name in study.maps}
+    (folder / "summary.csv").write_text(to_csv(overall), encoding="utf-8")
+    every = [row for rows in by_map.values() for row in rows]
+    (folder / "maps.csv").write_text(to_csv(every), encoding="utf-8")
+    (folder / "summary.md").write_text(markdown(overall, study), encoding="utf-8")
+    report = _report(study, title, overall, by_map)
+    (folder / "report.html").write_text(render_report(report), encoding="utf-8")
+    return study
+
+
+def markdown(overall: Sequence[Row], study: Study) -> str:
+    """The tables of all maps together, one for each of Thrun's criteria."""
+    checks = sum(outcome.checks for outcome in study.outcomes)
+    failures = sum(outcome.failures for outcome in study.outcomes)
+    found = len(study.faults)
+    return (
+        f"## Consistency\n\n{checks:,} answers checked, {found} counter-examples, "
+        f"{failures} queries without an answer.\n\n"
+        f"## Loss\n\n{to_markdown(overall, ('method', 'maps', *LOSS_COLUMNS))}\n"
+        f"## Efficiency\n\n{to_markdown(overall, ('method', *EFFICIENCY_COLUMNS))}"
+    )
+
+
+def _report(
+    study: Study, title: str, overall: Sequence[Row], by_map: dict[str, list[Row]]
+) -> ReportData:
+    faults = [
+        f"{outcome.map_name}, {outcome.label}, {_pair_text(record)}: {fault}"
+        for outcome, record, fault in study.faults
+    ]
+    hidden = len(faults) - MAX_FAULTS_SHOWN
+    if hidden > 0:
+        faults = [*faults[:MAX_FAULTS_SHOWN], f"and {hidden} more, see records.jsonl"]
+    facts = [
+        *environment().items(),
+        ("maps", str(len(study.maps))),
+        ("methods", ", ".join(study.labels)),
+        ("answers without a result", str(sum(o.failures for o in study.outcomes))),
+    ]
+    pooled = {label: study.of_method(label) for label in study.labels}
+    return ReportData(
+        title=title,
+        facts=facts,
+        faults=faults,
+        checks=sum(outcome.checks for outcome in study.outcomes),
+        criteria=_table(
+            overall, ("method", "maps", *LOSS_COLUMNS, *EFFICIENCY_COLUMNS), "All maps together"
+        ),
+        maps=[_section(study, name, by_map[name]) for name in study.maps],
+        overall_losses={
+            label: np.concatenate([outcome.losses for outcome in outcomes])
+            for label, outcomes in pooled.items()
+        },
+        overall_times_ms={
+            label: _median_ms(np.concatenate([outcome.seconds for outcome in outcomes]))
+            for label, outcomes in pooled.items()
+        },
+    )
+
+
+def _median_ms(seconds: np.ndarray) -> float:
+    finite = seconds[np.isfinite(seconds)]
+    return 1e3 * float(np.median(finite)) if finite.size else float("nan")
+
+
+def _pair_text(record: Record) -> str:
+    if record["type"] != "pair":
+        return "all pairs"
+    return f"{tuple(record['start'])} to {tuple(record['goal'])}"
+
+
+def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
+    kept = [column for column in columns if any(column in row for row in rows)]
+    numeric = frozenset(at for at, column in enumerate(kept) if column not in ("method", "map"))
+    return Table(
+        columns=kept,
+        rows=[[text_of(row.get(column, "")) for column in kept] for row in rows],
+        caption=caption,
+        numeric=numeric,
+    )
+
+
+def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
+    outcomes = study.of_map(name)
+    first = outcomes[0].preparation
+    shape = first.get("shape", [0, 0])
+    distance = rows_by_distance(study, name)
+    columns = list(dict.fromkeys(key for row in distance for key in row))
+    return MapSection(
+        name=name,
+        facts=[
+            ("size", f"{shape[0]} x {shape[1]} cells of {first.get('resolution_m', 0):g} m"),
+            ("free cells", f"{first.get('free_cells', 0):,}"),
+            ("robot radius", f"{first.get('robot_radius_m', 0):g} m"),
+            ("SHA-256", str(first["map_sha"])[:16]),
+        ],
+        tables=[
+            _table(rows, ("method", *LOSS_COLUMNS), "Loss"),
+            _table(rows, ("method", *EFFICIENCY_COLUMNS), "Efficiency"),
+            _table(distance, columns, "Mean loss in per cent by length of the optimum (pairs)"),
+        ],
+        losses={outcome.label: outcome.losses for outcome in outcomes},
+        times_ms={outcome.label: _median_ms(outcome.seconds) for outcome in outcomes},
+        worst=[case for outcome in outcomes for case in _worst(outcome)],
+    )
+
+
+def _worst(outcome: Outcome) -> list[WorstCase]:
+    """The pairs that a preset of ours loses most on, and every method's counter-examples."""
+    cases = [_case(outcome, record, fault) for record, fault in outcome.faults[:WORST_CASES]]
+    if outcome.preparation.get("preset") is not None and outcome.label != REFERENCE:
+        own = {tuple(r["start"] + r["goal"]): r for r in outcome.records if r.get("path")}
+        order = np.argsort(-np.nan_to_num(outcome.losses, nan=0.0), kind="stable")[:WORST_CASES]
+        for at in order[outcome.losses[order] > 0]:
+            reference = outcome.references[at]
+            record = own[tuple(reference["start"] + reference["goal"])]
+            cases.append(_case(outcome, record, f"{100 * outcome.losses[at]:.1f} % too long"))
+    return [case for case in cases if case is not None]
+
+
+def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
+    about = outcome.preparation
+    if "file" not in about:
+        return None
+    grid = read_map(MapSpec(about["file"], about["robot_radius_m"], about["corner_cutting"]))
+    optimum = None
+    if record["type"] == "pair":
+        path = _path(record) if record.get("path") else np.array([record["start"], record["goal"]])
+        reference = outcome.optimum.get(query_key(record))
+        if reference is not None and reference.get("path"):
+            optimum = _path(reference)
+    else:  # a fault of the regions: the two cells that show it
+        path = np.array(record["fault_cells"][record["faults"].index(text)])
+    return WorstCase(
+        title=f"{outcome.label}, {_pair_text(record)}: {text}",
+        classes=grid.classes,
+        resolution_m=grid.resolution_m,
+        path=path,
+        optimum=optimum,
+    )
+
+
+def _path(record: Record) -> LongArray:
+    start: list[int] = record["start"]
+    return decode_path((start[0], start[1]), record["path"])

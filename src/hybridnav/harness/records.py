@@ -1,0 +1,143 @@
+"""Records: a JSON line for each query and method, append-only, resumable after any kill."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+import hybridnav
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+    from types import TracebackType
+
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.methods import MethodSpec
+    from hybridnav.harness.pairs import Pair
+
+Record = dict[str, Any]
+
+RECORDS_FILE = "records.jsonl"
+
+_KEYS = ("id", "type", "map", "map_sha", "method", "method_sha", "status")
+_LIBRARIES = ("numpy", "scipy", "numba")
+
+
+def map_digest(grid: OccupancyGrid) -> str:
+    """SHA-256 over what planners see of a map: size, resolution, classes, moves."""
+    digest = hashlib.sha256(repr((grid.shape, grid.resolution_m, grid.corner_cutting)).encode())
+    digest.update(np.ascontiguousarray(grid.classes).tobytes())
+    return digest.hexdigest()
+
+
+def pair_id(map_sha: str, spec: MethodSpec, pair: Pair) -> str:
+    """Id of the record of one query: the same for equal map, settings and pair."""
+    return f"{map_sha[:12]}/{spec.name}-{spec.digest}/{pair.key}"
+
+
+def preparation_id(map_sha: str, spec: MethodSpec) -> str:
+    """Id of the record of a method's preparation for a map."""
+    return f"{map_sha[:12]}/{spec.name}-{spec.digest}/preparation"
+
+
+def environment() -> dict[str, str]:
+    """Versions and host, part of every preparation's record."""
+    versions = {name: importlib.metadata.version(name) for name in _LIBRARIES}
+    return {
+        "hybridnav": hybridnav.__version__,
+        "python": platform.python_version(),
+        **versions,
+        "host": platform.node(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+    }
+
+
+class RecordFile:
+    """The records of one run. Opening it drops a last line that a kill cut short.
+
+    Parameters
+    ----------
+    folder
+        Where `records.jsonl` is or will be.
+
+    Raises
+    ------
+    InvalidValueError
+        When the file holds a line that is no record.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / RECORDS_FILE
+        self.ids: set[str] = set()
+        _drop_cut_line(self.path)
+        self.ids = {record["id"] for record in read_records(folder)}
+        self._stream = self.path.open("ab")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stream.close()
+
+    def append(self, records: Iterable[Record]) -> None:
+        """Write records that are not there yet; they are on disk when this returns."""
+        fresh = [record for record in records if record["id"] not in self.ids]
+        lines = [json.dumps(record, allow_nan=False, separators=(",", ":")) for record in fresh]
+        if not lines:
+            return
+        self._stream.write("".join(f"{line}\n" for line in lines).encode())
+        self._stream.flush()
+        os.fsync(self._stream.fileno())
+        self.ids.update(record["id"] for record in fresh)
+
+
+def _drop_cut_line(path: Path) -> None:
+    if not path.exists():
+        return
+    content = path.read_bytes()
+    whole = content.rfind(b"\n") + 1
+    if whole < len(content):
+        with path.open("r+b") as stream:
+            stream.truncate(whole)
+
+
+def read_records(folder: Path) -> list[Record]:
+    """All whole records of a run, in the order written; none where there is no file.
+
+    Raises
+    ------
+    InvalidValueError
+        When the file cannot be read or a line of it is no record.
+    """
+    path = folder / RECORDS_FILE
+    records: list[Record] = []
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return records
+    except OSError as error:
+        raise InvalidValueError(f"records {path}: {error.strerror}") from None
+    for number, line in enumerate(content.split(b"\n")[:-1], start=1):
+        try:
+            record = json.loads(line)
+        except ValueError:
+            record = None
+        if not isinstance(record, dict) or not all(
+            isinstance(record.get(key), str) for key in _KEYS
+        ):
+            raise InvalidValueError(f"records {path}, line {number}: no record of this harness")
+        records.append(record)
+    return records

@@ -1,0 +1,200 @@
+"""A run of the harness: maps and methods in, records in a folder out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.harness.methods import REFERENCE, MethodSpec, baseline_spec, preset_spec
+from hybridnav.harness.pairs import (
+    SAMPLER_VERSION,
+    Pair,
+    lattice_pairs,
+    sample_pairs,
+    scenario_pairs,
+)
+from hybridnav.harness.records import RecordFile, map_digest
+from hybridnav.harness.task import MapSpec, Task, read_map
+from hybridnav.harness.workers import run_local, run_on_cluster
+from hybridnav.io.movingai import read_scenarios
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from hybridnav._typing import PathLike
+    from hybridnav.config import Preset
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.records import Record
+
+RUN_FILE = "run.json"
+
+ROS_RADIUS_M = 0.25
+MOVINGAI_MERGE_DISTANCE_M = 40.0
+"""On MovingAI maps, whose cells are 1 m by agreement, the robot is a point and places are 40 cells
+wide unless said otherwise."""
+
+_PAIRS = 100
+_PAIRS_PER_TASK = 2000
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSettings:
+    """What a run evaluates; see `evaluate`."""
+
+    maps: tuple[str, ...]
+    presets: tuple[str | Preset, ...] = ("paper",)
+    baselines: tuple[str, ...] = ()
+    pairs: int | None = None
+    """Sampled pairs a map, 100 unless given; of a scenario file as many, evenly spread over it, or
+    all."""
+    lattice_step_m: float | None = None
+    """Instead of sampled pairs: all pairs of free cells on a lattice."""
+    scenarios: str | None = None
+    """Instead of sampled pairs: a MovingAI scenario file; there must be one map."""
+    seed: int = 0
+    """Of the sampler."""
+    robot_radius_m: float | None = None
+    """None: 0.25 m for ROS maps, 0 for MovingAI's."""
+    merge_distance_m: float | None = None
+    """None: the preset's for ROS maps (4 m for baselines), 40 m for MovingAI's."""
+    corner_cutting: bool = False
+    workers: int = 1
+    scheduler: str | None = None
+    """Address of a dask.distributed scheduler, instead of processes of this machine."""
+    timeout_s: float = 600.0
+    """Longest silence of a worker: one query, or a preparation."""
+
+
+def evaluate(
+    settings: RunSettings, folder: PathLike, *, progress: Callable[[int, int], None] | None = None
+) -> int:
+    """Answer all pairs on all maps by all methods, and append the records to a folder.
+
+    A record that is there already is not made again, so a run that was killed goes on where it was.
+    The baseline "grid-astar" is always among the methods: its lengths are the optimum.
+
+    Parameters
+    ----------
+    settings
+        What to evaluate.
+    folder
+        Made where it is not there; holds `records.jsonl` and `run.json`.
+    progress
+        Called with the numbers of records that are there and that there will be.
+
+    Returns
+    -------
+    int
+        How many records were made.
+
+    Raises
+    ------
+    InvalidValueError
+        When a setting is out of range, or the folder cannot be written.
+    MapError, PresetError
+        When a map, a scenario file or a preset cannot be read.
+    """
+    path = Path(folder)
+    read_map.cache_clear()  # a file may have changed since the last run of this process
+    tasks = [task for name in settings.maps for task in _tasks_of(settings, name)]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        _write_settings(settings, path)
+        with RecordFile(path) as records:
+            total = len({name for task in tasks for name in task.ids})
+            wanted = [rest for task in tasks if (rest := _missing(task, records.ids)) is not None]
+            before = len(records.ids)
+            done = total - sum(len(_new_ids(task, records.ids)) for task in wanted)
+            for batch in _run(settings, wanted):
+                known = len(records.ids)
+                records.append(batch)
+                done += len(records.ids) - known
+                if progress is not None:
+                    progress(done, total)
+            return len(records.ids) - before
+    except OSError as error:
+        raise InvalidValueError(f"folder {folder}: {error.strerror}") from None
+
+
+def _run(settings: RunSettings, tasks: Sequence[Task]) -> Iterator[list[Record]]:
+    if not tasks:
+        return iter(())
+    if settings.scheduler is not None:
+        return run_on_cluster(tasks, address=settings.scheduler)
+    return run_local(tasks, workers=settings.workers, timeout_s=settings.timeout_s)
+
+
+def _missing(task: Task, there: set[str]) -> Task | None:
+    """The part of a task without records, None where there is no such part."""
+    pairs = tuple(
+        pair for pair, name in zip(task.pairs, task.ids[1:], strict=True) if name not in there
+    )
+    if not pairs and task.ids[0] in there:
+        return None
+    return Task(task.map, task.map_sha, task.method, pairs)
+
+
+def _new_ids(task: Task, there: set[str]) -> set[str]:
+    return {name for name in task.ids if name not in there}
+
+
+def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
+    """Tasks of one map, the reference's first."""
+    ros = Path(name).suffix.lower() != ".map"
+    radius_m = settings.robot_radius_m
+    if radius_m is None:
+        radius_m = ROS_RADIUS_M if ros else 0.0
+    merge_distance_m = settings.merge_distance_m
+    if merge_distance_m is None and not ros:
+        merge_distance_m = MOVINGAI_MERGE_DISTANCE_M
+    spec = MapSpec(str(Path(name).resolve()), radius_m, settings.corner_cutting)
+    grid = read_map(spec)
+    digest = map_digest(grid)
+    pairs = _pairs_of(settings, grid)
+    return [
+        Task(spec, digest, method, tuple(pairs[at : at + _PAIRS_PER_TASK]))
+        for method in methods_of(settings, merge_distance_m)
+        for at in range(0, max(len(pairs), 1), _PAIRS_PER_TASK)
+    ]
+
+
+def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[MethodSpec]:
+    """The methods of a run on a map, the reference first, none twice."""
+    names = dict.fromkeys((REFERENCE, *settings.baselines))
+    specs = [baseline_spec(name, merge_distance_m=merge_distance_m) for name in names]
+    for preset in settings.presets:
+        spec = preset_spec(preset, merge_distance_m=merge_distance_m)
+        # The preset of the same name as the reference is that very search: measured once.
+        if spec.name != REFERENCE:
+            specs.append(spec)
+    return list({spec.digest: spec for spec in specs}.values())
+
+
+def _pairs_of(settings: RunSettings, grid: OccupancyGrid) -> list[Pair]:
+    if settings.scenarios is not None:
+        if len(settings.maps) != 1:
+            raise InvalidValueError(
+                f"a scenario file goes with one map, got {len(settings.maps)} maps"
+            )
+        pairs = list(dict.fromkeys(scenario_pairs(grid, read_scenarios(settings.scenarios))))
+        count = min(settings.pairs or len(pairs), len(pairs))
+        return [pairs[at * len(pairs) // count] for at in range(count)]
+    if settings.lattice_step_m is not None:
+        return lattice_pairs(grid, settings.lattice_step_m)
+    return sample_pairs(
+        grid, _PAIRS if settings.pairs is None else settings.pairs, seed=settings.seed
+    )
+
+
+def _write_settings(settings: RunSettings, folder: Path) -> None:
+    """The settings of the last run into this folder, for its report."""
+    plain = asdict(settings)
+    plain["presets"] = [
+        preset if isinstance(preset, str) else preset.name for preset in settings.presets
+    ]
+    plain["sampler_version"] = SAMPLER_VERSION
+    text = json.dumps(plain, indent=2) + "\n"
+    (folder / RUN_FILE).write_text(text, encoding="utf-8")

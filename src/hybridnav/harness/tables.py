@@ -1,0 +1,208 @@
+"""Tables of a study: CSV for machines, Markdown for pages, the same rows for the report."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.harness.analysis import nanmean, nanquantile
+from hybridnav.harness.methods import REFERENCE
+from hybridnav.metrics import distance_buckets, summarise
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav.harness.analysis import Outcome, Study
+
+Row = dict[str, str | float]
+
+_DIGITS = 3
+
+LOSS_COLUMNS = (
+    "pairs",
+    "solved",
+    "faults",
+    "loss mean %",
+    "loss 95 % interval",
+    "loss median %",
+    "loss p95 %",
+    "loss p99 %",
+    "loss max %",
+    "without loss %",
+    "loss of the plan %",
+    "any-angle loss %",
+    "loss mean m",
+)
+EFFICIENCY_COLUMNS = (
+    "nodes",
+    "backups",
+    "backups of the grid / backups",
+    "cells expanded",
+    "nodes expanded",
+    "query ms, median",
+    "query ms, p95",
+    "without refinement ms",
+    "with preparation ms",
+    "speed-up",
+    "preparation s",
+    "memory MB",
+    "break-even queries",
+)
+
+
+def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
+    """The figures of one method on some maps.
+
+    Parameters
+    ----------
+    outcomes
+        The method's, one for each map.
+    references
+        The reference's on the same maps, in the same order.
+
+    Returns
+    -------
+    dict
+        By column. Losses are pooled over all pairs; nodes, memory and preparation are means over
+        the maps; counts and times are means or quantiles over all pairs.
+    """
+    losses = _pooled([outcome.losses for outcome in outcomes])
+    finite = losses[np.isfinite(losses)]
+    summary = summarise(finite)
+    lengths = _pooled([outcome.figure("length_m") for outcome in outcomes])
+    optima = _pooled([outcome.optima_m for outcome in outcomes])
+    low, high = (100 * end for end in summary.mean_interval)
+    return {
+        "pairs": len(losses),
+        "solved": len(finite),
+        "faults": sum(len(outcome.faults) for outcome in outcomes),
+        "loss mean %": 100 * summary.mean,
+        "loss 95 % interval": f"{text_of(low)} to {text_of(high)}" if len(finite) else "",
+        "loss median %": 100 * summary.median,
+        "loss p95 %": 100 * summary.p95,
+        "loss p99 %": 100 * summary.p99,
+        "loss max %": 100 * summary.max,
+        "without loss %": 100 * summary.share_without_loss,
+        "loss of the plan %": 100 * nanmean(_pooled([o.plan_losses for o in outcomes])),
+        "any-angle loss %": 100 * nanmean(_pooled([o.any_angle_losses for o in outcomes])),
+        "loss mean m": nanmean(lengths - optima),
+        **_efficiency(outcomes, references),
+    }
+
+
+def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
+    seconds = _pooled([outcome.seconds for outcome in outcomes])
+    whole = _pooled([outcome.seconds for outcome in references])
+    coarse = seconds - _pooled([outcome.refine_seconds for outcome in outcomes])
+    preparation = nanmean(np.array([outcome.preparation_seconds for outcome in outcomes]))
+    queries = len(seconds) / max(len(outcomes), 1)
+    gain = nanmean(whole) - nanmean(seconds)
+    counts = np.array([outcome.thrun_count for outcome in outcomes])
+    grid_counts = np.array([outcome.thrun_count for outcome in references])
+    return {
+        "nodes": _mean_of(outcomes, "n_nodes"),
+        "backups": nanmean(counts),
+        "backups of the grid / backups": nanmean(grid_counts) / (nanmean(counts) or math.nan),
+        "cells expanded": nanmean(_pooled([outcome.figure("expanded") for outcome in outcomes])),
+        "nodes expanded": nanmean(
+            _pooled([outcome.figure("expanded_nodes") for outcome in outcomes])
+        ),
+        "query ms, median": 1e3 * nanquantile(seconds, 0.5),
+        "query ms, p95": 1e3 * nanquantile(seconds, 0.95),
+        "without refinement ms": 1e3 * nanquantile(coarse, 0.5),
+        "with preparation ms": 1e3 * (nanmean(seconds) + preparation / max(queries, 1)),
+        "speed-up": nanquantile(whole / seconds, 0.5),
+        "preparation s": preparation,
+        "memory MB": _mean_of(outcomes, "memory_bytes") / 1e6,
+        "break-even queries": math.ceil(preparation / gain) if gain > 0 else math.inf,
+    }
+
+
+def _mean_of(outcomes: Sequence[Outcome], key: str) -> float:
+    values = [outcome.preparation.get(key, math.nan) for outcome in outcomes]
+    return nanmean(np.array(values, dtype=float))
+
+
+def _pooled(parts: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def rows_of_map(study: Study, name: str) -> list[Row]:
+    """One row for each method on a map."""
+    outcomes = study.of_map(name)
+    reference = [outcome for outcome in outcomes if outcome.label == REFERENCE]
+    return [
+        {"map": name, "method": outcome.label, **figures([outcome], reference)}
+        for outcome in outcomes
+    ]
+
+
+def rows_of_study(study: Study) -> list[Row]:
+    """One row for each method, over all maps that it was run on."""
+    references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
+    rows = []
+    for label in study.labels:
+        outcomes = [o for o in study.of_method(label) if o.map_name in references]
+        there = [references[outcome.map_name] for outcome in outcomes]
+        rows.append({"method": label, "maps": len(outcomes), **figures(outcomes, there)})
+    return rows
+
+
+def rows_by_distance(study: Study, name: str) -> list[Row]:
+    """Mean loss in per cent by the length of the optimum, one row for each method on a map."""
+    rows = []
+    for outcome in study.of_map(name):
+        buckets = distance_buckets(outcome.optima_m)
+        row: Row = {"method": outcome.label}
+        for at, label in enumerate(buckets.labels):
+            inside = outcome.losses[buckets.indices == at]
+            if len(inside):
+                row[f"{label} ({len(inside)})"] = 100 * nanmean(inside)
+        rows.append(row)
+    return rows
+
+
+def to_csv(rows: Sequence[Row]) -> str:
+    """Rows as CSV, numbers in full."""
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    out = io.StringIO()
+    writer = csv.DictWriter(out, columns, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({key: _blank(value) for key, value in row.items()} for row in rows)
+    return out.getvalue()
+
+
+def _blank(value: str | float) -> str | float:
+    return "" if isinstance(value, float) and math.isnan(value) else value
+
+
+def to_markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
+    """Rows as a table in Markdown, numbers rounded to three digits."""
+    columns = (
+        list(dict.fromkeys(key for row in rows for key in row)) if columns is None else columns
+    )
+    lines = [f"| {' | '.join(columns)} |", f"|{'---|' * len(columns)}"]
+    for row in rows:
+        cells = (text_of(row.get(column, "")) for column in columns)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def text_of(value: str | float) -> str:
+    """A value for people: three digits, thousands separated, nothing for what there is not."""
+    if isinstance(value, str):
+        return value.replace("|", "\\|")
+    if isinstance(value, int):
+        return f"{value:,}"
+    if math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "never"
+    if value == 0 or abs(value) >= 10**_DIGITS / 10:
+        return f"{value:,.0f}"
+    digits = max(0, _DIGITS - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{min(digits, 4)}f}"

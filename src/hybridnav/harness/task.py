@@ -1,0 +1,205 @@
+"""A task: one method on one map, some pairs. It runs in any process and yields records."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from hybridnav.errors import HybridNavError, MapWarning
+from hybridnav.grid import CellClass
+from hybridnav.grid.worlds import figure1_world
+from hybridnav.harness.judging import Judge
+from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
+from hybridnav.harness.paths import encode_path
+from hybridnav.harness.records import environment, pair_id, preparation_id
+from hybridnav.io import load_map
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from hybridnav.baselines import Answer
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.pairs import Pair
+    from hybridnav.harness.records import Record
+
+
+@dataclass(frozen=True)
+class MapSpec:
+    """A map file and how it is read."""
+
+    path: str
+    robot_radius_m: float
+    corner_cutting: bool = False
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker is sent."""
+
+    map: MapSpec
+    map_sha: str
+    method: MethodSpec
+    pairs: tuple[Pair, ...]
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Ids of the records that it yields: of the preparation, then of the pairs."""
+        of_pairs = (pair_id(self.map_sha, self.method, pair) for pair in self.pairs)
+        return preparation_id(self.map_sha, self.method), *of_pairs
+
+
+@lru_cache(maxsize=2)
+def read_map(spec: MapSpec) -> OccupancyGrid:
+    """The grid of a map file; the last two are kept."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MapWarning)
+        grid = load_map(spec.path, robot_radius_m=spec.robot_radius_m)
+    return replace(grid, corner_cutting=True) if spec.corner_cutting else grid
+
+
+def run_task(task: Task) -> Iterator[Record]:
+    """Prepare the method, answer the pairs, judge the answers.
+
+    Parameters
+    ----------
+    task
+        What to do.
+
+    Yields
+    ------
+    Record
+        The preparation's, then one for each pair; failures are records too.
+    """
+    grid = read_map(task.map)
+    common = {
+        "map": grid.name,
+        "map_sha": task.map_sha,
+        "method": task.method.name,
+        "method_sha": task.method.digest,
+    }
+    head = {"id": task.ids[0], "type": "preparation", **common}
+    try:
+        _warm_up(task.method)
+        prepared = prepare(task.method, grid)
+        judge = Judge(grid, prepared, reference=task.method.name == REFERENCE)
+    except Exception as error:  # noqa: BLE001 - a method that cannot be made is a result
+        reason = _reason(error)
+        yield {**head, "status": "error", "error": reason, **_about(grid, task)}
+        for name, pair in zip(task.ids[1:], task.pairs, strict=True):
+            yield {**_of_pair(name, pair, common), "status": "error", "error": reason, "faults": []}
+        return
+    method = prepared.method
+    yield {
+        **head,
+        "status": "ready",
+        **_about(grid, task),
+        "pyramid_seconds": prepared.pyramid_seconds,
+        "method_seconds": prepared.method_seconds,
+        "n_nodes": int(method.n_nodes),
+        "n_edges": int(method.n_edges),
+        "memory_bytes": int(method.memory_bytes),
+        "faults": [text for text, _ in judge.region_faults],
+        "fault_cells": [cells for _, cells in judge.region_faults],
+    }
+    for name, pair in zip(task.ids[1:], task.pairs, strict=True):
+        yield {**_of_pair(name, pair, common), **_answer(prepared, judge, pair)}
+
+
+def _about(grid: OccupancyGrid, task: Task) -> Record:
+    return {
+        "file": task.map.path,
+        "shape": list(grid.shape),
+        "resolution_m": grid.resolution_m,
+        "robot_radius_m": grid.robot_radius_m,
+        "corner_cutting": grid.corner_cutting,
+        "free_cells": int((grid.classes == CellClass.FREE).sum()),
+        "preset": None if task.method.preset is None else _plain(task.method.preset),
+        "pyramid": _plain(task.method.pyramid),
+        "environment": environment(),
+    }
+
+
+def _plain(settings: Record) -> Record:
+    """Settings without infinities, which JSON has no number for."""
+    plain: Record = {}
+    for key, value in settings.items():
+        if isinstance(value, dict):
+            plain[key] = _plain(value)
+        else:
+            plain[key] = None if isinstance(value, float) and math.isinf(value) else value
+    return plain
+
+
+def _reason(error: Exception) -> str:
+    """One line that says what went wrong."""
+    known = isinstance(error, HybridNavError)
+    text = str(error) if known else f"{type(error).__name__}: {error}"
+    return " ".join(text.split())[:200]
+
+
+def _of_pair(name: str, pair: Pair, common: Record) -> Record:
+    record = {
+        "id": name,
+        "type": "pair",
+        **common,
+        "kind": pair.kind,
+        "start": list(pair.start),
+        "goal": list(pair.goal),
+    }
+    if pair.stated_optimum_cells is not None:
+        record["stated_optimum_cells"] = pair.stated_optimum_cells
+    return record
+
+
+def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
+    began = time.perf_counter()
+    try:
+        answer = prepared.method.solve(pair.start, pair.goal)
+    except Exception as error:  # noqa: BLE001 - a failing method is a result
+        return {"status": "error", "error": _reason(error), "faults": []}
+    seconds = time.perf_counter() - began
+    try:
+        return _judged(answer, judge, pair, seconds)
+    except (HybridNavError, ValueError, TypeError, IndexError, OverflowError) as error:
+        # No cells, regions or arcs of this map: as wrong as an answer can be.
+        reason = _reason(error)
+        return {"status": "error", "error": reason, "faults": [f"no answer to judge: {reason}"]}
+
+
+def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
+    length_m, faults = judge.faults(pair, answer)
+    known, wrong = judge.oracles(answer, pair, length_m)
+    faults += wrong
+    return {
+        "status": "no path" if answer.cells is None else "solved",
+        "length_m": length_m,
+        "bound": float(answer.bound) if math.isfinite(answer.bound) else None,
+        "plan": None if answer.nodes is None else len(answer.nodes),
+        "plan_optimum_m": None if faults else judge.plan_optimum_m(pair, answer),
+        "path": None if answer.cells is None else encode_path(answer.cells),
+        "expanded": int(answer.expanded),
+        "expanded_nodes": int(answer.expanded_nodes),
+        "seconds": seconds,
+        "stages": {stage: float(value) for stage, value in answer.seconds.items()},
+        **known,
+        "faults": faults,
+    }
+
+
+def _warm_up(spec: MethodSpec) -> None:
+    """Compile or load the kernels of a method on a small map, so that no time includes it."""
+    if spec.digest in _WARM:
+        return
+    grid = figure1_world().grid()
+    prepared = prepare(spec, grid)
+    Judge(grid, prepared, reference=False)
+    for goal in ((2, 2), (grid.shape[0] - 3, 12)):
+        prepared.method.solve((2, 2), goal)
+    _WARM.add(spec.digest)
+
+
+_WARM: set[str] = set()

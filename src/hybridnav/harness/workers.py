@@ -1,0 +1,245 @@
+"""Where tasks run: processes of this machine, or a dask.distributed cluster."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.harness.task import Task, run_task
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from multiprocessing.connection import Connection
+
+    from hybridnav.harness.records import Record
+
+_FLUSH_S = 0.2
+_ATTEMPTS = 2
+
+
+def _serve(connection: Connection, turn: Any) -> None:
+    """Run tasks until the other side hangs up; records go back in batches.
+
+    `turn` is shared with the other side: the index of the record that is being made, since a batch
+    that was not sent yet says nothing of it when the process ends.
+    """
+    try:
+        while True:
+            task = connection.recv()
+            batch: list[Record] = []
+            sent = time.monotonic()
+            for record in run_task(task):
+                batch.append(record)
+                turn.value += 1
+                if time.monotonic() - sent > _FLUSH_S:
+                    connection.send(batch)
+                    batch, sent = [], time.monotonic()
+            connection.send([*batch, None])
+    except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
+        return
+
+
+class _Worker:
+    """A process, the task that it is at, and when it was last heard of."""
+
+    def __init__(self, context: multiprocessing.context.SpawnContext) -> None:
+        self.connection, theirs = context.Pipe()
+        self._turn = context.Value("q", 0, lock=False)
+        self._process = context.Process(target=_serve, args=(theirs, self._turn), daemon=True)
+        self._process.start()
+        theirs.close()
+        self.task: Task | None = None
+        self.missing: list[str] = []
+        self.heard = time.monotonic()
+
+    def start(self, task: Task) -> None:
+        self.task = task
+        self.missing = list(task.ids)
+        self.heard = time.monotonic()
+        self._turn.value = 0
+        with suppress(BrokenPipeError):  # it died while idle: the next look at it will say so
+            self.connection.send(task)
+
+    def failed_at(self, task: Task) -> int:
+        """Index of the record that it did not get done; to be asked once it is stopped."""
+        turn = int(self._turn.value)
+        # After the last one what fails is to send: it must not be tried for ever.
+        return turn if turn < len(task.ids) else task.ids.index(self.missing[0])
+
+    def stop(self) -> None:
+        self.connection.close()
+        self._process.kill()
+        self._process.join()
+
+
+def run_local(tasks: Sequence[Task], *, workers: int, timeout_s: float) -> Iterator[list[Record]]:
+    """Run tasks in processes of this machine.
+
+    Parameters
+    ----------
+    tasks
+        In the order in which they start.
+    workers
+        Processes.
+    timeout_s
+        Longest silence of a process, seconds. Then, or when it dies, the query that it was at is
+        recorded as "timeout" or "lost", and another process goes on with the rest.
+
+    Yields
+    ------
+    list of Record
+        As they come in.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is no worker or no time.
+    """
+    if workers < 1 or not timeout_s > 0:
+        raise InvalidValueError(
+            f"at least one worker and a positive timeout are needed, got {workers} and {timeout_s}"
+        )
+    context = multiprocessing.get_context("spawn")
+    waiting = list(reversed(tasks))
+    busy: list[_Worker] = []
+    idle: list[_Worker] = []
+    try:
+        while waiting or busy:
+            while waiting and len(busy) < workers:
+                worker = idle.pop() if idle else _Worker(context)
+                worker.start(waiting.pop())
+                busy.append(worker)
+            ready = wait([worker.connection for worker in busy], timeout=min(1.0, timeout_s / 4))
+            for worker in list(busy):
+                records, ended = _listen(worker, heard=worker.connection in ready)
+                late = not ended and time.monotonic() - worker.heard > timeout_s
+                if ended or late:
+                    busy.remove(worker)
+                if ended and not worker.missing:
+                    idle.append(worker)
+                elif ended or late:
+                    records += _give_up(worker, waiting, "timeout" if late else "lost")
+                if records:
+                    yield records
+    finally:
+        for worker in busy + idle:
+            worker.stop()
+
+
+def _listen(worker: _Worker, *, heard: bool) -> tuple[list[Record], bool]:
+    """What a worker sent, and whether its task ended, well or not."""
+    if not heard:
+        return [], False
+    try:
+        batch: list[Any] = worker.connection.recv()
+    except (EOFError, OSError):  # the latter when it died in the middle of a batch
+        return [], True
+    worker.heard = time.monotonic()
+    records = [record for record in batch if record is not None]
+    for record in records:
+        worker.missing.remove(record["id"])
+    return records, len(records) < len(batch)
+
+
+def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
+    """Record the query that a worker failed at; the rest of its task waits for another."""
+    worker.stop()
+    task = worker.task
+    if task is None:
+        return []
+    index = worker.failed_at(task)
+    if index == 0:  # it never got ready: no other would
+        return [failed_record(task, at, status) for at in range(len(task.ids))]
+    left = tuple(
+        pair
+        for pair, name in zip(task.pairs, task.ids[1:], strict=True)
+        if name in worker.missing and name != task.ids[index]
+    )
+    if left or task.ids[0] in worker.missing:
+        waiting.append(Task(task.map, task.map_sha, task.method, left))
+    return [failed_record(task, index, status)]
+
+
+def failed_record(task: Task, index: int, status: str) -> Record:
+    """Record of a query, or with index 0 of a preparation, whose process was lost or too slow."""
+    common: Record = {
+        "id": task.ids[index],
+        "type": "pair" if index else "preparation",
+        "map_sha": task.map_sha,
+        "map": Path(task.map.path).stem,
+        "method": task.method.name,
+        "method_sha": task.method.digest,
+        "status": status,
+        "faults": [],
+    }
+    if index:
+        pair = task.pairs[index - 1]
+        common |= {"kind": pair.kind, "start": list(pair.start), "goal": list(pair.goal)}
+    return common
+
+
+def _whole(task: Task) -> list[Record]:
+    return list(run_task(task))
+
+
+def run_on_cluster(tasks: Sequence[Task], *, address: str) -> Iterator[list[Record]]:
+    """Run tasks on a dask.distributed cluster; those of a lost worker run again elsewhere.
+
+    Parameters
+    ----------
+    tasks
+        In any order.
+    address
+        Of the scheduler, such as "tcp://10.0.0.1:8786". Its workers need this package and the map
+        files under the same paths.
+
+    Yields
+    ------
+    list of Record
+        Those of one task, as tasks end.
+
+    Raises
+    ------
+    InvalidValueError
+        When dask.distributed is not installed or the scheduler cannot be reached.
+    """
+    try:
+        from dask import distributed  # noqa: PLC0415 - an optional extra
+    except ImportError:
+        raise InvalidValueError(
+            "a scheduler needs dask.distributed: pip install 'hybridnav[cluster]'"
+        ) from None
+    try:
+        _knock(address)
+        client: Any = distributed.Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise InvalidValueError(f"scheduler {address}: {error}") from None
+    with client:
+        futures = client.map(_whole, tasks, retries=_ATTEMPTS, pure=False)
+        task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
+        for future in distributed.as_completed(futures):  # type: ignore[no-untyped-call]
+            try:
+                records = future.result()
+            except distributed.KilledWorker:  # several workers died of it
+                task = task_of[future.key]
+                records = [failed_record(task, at, "lost") for at in range(len(task.ids))]
+            yield records
+
+
+def _knock(address: str) -> None:
+    """Connect to a scheduler and hang up: a client that cannot lives on and complains at exit."""
+    from distributed.comm.core import connect  # noqa: PLC0415 - an optional extra
+
+    async def knock() -> None:
+        comm = await connect(address, timeout=10)  # type: ignore[no-untyped-call]
+        await comm.close()
+
+    with ThreadPoolExecutor(1) as pool:  # a notebook has a running loop of its own
+        pool.submit(asyncio.run, knock()).result()
