@@ -17,9 +17,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 import hybridnav as hn
+from hybridnav.harness.analysis import ANSWERED, nanquantile
 from hybridnav.harness.methods import BASELINES
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.report_html import chart_file, loss_chart, speed_chart
@@ -113,8 +112,6 @@ def run(data: Path, folder: Path, pairs: int, workers: int) -> None:
 def page(study: Study, pairs: int) -> str:
     """The page of the study."""
     overall = rows_of_study(study)
-    checks = sum(outcome.checks for outcome in study.outcomes)
-    failures = sum(outcome.failures for outcome in study.outcomes)
     maps = [row for name in study.maps for row in rows_of_map(study, name)]
     short = ("map", "method", "solved", "loss mean %", "loss p95 %", "loss max %", "without loss %",
              "query ms, median", "speed-up", "preparation s", "memory MB")  # fmt: skip
@@ -128,8 +125,8 @@ said in [harness.md](harness.md).
 
 ## Consistency
 
-{checks:,} answers checked: {len(study.faults)} counter-examples, {failures} queries without an
-answer.
+{study.checks:,} answers checked: {len(study.faults)} counter-examples, {study.failures} queries
+without an answer.
 
 {_failures(study)}
 ## Loss
@@ -154,7 +151,7 @@ def _failures(study: Study) -> str:
     """Why some queries have no answer, one line for each map and method."""
     lines = []
     for outcome in study.outcomes:
-        failed = [r for r in outcome.records if r["status"] not in ("solved", "no path")]
+        failed = [r for r in outcome.records if r["status"] not in ANSWERED]
         if failed:
             reason = failed[0].get("error", failed[0]["status"])
             lines.append(
@@ -176,10 +173,10 @@ def main() -> None:
     run(Path(arguments.data), arguments.out, arguments.pairs, arguments.workers)
     study = write_outputs(arguments.out, title="hybridnav: the study", root=Path(arguments.data))
     (DOCS / "study.md").write_text(page(study, arguments.pairs), encoding="utf-8")
-    pooled = {label: study.of_method(label) for label in study.labels}
-    losses = {k: np.concatenate([o.losses for o in v]) for k, v in pooled.items()}
-    seconds = {k: np.concatenate([o.seconds for o in v]) for k, v in pooled.items()}
-    times = {k: 1e3 * float(np.nanmedian(v)) for k, v in seconds.items()}
+    losses = {label: study.pooled(label, "losses") for label in study.labels}
+    times = {
+        label: 1e3 * nanquantile(study.pooled(label, "seconds"), 0.5) for label in study.labels
+    }
     seen = looks(study.labels)
     charts = {
         "study-loss.svg": loss_chart(losses, seen, "Loss of each method, all maps"),

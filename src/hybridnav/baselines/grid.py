@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav.baselines import _weighted_kernels
 from hybridnav.baselines.protocol import Answer, Cell
+from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.search import _kernels
@@ -17,6 +18,8 @@ from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import length_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
@@ -40,7 +43,7 @@ class GridAstar:
         self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
         moves = _kernels.legal_moves(enterable, grid.corner_cutting)
         self.n_nodes, self.n_edges = _graph_size(enterable, moves)
-        self.memory_bytes = _array_bytes(self._search)
+        self.memory_bytes = array_bytes(self._search)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Find a shortest path between two free cells; the bound is 1."""
@@ -69,20 +72,16 @@ class GridDijkstra:
         self.region_of: IntArray | None = None
         self._work = _Workspace(grid)
         self.n_nodes, self.n_edges = self._work.graph_size
-        self.memory_bytes = _array_bytes(self._work)
+        self.memory_bytes = array_bytes(self._work)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Find a shortest path between two free cells; the bound is 1."""
         began = time.perf_counter()
-        work = self._work
-        first, last = work.flat(start), work.flat(goal)
-        found, expanded = _weighted_kernels.dijkstra(
-            work.moves, work.cols, first, last, work.cost_of, work.came, work.mark, work.turn()
-        )
-        cells = work.path(first, last) if found else None
+        found, expanded = self._work.search(_weighted_kernels.dijkstra, start, goal)
+        cells = self._work.path(start, goal) if found else None
         seconds = {"refine": time.perf_counter() - began}
         bound = 1.0 if found else math.inf
-        return Answer(cells, bound=bound, expanded=int(expanded), seconds=seconds)
+        return Answer(cells, bound=bound, expanded=expanded, seconds=seconds)
 
 
 class WeightedAstar:
@@ -115,28 +114,18 @@ class WeightedAstar:
         self._weight = float(weight)
         self._work = _Workspace(grid)
         self.n_nodes, self.n_edges = self._work.graph_size
-        self.memory_bytes = _array_bytes(self._work)
+        self.memory_bytes = array_bytes(self._work)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Find a path between two free cells, and prove how much longer than the shortest it is."""
         began = time.perf_counter()
-        work = self._work
-        first, last = work.flat(start), work.flat(goal)
-        lower, expanded = _weighted_kernels.weighted_astar(
-            work.moves,
-            work.cols,
-            first,
-            last,
-            self._weight,
-            work.cost_of,
-            work.came,
-            work.mark,
-            work.turn(),
+        lower, expanded = self._work.search(
+            _weighted_kernels.weighted_astar, start, goal, self._weight
         )
-        cells = work.path(first, last) if lower >= 0 else None
-        bound = math.inf if cells is None else self._bound(cells, int(lower))
+        cells = self._work.path(start, goal) if lower >= 0 else None
+        bound = math.inf if cells is None else self._bound(cells, lower)
         seconds = {"refine": time.perf_counter() - began}
-        return Answer(cells, bound=bound, expanded=int(expanded), seconds=seconds)
+        return Answer(cells, bound=bound, expanded=expanded, seconds=seconds)
 
     def _bound(self, cells: LongArray, lower: int) -> float:
         """The weight, or what the search proved beyond it."""
@@ -149,39 +138,47 @@ class WeightedAstar:
 class _Workspace:
     """Legal moves of a grid and the arrays that its searches share: 18 bytes a cell.
 
-    Searches are told apart by their turn, so nothing is cleared between them.
+    Searches are told apart by their generation, so nothing is cleared between them.
     """
 
     def __init__(self, grid: OccupancyGrid) -> None:
         enterable = grid.classes == CellClass.FREE
-        self.cols = grid.shape[1]
+        self._cols = grid.shape[1]
         moves: ByteArray = _kernels.legal_moves(enterable, grid.corner_cutting)
         self.graph_size = _graph_size(enterable, moves)
-        self.moves: ByteArray = moves.ravel()
-        self.cost_of = np.zeros(enterable.size, dtype=np.int64)
-        self.came = np.zeros(enterable.size, dtype=np.uint8)
-        self.mark = np.zeros(enterable.size, dtype=np.int64)
-        self._turn = 0
+        self._moves: ByteArray = moves.ravel()
+        self._cost_of = np.zeros(enterable.size, dtype=np.int64)
+        self._came = np.zeros(enterable.size, dtype=np.uint8)
+        self._mark = np.zeros(enterable.size, dtype=np.int64)
+        self._generation = 0
 
-    def turn(self) -> int:
-        """Number of the search that begins now, from 1."""
-        self._turn += 1
-        return self._turn
+    def search(
+        self, kernel: Callable[..., Any], start: Cell, goal: Cell, *parameters: float
+    ) -> tuple[int, int]:
+        """What a kernel says of the path between two cells, and the cells expanded."""
+        self._generation += 1
+        said, expanded = kernel(
+            self._moves,
+            self._cols,
+            self._flat(start),
+            self._flat(goal),
+            *parameters,
+            self._cost_of,
+            self._came,
+            self._mark,
+            self._generation,
+        )
+        return int(said), int(expanded)
 
-    def flat(self, cell: Cell) -> int:
-        """Index of a cell in the flat arrays."""
-        return cell[0] * self.cols + cell[1]
-
-    def path(self, start: int, goal: int) -> LongArray:
+    def path(self, start: Cell, goal: Cell) -> LongArray:
         """Cells of the path that the last search left behind."""
-        flat = _kernels.trace(self.came, self.cols, start, goal)
-        return np.stack(divmod(flat, self.cols), axis=1)
+        flat = _kernels.trace(self._came, self._cols, self._flat(start), self._flat(goal))
+        return np.stack(divmod(flat, self._cols), axis=1)
+
+    def _flat(self, cell: Cell) -> int:
+        return cell[0] * self._cols + cell[1]
 
 
 def _graph_size(enterable: BoolArray, moves: ByteArray) -> tuple[int, int]:
     """Cells that may be entered, and moves between them, both ways counted once."""
     return int(enterable.sum()), int(np.bitwise_count(moves).sum(dtype=np.int64)) // 2
-
-
-def _array_bytes(holder: object) -> int:
-    return sum(array.nbytes for array in vars(holder).values() if isinstance(array, np.ndarray))

@@ -123,6 +123,7 @@ class HpaStar:
         return Answer(
             cells,
             nodes,
+            plan_steps=passed.size - 1,
             expanded=int(expanded + refined),
             expanded_nodes=int(expanded_nodes),
             seconds=seconds,

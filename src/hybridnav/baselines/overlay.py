@@ -11,7 +11,7 @@ from scipy.sparse import csgraph
 
 from hybridnav.baselines import _overlay_kernels as kernels
 from hybridnav.baselines.protocol import Answer
-from hybridnav.baselines.regions import GRID_SEARCH_BYTES, region_at
+from hybridnav.baselines.regions import array_bytes, free_fields, region_at
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.search._kernels import legal_moves
@@ -51,35 +51,30 @@ class ExactOverlay:
     def __init__(self, topology: TopologicalMap) -> None:
         grid, level = topology.grid, topology.level
         free = grid.classes == CellClass.FREE
-        region_of = np.where(free, level.field_of, np.int32(-1))
-        region_of.flags.writeable = False
         self.name = "exact-overlay"
-        self.region_of: IntArray | None = region_of
-        self._labels = region_of
+        self.region_of: IntArray = free_fields(topology)
+        self._labels = self.region_of.ravel()
         self._cols = grid.shape[1]
         self._moves = legal_moves(free, grid.corner_cutting).ravel()
-        self._boxes = kernels.field_boxes(region_of.ravel(), self._cols, level.n_vertices)
-        cells = kernels.boundary_cells(region_of.ravel(), self._moves, self._cols)
-        order = np.argsort(region_of.ravel()[cells], kind="stable")
+        self._boxes = kernels.field_boxes(self._labels, self._cols, level.n_vertices)
+        cells = kernels.boundary_cells(self._labels, self._moves, self._cols)
+        order = np.argsort(self._labels[cells], kind="stable")
         self._node_cell = cells[order].astype(np.int32)
-        self._node_field = region_of.ravel()[self._node_cell]
+        self._node_field = self._labels[self._node_cell]
         self._node_first = np.searchsorted(self._node_field, np.arange(level.n_vertices + 1))
         self._cross_first, self._cross_head, self._cross_cost = kernels.cross_edges(
-            region_of.ravel(), self._moves, self._cols, self._node_cell
+            self._labels, self._moves, self._cols, self._node_cell
         )
         sizes = np.diff(self._node_first)
         self._clique_first = np.concatenate([[0], np.cumsum(sizes**2)])
         self._clique = self._distances_inside()
         self._component_of = self._components()
-        low, high = np.sort(level.arcs, axis=1).astype(np.int64).T
-        self._arcs = np.unique(low * level.n_vertices + high)
+        self._arcs = np.unique(self._pair_keys(*level.arcs.T.astype(np.int64)))
         self._search = GridSearch(free, corner_cutting=grid.corner_cutting)
         self._in_field = np.zeros(level.n_vertices, dtype=np.bool_)
         self.n_nodes = len(self._node_cell)
         self.n_edges = int((sizes * (sizes - 1) // 2).sum()) + len(self._cross_head) // 2
-        held = [value for value in vars(self).values() if isinstance(value, np.ndarray)]
-        self.memory_bytes = sum(array.nbytes for array in held)
-        self.memory_bytes += GRID_SEARCH_BYTES * free.size - region_of.nbytes  # it has two names
+        self.memory_bytes = array_bytes(self, self._search)
 
     def _distances_inside(self) -> AnyArray:
         """Matrices of all cliques in a row; of 32 bits where that is enough."""
@@ -93,7 +88,7 @@ class ExactOverlay:
                 )
             clique: AnyArray = np.empty(n_entries, dtype=dtype)
             if kernels.fill_cliques(
-                self._labels.ravel(),
+                self._labels,
                 self._moves,
                 self._cols,
                 self._boxes,
@@ -115,25 +110,17 @@ class ExactOverlay:
         return labels
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
-        """Plan between two free cells.
+        """Find a shortest path between two free cells; the bound is 1.
 
-        Parameters
-        ----------
-        start, goal
-            Free cells as (row, col).
-
-        Returns
-        -------
-        Answer
-            A shortest path, its bound 1. The nodes are dense indices of the places that it passes;
-            None where it goes from a place to one that no arc joins it with, by a corner.
+        The nodes are dense indices of the places that it passes, None where it goes from a place to
+        one that no arc joins it with, by a corner.
 
         Raises
         ------
         InvalidValueError
             When a cell lies outside the map or is not free.
         """
-        first, last = region_at(self._labels, start), region_at(self._labels, goal)
+        first, last = region_at(self.region_of, start), region_at(self.region_of, goal)
         if self._component_of[first] != self._component_of[last]:
             return Answer(None)
         began = time.perf_counter()
@@ -163,15 +150,21 @@ class ExactOverlay:
         return Answer(
             cells,
             nodes=self._passed(cells),
+            plan_steps=len(nodes) + 1,
             bound=1.0,
             expanded=expanded + reached + reached_too,
             expanded_nodes=expanded_nodes,
             seconds={"coarse": searched - began, "refine": time.perf_counter() - searched},
         )
 
+    def _pair_keys(self, fields: LongArray, others: LongArray) -> LongArray:
+        """One number for each unordered pair of fields."""
+        keys: LongArray = np.minimum(fields, others) * len(self._boxes) + np.maximum(fields, others)
+        return keys
+
     def _to_boundary(self, cell: int, other: int) -> tuple[LongArray, int, int]:
         distances, direct, reached = kernels.distances_to_nodes(
-            self._labels.ravel(),
+            self._labels,
             self._moves,
             self._cols,
             self._boxes,
@@ -186,7 +179,7 @@ class ExactOverlay:
         self, start: Cell, goal: Cell, nodes: LongArray, by_cross: BoolArray
     ) -> tuple[LongArray, int]:
         """Cells of a path through some nodes, and the cells expanded inside the fields."""
-        rows, cols = np.divmod(self._node_cell[nodes].astype(np.int64), self._cols)
+        rows, cols = np.divmod(self._node_cell[nodes], self._cols)
         stops = [start, *zip(rows.tolist(), cols.tolist(), strict=True), goal]
         crossed = [*by_cross.tolist(), False]
         pieces, expanded = [np.array([start], dtype=np.int64)], 0
@@ -194,10 +187,10 @@ class ExactOverlay:
             if across:
                 pieces.append(np.array([there], dtype=np.int64))
                 continue
-            field = self._labels[here]
+            field = self.region_of[here]
             self._in_field[field] = True
             leg = self._search.search(
-                here, there, field_of=self._labels, in_corridor=self._in_field
+                here, there, field_of=self.region_of, in_corridor=self._in_field
             )
             self._in_field[field] = False
             expanded += leg.expanded
@@ -206,8 +199,7 @@ class ExactOverlay:
         return np.concatenate(pieces), expanded
 
     def _passed(self, cells: LongArray) -> tuple[int, ...] | None:
-        fields = self._labels[cells[:, 0], cells[:, 1]].astype(np.int64)
+        fields = self.region_of[*cells.T].astype(np.int64)
         fields = fields[np.concatenate([[True], fields[1:] != fields[:-1]])]
-        low, high = np.minimum(fields[1:], fields[:-1]), np.maximum(fields[1:], fields[:-1])
-        joined = np.isin(low * len(self._boxes) + high, self._arcs)
+        joined = np.isin(self._pair_keys(fields[:-1], fields[1:]), self._arcs)
         return tuple(fields.tolist()) if joined.all() else None

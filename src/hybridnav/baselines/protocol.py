@@ -25,6 +25,9 @@ class Answer:
     (`cells` None) contradicts consistency, and the harness says so."""
     arcs: tuple[int, ...] | None = None
     """Dense ids of the edges between those nodes, where the method's edges have ids."""
+    plan_steps: int | None = None
+    """Edges of the topological search's own path, in the graph that `n_nodes` counts; None where
+    that is the way from node to node of `nodes`."""
     bound: float = math.inf
     """Proved: the path is at most `bound` times as long as the shortest; infinite for no proof."""
     expanded: int = 0

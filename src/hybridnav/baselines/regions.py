@@ -1,4 +1,7 @@
-"""Planning on regions: a coarse search on their graph, then the best path inside them."""
+"""Planning on regions: a coarse search on their graph, then the best path inside them.
+
+And what other baselines share: the regions of a topological map, cells checked, bytes counted.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,14 @@ import numpy as np
 
 from hybridnav.baselines.protocol import Answer
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
 from hybridnav.search import _kernels
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.baselines.protocol import Cell
-
-GRID_SEARCH_BYTES = 10
-"""Bytes that a `GridSearch` holds for each cell."""
+    from hybridnav.topology import TopologicalMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +57,6 @@ class RegionGraph:
         self._ends = np.asarray(edges, dtype=np.int64)
         self._costs, self._ties = costs, ties
         self._allowed = np.ones(n_regions, dtype=np.bool_)
-        arrays = (self._first, self._neighbour, self._edge, self._ends, costs, ties, self._allowed)
-        self.memory_bytes = sum(array.nbytes for array in arrays)
 
     def search(self, start: int, goal: int) -> RegionPlan:
         """Find the cheapest walk between two regions."""
@@ -98,15 +98,16 @@ class RegionPlanner:
         self._graph = graph
         self._grid_search = GridSearch(region_of >= 0, corner_cutting=corner_cutting)
         self._in_corridor = np.zeros(graph.n_regions, dtype=np.bool_)
-        self.memory_bytes = (
-            region_of.nbytes
-            + graph.memory_bytes
-            + self._in_corridor.nbytes
-            + GRID_SEARCH_BYTES * region_of.size
-        )
+        self.memory_bytes = array_bytes(self, graph, self._grid_search)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
-        """Plan between two free cells; see `hybridnav.baselines.Method`."""
+        """Plan between two free cells.
+
+        Raises
+        ------
+        InvalidValueError
+            When a cell lies outside the map or is not free.
+        """
         first = region_at(self._region_of, start)
         last = region_at(self._region_of, goal)
         began = time.perf_counter()
@@ -128,6 +129,21 @@ class RegionPlanner:
             expanded_nodes=plan.expanded,
             seconds=seconds,
         )
+
+
+def array_bytes(*holders: object) -> int:
+    """Bytes of the arrays that are attributes of some objects, an array and its views once."""
+    held = (value for holder in holders for value in vars(holder).values())
+    arrays = (value for value in held if isinstance(value, np.ndarray))
+    return sum({array.ctypes.data: array.nbytes for array in arrays}.values())
+
+
+def free_fields(topology: TopologicalMap) -> IntArray:
+    """int32 (rows, cols), the dense index of each free cell's place, -1 elsewhere; read-only."""
+    free = topology.grid.classes == CellClass.FREE
+    region_of: IntArray = np.where(free, topology.level.field_of, np.int32(-1))
+    region_of.flags.writeable = False
+    return region_of
 
 
 def region_at(region_of: IntArray, cell: Cell) -> int:
@@ -168,15 +184,15 @@ def joined_regions(
     """
     n_regions = int(region_of.max(initial=-1)) + 1
     free = region_of >= 0
-    up, down = free[:-1, :-1] & free[1:, 1:], free[:-1, 1:] & free[1:, :-1]
+    rising, falling = free[:-1, :-1] & free[1:, 1:], free[:-1, 1:] & free[1:, :-1]
     if not corner_cutting:
-        up = down = up & down
+        rising = falling = rising & falling
     keys, rows, cols = [], [], []
     for tail, head, legal, offset in (
         (np.s_[:, :-1], np.s_[:, 1:], free[:, :-1] & free[:, 1:], (0.0, 0.5)),
         (np.s_[:-1, :], np.s_[1:, :], free[:-1] & free[1:], (0.5, 0.0)),
-        (np.s_[:-1, :-1], np.s_[1:, 1:], up, (0.5, 0.5)),
-        (np.s_[:-1, 1:], np.s_[1:, :-1], down, (0.5, 0.5)),
+        (np.s_[:-1, :-1], np.s_[1:, 1:], rising, (0.5, 0.5)),
+        (np.s_[:-1, 1:], np.s_[1:, :-1], falling, (0.5, 0.5)),
     ):
         row, col = np.nonzero(legal & (region_of[tail] != region_of[head]))
         ends = np.stack([region_of[tail][row, col], region_of[head][row, col]]).astype(np.int64)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.baselines.regions import RegionGraph, RegionPlanner
+from hybridnav.baselines.regions import RegionGraph, RegionPlanner, free_fields
 from hybridnav.grid import CellClass
 
 if TYPE_CHECKING:
@@ -37,38 +37,21 @@ class SimpleGraphPyramid:
         level = topology.level
         free = level.classes == CellClass.FREE
         kept = first_arcs(level)
-        kept = kept[free[level.arcs[kept, 0]]]  # arcs join places of two classes, too
-        kept = kept[free[level.arcs[kept, 1]]]
+        kept = kept[free[level.arcs[kept]].all(axis=1)]  # arcs join places of two classes, too
         self.name = "simple-graph"
-        region_of = np.where(topology.grid.classes == CellClass.FREE, level.field_of, np.int32(-1))
-        region_of.flags.writeable = False
-        self.region_of: IntArray | None = region_of
+        self.region_of: IntArray = free_fields(topology)
         self.n_nodes = int(free.sum())
         self.n_edges = len(kept)
         graph = RegionGraph(
             level.n_vertices, level.arcs[kept], level.max_distance_m[kept], level.through_m[kept]
         )
-        self._planner = RegionPlanner(region_of, graph, corner_cutting=topology.grid.corner_cutting)
+        self._planner = RegionPlanner(
+            self.region_of, graph, corner_cutting=topology.grid.corner_cutting
+        )
         self.memory_bytes = self._planner.memory_bytes
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
-        """Plan between two free cells.
-
-        Parameters
-        ----------
-        start, goal
-            Free cells as (row, col).
-
-        Returns
-        -------
-        Answer
-            The nodes are dense indices of places.
-
-        Raises
-        ------
-        InvalidValueError
-            When a cell lies outside the map or is not free.
-        """
+        """Plan between two free cells; nodes are dense indices of places. See `RegionPlanner`."""
         return self._planner.solve(start, goal)
 
 

@@ -78,7 +78,7 @@ class ThrunMap:
         col); basis points are cells that are not free, or lie one cell outside the map."""
         region_of = regions_between(free, self.critical_points, self.basis_points)
         region_of.flags.writeable = False
-        self.region_of: IntArray | None = region_of
+        self.region_of: IntArray = region_of
         edges, middles = joined_regions(region_of, corner_cutting=grid.corner_cutting)
         self.n_nodes = int(region_of.max()) + 1
         self.n_edges = len(edges)
@@ -89,23 +89,7 @@ class ThrunMap:
         self.memory_bytes = self._planner.memory_bytes
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
-        """Plan between two free cells.
-
-        Parameters
-        ----------
-        start, goal
-            Free cells as (row, col).
-
-        Returns
-        -------
-        Answer
-            The nodes are regions, numbered in the order of their first cells.
-
-        Raises
-        ------
-        InvalidValueError
-            When a cell lies outside the map or is not free.
-        """
+        """Plan between two free cells. See `RegionPlanner`."""
         return self._planner.solve(start, goal)
 
 

@@ -95,10 +95,10 @@ def evaluate(
     """Measure consistency, loss and efficiency of methods on maps, pair by pair.
 
     Records go to DIR/records.jsonl; a run that was stopped goes on where it was. Exits with 1 when
-    a counter-example was found.
+    a counter-example was found or a method could not be made.
     """
-    if all_pairs is not None and scen is not None:
-        raise UsageError("--all-pairs and --scen are two ways to say which pairs: give one")
+    if all_pairs is not None and (scen is not None or pairs is not None):
+        raise UsageError("--all-pairs says which pairs: it does not go with --scen or --pairs")
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
@@ -121,11 +121,16 @@ def evaluate(
     _run(settings, out)
     study = write_outputs(out)
     answer((out / "summary.md").read_text(encoding="utf-8") + f"\nreport: {out / 'report.html'}\n")
-    faults = study.faults
-    if faults:
-        outcome, _, fault = faults[0]
-        first = f"{outcome.map_name}, {outcome.label}: {fault}"
-        complain(f"{len(faults)} counter-examples, the first: {first}")
+    faults = [f"{found.map_name}, {found.label}: {fault}" for found, _, fault in study.faults]
+    unmade = [
+        f"{found.map_name}, {found.label}: {found.preparation.get('error', 'lost')}"
+        for found in study.outcomes
+        if found.preparation["status"] != "ready"
+    ]
+    for what, found in (("counter-examples", faults), ("methods could not be made", unmade)):
+        if found:
+            complain(f"{len(found)} {what}, the first: {found[0]}")
+    if faults or unmade:
         raise typer.Exit(EXIT_NOT_SOLVED)
 
 

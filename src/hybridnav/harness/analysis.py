@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.harness.methods import BASELINES, REFERENCE
+from hybridnav.harness.paths import path_steps
 from hybridnav.harness.records import read_records
+from hybridnav.metrics import thrun_count
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 SLACK = 1e-9
 """Relative difference of lengths that is rounding."""
+
+ANSWERED = ("solved", "no path")
+"""Statuses of records that hold an answer."""
 
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
 
@@ -53,7 +58,11 @@ class Outcome:
     @cached_property
     def references(self) -> list[Record]:
         """The reference's records of the pairs that arrays are about."""
-        return [record for record in self.optimum.values() if (record.get("length_m") or 0) > 0]
+        return [
+            record
+            for record in self.optimum.values()
+            if (record.get("length_m") or 0) > 0 and not record.get("faults")
+        ]
 
     def figure(self, key: str) -> FloatArray:
         """One number of each record."""
@@ -68,7 +77,13 @@ class Outcome:
     @cached_property
     def losses(self) -> FloatArray:
         """Length over the optimum's, minus one."""
-        return self._loss(self.figure("length_m"), self.optima_m)
+        return self._loss(self.lengths_m, self.optima_m)
+
+    @cached_property
+    def lengths_m(self) -> FloatArray:
+        """Lengths of the paths in which no fault was found."""
+        faulty = [bool(record and record.get("faults")) for record in self._matched]
+        return np.where(faulty, math.nan, self.figure("length_m"))
 
     @cached_property
     def plan_losses(self) -> FloatArray:
@@ -79,18 +94,13 @@ class Outcome:
     def any_angle_losses(self) -> FloatArray:
         """Length over the any-angle optimum or the best any-angle path known, minus one."""
         known = [record.get("any_angle_m") or math.nan for record in self.references]
-        return self._loss(self.figure("length_m"), np.array(known, dtype=float))
+        return self._loss(self.lengths_m, np.array(known, dtype=float))
 
     @staticmethod
     def _loss(lengths: FloatArray, optima: FloatArray) -> FloatArray:
         loss = lengths / optima - 1
         rounded: FloatArray = np.where(np.abs(loss) <= SLACK, 0.0, loss)
         return rounded
-
-    @property
-    def solved(self) -> int:
-        """Pairs of arrays that the method solved."""
-        return int(np.isfinite(self.losses).sum())
 
     @cached_property
     def seconds(self) -> FloatArray:
@@ -113,18 +123,19 @@ class Outcome:
 
     @cached_property
     def thrun_count(self) -> float:
-        """Nodes times mean length of a plan, in value-iteration backups: nodes of the topological
-        plan, or cells of the path where there is no topological layer."""
-        nodes = self.preparation.get("n_nodes", math.nan)
-        lengths = self.figure("plan")
-        if not np.isfinite(lengths).any():
-            lengths = self._path_cells
-        return float(nodes * nanmean(lengths))
+        """Thrun's count: nodes times mean steps of a plan; of a method without a topological
+        layer, cells times mean steps of a path."""
+        steps = self.figure("plan_steps")
+        if not np.isfinite(steps).any():
+            paths = ((record or {}).get("path") for record in self._matched)
+            steps = np.array([math.nan if path is None else path_steps(path) for path in paths])
+        return thrun_count(self.preparation.get("n_nodes", math.nan), nanmean(steps))
 
     @cached_property
-    def _path_cells(self) -> FloatArray:
-        """Cells of each path: its length in cells is close enough to count steps."""
-        return self.figure("length_m") / np.float64(self.preparation.get("resolution_m", math.nan))
+    def any_angle_exact(self) -> FloatArray:
+        """1 for pairs whose any-angle optimum is exact, 0 where it is the best known."""
+        exact = (record.get("any_angle_exact") for record in self.references)
+        return np.array([math.nan if known is None else float(known) for known in exact])
 
     @cached_property
     def faults(self) -> list[tuple[Record, str]]:
@@ -141,12 +152,12 @@ class Outcome:
     @property
     def checks(self) -> int:
         """Answers that were judged."""
-        return sum(record["status"] in ("solved", "no path") for record in self.records)
+        return sum(record["status"] in ANSWERED for record in self.records)
 
     @property
     def failures(self) -> int:
         """Queries without an answer: errors, time-outs, lost workers."""
-        return sum(record["status"] not in ("solved", "no path") for record in self.records)
+        return sum(record["status"] not in ANSWERED for record in self.records)
 
 
 def nanmean(values: FloatArray) -> float:
@@ -164,7 +175,7 @@ def nanquantile(values: FloatArray, share: float) -> float:
 def _against(record: Record, reference: Record) -> str | None:
     """What the optimum says against an answer."""
     statuses = {record["status"], reference["status"]}
-    if statuses == {"solved", "no path"}:
+    if statuses == set(ANSWERED):
         return f"solvability: {record['status']}, the whole grid says {reference['status']}"
     length, optimum = record.get("length_m"), reference.get("length_m")
     if length is None or optimum is None:
@@ -200,6 +211,21 @@ class Study:
     def of_method(self, label: str) -> list[Outcome]:
         """Outcomes of one method."""
         return [outcome for outcome in self.outcomes if outcome.label == label]
+
+    @property
+    def checks(self) -> int:
+        """Answers that were judged."""
+        return sum(outcome.checks for outcome in self.outcomes)
+
+    @property
+    def failures(self) -> int:
+        """Queries without an answer."""
+        return sum(outcome.failures for outcome in self.outcomes)
+
+    def pooled(self, label: str, name: str) -> FloatArray:
+        """An array of a method, such as "losses" or "seconds", over all its maps."""
+        arrays = [getattr(outcome, name) for outcome in self.of_method(label)]
+        return np.concatenate(arrays) if arrays else np.empty(0)
 
     @property
     def faults(self) -> list[tuple[Outcome, Record, str]]:
@@ -262,6 +288,9 @@ def load_study(folder: Path, *, root: Path | None = None) -> Study:
 def _map_labels(preparations: dict[tuple[str, str], Record], root: Path | None) -> dict[str, str]:
     """Name of each map, with a part of its hash where two maps have one name."""
     named = {sha: _map_label(record, root) for (sha, _), record in preparations.items()}
+    for (sha, _), record in preparations.items():
+        if record["status"] == "ready":  # of a lost worker only the file's name is known
+            named[sha] = _map_label(record, root)
     taken: dict[str, list[str]] = {}
     for sha, name in named.items():
         taken.setdefault(name, []).append(sha)

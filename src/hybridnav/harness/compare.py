@@ -74,7 +74,7 @@ def _methods(first: Study, second: Study) -> list[tuple[str, str]]:
     alone = [[label for label in study.labels if label != REFERENCE] for study in (first, second)]
     if not common and all(len(labels) == 1 for labels in alone):
         return [(alone[0][0], alone[1][0])]
-    return [(label, label) for label in common or [REFERENCE]]
+    return [(label, label) for label in common]
 
 
 def _paired(first: Outcome, second: Outcome) -> _Sample:

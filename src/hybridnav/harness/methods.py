@@ -59,7 +59,7 @@ class MethodSpec:
     pyramid: dict[str, Any] = field(default_factory=dict)
     """merge_distance_m, linkage, seed: of the places that it plans on."""
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Short hash of all settings, part of every record's id."""
         text = json.dumps([self.name, self.preset, self.pyramid], sort_keys=True)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.analysis import Outcome, Study, load_study, query_key
+from hybridnav.errors import MapError
+from hybridnav.harness.analysis import Outcome, Study, load_study, nanquantile, query_key
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.paths import decode_path
-from hybridnav.harness.records import environment
+from hybridnav.harness.records import map_digest
 from hybridnav.harness.report_html import MapSection, ReportData, Table, WorstCase, render_report
 from hybridnav.harness.tables import (
     EFFICIENCY_COLUMNS,
@@ -68,12 +69,10 @@ def write_outputs(
 
 def markdown(overall: Sequence[Row], study: Study) -> str:
     """The tables of all maps together, one for each of Thrun's criteria."""
-    checks = sum(outcome.checks for outcome in study.outcomes)
-    failures = sum(outcome.failures for outcome in study.outcomes)
     found = len(study.faults)
     return (
-        f"## Consistency\n\n{checks:,} answers checked, {found} counter-examples, "
-        f"{failures} queries without an answer.\n\n"
+        f"## Consistency\n\n{study.checks:,} answers checked, {found} counter-examples, "
+        f"{study.failures} queries without an answer.\n\n"
         f"## Loss\n\n{to_markdown(overall, ('method', 'maps', *LOSS_COLUMNS))}\n"
         f"## Efficiency\n\n{to_markdown(overall, ('method', *EFFICIENCY_COLUMNS))}"
     )
@@ -90,35 +89,34 @@ def _report(
     if hidden > 0:
         faults = [*faults[:MAX_FAULTS_SHOWN], f"and {hidden} more, see records.jsonl"]
     facts = [
-        *environment().items(),
+        *_machines(study).items(),
         ("maps", str(len(study.maps))),
         ("methods", ", ".join(study.labels)),
-        ("answers without a result", str(sum(o.failures for o in study.outcomes))),
+        ("queries without an answer", f"{study.failures:,}"),
     ]
-    pooled = {label: study.of_method(label) for label in study.labels}
     return ReportData(
         title=title,
         facts=facts,
         faults=faults,
-        checks=sum(outcome.checks for outcome in study.outcomes),
+        checks=study.checks,
         criteria=_table(
             overall, ("method", "maps", *LOSS_COLUMNS, *EFFICIENCY_COLUMNS), "All maps together"
         ),
         maps=[_section(study, name, by_map[name]) for name in study.maps],
-        overall_losses={
-            label: np.concatenate([outcome.losses for outcome in outcomes])
-            for label, outcomes in pooled.items()
-        },
+        overall_losses={label: study.pooled(label, "losses") for label in study.labels},
         overall_times_ms={
-            label: _median_ms(np.concatenate([outcome.seconds for outcome in outcomes]))
-            for label, outcomes in pooled.items()
+            label: 1e3 * nanquantile(study.pooled(label, "seconds"), 0.5) for label in study.labels
         },
     )
 
 
-def _median_ms(seconds: np.ndarray) -> float:
-    finite = seconds[np.isfinite(seconds)]
-    return 1e3 * float(np.median(finite)) if finite.size else float("nan")
+def _machines(study: Study) -> dict[str, str]:
+    """Versions and host of the runs, as the records have them; several where they differ."""
+    found: dict[str, dict[str, None]] = {}
+    for outcome in study.outcomes:
+        for key, value in outcome.preparation.get("environment", {}).items():
+            found.setdefault(key, {})[value] = None
+    return {key: ", ".join(values) for key, values in found.items()}
 
 
 def _pair_text(record: Record) -> str:
@@ -158,7 +156,7 @@ def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
             _table(distance, columns, "Mean loss in per cent by length of the optimum (pairs)"),
         ],
         losses={outcome.label: outcome.losses for outcome in outcomes},
-        times_ms={outcome.label: _median_ms(outcome.seconds) for outcome in outcomes},
+        times_ms={outcome.label: 1e3 * nanquantile(outcome.seconds, 0.5) for outcome in outcomes},
         worst=[case for outcome in outcomes for case in _worst(outcome)],
     )
 
@@ -167,11 +165,11 @@ def _worst(outcome: Outcome) -> list[WorstCase]:
     """The pairs that a preset of ours loses most on, and every method's counter-examples."""
     cases = [_case(outcome, record, fault) for record, fault in outcome.faults[:WORST_CASES]]
     if outcome.preparation.get("preset") is not None and outcome.label != REFERENCE:
-        own = {tuple(r["start"] + r["goal"]): r for r in outcome.records if r.get("path")}
+        own = {query_key(record): record for record in outcome.records if record.get("path")}
         order = np.argsort(-np.nan_to_num(outcome.losses, nan=0.0), kind="stable")[:WORST_CASES]
         for at in order[outcome.losses[order] > 0]:
             reference = outcome.references[at]
-            record = own[tuple(reference["start"] + reference["goal"])]
+            record = own[query_key(reference)]
             cases.append(_case(outcome, record, f"{100 * outcome.losses[at]:.1f} % too long"))
     return [case for case in cases if case is not None]
 
@@ -180,7 +178,12 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
     about = outcome.preparation
     if "file" not in about:
         return None
-    grid = read_map(MapSpec(about["file"], about["robot_radius_m"], about["corner_cutting"]))
+    try:
+        grid = read_map(MapSpec(about["file"], about["robot_radius_m"], about["corner_cutting"]))
+    except MapError:  # it is no longer there
+        return None
+    if map_digest(grid) != about["map_sha"]:
+        return None
     optimum = None
     if record["type"] == "pair":
         path = _path(record) if record.get("path") else np.array([record["start"], record["goal"]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -27,6 +27,8 @@ SAMPLER_VERSION = 1
 STRATA = 5
 LEAST_DISTANCE_M = 1.0
 MAX_PAIRS = 10_000_000
+MAX_SAMPLED = 1_000_000
+"""Sampling draws forty times as many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,8 @@ class Pair:
     kind: Kind = "sampled"
     stated_optimum_cells: float | None = None
     """Optimum that a scenario file states, in cells."""
+    seed: int | None = None
+    """Of the sampler that drew the pair."""
 
     @property
     def key(self) -> str:
@@ -86,8 +90,8 @@ def sample_pairs(
     InvalidValueError
         When the count or the seed is out of range.
     """
-    if not 0 < count <= MAX_PAIRS:
-        raise InvalidValueError(f"the number of pairs must be from 1 to {MAX_PAIRS}, got {count}")
+    if not 0 < count <= MAX_SAMPLED:
+        raise InvalidValueError(f"the number of pairs must be from 1 to {MAX_SAMPLED}, got {count}")
     if seed < 0:
         raise InvalidValueError(f"the seed must be a whole number >= 0, got {seed}")
     labels, sizes = components(grid)
@@ -102,7 +106,7 @@ def sample_pairs(
         pairs = [_pair(cells[i], cells[j], "sampled") for i, j in chosen]
     if sizes.size > 1:
         pairs += _across(labels, largest + 1, -(-count // 20), rng)
-    return pairs
+    return [replace(pair, seed=seed) for pair in pairs]
 
 
 def _stratified(

@@ -42,6 +42,12 @@ def encode_path(cells: LongArray) -> str:
     return "".join(text)
 
 
+def path_steps(text: str) -> int:
+    """Steps of a path written by `encode_path`."""
+    runs = _RUN.finditer(text)
+    return sum(int(run.group(2)) if run.group(1) else 1 for run in runs)
+
+
 def decode_path(start: Cell, text: str) -> LongArray:
     """Cells of a path from its first cell and its moves.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.records import Record
 
-RUN_FILE = "run.json"
+RUNS_FILE = "runs.jsonl"
 
 ROS_RADIUS_M = 0.25
 MOVINGAI_MERGE_DISTANCE_M = 40.0
@@ -81,7 +82,7 @@ def evaluate(
     settings
         What to evaluate.
     folder
-        Made where it is not there; holds `records.jsonl` and `run.json`.
+        Made where it is not there; holds `records.jsonl` and `runs.jsonl`.
     progress
         Called with the numbers of records that are there and that there will be.
 
@@ -190,11 +191,13 @@ def _pairs_of(settings: RunSettings, grid: OccupancyGrid) -> list[Pair]:
 
 
 def _write_settings(settings: RunSettings, folder: Path) -> None:
-    """The settings of the last run into this folder, for its report."""
+    """Note the settings of this run, one line for each run into the folder."""
     plain = asdict(settings)
     plain["presets"] = [
         preset if isinstance(preset, str) else preset.name for preset in settings.presets
     ]
     plain["sampler_version"] = SAMPLER_VERSION
-    text = json.dumps(plain, indent=2) + "\n"
-    (folder / RUN_FILE).write_text(text, encoding="utf-8")
+    if settings.merge_distance_m == math.inf:  # JSON has no such number
+        plain["merge_distance_m"] = "inf"
+    with (folder / RUNS_FILE).open("a", encoding="utf-8") as stream:
+        stream.write(json.dumps(plain) + "\n")

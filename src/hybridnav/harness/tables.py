@@ -16,6 +16,7 @@ from hybridnav.metrics import distance_buckets, summarise
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from hybridnav._typing import FloatArray
     from hybridnav.harness.analysis import Outcome, Study
 
 Row = dict[str, str | float]
@@ -35,6 +36,7 @@ LOSS_COLUMNS = (
     "without loss %",
     "loss of the plan %",
     "any-angle loss %",
+    "any-angle exact %",
     "loss mean m",
 )
 EFFICIENCY_COLUMNS = (
@@ -73,7 +75,7 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
     losses = _pooled([outcome.losses for outcome in outcomes])
     finite = losses[np.isfinite(losses)]
     summary = summarise(finite)
-    lengths = _pooled([outcome.figure("length_m") for outcome in outcomes])
+    lengths = _pooled([outcome.lengths_m for outcome in outcomes])
     optima = _pooled([outcome.optima_m for outcome in outcomes])
     low, high = (100 * end for end in summary.mean_interval)
     return {
@@ -89,6 +91,7 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
         "without loss %": 100 * summary.share_without_loss,
         "loss of the plan %": 100 * nanmean(_pooled([o.plan_losses for o in outcomes])),
         "any-angle loss %": 100 * nanmean(_pooled([o.any_angle_losses for o in outcomes])),
+        "any-angle exact %": 100 * nanmean(_pooled([o.any_angle_exact for o in outcomes])),
         "loss mean m": nanmean(lengths - optima),
         **_efficiency(outcomes, references),
     }
@@ -100,13 +103,14 @@ def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> R
     coarse = seconds - _pooled([outcome.refine_seconds for outcome in outcomes])
     preparation = nanmean(np.array([outcome.preparation_seconds for outcome in outcomes]))
     queries = len(seconds) / max(len(outcomes), 1)
-    gain = nanmean(whole) - nanmean(seconds)
+    own = nanmean(np.array([outcome.preparation_seconds for outcome in references]))
+    even = (preparation - own) / (nanmean(whole - seconds) or math.nan)
     counts = np.array([outcome.thrun_count for outcome in outcomes])
     grid_counts = np.array([outcome.thrun_count for outcome in references])
     return {
         "nodes": _mean_of(outcomes, "n_nodes"),
         "backups": nanmean(counts),
-        "backups of the grid / backups": nanmean(grid_counts) / (nanmean(counts) or math.nan),
+        "backups of the grid / backups": nanquantile(_ratio(grid_counts, counts), 0.5),
         "cells expanded": nanmean(_pooled([outcome.figure("expanded") for outcome in outcomes])),
         "nodes expanded": nanmean(
             _pooled([outcome.figure("expanded_nodes") for outcome in outcomes])
@@ -115,11 +119,20 @@ def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> R
         "query ms, p95": 1e3 * nanquantile(seconds, 0.95),
         "without refinement ms": 1e3 * nanquantile(coarse, 0.5),
         "with preparation ms": 1e3 * (nanmean(seconds) + preparation / max(queries, 1)),
-        "speed-up": nanquantile(whole / seconds, 0.5),
+        "speed-up": nanquantile(_ratio(whole, seconds), 0.5),
         "preparation s": preparation,
         "memory MB": _mean_of(outcomes, "memory_bytes") / 1e6,
-        "break-even queries": math.ceil(preparation / gain) if gain > 0 else math.inf,
+        "break-even queries": even
+        if math.isnan(even)
+        else math.ceil(even)
+        if even > 0
+        else math.inf,
     }
+
+
+def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Quotients, NaN where there is none."""
+    return np.divide(first, second, out=np.full(len(first), math.nan), where=second > 0)
 
 
 def _mean_of(outcomes: Sequence[Outcome], key: str) -> float:
@@ -127,7 +140,7 @@ def _mean_of(outcomes: Sequence[Outcome], key: str) -> float:
     return nanmean(np.array(values, dtype=float))
 
 
-def _pooled(parts: list[np.ndarray]) -> np.ndarray:
+def _pooled(parts: list[FloatArray]) -> FloatArray:
     return np.concatenate(parts) if parts else np.empty(0)
 
 

@@ -6,16 +6,17 @@ import math
 import time
 import warnings
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
-from hybridnav.errors import HybridNavError, MapWarning
+from hybridnav.errors import HybridNavError, InvalidValueError, MapWarning
 from hybridnav.grid import CellClass
 from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
+from hybridnav.harness.pairs import SAMPLER_VERSION
 from hybridnav.harness.paths import encode_path
-from hybridnav.harness.records import environment, pair_id, preparation_id
+from hybridnav.harness.records import environment, map_digest, pair_id, preparation_id
 from hybridnav.io import load_map
 
 if TYPE_CHECKING:
@@ -45,7 +46,10 @@ class Task:
     method: MethodSpec
     pairs: tuple[Pair, ...]
 
-    @property
+    attempt: int = 0
+    """How often it was lost before it began."""
+
+    @cached_property
     def ids(self) -> tuple[str, ...]:
         """Ids of the records that it yields: of the preparation, then of the pairs."""
         of_pairs = (pair_id(self.map_sha, self.method, pair) for pair in self.pairs)
@@ -83,9 +87,7 @@ def run_task(task: Task) -> Iterator[Record]:
     }
     head = {"id": task.ids[0], "type": "preparation", **common}
     try:
-        _warm_up(task.method)
-        prepared = prepare(task.method, grid)
-        judge = Judge(grid, prepared, reference=task.method.name == REFERENCE)
+        prepared, judge = _ready(grid, task)
     except Exception as error:  # noqa: BLE001 - a method that cannot be made is a result
         reason = _reason(error)
         yield {**head, "status": "error", "error": reason, **_about(grid, task)}
@@ -107,6 +109,14 @@ def run_task(task: Task) -> Iterator[Record]:
     }
     for name, pair in zip(task.ids[1:], task.pairs, strict=True):
         yield {**_of_pair(name, pair, common), **_answer(prepared, judge, pair)}
+
+
+def _ready(grid: OccupancyGrid, task: Task) -> tuple[Prepared, Judge]:
+    if map_digest(grid) != task.map_sha:
+        raise InvalidValueError(f"map {task.map.path} has changed since the run began")
+    _warm_up(task.method)
+    prepared = prepare(task.method, grid)
+    return prepared, Judge(grid, prepared, reference=task.method.name == REFERENCE)
 
 
 def _about(grid: OccupancyGrid, task: Task) -> Record:
@@ -150,6 +160,8 @@ def _of_pair(name: str, pair: Pair, common: Record) -> Record:
         "start": list(pair.start),
         "goal": list(pair.goal),
     }
+    if pair.seed is not None:
+        record |= {"seed": pair.seed, "sampler_version": SAMPLER_VERSION}
     if pair.stated_optimum_cells is not None:
         record["stated_optimum_cells"] = pair.stated_optimum_cells
     return record
@@ -172,13 +184,14 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
 
 def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
     length_m, faults = judge.faults(pair, answer)
-    known, wrong = judge.oracles(answer, pair, length_m)
-    faults += wrong
+    known: Record = {}
+    if not faults:
+        known, faults = judge.oracles(answer, pair, length_m)
     return {
         "status": "no path" if answer.cells is None else "solved",
         "length_m": length_m,
         "bound": float(answer.bound) if math.isfinite(answer.bound) else None,
-        "plan": None if answer.nodes is None else len(answer.nodes),
+        "plan_steps": _plan_steps(answer),
         "plan_optimum_m": None if faults else judge.plan_optimum_m(pair, answer),
         "path": None if answer.cells is None else encode_path(answer.cells),
         "expanded": int(answer.expanded),
@@ -188,6 +201,13 @@ def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
         **known,
         "faults": faults,
     }
+
+
+def _plan_steps(answer: Answer) -> int | None:
+    """Steps of the plan in the topological layer, None where there is no plan."""
+    if answer.plan_steps is not None:
+        return int(answer.plan_steps)
+    return None if answer.nodes is None else len(answer.nodes) - 1
 
 
 def _warm_up(spec: MethodSpec) -> None:

@@ -7,6 +7,7 @@ import multiprocessing
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 _FLUSH_S = 0.2
 _ATTEMPTS = 2
+
+CONNECT_S = 10.0
+"""How long a scheduler may take to answer, seconds."""
 
 
 def _serve(connection: Connection, turn: Any) -> None:
@@ -64,7 +68,7 @@ class _Worker:
         self.missing = list(task.ids)
         self.heard = time.monotonic()
         self._turn.value = 0
-        with suppress(BrokenPipeError):  # it died while idle: the next look at it will say so
+        with suppress(OSError):  # it died while idle: the next look at it will say so
             self.connection.send(task)
 
     def failed_at(self, task: Task) -> int:
@@ -155,7 +159,10 @@ def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
     if task is None:
         return []
     index = worker.failed_at(task)
-    if index == 0:  # it never got ready: no other would
+    if index == 0 and status == "lost" and task.attempt + 1 < _ATTEMPTS:
+        waiting.append(replace(task, attempt=task.attempt + 1))
+        return []
+    if index == 0:  # it never gets ready: no other would
         return [failed_record(task, at, status) for at in range(len(task.ids))]
     left = tuple(
         pair
@@ -218,19 +225,24 @@ def run_on_cluster(tasks: Sequence[Task], *, address: str) -> Iterator[list[Reco
         ) from None
     try:
         _knock(address)
-        client: Any = distributed.Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+        client: Any = distributed.Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise InvalidValueError(f"scheduler {address}: {error}") from None
     with client:
         futures = client.map(_whole, tasks, retries=_ATTEMPTS, pure=False)
         task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
+        suspects = []
         for future in distributed.as_completed(futures):  # type: ignore[no-untyped-call]
             try:
-                records = future.result()
-            except distributed.KilledWorker:  # several workers died of it
-                task = task_of[future.key]
-                records = [failed_record(task, at, "lost") for at in range(len(task.ids))]
-            yield records
+                yield future.result()
+            except distributed.KilledWorker:
+                suspects.append(task_of[future.key])
+        # dask blames all that waited for a worker that died: each again, and by itself.
+        for task in suspects:
+            try:
+                yield client.submit(_whole, task, pure=False).result()
+            except distributed.KilledWorker:
+                yield [failed_record(task, at, "lost") for at in range(len(task.ids))]
 
 
 def _knock(address: str) -> None:
@@ -238,7 +250,7 @@ def _knock(address: str) -> None:
     from distributed.comm.core import connect  # noqa: PLC0415 - an optional extra
 
     async def knock() -> None:
-        comm = await connect(address, timeout=10)  # type: ignore[no-untyped-call]
+        comm = await connect(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
         await comm.close()
 
     with ThreadPoolExecutor(1) as pool:  # a notebook has a running loop of its own

@@ -1,0 +1,272 @@
+# ruff: noqa: D102 - what `solve` does differently is what each class says
+"""Methods with planted faults, for the harness to catch; workers import them by name."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.baselines import Answer
+from hybridnav.baselines.grid import GridAstar
+from hybridnav.config import Preset
+from hybridnav.grid import CellClass
+from hybridnav.harness.methods import HybridMethod
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.search.grid_search import GridSearch
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from hybridnav.grid import OccupancyGrid
+
+    Cell = tuple[int, int]
+
+FATAL_PAIR = "HYBRIDNAV_TEST_FATAL_PAIR"
+"""Environment variable: the `Pair.key` at which `Dies` and `Hangs` do so, without its kind."""
+
+MERGE_DISTANCE_M = 4.0
+WARM_UP_SHAPE = (30, 40)
+"""Of the map on which every process warms up."""
+
+
+class Sound(GridAstar):
+    """A method without a fault, for the others to derive from: A* on the grid."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        super().__init__(grid)
+        self.name = type(self).__name__
+        self.grid = grid
+        self.free = grid.classes == CellClass.FREE
+
+
+class SoundPlaces(HybridMethod):
+    """A method without a fault, for the others to derive from: the pyramid's places."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        pyramid = DualGraphPyramid.build(grid, merge_distance_m=MERGE_DISTANCE_M)
+        super().__init__(TopologicalMap(pyramid), Preset())
+        self.name = type(self).__name__
+
+
+# --- wrong paths --------------------------------------------------------------------------------
+
+
+class ThroughWall(Sound):
+    """One cell of the path lies inside an obstacle, between two neighbours of that cell."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        if answer.cells is None:
+            return answer
+        rows, cols = self.free.shape
+        for at, (row, col) in enumerate(answer.cells[:-1].tolist()):
+            for side in np.ndindex(3, 3):
+                cell = (row + side[0] - 1, col + side[1] - 1)
+                if not (0 <= cell[0] < rows and 0 <= cell[1] < cols) or self.free[cell]:
+                    continue
+                if np.abs(answer.cells[at + 1] - cell).max() == 1:
+                    cells = np.insert(answer.cells, at + 1, cell, axis=0)
+                    return replace(answer, cells=cells, bound=math.inf)
+        return answer
+
+
+class CutsCorners(Sound):
+    """Diagonals pass obstacles at their corners."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        super().__init__(grid)
+        self._search = GridSearch(self.free, corner_cutting=True)
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        return replace(super().solve(start, goal), bound=math.inf)
+
+
+class _Longer(Sound):
+    """A legal path that is 5 % too long: it goes to and fro at its start."""
+
+    claim: float
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        cells = answer.cells
+        if cells is None or len(cells) < 2:
+            return answer
+        turns = math.ceil(0.05 * len(cells) / 2)
+        cells = np.concatenate([np.repeat(cells[None, :2], turns, axis=0).reshape(-1, 2), cells])
+        return replace(answer, cells=cells, bound=self.claim)
+
+
+class TooLong(_Longer):
+    """5 % too long, and said to be optimal."""
+
+    claim = 1.0
+
+
+class HonestlyLong(_Longer):
+    """5 % too long or more, and said to be: no fault."""
+
+    claim = 3.0
+
+
+class Jumps(Sound):
+    """One step from start to goal: shorter than the optimum wherever a path must bend."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        return answer if answer.cells is None else replace(answer, cells=np.array([start, goal]))
+
+
+class StopsShort(Sound):
+    """The path ends a cell before the goal."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        return answer if answer.cells is None else replace(answer, cells=answer.cells[:-1])
+
+
+class LeavesTheMap(Sound):
+    """The path goes to the far end of the world and back."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        far = (-(2**40), 2**40)
+        return Answer(np.array([start, far, goal]))
+
+
+class WalksThroughAll(Sound):
+    """A path for every pair, across obstacles where need be."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        search = GridSearch(np.ones_like(self.free))
+        return Answer(search.search(start, goal).cells)
+
+
+class NoCells(Sound):
+    """An answer that is no path at all."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:  # noqa: ARG002
+        return Answer(np.array([[0.5, math.nan]]))
+
+
+# --- wrong plans and regions --------------------------------------------------------------------
+
+
+class MissingDoor(SoundPlaces):
+    """Two places beside each other are not known to be: no path from one to the other."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        assert self.region_of is not None
+        if self.region_of[start] == self.region_of[goal]:
+            return super().solve(start, goal)
+        return Answer(None)
+
+
+class SkipsRegions(SoundPlaces):
+    """The plan names its first and last region only, the path is right."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        if answer.nodes is None or len(answer.nodes) < 3:
+            return answer
+        return replace(answer, nodes=(answer.nodes[0], answer.nodes[-1]), arcs=None)
+
+
+class Backwards(SoundPlaces):
+    """The plan runs from the goal to the start."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        return replace(answer, nodes=answer.nodes and answer.nodes[::-1], arcs=None)
+
+
+class UnknownRegions(SoundPlaces):
+    """The plan names regions that there are not."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        if answer.nodes is None:
+            return answer
+        return replace(answer, nodes=(answer.nodes[0], 10**6, answer.nodes[-1]), arcs=None)
+
+
+class TornRegion(Sound):
+    """The map's first and last free column of cells are one region, all between another."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        super().__init__(grid)
+        cols = np.flatnonzero(self.free.any(axis=0))
+        region_of = np.where(self.free, 1, -1).astype(np.int32)
+        for col in (cols[0], cols[-1]):
+            region_of[self.free[:, col], col] = 0
+        self.region_of = region_of
+
+
+class HomelessCells(Sound):
+    """Some free cells are in no region."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        super().__init__(grid)
+        region_of = np.where(self.free, 0, -1).astype(np.int32)
+        region_of[tuple(np.argwhere(self.free)[0])] = -1
+        self.region_of = region_of
+
+
+# --- methods that fail --------------------------------------------------------------------------
+
+
+class Raises(Sound):
+    """No answer for some pairs."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        if (start[0] + goal[0]) % 2 and self.free.shape != WARM_UP_SHAPE:
+            raise RuntimeError("odd rows\nare beyond me")
+        return super().solve(start, goal)
+
+
+class CannotBeMade(Sound):
+    """Its preparation fails."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        super().__init__(grid)
+        if grid.shape != WARM_UP_SHAPE:
+            raise RuntimeError("too small a map")
+
+
+class FailsAtOnce(Sound):
+    """Fails already when it is warmed up."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        raise KeyError((start, goal))
+
+
+class Dies(Sound):
+    """Takes its whole process along at one pair."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        if _is_fatal(start, goal):
+            os._exit(3)
+        return super().solve(start, goal)
+
+
+class Hangs(Sound):
+    """Never comes back from one pair."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        if _is_fatal(start, goal):
+            time.sleep(600)
+        return super().solve(start, goal)
+
+
+class Slow(Sound):
+    """Takes ten milliseconds for each pair."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        time.sleep(0.01)
+        return super().solve(start, goal)
+
+
+def _is_fatal(start: Cell, goal: Cell) -> bool:
+    return os.environ.get(FATAL_PAIR) == f"{start[0]},{start[1]}>{goal[0]},{goal[1]}"
