@@ -132,7 +132,10 @@ def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> R
 
 def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
     """Quotients, NaN where there is none."""
-    return np.divide(first, second, out=np.full(len(first), math.nan), where=second > 0)
+    quotients: FloatArray = np.divide(
+        first, second, out=np.full(len(first), math.nan), where=second > 0
+    )
+    return quotients
 
 
 def _mean_of(outcomes: Sequence[Outcome], key: str) -> float:
