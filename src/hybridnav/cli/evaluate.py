@@ -127,10 +127,12 @@ def evaluate(
         for found in study.outcomes
         if found.preparation["status"] != "ready"
     ]
-    for what, found in (("counter-examples", faults), ("methods could not be made", unmade)):
+    for what, found in (("counter-examples", faults), ("methods without answers", unmade)):
         if found:
-            complain(f"{len(found)} {what}, the first: {found[0]}")
-    if faults or unmade:
+            complain(f"{what}: {len(found)}, the first: {found[0]}")
+    if not study.checks:
+        complain("nothing was checked: the maps have no such pairs of free cells")
+    if faults or unmade or not study.checks:
         raise typer.Exit(EXIT_NOT_SOLVED)
 
 

@@ -37,8 +37,8 @@ def query_key(record: Record) -> QueryKey:
 class Outcome:
     """All that one method did on one map.
 
-    Arrays have one entry for each pair that the reference solved between two different cells, in
-    the reference's order; NaN where the method has no such figure.
+    Arrays have one entry for each pair that the method was asked and the reference solved between
+    two different cells, in the reference's order; NaN where the method has no such figure.
     """
 
     map_name: str
@@ -58,10 +58,11 @@ class Outcome:
     @cached_property
     def references(self) -> list[Record]:
         """The reference's records of the pairs that arrays are about."""
+        asked = {query_key(record) for record in self.records}
         return [
             record
-            for record in self.optimum.values()
-            if (record.get("length_m") or 0) > 0 and not record.get("faults")
+            for key, record in self.optimum.items()
+            if (record.get("length_m") or 0) > 0 and not record.get("faults") and key in asked
         ]
 
     def figure(self, key: str) -> FloatArray:
@@ -104,8 +105,13 @@ class Outcome:
 
     @cached_property
     def seconds(self) -> FloatArray:
-        """Wall-clock seconds of each query."""
-        return self.figure("seconds")
+        """Wall-clock seconds of each query that it solved without a fault."""
+        return np.where(np.isfinite(self.losses), self.figure("seconds"), math.nan)
+
+    @cached_property
+    def reference_seconds(self) -> FloatArray:
+        """Those of the reference on the same pairs."""
+        return np.array([record["seconds"] for record in self.references], dtype=float)
 
     @cached_property
     def refine_seconds(self) -> FloatArray:

@@ -87,12 +87,13 @@ def baseline_spec(
     Raises
     ------
     InvalidValueError
-        When there is none of that name.
+        When there is none of that name, or its class cannot be imported.
     """
     if name not in BASELINES and ":" not in name:
         raise InvalidValueError(
             f"no baseline is called {name!r}: there are {', '.join(BASELINES)}, or module:class"
         )
+    _class_of(name)
     if name not in ON_PLACES:
         return MethodSpec(name, None)
     pyramid = Preset().pyramid.model_dump(exclude={"robot_radius_m"})

@@ -162,11 +162,12 @@ def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
 
 
 def _worst(outcome: Outcome) -> list[WorstCase]:
-    """The pairs that a preset of ours loses most on, and every method's counter-examples."""
+    """Counter-examples, and the pairs with the largest losses: two of presets, one of others."""
     cases = [_case(outcome, record, fault) for record, fault in outcome.faults[:WORST_CASES]]
-    if outcome.preparation.get("preset") is not None and outcome.label != REFERENCE:
+    if outcome.label != REFERENCE:
+        shown = WORST_CASES if outcome.preparation.get("preset") is not None else 1
         own = {query_key(record): record for record in outcome.records if record.get("path")}
-        order = np.argsort(-np.nan_to_num(outcome.losses, nan=0.0), kind="stable")[:WORST_CASES]
+        order = np.argsort(-np.nan_to_num(outcome.losses, nan=0.0), kind="stable")[:shown]
         for at in order[outcome.losses[order] > 0]:
             reference = outcome.references[at]
             record = own[query_key(reference)]

@@ -7,11 +7,16 @@ import importlib.metadata
 import json
 import os
 import platform
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
 import hybridnav
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system: no lock there
+    fcntl = None  # type: ignore[assignment]
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -80,6 +85,7 @@ class RecordFile:
         _drop_cut_line(self.path)
         self.ids = {record["id"] for record in read_records(folder)}
         self._stream = self.path.open("ab")
+        _lock(self._stream, folder)
 
     def __enter__(self) -> Self:
         return self
@@ -102,6 +108,17 @@ class RecordFile:
         self._stream.flush()
         os.fsync(self._stream.fileno())
         self.ids.update(record["id"] for record in fresh)
+
+
+def _lock(stream: BinaryIO, folder: Path) -> None:
+    """Keep a second run out of the file; the lock ends with the process."""
+    if fcntl is None:
+        return
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        stream.close()
+        raise InvalidValueError(f"another run is writing into folder {folder}") from None
 
 
 def _drop_cut_line(path: Path) -> None:

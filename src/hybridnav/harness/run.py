@@ -17,7 +17,7 @@ from hybridnav.harness.pairs import (
     sample_pairs,
     scenario_pairs,
 )
-from hybridnav.harness.records import RecordFile, map_digest
+from hybridnav.harness.records import RECORDS_FILE, RecordFile, map_digest
 from hybridnav.harness.task import MapSpec, Task, read_map
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.io.movingai import read_scenarios
@@ -103,6 +103,8 @@ def evaluate(
     tasks = [task for name in settings.maps for task in _tasks_of(settings, name)]
     try:
         path.mkdir(parents=True, exist_ok=True)
+        if any(path.iterdir()) and not (path / RECORDS_FILE).exists():
+            raise InvalidValueError(f"folder {folder} holds other files and no run: take a new one")
         _write_settings(settings, path)
         with RecordFile(path) as records:
             total = len({name for task in tasks for name in task.ids})
@@ -151,6 +153,8 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
     merge_distance_m = settings.merge_distance_m
     if merge_distance_m is None and not ros:
         merge_distance_m = MOVINGAI_MERGE_DISTANCE_M
+    if merge_distance_m is not None and not merge_distance_m > 0:
+        raise InvalidValueError(f"the merge distance must be positive, got {merge_distance_m} m")
     spec = MapSpec(str(Path(name).resolve()), radius_m, settings.corner_cutting)
     grid = read_map(spec)
     digest = map_digest(grid)

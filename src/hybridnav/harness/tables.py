@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Row = dict[str, str | float]
 
 _DIGITS = 3
+_LEAST = 1e-4
 
 LOSS_COLUMNS = (
     "pairs",
@@ -99,12 +100,11 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
 
 def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
     seconds = _pooled([outcome.seconds for outcome in outcomes])
-    whole = _pooled([outcome.seconds for outcome in references])
+    whole = _pooled([outcome.reference_seconds for outcome in outcomes])
     coarse = seconds - _pooled([outcome.refine_seconds for outcome in outcomes])
     preparation = nanmean(np.array([outcome.preparation_seconds for outcome in outcomes]))
     queries = len(seconds) / max(len(outcomes), 1)
     own = nanmean(np.array([outcome.preparation_seconds for outcome in references]))
-    even = (preparation - own) / (nanmean(whole - seconds) or math.nan)
     counts = np.array([outcome.thrun_count for outcome in outcomes])
     grid_counts = np.array([outcome.thrun_count for outcome in references])
     return {
@@ -122,12 +122,16 @@ def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> R
         "speed-up": nanquantile(_ratio(whole, seconds), 0.5),
         "preparation s": preparation,
         "memory MB": _mean_of(outcomes, "memory_bytes") / 1e6,
-        "break-even queries": even
-        if math.isnan(even)
-        else math.ceil(even)
-        if even > 0
-        else math.inf,
+        "break-even queries": _break_even(preparation - own, nanmean(whole - seconds)),
     }
+
+
+def _break_even(price: float, gain: float) -> float:
+    """Queries after which a gain for each has paid a price, seconds both; infinite where there is
+    none, NaN where nothing is known or the method is the reference itself."""
+    if not abs(gain) > 0:
+        return math.nan
+    return math.ceil(max(price, 0.0) / gain) if gain > 0 else math.inf
 
 
 def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -210,14 +214,14 @@ def to_markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> st
 
 def text_of(value: str | float) -> str:
     """A value for people: three digits, thousands separated, nothing for what there is not."""
-    if isinstance(value, str):
-        return value.replace("|", "\\|")
-    if isinstance(value, int):
-        return f"{value:,}"
+    if isinstance(value, (str, int)):
+        return value.replace("|", "\\|") if isinstance(value, str) else f"{value:,}"
     if math.isnan(value):
         return ""
     if math.isinf(value):
         return "never"
+    if 0 < value < _LEAST:
+        return f"< {_LEAST:.4f}"
     if value == 0 or abs(value) >= 10**_DIGITS / 10:
         return f"{value:,.0f}"
     digits = max(0, _DIGITS - 1 - math.floor(math.log10(abs(value))))

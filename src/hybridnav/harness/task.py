@@ -176,7 +176,14 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
     seconds = time.perf_counter() - began
     try:
         return _judged(answer, judge, pair, seconds)
-    except (HybridNavError, ValueError, TypeError, IndexError, OverflowError) as error:
+    except (
+        HybridNavError,
+        AttributeError,
+        IndexError,
+        OverflowError,
+        TypeError,
+        ValueError,
+    ) as error:
         # No cells, regions or arcs of this map: as wrong as an answer can be.
         reason = _reason(error)
         return {"status": "error", "error": reason, "faults": [f"no answer to judge: {reason}"]}

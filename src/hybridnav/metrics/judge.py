@@ -74,7 +74,8 @@ def judge_path(
         go to one of the 8 neighbours; a segment between centres that enters a blocked cell or
         passes between two that meet at a corner; a diagonal step with one blocked side cell
         ("cuts a corner": legal for a line, not for a move of the octile grid). A cell that is not
-        free counts as blocked in all of these.
+        free counts as blocked in all of these. On a grid with `corner_cutting` the faults about
+        corners are none.
 
     Raises
     ------
@@ -95,6 +96,11 @@ def judge_path(
     # Halves are exact in float64, so are the tests of segments between centres.
     centres = np.clip(path.astype(np.float64), -_FAR, _FAR) + 0.5
     codes = kernels.segment_codes(grid.classes, free_of, centres)[: len(steps)]
+    cut = _cut_corners(grid, path, near & inside[1:], free_of)
+    corners = (
+        *_about_steps(path, codes == kernels.BETWEEN, _BETWEEN),
+        *_about_steps(path, cut, "cuts a corner"),
+    )
     return Verdict(
         (
             *_wrong_ends(path, start, goal),
@@ -102,10 +108,7 @@ def judge_path(
             *_about_cells(path, inside & ~free, "not free"),
             *_about_steps(path, ~near, "does not go to a neighbour"),
             *_about_steps(path, codes == kernels.BLOCKED, _WORDS[kernels.BLOCKED]),
-            *_about_steps(path, codes == kernels.BETWEEN, _BETWEEN),
-            *_about_steps(
-                path, _cut_corners(grid, path, near & inside[1:], free_of), "cuts a corner"
-            ),
+            *(() if grid.corner_cutting else corners),
         ),
         _length_in_cells(steps) * grid.resolution_m,
     )
