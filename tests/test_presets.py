@@ -164,7 +164,10 @@ def test_a_preset_is_a_frozen_value(write):
         ("pyramid: {seed: 4294967296}\n", ["pyramid.seed", "less than 4294967296"]),
         ("pyramid: {seed: " + "9" * 2000 + "}\n", ["pyramid.seed"]),
         ("pyramid: {linkage: average}\n", ["pyramid.linkage", "'radius'", "got 'average'"]),
-        ("planner: {coarse: fast}\n", ["planner.coarse", "'max-distance' or 'none'", "'fast'"]),
+        (
+            "planner: {coarse: fast}\n",
+            ["planner.coarse", "'max-distance', 'portals' or 'none'", "'fast'"],
+        ),
         ("planner: {refine: ompl}\n", ["planner.refine", "'grid-astar'", "got 'ompl'"]),
         ("planner: {allow_unexplored: maybe}\n", ["planner.allow_unexplored", "got 'maybe'"]),
         ("planner: {allow_unexplored: 2}\n", ["planner.allow_unexplored", "got 2"]),

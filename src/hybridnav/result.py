@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy as np
 from hybridnav.errors import PlanError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._typing import FloatArray, LongArray
 
 Metric = Literal["octile"]
@@ -77,13 +80,18 @@ class PlanResult:
     status: PlanStatus
     metric: Metric = "octile"
     path: Path | None = None
-    route: Route | None = None
-    """The places and arcs; None too where the preset searches the whole map."""
+    route_source: Callable[[], Route] | None = field(default=None, repr=False)
+    """What finds the route once somebody asks for it."""
     lower_bound: float = math.inf
     """A proved bound on the optimum in the metric, metres; infinite where there is no path."""
     stats: PlanStats = field(default_factory=PlanStats)
     settings: dict[str, Any] = field(default_factory=dict)
     """Preset, and how the pyramid was built."""
+
+    @cached_property
+    def route(self) -> Route | None:
+        """The places and arcs; None too where the preset searches the whole map."""
+        return None if self.route_source is None else self.route_source()
 
     @property
     def solved(self) -> bool:

@@ -5,10 +5,17 @@ from __future__ import annotations
 import os
 import reprlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import yaml
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from hybridnav.config.yaml_file import printable, read_yaml
@@ -58,14 +65,23 @@ class PyramidSettings(_Section):
 class PlannerSettings(_Section):
     """Section `planner`: coarse search, corridor, refinement."""
 
-    coarse: Literal["max-distance", "none"] = "max-distance"
-    """Cost of an arc in the coarse search; `none` makes the whole map the corridor."""
+    coarse: Literal["max-distance", "portals", "none"] = "max-distance"
+    """How the coarse route is found: by that attribute of the arcs, or by distances between portals
+    of fields of its own; `none` makes the whole map the corridor."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields the refiner may stand on: those of the route, or also their neighbours'."""
-    refine: Literal["grid-astar"] = "grid-astar"
-    """How a path is found inside the corridor."""
+    refine: Literal["grid-astar", "stored-paths"] = "grid-astar"
+    """How a path is found inside the corridor; `stored-paths` needs no search, and portals."""
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
+
+    @model_validator(mode="after")
+    def _stored_paths_lead_to_portals(self) -> Self:
+        if self.refine == "stored-paths" and self.coarse != "portals":
+            raise PydanticCustomError(
+                "portals_needed", "refine: stored-paths needs coarse: portals"
+            )
+        return self
 
 
 class Preset(_Section):

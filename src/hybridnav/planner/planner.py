@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,15 +12,15 @@ import numpy as np
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.refine import GridRefiner
+from hybridnav.refine import GridRefiner, path_of
 from hybridnav.result import PlanResult, PlanStats, PlanStatus, Route
-from hybridnav.route import MaxDistanceSearch, corridor_of
+from hybridnav.route import MaxDistanceSearch, PortalSearch, Walks, corridor_of
 from hybridnav.search.octile import octile_distance_in_cells
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import PathLike
+    from hybridnav._typing import LongArray, PathLike
     from hybridnav.refine import Refiner
     from hybridnav.route import CoarseRoute, Corridor
     from hybridnav.topology import TopologicalMap
@@ -60,6 +61,10 @@ class HybridPlanner:
         self._coarse: MaxDistanceSearch | None = None
         if settings.coarse == "max-distance":
             self._coarse = MaxDistanceSearch(topology, allow_unexplored=settings.allow_unexplored)
+        self._portals: PortalSearch | None = None
+        if settings.coarse == "portals":
+            self._portals = PortalSearch(topology, allow_unexplored=settings.allow_unexplored)
+            self._walks = Walks(topology)
         self._refiner: Refiner = GridRefiner(
             topology.grid, allow_unexplored=settings.allow_unexplored
         )
@@ -91,7 +96,36 @@ class HybridPlanner:
         status = self._refusal(first, last)
         if status is not None:
             return self._answer(status)
+        if self._portals is not None:
+            return self._plan_over_portals(self._portals, first, last)
         return self._plan_cells(first, last)
+
+    def _plan_over_portals(self, search: PortalSearch, first: Cell, last: Cell) -> PlanResult:
+        began = time.perf_counter()
+        cells, expanded = search.path(first, last)
+        seconds = {"coarse": time.perf_counter() - began}
+        if cells is None:
+            return self._answer(PlanStatus.NO_PATH, stats=PlanStats(expanded, seconds=seconds))
+        n_cells = 0
+        if self.preset.planner.refine == "grid-astar":
+            corridor = search.corridor(cells)
+            n_cells = corridor.n_cells
+            path, refined = self._refiner.refine(first, last, corridor)
+            seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
+            expanded += refined
+        else:
+            path = path_of(self.topology.grid, cells)
+        if path is None:
+            return self._answer(PlanStatus.NO_PATH, stats=PlanStats(expanded, seconds=seconds))
+        walked = partial(self._walked, path.cells)
+        bound = octile_distance_in_cells(first, last) * self.topology.grid.resolution_m
+        return self._answer(
+            PlanStatus.SOLVED,
+            path=path,
+            route_source=walked,
+            lower_bound=min(bound, path.length_m),
+            stats=PlanStats(expanded, corridor_cells=n_cells, seconds=seconds),
+        )
 
     def _plan_cells(self, first: Cell, last: Cell) -> PlanResult:
         began = time.perf_counter()
@@ -118,7 +152,7 @@ class HybridPlanner:
         return self._answer(
             PlanStatus.SOLVED,
             path=path,
-            route=self._route(route),
+            route_source=None if route is None else partial(self._route, route),
             lower_bound=min(bound, path.length_m),
             stats=stats,
         )
@@ -136,11 +170,15 @@ class HybridPlanner:
         beside = self._coarse.enterable if self.preset.planner.corridor == "neighbours" else None
         return route, corridor_of(topology, route.places, neighbours=beside), True
 
-    def _route(self, coarse: CoarseRoute | None) -> Route | None:
-        if coarse is None:
-            return None
+    def _route(self, coarse: CoarseRoute) -> Route:
         places, arcs = self.topology.place_ids, self.topology.arc_ids
         return Route(tuple(places[coarse.places].tolist()), tuple(arcs[coarse.arcs].tolist()))
+
+    def _walked(self, cells: LongArray) -> Route:
+        """The places and arcs that a path passes."""
+        places, arcs = self._walks.of(cells)
+        ids = self.topology.place_ids, self.topology.arc_ids
+        return Route(tuple(ids[0][places].tolist()), tuple(ids[1][arcs].tolist()))
 
     def _refusal(self, start: Cell, goal: Cell) -> PlanStatus | None:
         """Status of a query that cannot be planned for where its ends lie."""

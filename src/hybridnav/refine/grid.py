@@ -10,6 +10,7 @@ from hybridnav.search.grid_search import Cell, GridSearch
 from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
+    from hybridnav._typing import LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.route import Corridor
 
@@ -54,6 +55,18 @@ class GridRefiner:
         )
         if found.cells is None:
             return None, found.expanded
-        frame = self._grid.frame
-        length_m = path_length_in_cells(found.cells) * frame.resolution_m
-        return Path(found.cells, frame.points_of(found.cells), length_m), found.expanded
+        return path_of(self._grid, found.cells), found.expanded
+
+
+def path_of(grid: OccupancyGrid, cells: LongArray) -> Path:
+    """The path through the centres of some cells.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    cells
+        int64 (n, 2), consecutive ones 8-neighbours.
+    """
+    length_m = path_length_in_cells(cells) * grid.resolution_m
+    return Path(cells, grid.frame.points_of(cells), length_m)

@@ -1,0 +1,127 @@
+"""The presets that route over portals: legal, consistent, and as good as they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import hybridnav as hn
+from hybridnav.grid.worlds import office_world
+from hybridnav.harness.consistency import Consistency
+from hybridnav.harness.pairs import sample_pairs
+from hybridnav.metrics import judge_path
+from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.octile import path_length_in_cells
+from tests.strategies import scenes
+
+PRESETS = ("fast", "balanced")
+
+
+def planned(planner, start, goal):
+    ends = planner.topology.grid.frame.points_of(np.array([start, goal]))
+    return planner.plan(ends[0], ends[1])
+
+
+@pytest.fixture(scope="module")
+def office():
+    grid = office_world().grid(robot_radius_m=0.25)
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+
+
+@pytest.fixture(scope="module")
+def pairs(office):
+    return sample_pairs(office.grid, 120, seed=3)
+
+
+def check(result, topology, ends, optimum_cells, checks):
+    """A result against the grid's optimum, the judge and the definition of consistency."""
+    grid, (start, goal) = topology.grid, ends
+    if optimum_cells is None:
+        assert result.status is hn.PlanStatus.NO_PATH
+        assert result.route is None
+        return
+    assert result.solved
+    assert judge_path(grid, result.path.cells, start=start, goal=goal).faults == ()
+    optimum = path_length_in_cells(optimum_cells) * grid.resolution_m
+    assert result.cost >= optimum * (1 - 1e-9)
+    assert result.lower_bound <= optimum * (1 + 1e-9)
+    assert len(result.route.arcs) == len(result.route.places) - 1
+    wrong = checks.check_plan(start, goal, result.route.places, result.route.arcs)
+    assert wrong is None
+    assert checks.check_walk(result.path.cells) is None
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@given(scene=scenes(max_side=20))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_paths_are_legal_and_walk_along_arcs_on_any_map(scene, preset):
+    topology = hn.TopologicalMap(
+        hn.DualGraphPyramid.build(scene.grid, merge_distance_m=scene.merge_distance_m)
+    )
+    free = np.argwhere(scene.classes == hn.CellClass.FREE)
+    planner = hn.HybridPlanner(topology, preset=preset)
+    checks = Consistency(scene.grid, topology.level.field_of, topology=topology)
+    search = GridSearch(scene.classes == hn.CellClass.FREE)
+    rng = np.random.default_rng(scene.seed)
+    for _ in range(6 if len(free) else 0):
+        start, goal = (tuple(cell) for cell in free[rng.integers(len(free), size=2)].tolist())
+        optimum = search.search(start, goal).cells
+        check(planned(planner, start, goal), topology, (start, goal), optimum, checks)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_office_is_planned_well(office, pairs, preset):
+    planner = hn.HybridPlanner(office, preset=preset)
+    checks = Consistency(office.grid, office.level.field_of, topology=office)
+    search = GridSearch(office.grid.classes == hn.CellClass.FREE)
+    losses = []
+    for pair in pairs:
+        optimum = search.search(pair.start, pair.goal).cells
+        result = planned(planner, pair.start, pair.goal)
+        check(result, office, (pair.start, pair.goal), optimum, checks)
+        if optimum is not None:
+            length = path_length_in_cells(optimum) * office.grid.resolution_m
+            losses.append(result.cost / length - 1)
+    mean, most = {"fast": (0.006, 0.05), "balanced": (0.0005, 0.01)}[preset]
+    assert np.mean(losses) < mean
+    assert max(losses) < most
+
+
+def test_the_optimum_of_the_corridor_is_no_longer_than_the_stored_path(office, pairs):
+    fast, balanced = (hn.HybridPlanner(office, preset=preset) for preset in PRESETS)
+    for pair in pairs[:40]:
+        one, other = (planned(planner, pair.start, pair.goal) for planner in (fast, balanced))
+        assert other.cost <= one.cost * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("distance_m", [0.5, 4.0, float("inf")])
+def test_any_merge_distance_of_the_places_will_do(distance_m):
+    grid = office_world().grid(robot_radius_m=0.25)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=distance_m))
+    planner = hn.HybridPlanner(topology, preset="fast")
+    search = GridSearch(grid.classes == hn.CellClass.FREE)
+    for pair in sample_pairs(grid, 10, seed=1):
+        optimum = search.search(pair.start, pair.goal).cells
+        result = planned(planner, pair.start, pair.goal)
+        assert result.solved == (optimum is not None)
+        if optimum is not None:
+            assert result.cost <= path_length_in_cells(optimum) * grid.resolution_m * 1.06
+
+
+def test_unexplored_cells_are_entered_where_they_may_be():
+    classes = np.zeros((9, 30), dtype=np.float32)
+    classes[:, 12:18] = 0.5
+    grid = hn.OccupancyGrid(classes, hn.Frame(0.05))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=0.3))
+    plain = hn.HybridPlanner(topology, preset="fast")
+    assert planned(plain, (4, 2), (4, 27)).status is hn.PlanStatus.NO_PATH
+    open_preset = hn.load_preset("fast", overrides=["planner.allow_unexplored=true"])
+    result = planned(hn.HybridPlanner(topology, preset=open_preset), (4, 2), (4, 27))
+    assert result.solved
+    assert result.cost >= 25 * 0.05 * (1 - 1e-9)
+
+
+def test_stored_paths_need_portals():
+    with pytest.raises(hn.PresetError, match="stored-paths needs coarse: portals"):
+        hn.load_preset("paper", overrides=["planner.refine=stored-paths"])
