@@ -11,9 +11,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
+from hybridnav.pyramid import DualGraphPyramid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from hybridnav.pyramid import Linkage
 
     Classes = NDArray[np.uint8]
 
@@ -51,6 +54,12 @@ class Scene:
     def grid(self) -> OccupancyGrid:
         """The map as an occupancy grid."""
         return occupancy_grid(self.classes, resolution_m=self.resolution_m)
+
+    def pyramid(self, linkage: Linkage) -> DualGraphPyramid:
+        """The pyramid that it asks for."""
+        return DualGraphPyramid.build(
+            self.grid, merge_distance_m=self.merge_distance_m, linkage=linkage, seed=self.seed
+        )
 
 
 @st.composite

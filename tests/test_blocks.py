@@ -31,9 +31,7 @@ def open_scenes(draw):
 
 
 def check_blocks(scene, linkage):
-    pyramid = DualGraphPyramid.build(
-        scene.grid, merge_distance_m=scene.merge_distance_m, linkage=linkage, seed=scene.seed
-    )
+    pyramid = scene.pyramid(linkage)
     distance = scene.merge_distance_m / scene.resolution_m
     for block in blocks(scene.classes, distance):
         assert len(pyramid) > block.whole_at
@@ -60,9 +58,7 @@ def test_blocks_merge_by_halves_and_with_nothing_else_until_they_are_whole(scene
 @given(scene=open_scenes())
 @ORDINARY
 def test_levels_of_open_ground_are_plane_maps(scene, linkage):
-    pyramid = DualGraphPyramid.build(
-        scene.grid, merge_distance_m=scene.merge_distance_m, linkage=linkage, seed=scene.seed
-    )
+    pyramid = scene.pyramid(linkage)
     base = Base.of(scene.classes)
     for level in range(len(pyramid)):
         check_level(pyramid[level], base)

@@ -26,9 +26,7 @@ each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
 
 def levels_of(scene, linkage):
-    return DualGraphPyramid.build(
-        scene.grid, merge_distance_m=scene.merge_distance_m, linkage=linkage, seed=scene.seed
-    )
+    return scene.pyramid(linkage)
 
 
 def check_walks(level):

@@ -227,7 +227,8 @@ def test_unknown_grey_called_free_is_a_warning(write, negate, mode):
 
 
 def test_no_warning_without_such_pixels_where_they_are_transparent_or_in_raw_mode(write):
-    load_map(write(_picture([[0, 204, 206]]), free_thresh=0.25))
+    grid = load_map(write(_picture([[0, 204, 206]]), free_thresh=0.25))
+    assert grid.shape == (1, 3)
     load_map(write(_picture([[0, 205]]), free_thresh=0.25, mode="raw"))
     hidden = Image.fromarray(np.array([[[205, 10], [0, 255]]], dtype=np.uint8), "LA")
     load_map(write(hidden, free_thresh=0.25))
@@ -250,7 +251,8 @@ def test_inflation_is_in_metres(write):
 
 
 def test_keys_that_nav2_does_not_know_are_let_be(write):
-    load_map(write(_picture(GREYS), map_type="occupancy", note="{a: [1, 2]}"))
+    grid = load_map(write(_picture(GREYS), map_type="occupancy", note="{a: [1, 2]}"))
+    np.testing.assert_array_equal(grid.classes, load_map(write(_picture(GREYS))).classes)
 
 
 def test_the_image_may_be_anywhere(write, tmp_path, monkeypatch):

@@ -47,9 +47,7 @@ each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
 
 def build(scene, linkage):
-    return DualGraphPyramid.build(
-        scene.grid, merge_distance_m=scene.merge_distance_m, linkage=linkage, seed=scene.seed
-    )
+    return scene.pyramid(linkage)
 
 
 def levels_of(pyramid):

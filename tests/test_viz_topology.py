@@ -299,7 +299,7 @@ def test_given_axes_are_drawn_on_and_their_figure_is_left_alone(figure1):
 def test_maps_without_arcs_are_drawn(plot):
     for rows in ((".",), ("#",), (".#.", "###", "?#?")):
         level = DualGraphPyramid.build(occupancy_grid(drawn(*rows)), merge_distance_m=4.0)[-1]
-        plot(level)
+        assert level.grid.name in plot(level).get_title()
 
 
 @pytest.mark.parametrize("plot", [plot_topology, plot_dual, plot_figure1])

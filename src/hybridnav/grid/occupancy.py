@@ -16,7 +16,7 @@ from hybridnav.grid.frame import Frame
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import ByteArray
+    from hybridnav._typing import BoolArray, ByteArray
 
 MAX_CELLS = 178_956_970
 """Cells a grid may have at most: Pillow's own limit for an image, and well inside int32."""
@@ -118,6 +118,19 @@ class OccupancyGrid:
     def resolution_m(self) -> float:
         """Side of a cell in metres."""
         return self.frame.resolution_m
+
+    def enterable(self, *, allow_unexplored: bool = False) -> BoolArray:
+        """Cells that paths may use, bool (rows, cols): free ones, and unexplored ones if allowed.
+
+        Parameters
+        ----------
+        allow_unexplored
+            Whether unexplored cells may be entered.
+        """
+        cells: BoolArray = self.classes == CellClass.FREE
+        if allow_unexplored:
+            cells |= self.classes == CellClass.UNEXPLORED
+        return cells
 
     def class_counts(self) -> dict[str, int]:
         """Cells per class; `blocked` are those that only inflation took."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from hybridnav.grid import CellClass
 from hybridnav.result import Path
 from hybridnav.search.grid_search import Cell, GridSearch
 from hybridnav.search.octile import path_length_in_cells
@@ -40,9 +39,7 @@ class GridRefiner:
 
     def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
         self._grid = grid
-        enterable = grid.classes == CellClass.FREE
-        if allow_unexplored:
-            enterable |= grid.classes == CellClass.UNEXPLORED
+        enterable = grid.enterable(allow_unexplored=allow_unexplored)
         self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
 
     def refine(self, start: Cell, goal: Cell, corridor: Corridor | None) -> tuple[Path | None, int]:

@@ -44,9 +44,7 @@ class PortalSearch:
     def __init__(self, topology: TopologicalMap, *, allow_unexplored: bool = False) -> None:
         grid = topology.grid
         self._shape = grid.shape
-        enterable = grid.classes == CellClass.FREE
-        if allow_unexplored:
-            enterable |= grid.classes == CellClass.UNEXPLORED
+        enterable = grid.enterable(allow_unexplored=allow_unexplored)
         self.level = _routing_level(topology)
         portals = build_portals(
             grid,

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import legal_moves
 from hybridnav.topology import _portal_kernels as kernels
@@ -111,9 +110,7 @@ def build_portals(
     """
     if spacing_cells < 1:
         raise InvalidValueError(f"portals need a spacing of at least one cell, got {spacing_cells}")
-    free = grid.classes == CellClass.FREE
-    if allow_unexplored:
-        free |= grid.classes == CellClass.UNEXPLORED
+    free = grid.enterable(allow_unexplored=allow_unexplored)
     if field_of.shape != grid.shape or (field_of[free] < 0).any():
         raise InvalidValueError("every cell that may be entered must be in a field")
     cols = grid.shape[1]
