@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.baselines import _overlay_kernels, overlay
 from hybridnav.baselines.overlay import ExactOverlay
-from hybridnav.baselines.regions import RegionGraph, joined_regions
+from hybridnav.baselines.regions import joined_regions
 from hybridnav.baselines.simple_graph import SimpleGraphPyramid, first_arcs
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.pyramid.simple import report_of
 from hybridnav.route import MaxDistanceSearch
+from hybridnav.search.arc_search import ArcSearch
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, components, distances, move_graph, recounted
 from tests.strategies import MAX_SIDE, Scene, drawn, occupancy_grid, scenes
@@ -251,15 +252,15 @@ def test_the_simple_graph_counts_free_places_and_the_edges_between_them() -> Non
     assert method.n_edges == sum(free[u] and free[v] for u, v in graph.edges)
 
 
-def test_a_region_graph_decides_between_equal_walks_by_the_second_cost() -> None:
+def test_a_search_on_arcs_decides_between_equal_walks_by_the_second_cost() -> None:
     edges = np.array([[0, 1], [1, 3], [2, 0], [3, 2], [4, 3]])
     costs = np.array([1.0, 2.0, 2.0, 1.0, 1.0])
     for ties, middle in (([1.0, 1, 2, 1, 0], 1), ([2.0, 1, 1, 1, 0], 2)):
-        graph = RegionGraph(6, edges, costs, np.array(ties))
+        graph = ArcSearch(np.ones(6, dtype=np.bool_), edges, costs, np.array(ties))
         plan = graph.search(0, 4)
-        assert plan.regions is not None
-        assert plan.regions.tolist() == [0, middle, 3, 4]
-        assert graph.search(0, 5).regions is None
+        assert plan.vertices is not None
+        assert plan.vertices.tolist() == [0, middle, 3, 4]
+        assert graph.search(0, 5).vertices is None
 
 
 def test_regions_are_joined_by_legal_moves_only() -> None:

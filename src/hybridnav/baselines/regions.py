@@ -6,7 +6,6 @@ And what other baselines share: the regions of a topological map, cells checked,
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,68 +13,13 @@ import numpy as np
 from hybridnav.baselines.protocol import Answer
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.search import _kernels
 from hybridnav.search.grid_search import GridSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.baselines.protocol import Cell
+    from hybridnav.search.arc_search import ArcSearch
     from hybridnav.topology import TopologicalMap
-
-
-@dataclass(frozen=True, eq=False)
-class RegionPlan:
-    """Regions that a coarse search passes, the start's first; None where there is no way."""
-
-    regions: LongArray | None
-    expanded: int
-
-
-class RegionGraph:
-    """An undirected graph on regions, searched for the cheapest walk by Dijkstra's algorithm.
-
-    Parameters
-    ----------
-    n_regions
-        Regions, labelled from 0; those without an edge can only be start and goal at once.
-    edges
-        int (n_edges, 2), the regions that each edge joins.
-    costs, ties
-        float64 (n_edges,), what an edge costs, and a second cost that decides between walks of
-        equal cost; >= 0, any unit.
-    """
-
-    def __init__(
-        self, n_regions: int, edges: IntArray | LongArray, costs: FloatArray, ties: FloatArray
-    ) -> None:
-        self.n_regions = n_regions
-        tail = np.concatenate([edges[:, 0], edges[:, 1]])
-        order = np.argsort(tail, kind="stable")
-        self._first = np.searchsorted(tail[order], np.arange(n_regions + 1))
-        self._neighbour = np.concatenate([edges[:, 1], edges[:, 0]])[order].astype(np.int64)
-        self._edge = np.tile(np.arange(len(edges)), 2)[order]
-        self._ends = np.asarray(edges, dtype=np.int64)
-        self._costs, self._ties = costs, ties
-        self._allowed = np.ones(n_regions, dtype=np.bool_)
-
-    def search(self, start: int, goal: int) -> RegionPlan:
-        """Find the cheapest walk between two regions."""
-        edges, reached, expanded = _kernels.cheapest_arcs(
-            self._first,
-            self._neighbour,
-            self._edge,
-            self._costs,
-            self._ties,
-            self._allowed,
-            start,
-            goal,
-        )
-        if not reached:
-            return RegionPlan(None, int(expanded))
-        regions = [start]
-        for u, v in self._ends[edges].tolist():
-            regions.append(v if u == regions[-1] else u)
-        return RegionPlan(np.array(regions, dtype=np.int64), int(expanded))
 
 
 class RegionPlanner:
@@ -92,12 +36,12 @@ class RegionPlanner:
     """
 
     def __init__(
-        self, region_of: IntArray, graph: RegionGraph, *, corner_cutting: bool = False
+        self, region_of: IntArray, graph: ArcSearch, *, corner_cutting: bool = False
     ) -> None:
         self._region_of = region_of
         self._graph = graph
         self._grid_search = GridSearch(region_of >= 0, corner_cutting=corner_cutting)
-        self._in_corridor = np.zeros(graph.n_regions, dtype=np.bool_)
+        self._in_corridor = np.zeros(graph.n_vertices, dtype=np.bool_)
         self.memory_bytes = array_bytes(self, graph, self._grid_search)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
@@ -113,18 +57,18 @@ class RegionPlanner:
         began = time.perf_counter()
         plan = self._graph.search(first, last)
         seconds = {"coarse": time.perf_counter() - began}
-        if plan.regions is None:
+        if plan.vertices is None:
             return Answer(None, expanded_nodes=plan.expanded, seconds=seconds)
         began = time.perf_counter()
         self._in_corridor[:] = False
-        self._in_corridor[plan.regions] = True
+        self._in_corridor[plan.vertices] = True
         found = self._grid_search.search(
             start, goal, field_of=self._region_of, in_corridor=self._in_corridor
         )
         seconds["refine"] = time.perf_counter() - began
         return Answer(
             found.cells,
-            nodes=tuple(plan.regions.tolist()),
+            nodes=tuple(plan.vertices.tolist()),
             expanded=found.expanded,
             expanded_nodes=plan.expanded,
             seconds=seconds,

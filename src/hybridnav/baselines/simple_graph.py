@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.baselines.regions import RegionGraph, RegionPlanner, free_fields
+from hybridnav.baselines.regions import RegionPlanner, free_fields
 from hybridnav.grid import CellClass
+from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray
@@ -42,9 +43,7 @@ class SimpleGraphPyramid:
         self.region_of: IntArray = free_fields(topology)
         self.n_nodes = int(free.sum())
         self.n_edges = len(kept)
-        graph = RegionGraph(
-            level.n_vertices, level.arcs[kept], level.max_distance_m[kept], level.through_m[kept]
-        )
+        graph = ArcSearch(free, level.arcs, level.max_distance_m, level.through_m, kept=kept)
         self._planner = RegionPlanner(
             self.region_of, graph, corner_cutting=topology.grid.corner_cutting
         )

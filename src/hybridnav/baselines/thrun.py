@@ -8,9 +8,10 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav.baselines import _thrun_kernels as kernels
-from hybridnav.baselines.regions import RegionGraph, RegionPlanner, joined_regions
+from hybridnav.baselines.regions import RegionPlanner, joined_regions
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
@@ -84,7 +85,8 @@ class ThrunMap:
         self.n_edges = len(edges)
         halves = centres_of(region_of, self.n_nodes)[edges] - middles[:, None]
         costs = np.hypot(halves[..., 0], halves[..., 1]).sum(axis=1) * grid.resolution_m
-        graph = RegionGraph(self.n_nodes, edges, costs, np.zeros(len(edges)))
+        every = np.ones(self.n_nodes, dtype=np.bool_)
+        graph = ArcSearch(every, edges, costs, np.zeros(len(edges)))
         self._planner = RegionPlanner(region_of, graph, corner_cutting=grid.corner_cutting)
         self.memory_bytes = self._planner.memory_bytes
 

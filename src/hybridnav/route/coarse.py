@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.grid import CellClass
-from hybridnav.search import _kernels
+from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, LongArray
@@ -41,19 +41,16 @@ class MaxDistanceSearch:
 
     def __init__(self, topology: TopologicalMap, *, allow_unexplored: bool = False) -> None:
         level = topology.level
-        plain = np.flatnonzero(~level.is_self_loop)
-        tail = np.concatenate([level.arcs[plain, 0], level.arcs[plain, 1]])
-        head = np.concatenate([level.arcs[plain, 1], level.arcs[plain, 0]])
-        order = np.argsort(tail, kind="stable")
-        self._first = np.searchsorted(tail[order], np.arange(level.n_vertices + 1))
-        self._neighbour = head[order].astype(np.int64)
-        self._arc = np.concatenate([plain, plain])[order]
-        self._arcs = level.arcs
-        self._cost = level.max_distance_m
-        self._tie = level.through_m
         self.enterable: BoolArray = level.classes == CellClass.FREE
         if allow_unexplored:
             self.enterable = np.ones_like(self.enterable)
+        self._search = ArcSearch(
+            self.enterable,
+            level.arcs,
+            level.max_distance_m,
+            level.through_m,
+            kept=np.flatnonzero(~level.is_self_loop),
+        )
 
     def search(self, start: int, goal: int) -> CoarseRoute | None:
         """Cheapest route between two places.
@@ -68,19 +65,7 @@ class MaxDistanceSearch:
         CoarseRoute | None
             None where no route joins them.
         """
-        arcs, reached, expanded = _kernels.cheapest_arcs(
-            self._first,
-            self._neighbour,
-            self._arc,
-            self._cost,
-            self._tie,
-            self.enterable,
-            start,
-            goal,
-        )
-        if not reached:
+        walk = self._search.search(start, goal)
+        if walk.vertices is None:
             return None
-        places = [start]
-        for u, v in self._arcs[arcs]:
-            places.append(int(v) if u == places[-1] else int(u))
-        return CoarseRoute(np.array(places, dtype=np.int64), arcs, int(expanded))
+        return CoarseRoute(walk.vertices, walk.arcs, walk.expanded)
