@@ -15,19 +15,20 @@ from hypothesis import strategies as st
 from hybridnav.grid import CellClass
 from hybridnav.search import _kernels
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.grid_search import GridSearch, move_tables
 from hybridnav.search.octile import (
     length_in_cells,
     octile_distance_in_cells,
     path_length_in_cells,
 )
-from tests.oracle.grid import assert_legal, distances, move_graph, recounted
+from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
 from tests.strategies import class_grids, drawn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Bools = NDArray[np.bool_]
+    Cells = NDArray[np.int64]
     Labels = NDArray[np.int32]
 
 seeds = st.integers(0, 2**32 - 1)
@@ -48,29 +49,44 @@ def block_labels(shape: tuple[int, ...], rng: np.random.Generator) -> Labels:
     return np.where(noisy, rng.integers(n_labels, size=shape, dtype=np.int32), labels)
 
 
-def check_search(
+def check_search(  # noqa: PLR0913 - the search's own parameters
     search: GridSearch,
     enterable: Bools,
     ends: tuple[tuple[int, int], tuple[int, int]],
     corridor: tuple[Labels, Bools] | None = None,
-) -> None:
-    """One search, judged against Dijkstra's algorithm on an edge list."""
+    *,
+    corner_cutting: bool = False,
+    blocked: Cells | None = None,
+) -> int | None:
+    """One search, judged against Dijkstra's algorithm on an edge list; returns its cost.
+
+    `enterable` is the grid without the blocked cells.
+    """
     start, goal = ends
     field_of, in_corridor = corridor or (None, None)
-    found = search.search(start, goal, field_of=field_of, in_corridor=in_corridor)
+    found = search.search(start, goal, field_of=field_of, in_corridor=in_corridor, blocked=blocked)
     standable = enterable.copy()
     if field_of is not None and in_corridor is not None:
         standable &= in_corridor[field_of]
-    optimum = distances(move_graph(enterable, standable), standable.shape, start)[goal]
+    # Where corners may be cut, every cell will do as the side of a diagonal.
+    sides = np.ones_like(enterable) if corner_cutting else enterable
+    optimum = distances(move_graph(sides, standable), standable.shape, start)[goal]
     assert found.expanded >= 0
-    if math.isinf(optimum):
+    if math.isinf(optimum) or not (standable[start] and standable[goal]):
         assert found.cells is None
-        return
+        return None
     assert found.cells is not None
     assert tuple(found.cells[0]) == start
     assert tuple(found.cells[-1]) == goal
-    assert_legal(found.cells, enterable, standable)
+    assert_legal(found.cells, sides, standable)
     assert path_length_in_cells(found.cells) == pytest.approx(optimum, rel=0, abs=1e-9)
+    return cost_of(found.cells)
+
+
+def cost_of(cells: Any) -> int:
+    """Integer cost of a path."""
+    straight, diagonal = moves(cells)
+    return straight * STRAIGHT + diagonal * DIAGONAL
 
 
 @given(class_grids(), seeds)
@@ -172,26 +188,161 @@ def test_one_blocked_side_forbids_the_diagonal() -> None:
     assert found.cells.tolist() == [[0, 0], [0, 1], [1, 1]]
 
 
-@given(class_grids(), seeds)
-def test_with_corner_cutting_a_path_has_the_length_of_the_graph_of_all_neighbours(
-    classes: Any, seed: int
-) -> None:
-    enterable = classes == CellClass.FREE
+@st.composite
+def cases(draw: st.DrawFn) -> tuple[Bools, bool, tuple[Labels, Bools] | None, Any]:
+    """Grids with and without corner cutting, corridors from ragged to coarse and none."""
+    enterable = draw(class_grids()) == CellClass.FREE
+    rng = np.random.default_rng(draw(seeds))
+    corridor = None
+    if draw(st.booleans()):
+        field_of = np.where(enterable, block_labels(enterable.shape, rng), np.int32(-1))
+        corridor = field_of, rng.random(6) < draw(st.sampled_from([0.5, 0.8]))
     assume(enterable.any())
-    graph: nx.Graph[tuple[int, int]] = nx.Graph()
-    graph.add_nodes_from((row, col) for row, col in np.argwhere(enterable).tolist())
-    for row, col in list(graph):
-        for rows, cols in ((0, 1), (1, -1), (1, 0), (1, 1)):
-            if (row + rows, col + cols) in graph:
-                graph.add_edge((row, col), (row + rows, col + cols), length=math.hypot(rows, cols))
-    rng = np.random.default_rng(seed)
-    start, goal = random_cell(enterable, rng), random_cell(enterable, rng)
-    found = GridSearch(enterable, corner_cutting=True).search(start, goal)
-    if found.cells is None:
-        assert not nx.has_path(graph, start, goal)
-    else:
-        optimum = nx.dijkstra_path_length(graph, start, goal, weight="length")
-        assert path_length_in_cells(found.cells) == pytest.approx(optimum)
+    return enterable, draw(st.booleans()), corridor, rng
+
+
+def inside_of(enterable: Bools, corridor: tuple[Labels, Bools] | None) -> Bools:
+    """Cells that a path may stand on."""
+    return enterable if corridor is None else enterable & corridor[1][corridor[0]]
+
+
+@given(cases())
+@settings(max_examples=200)
+def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
+    case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any],
+) -> None:
+    enterable, corner_cutting, corridor, rng = case
+    inside = inside_of(enterable, corridor)
+    assume(inside.any())
+    search = GridSearch(enterable, corner_cutting=corner_cutting)
+    # Room for one cell in each bucket to begin with: most searches must start over.
+    search._waiting = np.empty(_kernels.BUCKETS, dtype=np.int32)
+    for _ in range(4):
+        ends = random_cell(inside, rng), random_cell(inside, rng)
+        check_search(search, enterable, ends, corridor, corner_cutting=corner_cutting)
+
+
+@given(cases())
+def test_only_paths_below_the_limit_are_found(
+    case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any],
+) -> None:
+    enterable, corner_cutting, corridor, rng = case
+    inside = inside_of(enterable, corridor)
+    assume(inside.any())
+    search = GridSearch(enterable, corner_cutting=corner_cutting)
+    field_of, in_corridor = corridor or (None, None)
+    for _ in range(3):
+        ends = random_cell(inside, rng), random_cell(inside, rng)
+        optimum = check_search(search, enterable, ends, corridor, corner_cutting=corner_cutting)
+        for limit in (0, 1, STRAIGHT, 10 * DIAGONAL, -1):
+            cost = limit + (optimum or 0)
+            found = search.search(*ends, field_of=field_of, in_corridor=in_corridor, limit=cost)
+            if optimum is None or optimum >= cost:
+                assert found.cells is None
+            else:
+                assert found.cells is not None
+                assert cost_of(found.cells) == optimum
+
+
+@given(cases(), st.sampled_from([1, 3, 20]))
+@settings(max_examples=200)
+def test_blocked_cells_are_as_on_a_grid_without_them_and_only_for_one_search(
+    case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any], n_blocked: int
+) -> None:
+    enterable, corner_cutting, corridor, rng = case
+    inside = inside_of(enterable, corridor)
+    assume(inside.any())
+    search = GridSearch(enterable, corner_cutting=corner_cutting)
+    field_of, in_corridor = corridor or (None, None)
+    for _ in range(3):
+        # With repetitions, with cells that may not be entered anyway, at times with the ends.
+        blocked = rng.integers(enterable.size, size=n_blocked)
+        left = enterable.copy()
+        left.flat[blocked] = False
+        ends = random_cell(inside, rng), random_cell(inside, rng)
+        cost = check_search(
+            search, left, ends, corridor, corner_cutting=corner_cutting, blocked=blocked
+        )
+        fresh = GridSearch(left, corner_cutting=corner_cutting)
+        if left[ends[0]] and left[ends[1]]:
+            found = fresh.search(*ends, field_of=field_of, in_corridor=in_corridor)
+            assert cost == (None if found.cells is None else cost_of(found.cells))
+        check_search(search, enterable, ends, corridor, corner_cutting=corner_cutting)
+    untouched = GridSearch(enterable, corner_cutting=corner_cutting)
+    assert (search._moves == untouched._moves).all()
+
+
+@pytest.mark.parametrize("end", [(0, 0), (2, 3)])
+def test_from_and_to_a_blocked_cell_there_is_no_path(end: tuple[int, int]) -> None:
+    search = GridSearch(np.ones((3, 4), dtype=np.bool_))
+    blocked = np.array([5, end[0] * 4 + end[1]])
+    assert search.search((0, 0), (2, 3), blocked=blocked).cells is None
+    assert search.search(end, end, blocked=blocked).cells is None
+    assert search.search((0, 0), (2, 3), blocked=np.empty(0, np.int64)).cells is not None
+
+
+def test_blocked_cells_open_again_after_a_search_that_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    enterable = np.ones((4, 5), dtype=np.bool_)
+    search = GridSearch(enterable)
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_kernels, "astar", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            search.search((0, 0), (3, 4), blocked=np.arange(5, 10))
+    check_search(search, enterable, ((0, 0), (3, 4)))
+
+
+@pytest.mark.parametrize("corner_cutting", [False, True])
+def test_successors_are_left_out_for_a_path_as_good_and_diagonal_first(
+    corner_cutting: bool,  # noqa: FBT001 - a parameter of the test
+) -> None:
+    # All 3 x 3 maps round a cell x that is reached from one of its neighbours, p.
+    successors, detours = (
+        table.reshape(9, 256) for table in move_tables(corner_cutting=corner_cutting)
+    )
+    around = [(1, 2), (2, 2), (2, 1), (2, 0), (1, 0), (0, 0), (0, 1), (0, 2)]
+    for drawing, d in itertools.product(range(256), range(8)):
+        enterable = np.ones((3, 3), dtype=np.bool_)
+        for k, cell in enumerate(around):
+            enterable[cell] = drawing >> k & 1
+        mask = int(_kernels.legal_moves(enterable, corner_cutting)[1, 1])
+        if not mask >> (d + 4) % 8 & 1:
+            continue
+        sides = np.ones_like(enterable) if corner_cutting else enterable
+        without_x = enterable.copy()
+        without_x[1, 1] = False
+        other = distances(move_graph(sides, without_x), (3, 3), around[(d + 4) % 8])
+        kept, spared = (
+            {int(table[d, mask]) >> 4 * i & 7 for i in range(8) if table[d, mask] >> 4 * i & 8}
+            for table in (successors, detours)
+        )
+        for k in range(8):
+            through_x = sum(math.sqrt(2) if step & 1 else 1 for step in (d, k))
+            shorter = other[around[k]] < through_x - 1e-9
+            as_short_and_diagonal_first = not d & 1 and other[around[k]] < through_x + 1e-9
+            wanted = bool(mask >> k & 1) and not (shorter or as_short_and_diagonal_first)
+            assert (k in kept) == wanted
+            # A detour goes past a third cell, any other path from p is one move.
+            apart = np.abs(np.subtract(around[k], around[(d + 4) % 8])).max()
+            left_out = bool(mask >> k & 1) and not wanted
+            assert (k in spared) == (left_out and apart > 1)
+
+
+@pytest.mark.parametrize("shape", [(1, 300), (300, 1), (2, 200), (40, 90)])
+def test_long_paths_in_one_search_after_another(shape: tuple[int, int]) -> None:
+    # Costs far beyond those that a record holds.
+    rng = np.random.default_rng(3)
+    enterable = rng.random(shape) < (1.0 if 1 in shape else 0.85)
+    enterable[:, [0, -1]] = enterable[[0, -1]] = True
+    search = GridSearch(enterable)
+    for _ in range(8):
+        check_search(search, enterable, ((0, 0), (shape[0] - 1, shape[1] - 1)))
+        check_search(search, enterable, (random_cell(enterable, rng), random_cell(enterable, rng)))
 
 
 def test_diagonals_along_the_rim_of_a_corridor_are_legal() -> None:

@@ -15,18 +15,26 @@ from numba import njit
 
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 
-_COST_BITS = 44
+# A record of A*: generation, cost modulo 2^19, direction of arrival (see `astar`).
+_DIRECTION_BITS = 3
+_COST_BITS = 19
+_GENERATION_SHIFT = _DIRECTION_BITS + _COST_BITS
 _COST_MASK = (1 << _COST_BITS) - 1
-GENERATIONS = 1 << (62 - _COST_BITS)
-"""Searches that one `best` array serves before it must be filled anew."""
+_SAME_GENERATION = 1 << _GENERATION_SHIFT
+GENERATIONS = (1 << (32 - _GENERATION_SHIFT)) - 1
+"""Searches that one array of records serves before it must be filled with zeros anew."""
+
+NO_ROOM = -2
+"""What `astar` returns when a bucket of its open list is full."""
 
 # Directions in the order east, north-east, north, ... counter-clockwise, row step and column step.
 _ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
 _COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
 
-# Width of a bucket of the open list. Measured on a map of 0.8 M cells: an eighth to a half of a
-# straight step are equal within noise, a full step expands 20 % more.
-_BUCKET = STRAIGHT // 4
+# Width of a bucket of the open list, 0.41 of a straight step; a quarter and an eighth of that are
+# equal within noise. A move raises f by less than 2 * DIAGONAL, 7 buckets: 8 take turns.
+_BUCKET_SHIFT = 15
+BUCKETS = 8
 
 
 @njit(cache=True)
@@ -79,101 +87,204 @@ def grow(array):
 
 
 @njit(cache=True)
-def astar(moves, cols, start, goal, field_of, in_corridor, best, came, generation):
-    """Cost of the optimal path between two flat cells over the cells of a corridor, -1 for none.
+def forbid(moves, cols, blocked, corner_cutting):
+    """Take all moves into some flat cells, out of them and past their corners out of the masks.
 
-    `field_of` None makes the whole map the corridor (the kernel is compiled for both). The open
-    list is an array of buckets of f, each a stack: the newest entry of a bucket comes first, which
-    breaks ties in favour of the deeper cell. A cell can be expanded again within a bucket; the
-    search ends when no entry below the goal's cost is left, so the cost is optimal.
-
-    `best` holds, for each cell, a code that falls with every generation, so nothing has to be
-    cleared between searches; `came` the direction by which each cell was reached. Also returned
-    is the number of expansions.
+    Returns the flat cells whose masks may have changed, and these masks as they were.
     """
-    stamp = np.int64(GENERATIONS - 1 - generation) << _COST_BITS
-    goal_row, goal_col = goal // cols, goal % cols
-    origin = octile_cost(start // cols - goal_row, start % cols - goal_col)
-    heads = np.full(1024, np.int32(-1), np.int32)
-    entry_cell = np.empty(4096, np.int32)
-    entry_cost = np.empty(4096, np.int64)
-    entry_next = np.empty(4096, np.int32)
-    entry_cell[0], entry_cost[0], entry_next[0] = start, 0, -1
-    heads[0] = 0
-    n_entries = 1
-    best[start] = stamp
-    bucket = last_bucket = 0
-    goal_cost = np.int64(0) if start == goal else np.int64(_COST_MASK)
-    expanded = 0
-    while bucket <= last_bucket:
-        entry = heads[bucket]
-        if entry < 0:
-            bucket += 1
-            if origin + bucket * _BUCKET >= goal_cost:
-                break
-            continue
-        heads[bucket] = entry_next[entry]
-        cell, cost = np.int64(entry_cell[entry]), entry_cost[entry]
-        if best[cell] != stamp | cost:
-            continue
+    rows = moves.size // cols
+    touched = np.empty(9 * blocked.size, np.int64)
+    n_touched = 0
+    for cell in blocked:
         row, col = cell // cols, cell % cols
-        if cost + octile_cost(row - goal_row, col - goal_col) >= goal_cost:
-            continue
-        expanded += 1
-        mask = moves[cell]
+        for to_row in range(max(row - 1, 0), min(row + 2, rows)):
+            for to_col in range(max(col - 1, 0), min(col + 2, cols)):
+                touched[n_touched] = to_row * cols + to_col
+                n_touched += 1
+    touched = touched[:n_touched]
+    masks = moves[touched]
+    for cell in blocked:
+        moves[cell] = 0
+        row, col = cell // cols, cell % cols
         for k in range(8):
-            if not mask >> k & 1:
+            to_row, to_col = row + _ROW_STEP[k], col + _COL_STEP[k]
+            if to_row < 0 or to_row >= rows or to_col < 0 or to_col >= cols:
                 continue
-            row_step, col_step = _ROW_STEP[k], _COL_STEP[k]
-            following = cell + row_step * cols + col_step
-            if field_of is not None and not in_corridor[field_of[following]]:
+            gone = 1 << (k + 4 & 7)
+            if not (k & 1 or corner_cutting):
+                gone |= 1 << (k + 3 & 7) | 1 << (k + 5 & 7)
+            moves[to_row * cols + to_col] &= 255 - gone
+    return touched, masks
+
+
+@njit(cache=True)
+def astar(
+    moves,
+    cols,
+    ends,
+    limit,
+    successors,
+    detours,
+    field_of,
+    in_corridor,
+    records,
+    generation,
+    waiting,
+):
+    """Cost below `limit` of the optimal path between two flat cells over the cells of a corridor,
+    -1 for none, `NO_ROOM` when a bucket is full; and the expansions.
+
+    `field_of` None makes the whole map the corridor (the kernel is compiled for both).
+    `successors` and `detours` are those of `grid_search.move_tables`.
+
+    The open list is a ring of buckets of f, each a stack of cells: the newest comes first, which
+    breaks ties in favour of the deeper cell. A successor in the bucket at hand is expanded next
+    without a stay in its bucket, as the newest one would be. A cell can be expanded again within
+    a bucket; the search ends when no entry below the goal's cost is left, so the cost is optimal.
+
+    A record holds the generation of the search that wrote it, so that nothing has to be cleared
+    between searches, the direction of arrival, and the cost modulo 2^19. That is enough, W being
+    the width of a bucket: (1) A cell p is expanded within W of its least cost g*(p), for its f lies
+    in the first bucket that is not empty, and some cell of an optimal path to p waits there or
+    later at its least cost. (2) So p offers its neighbour q less than g*(p) + W + DIAGONAL, which
+    is less than W + 2 * DIAGONAL above the record of q. (3) The record of q had an f of less than
+    W + 2 * DIAGONAL above the start of the bucket from which it was written, and no later offer has
+    an f below that start: the offer is less than W + 2 * DIAGONAL below the record. As
+    W + 2 * DIAGONAL < 2^18, the difference modulo 2^19 has the sign of the difference. Likewise
+    the bucket of a waiting cell tells its full cost, and an entry whose cell has been improved
+    since shows as lying outside its bucket, or is as good as the newer one.
+
+    Nothing grows in here: with arrays that may be replaced in the loop, numba's code took half as
+    long again. Indices are unsigned because a test for negative ones took 15 % of the time.
+    """
+    start, goal = ends
+    stamp = np.int64(generation) << _GENERATION_SHIFT
+    goal_row, goal_col = goal // cols, goal % cols
+    per_col = 1.0 / cols
+    room = waiting.size // BUCKETS
+    count = np.zeros(BUCKETS, np.int64)
+    n_waiting = 0
+    bucket = slot = np.int64(0)
+    cell, cost, k = np.int64(start), np.int64(0), np.int64(8)
+    row, col = cell // cols, cell % cols
+    origin = octile_cost(row - goal_row, col - goal_col)
+    records[start] = stamp
+    bound = np.int64(limit)
+    if start == goal:
+        bound = np.int64(0)
+    expanded = 0
+    while True:
+        expanded += 1
+        index = k << 8 | np.int64(moves[np.uint64(cell)])
+        todo = np.int64(successors[np.uint64(index)])
+        if field_of is not None:
+            spared = np.int64(detours[np.uint64(index)])
+            while spared != 0:
+                pruned = spared & 7
+                spared >>= 4
+                via = pruned + (1 if pruned - k & 7 < 4 else -1) & 7
+                if not in_corridor[field_of[cell + _ROW_STEP[via] * cols + _COL_STEP[via]]]:
+                    todo = todo << 4 | 8 | pruned
+        following = np.int64(-1)
+        following_row = following_col = following_cost = following_k = np.int64(0)
+        while todo != 0:
+            k = todo & 7
+            todo >>= 4
+            row_step, col_step = _ROW_STEP[np.uint64(k)], _COL_STEP[np.uint64(k)]
+            to = cell + row_step * cols + col_step
+            if field_of is not None and not in_corridor[field_of[to]]:
                 continue
-            new_cost = cost + (DIAGONAL if k & 1 else STRAIGHT)
-            if stamp | new_cost >= best[following]:
+            new_cost = cost + STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT)
+            known = np.int64(records[np.uint64(to)]) ^ stamp
+            if known < _SAME_GENERATION:
+                gain = (known >> _DIRECTION_BITS) - new_cost & _COST_MASK
+                if gain == 0 or gain > _COST_MASK >> 1:
+                    continue
+            to_row, to_col = row + row_step, col + col_step
+            estimate = new_cost + octile_cost(to_row - goal_row, to_col - goal_col)
+            if estimate >= bound:
                 continue
-            estimate = new_cost + octile_cost(row + row_step - goal_row, col + col_step - goal_col)
-            if estimate >= goal_cost:
+            records[np.uint64(to)] = stamp | (new_cost & _COST_MASK) << _DIRECTION_BITS | k
+            if to == goal:
+                bound = new_cost
                 continue
-            best[following] = stamp | new_cost
-            came[following] = k
-            if following == goal:
-                goal_cost = new_cost
+            into = estimate - origin >> _BUCKET_SHIFT
+            entry = to
+            if into == bucket:
+                entry = following
+                following, following_cost, following_k = to, new_cost, k
+                following_row, following_col = to_row, to_col
+                if entry < 0:
+                    continue
+            into &= BUCKETS - 1
+            if count[np.uint64(into)] == room:
+                return NO_ROOM, expanded
+            waiting[np.uint64(into * room + count[np.uint64(into)])] = entry
+            count[np.uint64(into)] += 1
+            n_waiting += 1
+        if following >= 0:
+            cell, cost, k = following, following_cost, following_k
+            row, col = following_row, following_col
+            continue
+        found = False
+        while n_waiting > 0:
+            if count[np.uint64(slot)] == 0:
+                bucket += 1
+                slot = bucket & BUCKETS - 1
+                if origin + (bucket << _BUCKET_SHIFT) >= bound:
+                    break
                 continue
-            into = (estimate - origin) // _BUCKET
-            if into > last_bucket:
-                last_bucket = into
-                while into >= heads.size:
-                    size = heads.size
-                    heads = grow(heads)
-                    heads[size:] = -1
-            if n_entries == entry_cell.size:
-                entry_cell, entry_cost = grow(entry_cell), grow(entry_cost)
-                entry_next = grow(entry_next)
-            entry_cell[n_entries] = following
-            entry_cost[n_entries] = new_cost
-            entry_next[n_entries] = heads[into]
-            heads[into] = n_entries
-            n_entries += 1
-    return (-1 if goal_cost == _COST_MASK else goal_cost), expanded
+            count[np.uint64(slot)] -= 1
+            n_waiting -= 1
+            cell = np.int64(waiting[np.uint64(slot * room + count[np.uint64(slot)])])
+            # Exact: half a cell off any multiple, and far fewer than 2^50 cells.
+            row = np.int64((cell + 0.5) * per_col)
+            col = cell - row * cols
+            estimate = octile_cost(row - goal_row, col - goal_col)
+            least = origin + (bucket << _BUCKET_SHIFT) - estimate
+            record = np.int64(records[np.uint64(cell)])
+            cost = least + ((record >> _DIRECTION_BITS) - least & _COST_MASK)
+            if cost - least >> _BUCKET_SHIFT != 0 or cost + estimate >= bound:
+                continue
+            k = record & 7
+            found = True
+            break
+        if not found:
+            break
+    return (bound if bound < limit else -1), expanded
 
 
 @njit(cache=True)
 def trace(came, cols, start, goal):
-    """Flat cells of the path that a search left behind, from start to goal."""
+    """Flat cells of the path that a search left behind, from start to goal.
+
+    The lowest three bits of `came` are the direction by which each cell was reached.
+    """
     count = 1
     cell = goal
     while cell != start:
-        k = came[cell]
+        k = came[cell] & 7
         cell -= _ROW_STEP[k] * cols + _COL_STEP[k]
         count += 1
     path = np.empty(count, np.int64)
     cell = goal
     for i in range(count - 1, 0, -1):
         path[i] = cell
-        k = came[cell]
+        k = came[cell] & 7
         cell -= _ROW_STEP[k] * cols + _COL_STEP[k]
     path[0] = start
     return path
+
+
+@njit(cache=True)
+def trace_cells(came, cols, start, goal):
+    """The same path as (row, col), shape (n, 2)."""
+    flat = trace(came, cols, start, goal)
+    cells = np.empty((flat.size, 2), np.int64)
+    for i in range(flat.size):
+        row = flat[i] // cols
+        cells[i, 0], cells[i, 1] = row, flat[i] - row * cols
+    return cells
 
 
 @njit(cache=True)

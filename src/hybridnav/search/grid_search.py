@@ -1,12 +1,16 @@
-"""Optimal paths on the octile grid: A* with integer costs and buckets.
+"""Optimal paths on the octile grid: A* with integer costs, buckets and pruned successors.
 
 P. E. Hart, N. J. Nilsson, B. Raphael: A formal basis for the heuristic determination of minimum
-cost paths, 1968.
+cost paths, 1968. The open list is that of E. A. Dinic, 1978, by f in place of g. Successors are
+pruned by the direction of arrival as D. Harabor and A. Grastien do (Online graph pruning for
+pathfinding on grid maps, 2011), without jumps: N. R. Sturtevant and S. Rabin call that canonical
+A* (Canonical orderings on grids, 2016).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +18,14 @@ import numpy as np
 from hybridnav.search import _kernels
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from hybridnav._typing import BoolArray, IntArray, LongArray
 
 Cell = tuple[int, int]
+
+_UNLIMITED = 1 << 62
+_ROOM = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +37,9 @@ class CellPath:
 
 
 class GridSearch:
-    """A* on the cells of one grid; holds 10 bytes a cell that all its searches share.
+    """A* on the cells of one grid; holds 5 bytes a cell that all its searches share, one for the
+    legal moves and four for the record of the search, and some 32 kB for the open list, which grows
+    with the longest one that a search needed.
 
     Moves go to the 8 neighbours; a diagonal needs both side cells enterable (no corner cutting).
     They are judged once, on the whole grid; a corridor limits only the cells stood on.
@@ -43,19 +54,22 @@ class GridSearch:
 
     def __init__(self, enterable: BoolArray, *, corner_cutting: bool = False) -> None:
         self._cols = enterable.shape[1]
+        self._corner_cutting = corner_cutting
         moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting)
         self._moves = moves.ravel()
-        self._best = np.full(enterable.size, np.iinfo(np.int64).max)
-        self._came = np.zeros(enterable.size, dtype=np.uint8)
+        self._records = np.zeros(enterable.size, dtype=np.uint32)
+        self._waiting = np.empty(_kernels.BUCKETS * _ROOM, dtype=np.int32)
         self._generation = 0
 
-    def search(
+    def search(  # noqa: PLR0913 - independent limits of one search
         self,
         start: Cell,
         goal: Cell,
         *,
         field_of: IntArray | None = None,
         in_corridor: BoolArray | None = None,
+        limit: int | None = None,
+        blocked: LongArray | None = None,
     ) -> CellPath:
         """Find a shortest path between the centres of two cells.
 
@@ -67,25 +81,118 @@ class GridSearch:
             int32 (rows, cols), a label for each enterable cell; None for the whole grid.
         in_corridor
             bool, whether the cells of each label may be stood on; goes with `field_of`.
+        limit
+            Integer cost: only paths that cost less are looked for; None for all.
+        blocked
+            int64 (n,), flat cells of the grid that this search may not enter, nor pass on a
+            diagonal unless corners may be cut; takes time in proportion to n.
         """
-        if self._generation == _kernels.GENERATIONS:
-            self._best.fill(np.iinfo(np.int64).max)
-            self._generation = 0
         first = start[0] * self._cols + start[1]
         last = goal[0] * self._cols + goal[1]
-        cost, expanded = _kernels.astar(
-            self._moves,
-            self._cols,
-            first,
-            last,
-            None if field_of is None else field_of.ravel(),
-            in_corridor,
-            self._best,
-            self._came,
-            self._generation,
-        )
-        self._generation += 1
+        corridor = (None if field_of is None else field_of.ravel(), in_corridor)
+        bound = _UNLIMITED if limit is None else limit
+        if blocked is None or len(blocked) == 0:
+            return self._path(first, last, bound, corridor)
+        if first in blocked or last in blocked:
+            return CellPath(None, 0)
+        touched, masks = _kernels.forbid(self._moves, self._cols, blocked, self._corner_cutting)
+        try:
+            return self._path(first, last, bound, corridor)
+        finally:
+            self._moves[touched] = masks
+
+    def _path(
+        self,
+        first: int,
+        last: int,
+        limit: int,
+        corridor: tuple[IntArray | None, BoolArray | None],
+    ) -> CellPath:
+        """Find a shortest path between two flat cells; `search` says what the rest means."""
+        cost = _kernels.NO_ROOM
+        while cost == _kernels.NO_ROOM:
+            if self._generation == _kernels.GENERATIONS:
+                self._records.fill(0)
+                self._generation = 0
+            self._generation += 1
+            cost, expanded = _kernels.astar(
+                self._moves,
+                self._cols,
+                (first, last),
+                limit,
+                *move_tables(corner_cutting=self._corner_cutting),
+                *corridor,
+                self._records,
+                self._generation,
+                self._waiting,
+            )
+            if cost == _kernels.NO_ROOM:
+                self._waiting = np.empty(2 * self._waiting.size, dtype=np.int32)
         if cost < 0:
             return CellPath(None, int(expanded))
-        flat = _kernels.trace(self._came, self._cols, first, last)
-        return CellPath(np.stack(divmod(flat, self._cols), axis=1), int(expanded))
+        cells: LongArray = _kernels.trace_cells(self._records, self._cols, first, last)
+        return CellPath(cells, int(expanded))
+
+
+@lru_cache
+def move_tables(*, corner_cutting: bool) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Successors of a cell x by the direction d of arrival from p and the mask of its legal moves.
+
+    A successor y is left out when a path from p to y that does without x is shorter, or as short
+    and diagonal first. So every cell y is still reached at its least cost, by induction over it:
+    take a cell x before y on a shortest path. Where x leaves y out for a path of the same length,
+    that is p to z along a diagonal, z to y along a side, and then z too lies before y on a shortest
+    path; and a cell never leaves out a successor along a side but for a shorter path.
+
+    Some of these paths stand on a third cell z, next to x: d straight, y one turn of 45 degrees to
+    the left or right of d, z two turns; d diagonal, y two turns, z three. These y are the detours,
+    and must be put back where z is outside a corridor. All other paths are one move from p to y.
+
+    Returns
+    -------
+    tuple
+        uint32 (9 * 256,) each, index 256 * d + mask, d = 8 for the start: the successors, and the
+        detours that are not among them. Moves are digits of four bits, 8 + direction, the first one
+        lowest.
+    """
+    mask = np.arange(256, dtype=np.uint32)
+    legal = [mask >> k & 1 == 1 for k in range(8)]
+    successors = np.zeros((9, 256), dtype=np.uint32)
+    detours = np.zeros((9, 256), dtype=np.uint32)
+    for d in range(8):
+        # Straight on is put first, so it comes last and is expanded next, before all waiting cells.
+        for turn in (0, 7, 1, 6, 2, 5, 3, 4):
+            k = (d + turn) & 7
+            kept, left_out = _after_turn(legal, d, turn, corner_cutting=corner_cutting)
+            _put_first(successors[d], legal[k] & kept, k)
+            _put_first(detours[d], legal[k] & left_out, k)
+    for k in range(8):
+        _put_first(successors[8], legal[k], k)
+    successors.flags.writeable = detours.flags.writeable = False
+    return successors.ravel(), detours.ravel()
+
+
+def _after_turn(
+    legal: list[BoolArray], d: int, turn: int, *, corner_cutting: bool
+) -> tuple[BoolArray, BoolArray]:
+    """For each mask: whether a move is a successor, and whether it is a detour, if it is legal."""
+    side = 1 if turn < 4 else -1  # noqa: PLR2004 - 8 directions
+    turns = min(turn, 8 - turn)
+    second, third = (legal[(d + side * n) & 7] for n in (2, 3))
+    never, always = np.zeros(256, dtype=np.bool_), np.ones(256, dtype=np.bool_)
+    if turns == 0 or (turns == 1 and d & 1):
+        return always, never
+    if turns == 1:
+        # The diagonal from p to z: illegal past a blocked cell, unless corners are cut.
+        open_way = second if corner_cutting else third
+        return ~open_way, open_way
+    if turns == 2:  # noqa: PLR2004
+        if d & 1:
+            return ~third, third
+        return (never if corner_cutting else ~third), never
+    return never, never
+
+
+def _put_first(lists: NDArray[np.uint32], where: BoolArray, k: int) -> None:
+    """Put a move before the others of some lists."""
+    lists[where] = lists[where] << 4 | 8 | k
