@@ -1,0 +1,230 @@
+"""Kernels that lead parts of a taut string past the other sides of obstacles.
+
+Positions are those of `_taut_kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hybridnav.refine._taut_kernels import FREE, tighten, turn_of
+
+_ROUND = 2.0**20
+_WIDEST = 8
+"""Segments of the longest part of a string that is led another way."""
+_SLACK = 0.002
+"""Share of its length by which a part of more than two segments must exceed the straight line to
+be tried; one of two is always tried, so no point stays that can be left out."""
+
+
+@njit(cache=True)
+def _cell_at(marks, u_row, u_col, w_row, w_col):
+    """Row and column of the free cell touched by u that lies nearest to w; row -1 for none."""
+    best, best_row, best_col = np.inf, -1, -1
+    rows, cols = marks.shape
+    for row in range(max(math.ceil(u_row) - 1, 0), min(math.floor(u_row) + 1, rows)):
+        for col in range(max(math.ceil(u_col) - 1, 0), min(math.floor(u_col) + 1, cols)):
+            distance = abs(row + 0.5 - w_row) + abs(col + 0.5 - w_col)
+            if distance < best and (marks[row, col] >= FREE):
+                best, best_row, best_col = distance, row, col
+    return best_row, best_col
+
+
+@njit(cache=True)
+def _add(string, size, row, col):
+    """Append a point that may give way; points of no size on the map's scale are rounded off."""
+    string[size, 0], string[size, 1] = (
+        np.rint(row * _ROUND) / _ROUND,
+        np.rint(col * _ROUND) / _ROUND,
+    )
+    string[size, 2] = 1.0
+    return size + 1
+
+
+@njit(cache=True)
+def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
+    """Walk cells straight from u to w, and round what is in the way always on one hand.
+
+    After V. Lumelsky, A. Stepanov: Path-planning strategies for a point mobile automaton, 1987
+    (Bug2). Gives up outside the ellipse in which a path shorter than `limit` stays. Writes the
+    points of the way, returns their number, 0 for none, and the number of steps. The points where
+    the way leaves and meets the straight line are rounded, so what is made of it must be judged.
+    """
+    rows, cols = marks.shape
+    row, col = _cell_at(marks, u_row, u_col, w_row, w_col)
+    to_row, to_col = w_row - u_row, w_col - u_col
+    distance = math.hypot(to_row, to_col)
+    if row < 0 or distance == 0.0:
+        return 0, 0
+    string[0, 0], string[0, 1], string[0, 2] = u_row, u_col, 1.0
+    per_row = 1 / to_row if to_row != 0.0 else np.inf
+    per_col = 1 / to_col if to_col != 0.0 else np.inf
+    row_side, col_side = (to_row > 0) - u_row, (to_col > 0) - u_col
+    row_turn, col_turn = 1 if to_row > 0 else 3, 0 if to_col > 0 else 2
+    reach = (abs(to_row) + abs(to_col)) / 2
+    size, last, hit, follows, heading = 1, -1, 0.0, False, 0
+    # A cell's centre may lie a little outside where the string does not.
+    limit += 0.5
+    n_steps = int(3 * limit) + 16
+    for step in range(n_steps):
+        if size + 6 > string.shape[0]:
+            break
+        if follows:
+            d_row, d_col = row + 0.5 - u_row, col + 0.5 - u_col
+            done = (to_row * d_row + to_col * d_col) / (distance * distance)
+            if abs(to_row * d_col - to_col * d_row) <= reach and done > hit:
+                follows = False
+                size = _add(string, size, row + 0.5, col + 0.5)
+                meet_row, meet_col = u_row + done * to_row, u_col + done * to_col
+                meet_row = min(max(meet_row, float(row)), row + 1.0)
+                meet_col = min(max(meet_col, float(col)), col + 1.0)
+                size = _add(string, size, meet_row, meet_col)
+        if follows:
+            heading = (heading - hand) & 3
+        else:
+            # Where the line leaves the cell, as a share of its length.
+            at_row = (row + row_side) * per_row if to_row != 0.0 else np.inf
+            at_col = (col + col_side) * per_col if to_col != 0.0 else np.inf
+            at = min(at_row, at_col)
+            if at >= 1.0 - 1e-12:
+                string[size, 0], string[size, 1], string[size, 2] = w_row, w_col, 1.0
+                return size + 1, step
+            heading = row_turn if at_row < at_col else col_turn
+        free_way = False
+        for _ in range(4):
+            n_row = row + (heading == 1) - (heading == 3)
+            n_col = col + (heading == 0) - (heading == 2)
+            if 0 <= n_row < rows and 0 <= n_col < cols and (marks[n_row, n_col] >= FREE):
+                free_way = True
+                break
+            if not follows:
+                follows, hit, last = True, at + 0.5 / distance, -1
+                hit_row = min(max(u_row + at * to_row, float(row)), row + 1.0)
+                hit_col = min(max(u_col + at * to_col, float(col)), col + 1.0)
+                size = _add(string, size, hit_row, hit_col)
+            heading = (heading + hand) & 3
+        if not free_way:
+            return 0, step
+        if follows:
+            if heading != last:
+                size = _add(string, size, row + 0.5, col + 0.5)
+                last = heading
+            from_row, from_col = n_row + 0.5 - u_row, n_col + 0.5 - u_col
+            d_row, d_col = from_row - to_row, from_col - to_col
+            way = math.sqrt(from_row * from_row + from_col * from_col)
+            if way + math.sqrt(d_row * d_row + d_col * d_col) > limit:
+                return 0, step
+        row, col = n_row, n_col
+    return 0, step
+
+
+@njit(cache=True)
+def _is_legal(marks, a_row, a_col, b_row, b_col):
+    """Whether a segment, which is not a point, stays in the closed free cells; exact.
+
+    Walks the cells that it enters (J. Amanatides, A. Woo: A fast voxel traversal algorithm for ray
+    tracing, 1987); a segment along a line between cells needs one of the two free at each step.
+    """
+    rows, cols = marks.shape
+    if a_row == b_row or a_col == b_col:
+        lies = a_row == b_row
+        low, high = (
+            (min(a_col, b_col), max(a_col, b_col))
+            if lies
+            else (min(a_row, b_row), max(a_row, b_row))
+        )
+        fixed = a_row if lies else a_col
+        before_first = before_second = True
+        for k in range(math.floor(low), math.ceil(high)):
+            line = math.floor(fixed)
+            first = line < (rows if lies else cols) and (
+                (marks[line, k] >= FREE) if lies else (marks[k, line] >= FREE)
+            )
+            second = (
+                fixed == line
+                and line > 0
+                and ((marks[line - 1, k] >= FREE) if lies else (marks[k, line - 1] >= FREE))
+            )
+            # Out of one free cell into the other across the corner between them is no way.
+            if not (first and before_first) and not (second and before_second):
+                return False
+            before_first, before_second = first, second
+        return True
+    if b_col < a_col:
+        a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
+    up = b_row > a_row
+    turn = 1 if up else -1
+    row, col = math.floor(a_row) if up else math.ceil(a_row) - 1, math.floor(a_col)
+    last_row, last_col = math.ceil(b_row) - 1 if up else math.floor(b_row), math.ceil(b_col) - 1
+    while marks[row, col] >= FREE:
+        if row == last_row and col == last_col:
+            return True
+        # On which side of the segment the corner ahead lies.
+        side = turn * turn_of(a_row, a_col, b_row, b_col, row + 0.0 + up, col + 1.0)
+        if side == 0 and not (marks[row, col + 1] >= FREE) and not (marks[row + turn, col] >= FREE):
+            return False
+        row += turn * (side >= 0)
+        col += side <= 0
+    return False
+
+
+@njit(cache=True)
+def _length(string, first, last):
+    """Length of a part of a string."""
+    total = 0.0
+    for i in range(first, last):
+        d_row, d_col = string[i + 1, 0] - string[i, 0], string[i + 1, 1] - string[i, 1]
+        total += math.sqrt(d_row * d_row + d_col * d_col)
+    return total
+
+
+@njit(cache=True)
+def improve(marks, string, n, budget):
+    """Lead parts of a taut string past other sides of obstacles wherever that makes it shorter.
+
+    Parts of two to `_WIDEST` segments, short ones first, until the budget of steps is used up.
+    """
+    room = np.empty((256, 3))
+    for span in range(2, _WIDEST + 1):
+        i = 0
+        while i < n - span:
+            j, i = i + span, i + 1
+            length = _length(string, i - 1, j)
+            u_row, u_col, w_row, w_col = (
+                string[i - 1, 0],
+                string[i - 1, 1],
+                string[j, 0],
+                string[j, 1],
+            )
+            if length - math.hypot(w_row - u_row, w_col - u_col) < _SLACK * length * (span > 2):
+                continue
+            for hand in (1, -1):
+                if budget <= 0:
+                    return string, n
+                size, steps = _way_round(marks, room, u_row, u_col, w_row, w_col, length, hand)
+                budget -= steps + 20
+                if size == 0:
+                    continue
+                budget -= 10 * size
+                way, size = tighten(marks, room[:size].copy(), size)
+                if _length(way, 0, size - 1) > length - 1e-9:
+                    continue
+                legal = True
+                for k in range(size - 1):
+                    legal = legal and _is_legal(
+                        marks, way[k, 0], way[k, 1], way[k + 1, 0], way[k + 1, 1]
+                    )
+                if not legal:
+                    continue
+                larger = np.empty((n - span + size - 1, 3))
+                larger[:i] = string[:i]
+                larger[i : i - 1 + size] = way[1:size]
+                larger[i - 1 + size :] = string[j + 1 : n]
+                larger[:, 2] = 1.0
+                string, n = tighten(marks, larger, larger.shape[0])
+                i = max(i - 3, 0)
+                break
+    return string, n
