@@ -53,6 +53,7 @@ def settings(rooms):
     """A run of a second or two."""
     return RunSettings(
         maps=(str(rooms),),
+        presets=("paper",),
         baselines=(name_of(faulty.Slow), "simple-graph"),
         pairs=N_PAIRS,
         merge_distance_m=4.0,

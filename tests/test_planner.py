@@ -373,7 +373,7 @@ def test_a_preset_is_a_name_a_file_or_an_object(tmp_path: Path) -> None:
         result = hn.HybridPlanner(topology, preset=preset).plan(*ends)
         assert result.settings["preset"] == "mine"
         assert result.cost == whole.cost
-    assert hn.HybridPlanner(topology).preset.name == "paper"
+    assert hn.HybridPlanner(topology).preset.name == "balanced"
     with pytest.raises(hn.PresetNotFoundError, match="no preset is called 'papers'"):
         hn.HybridPlanner(topology, preset="papers")
 
@@ -403,23 +403,32 @@ def test_a_result_records_how_the_pyramid_was_built_and_not_what_the_preset_says
     ],
 )
 @pytest.mark.parametrize("goal", [(8.5, 0.5), (3.5, 2.5), (99.0, 0.0)])
-def test_a_result_is_json(build: dict[str, Any], goal: tuple[float, float]) -> None:
-    result = hn.HybridPlanner(map_of(SEALED, **build)).plan((0.5, 0.5), goal)
+@pytest.mark.parametrize(
+    ("preset", "seconds"), [("paper", {"coarse", "refine"}), ("grid-astar", {"refine"})]
+)
+def test_a_result_is_json(
+    build: dict[str, Any], goal: tuple[float, float], preset: str, seconds: set[str]
+) -> None:
+    result = hn.HybridPlanner(map_of(SEALED, **build), preset=preset).plan((0.5, 0.5), goal)
     # Neither NaN nor Infinity: they are no JSON, and strict readers refuse them.
     read = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     keys = {"status", "metric", "length_m", "places", "arcs", "points_m", "expanded", "seconds"}
     assert keys <= set(read)
     assert read["status"] == str(result.status)
     assert read["metric"] == "octile"
-    if result.path is None or result.route is None:
+    if result.path is None:
         assert read["length_m"] is read["places"] is read["arcs"] is read["points_m"] is None
         return
     assert read["length_m"] == result.path.length_m
     assert read["points_m"] == pytest.approx(result.path.points, abs=1e-6)
-    assert read["places"] == list(result.route.places)
-    assert read["arcs"] == list(result.route.arcs)
+    if preset == "grid-astar":
+        assert read["places"] is read["arcs"] is result.route is None
+    else:
+        assert result.route is not None
+        assert read["places"] == list(result.route.places)
+        assert read["arcs"] == list(result.route.arcs)
     assert read["expanded"] == result.stats.expanded > 0
-    assert set(read["seconds"]) == {"coarse", "refine"}
+    assert set(read["seconds"]) == seconds
 
 
 def test_numbers_of_numpy_give_the_answers_of_plain_ones() -> None:

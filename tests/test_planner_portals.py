@@ -15,7 +15,10 @@ from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import path_length_in_cells
 from tests.strategies import scenes
 
-PRESETS = ("fast", "balanced")
+PRESETS = ("fast", "balanced", "certified")
+LOSSES = {"fast": (0.004, 0.03), "balanced": (0.0002, 0.01), "certified": (0.001, 0.01)}
+"""Mean and greatest loss that the presets may have on the office; certified stops once 1 % is
+proved, and may lose more on average than balanced, which proves nothing."""
 
 
 def planned(planner, start, goal):
@@ -27,6 +30,11 @@ def planned(planner, start, goal):
 def office():
     grid = office_world().grid(robot_radius_m=0.25)
     return hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+
+
+@pytest.fixture(scope="module")
+def planners(office):
+    return {preset: hn.HybridPlanner(office, preset=preset) for preset in PRESETS}
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +79,8 @@ def test_paths_are_legal_and_walk_along_arcs_on_any_map(scene, preset):
 
 
 @pytest.mark.parametrize("preset", PRESETS)
-def test_the_office_is_planned_well(office, pairs, preset):
-    planner = hn.HybridPlanner(office, preset=preset)
+def test_the_office_is_planned_well(office, planners, pairs, preset):
+    planner = planners[preset]
     checks = Consistency(office.grid, office.level.field_of, topology=office)
     search = GridSearch(office.grid.classes == hn.CellClass.FREE)
     losses = []
@@ -83,20 +91,28 @@ def test_the_office_is_planned_well(office, pairs, preset):
         if optimum is not None:
             length = path_length_in_cells(optimum) * office.grid.resolution_m
             losses.append(result.cost / length - 1)
-    mean, most = {"fast": (0.006, 0.05), "balanced": (0.0005, 0.01)}[preset]
+    mean, most = LOSSES[preset]
     assert np.mean(losses) < mean
     assert max(losses) < most
 
 
-def test_the_optimum_of_the_corridor_is_no_longer_than_the_stored_path(office, pairs):
-    fast, balanced = (hn.HybridPlanner(office, preset=preset) for preset in PRESETS)
-    for pair in pairs[:40]:
-        one, other = (planned(planner, pair.start, pair.goal) for planner in (fast, balanced))
-        assert other.cost <= one.cost * (1 + 1e-9)
+def test_more_work_makes_no_path_longer(planners, pairs):
+    for pair in pairs:
+        costs = [planned(planners[preset], pair.start, pair.goal).cost for preset in PRESETS]
+        assert costs[1] <= costs[0] * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("distance_m", [0.5, 4.0, float("inf")])
-def test_any_merge_distance_of_the_places_will_do(distance_m):
+def test_certified_proves_its_epsilon_on_every_query(planners, pairs):
+    results = [planned(planners["certified"], pair.start, pair.goal) for pair in pairs]
+    gaps = [result.gap for result in results if result.solved]
+    assert len(gaps) > 100
+    assert max(gaps) <= 0.01 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "most"), [(0.5, 0.06), (2.0, 0.03), (4.0, 0.03), (float("inf"), 0.03)]
+)
+def test_any_merge_distance_of_the_places_will_do(distance_m, most):
     grid = office_world().grid(robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=distance_m))
     planner = hn.HybridPlanner(topology, preset="fast")
@@ -106,22 +122,23 @@ def test_any_merge_distance_of_the_places_will_do(distance_m):
         result = planned(planner, pair.start, pair.goal)
         assert result.solved == (optimum is not None)
         if optimum is not None:
-            assert result.cost <= path_length_in_cells(optimum) * grid.resolution_m * 1.06
+            assert result.cost <= path_length_in_cells(optimum) * grid.resolution_m * (1 + most)
 
 
-def test_unexplored_cells_are_entered_where_they_may_be():
+@pytest.mark.parametrize("preset", PRESETS)
+def test_unexplored_cells_are_entered_where_they_may_be(preset):
     classes = np.zeros((9, 30), dtype=np.float32)
     classes[:, 12:18] = 0.5
     grid = hn.OccupancyGrid(classes, hn.Frame(0.05))
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=0.3))
-    plain = hn.HybridPlanner(topology, preset="fast")
+    plain = hn.HybridPlanner(topology, preset=preset)
     assert planned(plain, (4, 2), (4, 27)).status is hn.PlanStatus.NO_PATH
-    open_preset = hn.load_preset("fast", overrides=["planner.allow_unexplored=true"])
+    open_preset = hn.load_preset(preset, overrides=["planner.allow_unexplored=true"])
     result = planned(hn.HybridPlanner(topology, preset=open_preset), (4, 2), (4, 27))
     assert result.solved
-    assert result.cost >= 25 * 0.05 * (1 - 1e-9)
+    assert result.cost == pytest.approx(25 * 0.05)
 
 
 def test_stored_paths_need_portals():
-    with pytest.raises(hn.PresetError, match="stored-paths needs coarse: portals"):
+    with pytest.raises(hn.PresetError, match="coarse: portals goes with refine"):
         hn.load_preset("paper", overrides=["planner.refine=stored-paths"])

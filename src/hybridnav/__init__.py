@@ -23,14 +23,15 @@ if TYPE_CHECKING:
     )
     from hybridnav.grid import CellClass, Frame, OccupancyGrid
     from hybridnav.io import load_map
-    from hybridnav.planner import HybridPlanner
+    from hybridnav.planner import Blocked, HybridPlanner
     from hybridnav.pyramid import DualGraphPyramid, Level
-    from hybridnav.result import Path, PlanResult, PlanStatus, Route
+    from hybridnav.result import Path, PlanBatch, PlanResult, PlanStatus, Route
     from hybridnav.topology import TopologicalMap
 
 __version__ = "0.1.0"
 
 _HOME_OF = {
+    "Blocked": "planner",
     "CellClass": "grid",
     "DualGraphPyramid": "pyramid",
     "Frame": "grid",
@@ -43,6 +44,7 @@ _HOME_OF = {
     "MapWarning": "errors",
     "OccupancyGrid": "grid",
     "Path": "result",
+    "PlanBatch": "result",
     "PlanError": "errors",
     "PlanResult": "result",
     "PlanStatus": "result",
@@ -57,6 +59,7 @@ _HOME_OF = {
 }
 
 __all__ = [
+    "Blocked",
     "CellClass",
     "DualGraphPyramid",
     "Frame",
@@ -69,6 +72,7 @@ __all__ = [
     "MapWarning",
     "OccupancyGrid",
     "Path",
+    "PlanBatch",
     "PlanError",
     "PlanResult",
     "PlanStatus",

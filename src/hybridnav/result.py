@@ -15,9 +15,9 @@ from hybridnav.errors import PlanError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import AnyArray, FloatArray, LongArray
 
-Metric = Literal["octile"]
+Metric = Literal["octile", "any-angle"]
 
 
 class PlanStatus(StrEnum):
@@ -30,19 +30,24 @@ class PlanStatus(StrEnum):
     GOAL_OCCUPIED = "goal occupied"
     START_UNEXPLORED = "start unexplored"
     GOAL_UNEXPLORED = "goal unexplored"
+    START_BLOCKED = "start blocked"
+    GOAL_BLOCKED = "goal blocked"
     NO_PATH = "no path"
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A path through the grid, from the centre of the start's cell to that of the goal's."""
+    """A path through the grid: from the centre of the start's cell to that of the goal's, or an
+    any-angle one from point to point."""
 
     cells: LongArray
-    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours."""
+    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. Of an
+    any-angle path those of the cell path that was shortened."""
     points: FloatArray
-    """float64 (n, 2), their centres as (x, y) in metres, map frame."""
+    """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
+    where an any-angle path turns."""
     length_m: float
-    """Length in metres, counted as a + b sqrt 2 cells from the moves."""
+    """Length in metres, of a cell path counted as a + b sqrt 2 cells from the moves."""
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False
@@ -67,10 +72,42 @@ class PlanStats:
     """Cells that the refiner expanded."""
     expanded_places: int = 0
     """Places that the coarse search expanded."""
+    expanded_gates: int = 0
+    """Border cells that the search over portals expanded."""
     corridor_cells: int = 0
-    """Cells in the corridor; 0 where the corridor is the whole map."""
+    """Cells in the corridor; 0 where it is the whole map, or the route leads over portals."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall-clock seconds per stage."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanBatch:
+    """Outcomes of many queries, arrays of n."""
+
+    status: AnyArray
+    """str (n,), the values of `PlanStatus`."""
+    cost: FloatArray
+    """float64 (n,), metres; infinite where there is no path."""
+    lower_bound: FloatArray
+    """float64 (n,), metres."""
+    path_start: LongArray
+    """int64 (n + 1,), query i has the points `path_start[i]` to `path_start[i + 1]`."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame, of all paths."""
+
+    @property
+    def gap(self) -> FloatArray:
+        """float64 (n,), proved distances from the optimum; NaN where there is no path."""
+        gap = np.full(len(self.cost), np.nan)
+        solved = np.isfinite(self.cost)
+        np.divide(self.cost, self.lower_bound, out=gap, where=solved & (self.lower_bound > 0))
+        gap[solved & (self.lower_bound <= 0)] = 1.0
+        return gap - 1
+
+    def path(self, query: int) -> FloatArray:
+        """Points of one path, float64 (k, 2); none where there is no path."""
+        points: FloatArray = self.points[self.path_start[query] : self.path_start[query + 1]]
+        return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +172,7 @@ class PlanResult:
             "points_m": np.round(self.path.points, 6).tolist() if self.path else None,
             "expanded": self.stats.expanded,
             "expanded_places": self.stats.expanded_places,
+            "expanded_gates": self.stats.expanded_gates,
             "corridor_cells": self.stats.corridor_cells,
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "settings": _finite(self.settings),

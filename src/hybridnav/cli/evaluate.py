@@ -102,7 +102,7 @@ def evaluate(
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
-    names = preset if preset is not None else ([] if baseline else ["paper"])
+    names = preset if preset is not None else ([] if baseline else ["balanced"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
         presets=tuple(read_settings(name, overrides, None, None) for name in names),

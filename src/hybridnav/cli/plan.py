@@ -64,7 +64,7 @@ def plan(
     map_file: MapArgument,
     start: StartOption,
     goal: GoalOption,
-    preset: PresetOption = "paper",
+    preset: PresetOption = "balanced",
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,
@@ -104,13 +104,13 @@ def _compare(
     result: hn.PlanResult,
 ) -> dict[str, Any]:
     """Plan on the whole grid too and set the result against it."""
-    whole = settings.planner.model_copy(update={"coarse": "none"})
+    whole = settings.planner.model_copy(update={"coarse": "none", "smooth": "none"})
     baseline = settings.model_copy(update={"name": "grid-astar", "planner": whole})
     grid_result = hn.HybridPlanner(topology, preset=baseline).plan(*ends)
     optimum_m, loss = None, None
     if grid_result.solved:
         optimum_m = grid_result.cost
-        if result.solved:
+        if result.solved and result.metric == grid_result.metric:
             loss = result.cost / optimum_m - 1 if optimum_m > 0 else 0.0
     return {
         "optimum_m": optimum_m,
@@ -149,9 +149,13 @@ def _summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[st
         for key in ("places", "arcs"):
             ids = figures[key]
             lines.append(f"{key:<10} {len(ids)}: {' '.join(map(str, ids))}".rstrip(": "))
-    if figures["expanded"] or figures["expanded_places"]:
-        places = f", {n:,} places" if (n := figures["expanded_places"]) else ""
-        lines.append(f"expanded   {figures['expanded']:,} cells{places}")
+    expanded = [
+        f"{n:,} {what}"
+        for what in ("cells", "places", "gates")
+        if (n := figures["expanded" if what == "cells" else f"expanded_{what}"])
+    ]
+    if expanded:
+        lines.append(f"expanded   {', '.join(expanded)}")
     lines += _comparison(figures)
     lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"

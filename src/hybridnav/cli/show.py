@@ -41,7 +41,7 @@ LevelOption = Annotated[
 def show(
     map_file: MapArgument,
     level: LevelOption = -1,
-    preset: PresetOption = "paper",
+    preset: PresetOption = "balanced",
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,

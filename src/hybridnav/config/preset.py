@@ -70,17 +70,26 @@ class PlannerSettings(_Section):
     of fields of its own; `none` makes the whole map the corridor."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields the refiner may stand on: those of the route, or also their neighbours'."""
-    refine: Literal["grid-astar", "stored-paths"] = "grid-astar"
-    """How a path is found inside the corridor; `stored-paths` needs no search, and portals."""
+    refine: Literal["grid-astar", "gates", "stored-paths"] = "grid-astar"
+    """How a path is found inside the corridor: cell by cell, or, over portals, by a search on the
+    border cells of the fields or by the stored paths alone."""
+    epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
+    """With `gates`: the corridor widens until no path can be shorter by more than this part; 0 for
+    the optimum. Null keeps to the corridor."""
+    smooth: Literal["none", "line-of-sight"] = "none"
+    """Whether the path is shortened to an any-angle one."""
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
 
     @model_validator(mode="after")
-    def _stored_paths_lead_to_portals(self) -> Self:
-        if self.refine == "stored-paths" and self.coarse != "portals":
+    def _go_together(self) -> Self:
+        if (self.refine == "grid-astar") == (self.coarse == "portals"):
             raise PydanticCustomError(
-                "portals_needed", "refine: stored-paths needs coarse: portals"
+                "portals_needed",
+                "coarse: portals goes with refine: gates or stored-paths, and they with it",
             )
+        if self.epsilon is not None and self.refine != "gates":
+            raise PydanticCustomError("gates_needed", "epsilon needs refine: gates")
         return self
 
 

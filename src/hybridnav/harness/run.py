@@ -46,7 +46,7 @@ class RunSettings:
     """What a run evaluates; see `evaluate`."""
 
     maps: tuple[str, ...]
-    presets: tuple[str | Preset, ...] = ("paper",)
+    presets: tuple[str | Preset, ...] = ("balanced",)
     baselines: tuple[str, ...] = ()
     pairs: int | None = None
     """Sampled pairs a map, 100 unless given; of a scenario file as many, evenly spread over it, or

@@ -4,28 +4,34 @@ from __future__ import annotations
 
 import math
 import time
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.refine import GridRefiner, path_of
-from hybridnav.result import PlanResult, PlanStats, PlanStatus, Route
-from hybridnav.route import MaxDistanceSearch, PortalSearch, Walks, corridor_of
-from hybridnav.search.octile import octile_distance_in_cells
+from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
+from hybridnav.refine import GridRefiner, LineOfSight
+from hybridnav.result import Path, PlanBatch, PlanResult, PlanStats, PlanStatus, Route
+from hybridnav.route import Walks
+from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from collections.abc import Mapping
 
-    from hybridnav._typing import LongArray, PathLike
-    from hybridnav.refine import Refiner
-    from hybridnav.route import CoarseRoute, Corridor
+    from numpy.typing import ArrayLike
+    from shapely.geometry.base import BaseGeometry
+
+    from hybridnav._typing import FloatArray, LongArray, PathLike
+    from hybridnav.planner.blocked import Blocked
+    from hybridnav.planner.cell_plans import CellPlanner
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
+Smooth = Literal["none", "line-of-sight"]
 
 _BAD_START = {
     CellClass.OCCUPIED: PlanStatus.START_OCCUPIED,
@@ -54,29 +60,39 @@ class HybridPlanner:
         When the preset does not exist or is not valid.
     """
 
-    def __init__(self, topology: TopologicalMap, *, preset: PathLike | Preset = "paper") -> None:
+    def __init__(self, topology: TopologicalMap, *, preset: PathLike | Preset = "balanced") -> None:
         self.topology = topology
         self.preset = load_preset(preset)
         settings = self.preset.planner
-        self._coarse: MaxDistanceSearch | None = None
+        self._refiner = GridRefiner(topology.grid, allow_unexplored=settings.allow_unexplored)
+        self._cells: CellPlanner
         if settings.coarse == "max-distance":
-            self._coarse = MaxDistanceSearch(topology, allow_unexplored=settings.allow_unexplored)
-        self._portals: PortalSearch | None = None
-        if settings.coarse == "portals":
-            self._portals = PortalSearch(topology, allow_unexplored=settings.allow_unexplored)
-            self._walks = Walks(topology)
-        self._refiner: Refiner = GridRefiner(
-            topology.grid, allow_unexplored=settings.allow_unexplored
-        )
+            self._cells = MaxDistance(topology, self._refiner, settings)
+        elif settings.coarse == "portals":
+            self._cells = OverPortals(topology, self._refiner, settings)
+        else:
+            self._cells = WholeMap(self._refiner)
 
-    def plan(self, start: ArrayLike, goal: ArrayLike) -> PlanResult:
+    def plan(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        *,
+        smooth: Smooth | None = None,
+        blocked: Blocked | BaseGeometry | Mapping[str, Any] | None = None,
+    ) -> PlanResult:
         """Plan a path between two points.
 
         Parameters
         ----------
         start, goal
             `(x, y)` in metres, map frame. The path runs between the centres of the cells that hold
-            them; nothing is snapped to free space.
+            them, an any-angle one between the points; nothing is snapped to free space.
+        smooth
+            `"line-of-sight"` shortens the path to an any-angle one; None as the preset says.
+        blocked
+            What is closed for this query: a `Blocked`, a shapely geometry in metres, or a mapping
+            with keys of `Blocked`. Where it lies in the way the whole map is searched.
 
         Returns
         -------
@@ -86,9 +102,12 @@ class HybridPlanner:
         Raises
         ------
         InvalidValueError
-            When a point is not two finite numbers.
+            When a point is not two finite numbers, or what is blocked is not on the map.
         """
-        first, last = self._cell_of("start", start), self._cell_of("goal", goal)
+        ends = _point("start", start), _point("goal", goal)
+        finish = self._finish_asked_for(smooth)
+        closed = None if blocked is None else self._closed(blocked)
+        first, last = self._cell_of(ends[0]), self._cell_of(ends[1])
         if first is None:
             return self._answer(PlanStatus.START_OUTSIDE)
         if last is None:
@@ -96,83 +115,143 @@ class HybridPlanner:
         status = self._refusal(first, last)
         if status is not None:
             return self._answer(status)
-        if self._portals is not None:
-            return self._plan_over_portals(self._portals, first, last)
-        return self._plan_cells(first, last)
+        if closed is not None:
+            cols = self.topology.grid.shape[1]
+            for cell, refused in (
+                (first, PlanStatus.START_BLOCKED),
+                (last, PlanStatus.GOAL_BLOCKED),
+            ):
+                if _is_in(closed, cell[0] * cols + cell[1]):
+                    return self._answer(refused)
+        plan = self._cells.plan(first, last)
+        if closed is not None and plan.cells is not None:
+            plan = self._round(closed, plan, first, last)
+        return self._result(plan, ends, finish, closed)
 
-    def _plan_over_portals(self, search: PortalSearch, first: Cell, last: Cell) -> PlanResult:
-        began = time.perf_counter()
-        cells, expanded = search.path(first, last)
-        seconds = {"coarse": time.perf_counter() - began}
-        if cells is None:
-            return self._answer(PlanStatus.NO_PATH, stats=PlanStats(expanded, seconds=seconds))
-        n_cells = 0
-        if self.preset.planner.refine == "grid-astar":
-            corridor = search.corridor(cells)
-            n_cells = corridor.n_cells
-            path, refined = self._refiner.refine(first, last, corridor)
-            seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
-            expanded += refined
-        else:
-            path = path_of(self.topology.grid, cells)
-        if path is None:
-            return self._answer(PlanStatus.NO_PATH, stats=PlanStats(expanded, seconds=seconds))
-        walked = partial(self._walked, path.cells)
-        bound = octile_distance_in_cells(first, last) * self.topology.grid.resolution_m
-        return self._answer(
-            PlanStatus.SOLVED,
-            path=path,
-            route_source=walked,
-            lower_bound=min(bound, path.length_m),
-            stats=PlanStats(expanded, corridor_cells=n_cells, seconds=seconds),
+    def plan_many(
+        self, starts: ArrayLike, goals: ArrayLike, *, smooth: Smooth | None = None
+    ) -> PlanBatch:
+        """Plan paths between many pairs of points: the answers of `plan`, in arrays.
+
+        Parameters
+        ----------
+        starts, goals
+            `(x, y)` in metres, map frame, shape (n, 2) each.
+        smooth
+            As in `plan`.
+
+        Raises
+        ------
+        InvalidValueError
+            When the shapes differ or a coordinate is not finite.
+        """
+        first, last = _points("starts", starts), _points("goals", goals)
+        if len(first) != len(last):
+            raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
+        results = [self.plan(*pair, smooth=smooth) for pair in zip(first, last, strict=True)]
+        paths = [r.path.points if r.path else np.empty((0, 2)) for r in results]
+        return PlanBatch(
+            status=np.array([str(r.status) for r in results], dtype=np.str_),
+            cost=np.array([r.cost for r in results], dtype=np.float64),
+            lower_bound=np.array([r.lower_bound for r in results], dtype=np.float64),
+            path_start=np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64),
+            points=np.concatenate([np.empty((0, 2)), *paths]),
         )
 
-    def _plan_cells(self, first: Cell, last: Cell) -> PlanResult:
+    def _round(self, closed: LongArray, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
+        """The plan itself where nothing closed is in its way, else the best path round it all.
+
+        Closing cells makes no path shorter, so a bound stays one.
+        """
+        grid = self.topology.grid
+        assert plan.cells is not None  # noqa: S101 - the caller has looked
+        if not _meets(plan.cells, closed, grid.shape[1], corner_cutting=grid.corner_cutting):
+            return plan
         began = time.perf_counter()
-        route, corridor, solvable = self._choose_corridor(first, last)
-        chosen = time.perf_counter()
-        seconds = {"coarse": chosen - began}
-        expanded_places = route.expanded if route is not None else 0
-        if not solvable:
-            stats = PlanStats(expanded_places=expanded_places, seconds=seconds)
-            return self._answer(PlanStatus.NO_PATH, stats=stats)
-        path, expanded = self._refiner.refine(first, last, corridor)
-        seconds["refine"] = time.perf_counter() - chosen
-        stats = PlanStats(
+        found = self._refiner.search.search(first, last, blocked=closed)
+        seconds = {**plan.seconds, "around": time.perf_counter() - began}
+        expanded = plan.expanded + found.expanded
+        if found.cells is None:
+            return CellPlan(None, expanded=expanded, seconds=seconds)
+        bound = path_length_in_cells(found.cells)
+        walked = plan.route_source and partial(self._walked, found.cells)
+        return replace(
+            plan,
+            cells=found.cells,
+            points=None,
+            length_cells=bound,
+            bound_cells=bound,
+            route_source=walked,
             expanded=expanded,
-            expanded_places=expanded_places,
-            corridor_cells=corridor.n_cells if corridor is not None else 0,
             seconds=seconds,
         )
-        if path is None:
+
+    def _result(
+        self,
+        plan: CellPlan,
+        ends: tuple[FloatArray, FloatArray],
+        finish: Smooth,
+        closed: LongArray | None,
+    ) -> PlanResult:
+        stats = PlanStats(
+            expanded=plan.expanded,
+            expanded_places=plan.expanded_places,
+            expanded_gates=plan.expanded_gates,
+            corridor_cells=plan.corridor_cells,
+            seconds=plan.seconds,
+        )
+        if plan.cells is None:
             return self._answer(PlanStatus.NO_PATH, stats=stats)
-        bound = path.length_m
-        if corridor is not None:
-            bound = octile_distance_in_cells(first, last) * self.topology.grid.resolution_m
+        source = plan.route_source
+        if source is None and self.preset.planner.coarse == "portals":
+            source = partial(self._walked, plan.cells)
+        if finish == "line-of-sight":
+            began = time.perf_counter()
+            points = self._sight(closed).shorten(plan.cells, *ends)
+            length_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
+            stats.seconds["smooth"] = time.perf_counter() - began
+            path, metric = Path(plan.cells, points, length_m), "any-angle"
+            bound = float(np.hypot(*(ends[1] - ends[0])))
+        else:
+            grid = self.topology.grid
+            centres = plan.points if plan.points is not None else grid.frame.points_of(plan.cells)
+            length = plan.length_cells or path_length_in_cells(plan.cells)
+            length_m = length * grid.resolution_m
+            path, metric = Path(plan.cells, centres, length_m), "octile"
+            bound = plan.bound_cells * grid.resolution_m
         return self._answer(
             PlanStatus.SOLVED,
+            metric=metric,
             path=path,
-            route_source=None if route is None else partial(self._route, route),
-            lower_bound=min(bound, path.length_m),
+            route_source=source,
+            lower_bound=min(bound, length_m),
             stats=stats,
         )
 
-    def _choose_corridor(
-        self, start: Cell, goal: Cell
-    ) -> tuple[CoarseRoute | None, Corridor | None, bool]:
-        """The coarse route, its corridor (None: the whole map), and whether there may be a path."""
-        if self._coarse is None:
-            return None, None, True
-        topology = self.topology
-        route = self._coarse.search(topology.place_at(start), topology.place_at(goal))
-        if route is None:
-            return None, None, False
-        beside = self._coarse.enterable if self.preset.planner.corridor == "neighbours" else None
-        return route, corridor_of(topology, route.places, neighbours=beside), True
+    def _sight(self, closed: LongArray | None) -> LineOfSight:
+        """What shortens paths; with closed cells one made for the query."""
+        if closed is None:
+            return self._line_of_sight
+        allowed = self.preset.planner.allow_unexplored
+        return LineOfSight(self.topology.grid, allow_unexplored=allowed, closed=closed)
 
-    def _route(self, coarse: CoarseRoute) -> Route:
-        places, arcs = self.topology.place_ids, self.topology.arc_ids
-        return Route(tuple(places[coarse.places].tolist()), tuple(arcs[coarse.arcs].tolist()))
+    @cached_property
+    def _line_of_sight(self) -> LineOfSight:
+        allowed = self.preset.planner.allow_unexplored
+        return LineOfSight(self.topology.grid, allow_unexplored=allowed)
+
+    def _finish_asked_for(self, smooth: Smooth | None) -> Smooth:
+        if smooth is None:
+            return self.preset.planner.smooth
+        if smooth not in get_args(Smooth):
+            raise InvalidValueError(
+                f"smooth must be 'none' or 'line-of-sight', or None, got {smooth!r:.80}"
+            )
+        return smooth
+
+    @cached_property
+    def _walks(self) -> Walks:
+        return Walks(self.topology)
 
     def _walked(self, cells: LongArray) -> Route:
         """The places and arcs that a path passes."""
@@ -180,34 +259,42 @@ class HybridPlanner:
         ids = self.topology.place_ids, self.topology.arc_ids
         return Route(tuple(ids[0][places].tolist()), tuple(ids[1][arcs].tolist()))
 
+    def _closed(self, blocked: Blocked | BaseGeometry | Mapping[str, Any]) -> LongArray:
+        # Loads shapely, which most queries can do without.
+        from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
+
+        return as_blocked(blocked).cells_of(self.topology)
+
     def _refusal(self, start: Cell, goal: Cell) -> PlanStatus | None:
         """Status of a query that cannot be planned for where its ends lie."""
         for cell, bad in ((start, _BAD_START), (goal, _BAD_GOAL)):
-            of_class = CellClass(self.topology.grid.classes[cell])
-            if of_class is CellClass.UNEXPLORED and self.preset.planner.allow_unexplored:
+            of_class = int(self.topology.grid.classes[cell])
+            if of_class == CellClass.FREE:
                 continue
-            if of_class in bad:
-                return bad[of_class]
+            if of_class == CellClass.UNEXPLORED and self.preset.planner.allow_unexplored:
+                continue
+            return bad[CellClass(of_class)]
         return None
 
-    def _cell_of(self, name: str, point: ArrayLike) -> Cell | None:
+    def _cell_of(self, point: FloatArray) -> Cell | None:
         """The cell that holds a point, None where it lies outside the map."""
-        try:
-            xy = np.asarray(point, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            xy = np.empty(0)
-        if xy.shape != (2,) or not all(map(math.isfinite, xy)):
-            raise InvalidValueError(
-                f"{name} must be two finite coordinates (x, y) in metres, got {point!r:.80}"
-            )
-        row, col = self.topology.grid.frame.cells_of(xy).tolist()
+        row, col = self.topology.grid.frame.cell_of(float(point[0]), float(point[1]))
         rows, cols = self.topology.grid.shape
         return (row, col) if 0 <= row < rows and 0 <= col < cols else None
 
     def _answer(self, status: PlanStatus, **outcome: Any) -> PlanResult:
         """A result that records the preset and how the pyramid was built."""
-        pyramid = self.topology.pyramid
+        # Each result has its own: whoever changes one must not change the next.
         settings = {
+            key: dict(value) if isinstance(value, dict) else value
+            for key, value in self._settings.items()
+        }
+        return PlanResult(status, settings=settings, **outcome)
+
+    @cached_property
+    def _settings(self) -> dict[str, Any]:
+        pyramid = self.topology.pyramid
+        return {
             "preset": self.preset.name,
             "planner": self.preset.planner.model_dump(),
             "pyramid": {
@@ -217,4 +304,45 @@ class HybridPlanner:
                 "robot_radius_m": pyramid.grid.robot_radius_m,
             },
         }
-        return PlanResult(status, settings=settings, **outcome)
+
+
+def _point(name: str, point: ArrayLike) -> FloatArray:
+    try:
+        xy = np.asarray(point, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        xy = np.empty(0)
+    if xy.shape != (2,) or not (math.isfinite(xy[0]) and math.isfinite(xy[1])):
+        raise InvalidValueError(
+            f"{name} must be two finite coordinates (x, y) in metres, got {point!r:.80}"
+        )
+    return xy
+
+
+def _points(name: str, points: ArrayLike) -> FloatArray:
+    try:
+        xy = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        xy = np.full(1, np.nan)
+    if xy.shape in {(0,), (0, 2)}:
+        return np.empty((0, 2))
+    if xy.ndim != 2 or xy.shape[1] != 2 or not np.isfinite(xy).all():  # noqa: PLR2004
+        raise InvalidValueError(
+            f"{name} must be finite coordinates (x, y) in metres, shape (n, 2), got {points!r:.80}"
+        )
+    return xy
+
+
+def _is_in(sorted_cells: LongArray, cell: int) -> bool:
+    at = int(np.searchsorted(sorted_cells, cell))
+    return at < len(sorted_cells) and int(sorted_cells[at]) == cell
+
+
+def _meets(cells: LongArray, closed: LongArray, cols: int, *, corner_cutting: bool) -> bool:
+    """Whether a path stands on a closed cell, or passes one on a diagonal where that counts."""
+    flat = cells[:, 0] * cols + cells[:, 1]
+    if corner_cutting:
+        return bool(np.isin(flat, closed).any())
+    sides = np.concatenate(
+        [cells[:-1, 0] * cols + cells[1:, 1], cells[1:, 0] * cols + cells[:-1, 1]]
+    )
+    return bool(np.isin(np.concatenate([flat, sides]), closed).any())

@@ -1,5 +1,6 @@
-"""Refiners: from a corridor to a metric path, behind one protocol."""
+"""From corridors to paths: grid search inside them, and the any-angle finish."""
 
-from hybridnav.refine.grid import GridRefiner, Refiner, path_of
+from hybridnav.refine.grid import GridRefiner, Refiner
+from hybridnav.refine.line_of_sight import LineOfSight
 
-__all__ = ["GridRefiner", "Refiner", "path_of"]
+__all__ = ["GridRefiner", "LineOfSight", "Refiner"]

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from hybridnav.result import Path
 from hybridnav.search.grid_search import Cell, GridSearch
-from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
@@ -17,11 +15,13 @@ if TYPE_CHECKING:
 class Refiner(Protocol):
     """Turns a corridor into a path; the protocol of every refiner."""
 
-    def refine(self, start: Cell, goal: Cell, corridor: Corridor | None) -> tuple[Path | None, int]:
+    def refine(
+        self, start: Cell, goal: Cell, corridor: Corridor | None
+    ) -> tuple[LongArray | None, int]:
         """Find a path between two cells that stands on cells of the corridor only.
 
-        `None` as the corridor is the whole map. Returns the path, None where there is none, and
-        the number of expansions.
+        `None` as the corridor is the whole map. Returns the cells of the path, int64 (n, 2), None
+        where there is none, and the number of expansions.
         """
         ...
 
@@ -38,32 +38,17 @@ class GridRefiner:
     """
 
     def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
-        self._grid = grid
         enterable = grid.enterable(allow_unexplored=allow_unexplored)
-        self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
+        self.search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
 
-    def refine(self, start: Cell, goal: Cell, corridor: Corridor | None) -> tuple[Path | None, int]:
+    def refine(
+        self, start: Cell, goal: Cell, corridor: Corridor | None
+    ) -> tuple[LongArray | None, int]:
         """Find the shortest path between two cells; see `Refiner`."""
-        found = self._search.search(
+        found = self.search.search(
             start,
             goal,
             field_of=None if corridor is None else corridor.field_of,
             in_corridor=None if corridor is None else corridor.places,
         )
-        if found.cells is None:
-            return None, found.expanded
-        return path_of(self._grid, found.cells), found.expanded
-
-
-def path_of(grid: OccupancyGrid, cells: LongArray) -> Path:
-    """The path through the centres of some cells.
-
-    Parameters
-    ----------
-    grid
-        The map.
-    cells
-        int64 (n, 2), consecutive ones 8-neighbours.
-    """
-    length_m = path_length_in_cells(cells) * grid.resolution_m
-    return Path(cells, grid.frame.points_of(cells), length_m)
+        return found.cells, found.expanded

@@ -1,18 +1,16 @@
-"""Coarse routes on the topological map, and the corridors they open."""
+"""Coarse routes on the topological map, and routes over portals."""
 
 from hybridnav.route.coarse import CoarseRoute, MaxDistanceSearch
 from hybridnav.route.corridor import Corridor, corridor_of
-from hybridnav.route.portal_search import PortalSearch
-from hybridnav.route.portal_table import PortalRoute, PortalTable
+from hybridnav.route.portal_search import Effort, PortalSearch
 from hybridnav.route.walk import Walks
 
 __all__ = [
     "CoarseRoute",
     "Corridor",
+    "Effort",
     "MaxDistanceSearch",
-    "PortalRoute",
     "PortalSearch",
-    "PortalTable",
     "Walks",
     "corridor_of",
 ]

@@ -20,7 +20,7 @@ from hybridnav.search import _kernels
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, LongArray
 
 Cell = tuple[int, int]
 
@@ -66,7 +66,7 @@ class GridSearch:
         start: Cell,
         goal: Cell,
         *,
-        field_of: IntArray | None = None,
+        field_of: NDArray[np.int16 | np.int32] | None = None,
         in_corridor: BoolArray | None = None,
         limit: int | None = None,
         blocked: LongArray | None = None,
@@ -78,7 +78,7 @@ class GridSearch:
         start, goal
             Enterable cells as (row, col); with a corridor, inside it.
         field_of
-            int32 (rows, cols), a label for each enterable cell; None for the whole grid.
+            int16 or int32 (rows, cols), a label for each enterable cell; None for the whole grid.
         in_corridor
             bool, whether the cells of each label may be stood on; goes with `field_of`.
         limit
@@ -106,7 +106,7 @@ class GridSearch:
         first: int,
         last: int,
         limit: int,
-        corridor: tuple[IntArray | None, BoolArray | None],
+        corridor: tuple[NDArray[np.int16 | np.int32] | None, BoolArray | None],
     ) -> CellPath:
         """Find a shortest path between two flat cells; `search` says what the rest means."""
         cost = _kernels.NO_ROOM

@@ -38,6 +38,12 @@ def length_in_cells(cost: ArrayLike) -> FloatArray:
     return length
 
 
+def length_of_cost(cost: int) -> float:
+    """The same for one cost, without numpy."""
+    diagonal = cost % STRAIGHT * _INVERSE % STRAIGHT
+    return (cost - diagonal * DIAGONAL) // STRAIGHT + diagonal * math.sqrt(2.0)
+
+
 def path_length_in_cells(cells: LongArray) -> float:
     """Length of a path of 8-neighbour moves, counted as a + b sqrt 2.
 
@@ -48,6 +54,18 @@ def path_length_in_cells(cells: LongArray) -> float:
     """
     diagonal = int((np.abs(np.diff(cells, axis=0)).sum(axis=1) == 2).sum())  # noqa: PLR2004
     return (len(cells) - 1 - diagonal) + diagonal * math.sqrt(2.0)
+
+
+def cost_of(cells: LongArray) -> int:
+    """Integer cost of a path of 8-neighbour moves; see `_kernels` for its unit.
+
+    Parameters
+    ----------
+    cells
+        `(row, col)` of the cells passed, shape `(n, 2)`, n >= 1.
+    """
+    diagonal = int((np.abs(np.diff(cells, axis=0)).sum(axis=1) == 2).sum())  # noqa: PLR2004
+    return (len(cells) - 1 - diagonal) * STRAIGHT + diagonal * DIAGONAL
 
 
 def octile_distance_in_cells(first: ArrayLike, second: ArrayLike) -> float:

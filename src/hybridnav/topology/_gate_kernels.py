@@ -1,0 +1,236 @@
+"""Kernels that prepare portals: shortest paths inside fields, from many gates at once.
+
+Directions are those of `search._kernels`: 0 to 7, east and on counter-clockwise; 8 is the source.
+Cells of a field are numbered from 0, `n` stands for "no such neighbour".
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
+
+_ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
+_COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
+LANES = 16
+"""Gates that are searched from together: one cache line of costs a cell."""
+FAR = 1 << 30
+"""No path inside a field may cost as much; a diagonal more still fits int32."""
+_STRAIGHT = np.int32(STRAIGHT)
+_DIAGONAL = np.int32(DIAGONAL)
+SOURCE = 8
+
+
+@njit(cache=True)
+def neighbours_in_field(moves, cols, index, cells, first, out):
+    """Fill `out[i]` with the neighbours of each cell of a field, all legal moves inside it."""
+    n = cells.size
+    for i in range(n):
+        cell = np.int64(cells[i])
+        mask = moves[cell]
+        for k in range(8):
+            out[i, k] = n
+            if mask >> k & 1:
+                j = index[cell + _ROW_STEP[k] * cols + _COL_STEP[k]] - first
+                if 0 <= j < n:
+                    out[i, k] = j
+
+
+@njit(cache=True)
+def wave(near, n, source, cost, ring, order):
+    """Costs from one cell to all of its field, and the cells in the order they are reached.
+
+    Dijkstra's algorithm with buckets one straight step wide: no step is shorter, so a bucket is
+    final when its turn comes, and three buckets in turn are enough. `ring` is scratch, (3, size).
+    Gives the number of cells reached.
+    """
+    cost[:n] = FAR
+    count = np.zeros(3, np.int64)
+    cost[source] = 0
+    ring[0, 0] = source
+    count[0] = 1
+    turn = reached = 0
+    left = 1
+    while left > 0:
+        at = turn % 3
+        for i in range(count[at]):
+            cell = np.int64(ring[at, i])
+            here = cost[cell]
+            if here // STRAIGHT != turn:
+                continue
+            order[reached] = cell
+            reached += 1
+            for k in range(8):
+                j = near[cell, k]
+                if j == n:
+                    continue
+                new_cost = here + (_DIAGONAL if k & 1 else _STRAIGHT)
+                if new_cost >= cost[j]:
+                    continue
+                listed = cost[j] // STRAIGHT == new_cost // STRAIGHT
+                cost[j] = new_cost
+                if listed:
+                    continue
+                into = new_cost // STRAIGHT % 3
+                ring[into, count[into]] = j
+                count[into] += 1
+                left += 1
+        left -= count[at]
+        count[at] = 0
+        turn += 1
+    return reached
+
+
+@njit(cache=True)
+def _sweep(near, order, begin, end, step, cost, row, stale, lanes):
+    """Relax the stale cells of order[begin:end:step], all lanes at once; says if any changed.
+
+    The inner loops run over contiguous lanes and compile to vector instructions; unsigned offsets
+    keep out the test for negative indices.
+    """
+    any_changed = False
+    width = np.uint64(lanes)
+    for q in range(begin, end, step):
+        cell = np.uint64(order[q])
+        if not stale[cell]:
+            continue
+        stale[cell] = 0
+        at = cell * width
+        e, ne = np.uint64(near[cell, 0]) * width, np.uint64(near[cell, 1]) * width
+        n, nw = np.uint64(near[cell, 2]) * width, np.uint64(near[cell, 3]) * width
+        w, sw = np.uint64(near[cell, 4]) * width, np.uint64(near[cell, 5]) * width
+        s, se = np.uint64(near[cell, 6]) * width, np.uint64(near[cell, 7]) * width
+        changed = np.int32(0)
+        for lane in range(width):
+            straight = min(cost[e + lane], cost[n + lane], cost[w + lane], cost[s + lane])
+            diagonal = min(cost[ne + lane], cost[nw + lane], cost[sw + lane], cost[se + lane])
+            best = min(straight + _STRAIGHT, diagonal + _DIAGONAL, cost[at + lane])
+            changed |= best ^ cost[at + lane]
+            row[lane] = best
+        if changed != 0:
+            any_changed = True
+            for lane in range(width):
+                cost[at + lane] = row[lane]
+            for k in range(8):
+                stale[near[cell, k]] = 1
+    return any_changed
+
+
+@njit(cache=True)
+def relax(near, n, order, prefix, cost, row, stale, lanes):
+    """Costs from all lanes' sources, which lie among the first `prefix` cells of the order.
+
+    The order is one source's: round the sources it is swept to and fro until nothing changes, from
+    there on once or twice is nearly always enough. It ends when no cell can be improved, so the
+    costs are exact whatever the order is.
+    """
+    stale[: n + 1] = 0
+    for q in range(prefix):
+        stale[order[q]] = 1
+    while True:
+        back = _sweep(near, order, prefix - 1, -1, -1, cost, row, stale, lanes)
+        forth = _sweep(near, order, 0, prefix, 1, cost, row, stale, lanes)
+        if not (back or forth):
+            break
+    stale[:n] = 1
+    while _sweep(near, order, 0, n, 1, cost, row, stale, lanes):
+        pass
+
+
+@njit(cache=True)
+def directions(near, n, cost, row, lanes, out):
+    """First direction of the path from each cell to each lane's source, `out` (LANES, n)."""
+    width = np.uint64(lanes)
+    for i in range(n):
+        cell = np.uint64(i)
+        at = cell * width
+        e, ne = np.uint64(near[cell, 0]) * width, np.uint64(near[cell, 1]) * width
+        nn, nw = np.uint64(near[cell, 2]) * width, np.uint64(near[cell, 3]) * width
+        w, sw = np.uint64(near[cell, 4]) * width, np.uint64(near[cell, 5]) * width
+        s, se = np.uint64(near[cell, 6]) * width, np.uint64(near[cell, 7]) * width
+        for lane in range(width):
+            straight = cost[at + lane] - _STRAIGHT
+            diagonal = cost[at + lane] - _DIAGONAL
+            k = np.int32(SOURCE)
+            k = np.int32(7) if cost[se + lane] == diagonal else k
+            k = np.int32(5) if cost[sw + lane] == diagonal else k
+            k = np.int32(3) if cost[nw + lane] == diagonal else k
+            k = np.int32(1) if cost[ne + lane] == diagonal else k
+            k = np.int32(6) if cost[s + lane] == straight else k
+            k = np.int32(4) if cost[w + lane] == straight else k
+            k = np.int32(2) if cost[nn + lane] == straight else k
+            k = np.int32(0) if cost[e + lane] == straight else k
+            row[lane] = k
+        for lane in range(lanes):
+            out[lane, i] = row[lane]
+
+
+@njit(cache=True)
+def _pack(directions_of_lane, n, rows, begin):
+    for i in range(n // 2):
+        rows[begin + i] = directions_of_lane[2 * i] | directions_of_lane[2 * i + 1] << 4
+    if n & 1:
+        rows[begin + n // 2] = directions_of_lane[n - 1]
+
+
+@njit(cache=True)
+def shift_of(cost):
+    """Bits to drop so that twice the largest cost, which bounds all in the field, fits uint16."""
+    bound = 2 * np.int64(cost.max())
+    shift = 0
+    while bound >> shift > np.iinfo(np.uint16).max:
+        shift += 1
+    return shift
+
+
+@njit(cache=True)
+def fill_field(near, n, gates, row_start, rows, border, costs, begin, columns, steps, scratch):
+    """Paths from all gates of a field.
+
+    `rows` gets their directions, two cells a byte; `costs` one row a gate, to all border cells;
+    `steps` (n * R) one column for each of the R sides: the columns of gate c are
+    `columns[begin[c]:begin[c + 1]]`. Gates and border are local cells. Gives the bits that `steps`
+    lack, -1 where a path is too long.
+    """
+    cost, first_cost, ring, order, row, stale, heading, member, gate_at = scratch
+    n_columns = columns.size
+    if wave(near, n, gates[0], first_cost, ring, order) < n:
+        return -1
+    shift = shift_of(first_cost[:n])
+    if 2 * np.int64(first_cost[:n].max()) >= FAR:
+        return -1
+    gate_at[:n] = -1
+    for c in range(gates.size):
+        gate_at[gates[c]] = c
+    following = 0
+    left = gates.size
+    while left > 0:
+        while gate_at[gates[following]] < 0:
+            following += 1
+        wave(near, n, gates[following], first_cost, ring, order)
+        lanes = prefix = 0
+        for q in range(n):  # the gates nearest to it that are not done
+            c = gate_at[order[q]]
+            if c >= 0:
+                gate_at[order[q]] = -1
+                member[lanes] = c
+                lanes += 1
+                prefix = q + 1
+                if lanes == LANES:
+                    break
+        left -= lanes
+        cost[: (n + 1) * LANES] = FAR
+        for lane in range(lanes):
+            cost[np.int64(gates[member[lane]]) * LANES + lane] = 0
+        relax(near, n, order, prefix, cost, row, stale, LANES)
+        directions(near, n, cost, row, LANES, heading)
+        for lane in range(lanes):
+            c = member[lane]
+            _pack(heading[lane], n, rows, row_start[c])
+            for b in range(border.size):
+                costs[c, b] = cost[np.int64(border[b]) * LANES + lane]
+            for j in range(begin[c], begin[c + 1]):
+                for i in range(n):
+                    steps[i * n_columns + columns[j]] = cost[i * LANES + lane] >> shift
+    return shift

@@ -1,0 +1,125 @@
+"""Crossings: all legal moves between the fields of a partition, and what they are grouped by."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+
+_STEPS = ((0, 1), (1, 1), (1, 0), (1, -1))
+
+
+class Crossings(NamedTuple):
+    """Legal moves between fields: cell in the lower field and in the higher one."""
+
+    low: LongArray
+    high: LongArray
+    diagonal: BoolArray
+    portal: LongArray
+    source: LongArray
+    is_gate: BoolArray
+    """Whether both ends are gates."""
+    stands: BoolArray
+    """Whether it stands for its portal."""
+    is_source: BoolArray
+    """Whether its lower end is its source."""
+
+    @property
+    def n_portals(self) -> int:
+        """Groups by portal."""
+        return int(self.portal.max(initial=-1)) + 1
+
+    @property
+    def n_sources(self) -> int:
+        """Groups by source."""
+        return int(self.source.max(initial=-1)) + 1
+
+    @property
+    def ends(self) -> LongArray:
+        """int64 (2 n,), all lower cells, then all higher ones."""
+        return np.concatenate([self.low, self.high])
+
+    @property
+    def cost(self) -> IntArray:
+        """int32 (n,), integer cost of each move."""
+        return np.where(self.diagonal, DIAGONAL, STRAIGHT).astype(np.int32)
+
+
+def find_crossings(
+    moves: ByteArray, label: IntArray, cols: int, spacings: tuple[int, int, int]
+) -> Crossings:
+    """Find all legal moves between two fields, and group them.
+
+    Parameters
+    ----------
+    moves
+        uint8 (rows * cols,), masks of the legal moves.
+    label
+        int32 (rows * cols,), the field of each cell, -1 where there is none.
+    cols
+        Columns of the map.
+    spacings
+        Sides of the lattice squares of portals, sources and gates, in cells. With gates in squares
+        of one cell all moves are between gates.
+    """
+    spacing, source_spacing, gate_spacing = spacings
+    low, high, diagonal = _moves_between(moves, label, cols)
+    position = np.stack([low // cols, low % cols])
+    fields = label[low] * (label.max(initial=0) + np.int64(1)) + label[high]
+
+    def groups(side: int) -> LongArray:
+        square = position[0] // side * cols + position[1] // side
+        order = np.lexsort((square, fields))
+        new = np.ones(len(order), dtype=np.bool_)
+        new[1:] = (np.diff(fields[order]) != 0) | (np.diff(square[order]) != 0)
+        group = np.empty(len(order), dtype=np.int64)
+        group[order] = np.cumsum(new) - 1
+        return group
+
+    portal, source = groups(spacing), groups(source_spacing)
+    is_gate = np.ones(len(low), dtype=np.bool_)
+    if gate_spacing > 1:
+        is_gate[:] = False
+        is_gate[_middles(groups(gate_spacing), position, diagonal)] = True
+    middles = _middles(portal, position, diagonal)
+    stands = np.zeros(len(low), dtype=np.bool_)
+    stands[middles] = True
+    # Where the move that stands for a portal is in a source's square, it is the source too.
+    centres = _middles(source, position, diagonal)
+    centres[source[middles]] = middles
+    is_source = np.zeros(len(low), dtype=np.bool_)
+    is_source[centres] = True
+    is_gate |= is_source
+    return Crossings(low, high, diagonal, portal, source, is_gate, stands, is_source)
+
+
+def _moves_between(
+    moves: ByteArray, label: IntArray, cols: int
+) -> tuple[LongArray, LongArray, BoolArray]:
+    """All legal moves between two fields: cell in the lower one, in the higher, if diagonal."""
+    found = []
+    for direction, (down, right) in enumerate(_STEPS):
+        tail = np.flatnonzero(moves >> direction & 1)
+        head = tail + down * cols + right
+        apart = label[tail] != label[head]
+        diagonal = np.full(int(apart.sum()), direction & 1 == 1)
+        found.append((tail[apart], head[apart], diagonal))
+    tail, head, diagonal = (np.concatenate(part) for part in zip(*found, strict=True))
+    turned = label[tail] > label[head]
+    return np.where(turned, head, tail), np.where(turned, tail, head), diagonal
+
+
+def _middles(group: LongArray, position: LongArray, diagonal: BoolArray) -> LongArray:
+    """Of the moves of each group the one nearest their middle; a diagonal counts as a cell off."""
+    if not len(group):
+        return np.empty(0, dtype=np.int64)
+    count = np.bincount(group)
+    row, col = (axis - (np.bincount(group, axis) / count)[group] for axis in position)
+    order = np.lexsort((np.hypot(row, col) + diagonal, group))
+    middles: LongArray = order[np.searchsorted(group[order], np.arange(len(count)))]
+    return middles

@@ -1,0 +1,161 @@
+"""Where everything about portals stands: the order of cells, gates and sides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav.topology.crossings import Crossings
+
+
+def starts_of(sorted_keys: IntArray | LongArray, count: int) -> LongArray:
+    """Where each of the keys 0 to count - 1 begins in a sorted array, and its end."""
+    starts: LongArray = np.searchsorted(sorted_keys, np.arange(count + 1)).astype(np.int64)
+    return starts
+
+
+def offsets_of(sizes: LongArray) -> LongArray:
+    """Where things of these sizes begin one after the other, and the end of the last."""
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Cells, gates and sides in the order of their fields; see `Portals` for the arrays."""
+
+    label: IntArray
+    """int32 (rows * cols,), the field of each cell."""
+    cols: int
+    crossings: Crossings
+
+    @cached_property
+    def n_fields(self) -> int:
+        """Fields."""
+        return int(self.label.max(initial=-1)) + 1
+
+    @cached_property
+    def cells(self) -> IntArray:
+        """int32, flat cells in the order of their positions: by field, then by square of 8 x 8."""
+        cells = np.flatnonzero(self.label >= 0)
+        row, col = np.divmod(cells, self.cols)
+        tile = (row >> 3) * (self.cols + 7 >> 3) + (col >> 3)
+        ordered: IntArray = cells[np.lexsort((tile, self.label[cells]))].astype(np.int32)
+        return ordered
+
+    @cached_property
+    def index(self) -> IntArray:
+        """int32 (rows * cols,), position of each cell, -1 where it has none."""
+        index = np.full(self.label.size, -1, dtype=np.int32)
+        index[self.cells] = np.arange(len(self.cells), dtype=np.int32)
+        return index
+
+    @cached_property
+    def field_start(self) -> LongArray:
+        """int64 (F + 1,), first position of each field."""
+        return starts_of(self.label[self.cells], self.n_fields)
+
+    @cached_property
+    def border(self) -> LongArray:
+        """int64, flat border cells, in the order of their positions."""
+        cells = np.unique(self.crossings.ends)
+        ordered: LongArray = cells[np.argsort(self.index[cells], kind="stable")]
+        return ordered
+
+    @cached_property
+    def is_gate(self) -> BoolArray:
+        """bool, which border cells are gates."""
+        gates = self.crossings.ends[np.tile(self.crossings.is_gate, 2)]
+        return np.isin(self.border, gates)
+
+    @cached_property
+    def gate_cell(self) -> LongArray:
+        """int64 (G,), flat cells."""
+        return self.border[self.is_gate]
+
+    @cached_property
+    def gate_of(self) -> IntArray:
+        """int32 (rows * cols,), the gate at each cell, -1 for none."""
+        gate_of = np.full(self.label.size, -1, dtype=np.int32)
+        gate_of[self.gate_cell] = np.arange(len(self.gate_cell), dtype=np.int32)
+        return gate_of
+
+    @cached_property
+    def gate_start(self) -> LongArray:
+        """int64 (F + 1,), first gate of each field."""
+        return starts_of(self.label[self.gate_cell], self.n_fields)
+
+    @cached_property
+    def row_start(self) -> LongArray:
+        """int64 (G + 1,), first byte of each gate's row of directions."""
+        sizes = np.diff(self.field_start)[self.label[self.gate_cell]]
+        return offsets_of((sizes + 1) // 2)
+
+    @cached_property
+    def side_order(self) -> LongArray:
+        """int64 (2 P,), sides by field: portal p's lower side is p, its higher one P + p."""
+        n_portals = self.crossings.n_portals
+        field = np.empty(2 * n_portals, dtype=np.int64)
+        portal = self.crossings.portal
+        field[np.concatenate([portal, portal + n_portals])] = self.label[self.crossings.ends]
+        return np.argsort(field, kind="stable")
+
+    @cached_property
+    def side_rank(self) -> LongArray:
+        """int64 (2 P,), its inverse."""
+        rank = np.empty_like(self.side_order)
+        rank[self.side_order] = np.arange(len(rank))
+        return rank
+
+    @cached_property
+    def side_of_end(self) -> LongArray:
+        """int64, the side of each end of a crossing."""
+        portal = self.crossings.portal
+        ends = np.concatenate([portal, portal + self.crossings.n_portals])
+        side: LongArray = self.side_rank[ends]
+        return side
+
+    @cached_property
+    def side_start(self) -> LongArray:
+        """int64 (F + 1,), first side of each field."""
+        n_sides = len(self.side_order)
+        field = np.empty(n_sides, dtype=np.int64)
+        field[self.side_of_end] = self.label[self.crossings.ends]
+        return starts_of(field, self.n_fields)
+
+    @cached_property
+    def side_gate(self) -> IntArray:
+        """int32 (2 P,), the gate that stands for the portal on each side."""
+        stands = np.tile(self.crossings.stands, 2)
+        gate = np.empty(len(self.side_order), dtype=np.int32)
+        gate[self.side_of_end[stands]] = self.gate_of[self.crossings.ends[stands]]
+        return gate
+
+    @cached_property
+    def side_border(self) -> tuple[LongArray, LongArray]:
+        """Border cells of each side, each once: starts, and positions in `border`."""
+        place = np.searchsorted(self.index[self.border], self.index[self.crossings.ends])
+        pairs = np.unique(np.stack([self.side_of_end, place], axis=1), axis=0)
+        return starts_of(pairs[:, 0], len(self.side_order)), pairs[:, 1]
+
+    @cached_property
+    def source_gate(self) -> IntArray:
+        """int32 (S,), the gate that each source lies at."""
+        crossings = self.crossings
+        gate = np.empty(crossings.n_sources, dtype=np.int32)
+        low = crossings.low[crossings.is_source]
+        gate[crossings.source[crossings.is_source]] = self.gate_of[low]
+        return gate
+
+    @property
+    def n_bytes(self) -> float:
+        """What paths, costs between gates, and a table from sources to gates will take."""
+        sizes, gates = np.diff(self.field_start), np.diff(self.gate_start)
+        steps = 2.0 * (sizes * np.diff(self.side_start)).sum()
+        cliques = 4.0 * (gates.astype(np.float64) ** 2).sum()
+        table = 4.0 * self.crossings.n_sources * len(self.gate_cell)
+        return float(self.row_start[-1] + cliques + steps + table)

@@ -1,0 +1,585 @@
+"""What every preset can do beside a plain plan: any-angle paths, many queries, closed doors."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.grid.worlds import office_world
+from hybridnav.harness.pairs import sample_pairs
+from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.planner.blocked import Blocked
+from hybridnav.search.grid_search import GridSearch
+from tests.oracle.grid import assert_legal, length_of_points, recounted
+from tests.strategies import Scene, drawn, scenes
+
+PRESETS = ("paper", "grid-astar", "fast", "balanced", "certified")
+PLAIN = settings(max_examples=60, deadline=None, derandomize=True)
+TWO_ROOMS = drawn(
+    ".......#.......",
+    "...............",
+    ".......#.......",
+    ".......#.......",
+    ".......#.......",
+    ".......#.......",
+    ".......#.......",
+    "...............",
+    ".......#.......",
+)
+EXACT = "planner.epsilon=0"
+
+presets = pytest.mark.parametrize("preset", PRESETS)
+
+
+def map_of(grid: hn.OccupancyGrid, **build: Any) -> hn.TopologicalMap:
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, **build))
+
+
+def grid_of(classes: Any, *, corner_cutting: bool = False) -> hn.OccupancyGrid:
+    """A grid of a few centimetres, turned and away from the origin."""
+    probability = np.where(classes == 2, 0.5, classes == 0).astype(np.float32)
+    frame = hn.Frame(0.05, origin_m=(3.1, -20.4), yaw_rad=0.7)
+    return hn.OccupancyGrid(probability, frame, corner_cutting=corner_cutting)
+
+
+def scene_map(scene: Scene, *, corner_cutting: bool = False) -> hn.TopologicalMap:
+    grid = grid_of(scene.classes, corner_cutting=corner_cutting)
+    distance_m = scene.merge_distance_m / scene.resolution_m * 0.05
+    return map_of(grid, merge_distance_m=distance_m, seed=scene.seed)
+
+
+def points_in(grid: hn.OccupancyGrid, rng: np.random.Generator, n: int) -> Any:
+    """Pairs of points, shape (n, 2, 2), anywhere in cells that are free."""
+    cells = np.argwhere(grid.enterable())
+    chosen = cells[rng.integers(len(cells), size=2 * n)] if len(cells) else cells
+    inside = rng.uniform(0.02, 0.98, size=(len(chosen), 2))
+    return grid.frame.points_of_grid(chosen + inside).reshape(-1, 2, 2)
+
+
+def answer(result: hn.PlanResult) -> tuple[Any, ...]:
+    """What two equal results share."""
+    points = None if result.path is None else result.path.points.tolist()
+    return result.status, result.metric, result.cost, result.lower_bound, points
+
+
+@pytest.fixture(scope="module")
+def office() -> hn.TopologicalMap:
+    return map_of(office_world().grid(robot_radius_m=0.25))
+
+
+@pytest.fixture(scope="module")
+def office_planners(office: hn.TopologicalMap) -> dict[str, hn.HybridPlanner]:
+    return {preset: hn.HybridPlanner(office, preset=preset) for preset in PRESETS}
+
+
+# --- smooth="line-of-sight" ---------------------------------------------------------------------
+
+
+def check_smooth(planner: hn.HybridPlanner, start: Any, goal: Any) -> hn.PlanResult:
+    """An any-angle plan beside the plain one: exact ends, legal, no longer, bounded."""
+    plain = planner.plan(start, goal)
+    result = planner.plan(start, goal, smooth="line-of-sight")
+    assert result.status is plain.status
+    if result.path is None or plain.path is None:
+        assert result.cost == result.lower_bound == math.inf
+        return result
+    assert (plain.metric, result.metric) == ("octile", "any-angle")
+    points = result.path.points
+    assert np.array_equal(points[0], start)
+    assert np.array_equal(points[-1], goal)
+    assert segment_faults(planner.topology.grid, points) == ()
+    assert result.cost == pytest.approx(length_of_points(points), abs=1e-12)
+    over_centres = np.concatenate([[start], plain.path.points[1:-1], [goal]])
+    assert result.cost <= length_of_points(over_centres) * (1 + 1e-9) + 1e-12
+    assert np.array_equal(result.path.cells, plain.path.cells)
+    assert 0 <= result.lower_bound <= result.cost
+    assert result.lower_bound == pytest.approx(math.dist(start, goal), abs=1e-12)
+    assert result.gap >= 0
+    return result
+
+
+@given(scene=scenes(max_side=16), at_centres=st.booleans())
+@PLAIN
+def test_an_any_angle_path_is_legal_and_its_bound_holds(scene: Scene, at_centres: bool) -> None:  # noqa: FBT001
+    topology = scene_map(scene)
+    grid = topology.grid
+    graph = VisibilityGraph(grid)
+    planners = [hn.HybridPlanner(topology, preset=preset) for preset in PRESETS]
+    for start, goal in points_in(grid, np.random.default_rng(scene.seed), 3):
+        cells = [grid.frame.cell_of(*point) for point in (start, goal)]
+        ends = grid.frame.points_of(cells) if at_centres else (start, goal)
+        optimum = graph.shortest(cells[0], cells[1]).length_m
+        for planner in planners:
+            result = check_smooth(planner, *ends)
+            assert result.solved == math.isfinite(optimum)
+            if at_centres and result.solved:
+                assert result.lower_bound <= optimum + 1e-9
+                assert optimum <= result.cost + 1e-9
+
+
+@presets
+def test_any_angle_paths_of_the_office(
+    office_planners: dict[str, hn.HybridPlanner], preset: str
+) -> None:
+    planner = office_planners[preset]
+    grid = planner.topology.grid
+    pairs = points_in(grid, np.random.default_rng(4), 40)
+    results = [check_smooth(planner, start, goal) for start, goal in pairs]
+    solved = [result.path for result in results if result.path is not None]
+    assert len(solved) > 20
+    assert sum(len(path.points) for path in solved) < 0.1 * sum(len(path.cells) for path in solved)
+
+
+@presets
+def test_the_presets_own_smooth_and_the_argument_agree(
+    office: hn.TopologicalMap, preset: str
+) -> None:
+    smoothing = hn.load_preset(preset, overrides=["planner.smooth=line-of-sight"])
+    by_setting = hn.HybridPlanner(office, preset=smoothing)
+    by_argument = hn.HybridPlanner(office, preset=preset)
+    for start, goal in points_in(office.grid, np.random.default_rng(5), 10):
+        asked = by_argument.plan(start, goal, smooth="line-of-sight")
+        assert answer(by_setting.plan(start, goal)) == answer(asked)
+        plain = by_argument.plan(start, goal)
+        assert answer(by_setting.plan(start, goal, smooth="none")) == answer(plain)
+        assert answer(by_argument.plan(start, goal, smooth="none")) == answer(plain)
+
+
+@presets
+def test_an_any_angle_path_inside_one_cell_is_the_line_itself(preset: str) -> None:
+    planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
+    start, goal = planner.topology.grid.frame.points_of_grid([(2.1, 3.2), (2.9, 3.9)])
+    result = check_smooth(planner, start, goal)
+    assert result.cost == pytest.approx(0.05 * math.hypot(0.8, 0.7))
+    assert result.gap == pytest.approx(0, abs=1e-12)
+    assert planner.plan(start, goal).cost == 0
+    same = planner.plan(start, start, smooth="line-of-sight")
+    assert same.cost == same.lower_bound == same.gap == 0
+    assert same.path is not None
+    assert same.path.points.tolist() == [start.tolist()]
+
+
+def test_an_any_angle_path_may_cross_unexplored_cells_where_they_may_be_entered() -> None:
+    classes = np.ones((9, 30), dtype=np.uint8)
+    classes[:, 12:18] = 2
+    overrides = ["planner.allow_unexplored=true", "planner.smooth=line-of-sight"]
+    for preset in PRESETS:
+        setting = hn.load_preset(preset, overrides=overrides)
+        planner = hn.HybridPlanner(map_of(grid_of(classes), merge_distance_m=0.3), preset=setting)
+        start, goal = planner.topology.grid.frame.points_of_grid([(4.5, 2.5), (2.1, 27.5)])
+        result = planner.plan(start, goal).raise_for_status()
+        assert result.path is not None
+        assert len(result.path.points) == 2
+        assert result.gap == pytest.approx(0, abs=1e-12)
+
+
+@presets
+@pytest.mark.parametrize("smooth", ["los", "", "LINE-OF-SIGHT", True])
+def test_a_smooth_that_does_not_exist_is_refused(preset: str, smooth: Any) -> None:
+    planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
+    start, goal = planner.topology.grid.frame.points_of([(2, 2), (2, 12)])
+    with pytest.raises(hn.HybridNavError, match=r"smooth.*line-of-sight"):
+        planner.plan(start, goal, smooth=smooth)
+
+
+# --- plan_many ----------------------------------------------------------------------------------
+
+
+@presets
+@pytest.mark.parametrize("smooth", [None, "line-of-sight"])
+def test_many_answers_are_the_answers_one_by_one(
+    office_planners: dict[str, hn.HybridPlanner], preset: str, smooth: Any
+) -> None:
+    planner = office_planners[preset]
+    grid = planner.topology.grid
+    rng = np.random.default_rng(6)
+    pairs = points_in(grid, rng, 25)
+    low, high = grid.frame.points_of_grid([(-5, -5), (grid.shape[0] + 5, grid.shape[1] + 5)])
+    anywhere = rng.uniform(low, high, size=(15, 2, 2))
+    same = np.repeat(pairs[:1, :1], 2, axis=1)
+    starts, goals = np.concatenate([pairs, anywhere, same]).transpose(1, 0, 2)
+    batch = planner.plan_many(starts, goals, smooth=smooth)
+    singles = [planner.plan(*ends, smooth=smooth) for ends in zip(starts, goals, strict=True)]
+    assert batch.status.tolist() == [str(single.status) for single in singles]
+    assert len(set(batch.status.tolist())) >= 3
+    assert batch.cost.tolist() == [single.cost for single in singles]
+    assert batch.lower_bound.tolist() == [single.lower_bound for single in singles]
+    np.testing.assert_array_equal(batch.gap, [single.gap for single in singles])
+    assert batch.path_start[0] == 0
+    assert batch.path_start[-1] == len(batch.points)
+    assert len(batch.path_start) == len(singles) + 1
+    for i, single in enumerate(singles):
+        points = np.empty((0, 2)) if single.path is None else single.path.points
+        np.testing.assert_array_equal(batch.path(i), points)
+
+
+@presets
+def test_many_takes_lists_and_nothing_at_all(
+    office_planners: dict[str, hn.HybridPlanner], preset: str
+) -> None:
+    planner = office_planners[preset]
+    (start, goal), *_ = points_in(planner.topology.grid, np.random.default_rng(7), 1)
+    one = planner.plan_many([start.tolist()], [tuple(goal)])
+    assert one.cost.tolist() == [planner.plan(start, goal).cost]
+    nothing: Any
+    for nothing in ([], np.empty((0, 2)), ()):
+        batch = planner.plan_many(nothing, nothing)
+        assert batch.status.shape == batch.cost.shape == batch.lower_bound.shape == (0,)
+        assert batch.gap.shape == (0,)
+        assert batch.points.shape == (0, 2)
+        assert batch.path_start.tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    ("starts", "goals", "message"),
+    [
+        ([(0, 0)], [], "there are 1 starts and 0 goals"),
+        ([(0, 0), (1, 1)], [(0, 0)], "there are 2 starts and 1 goals"),
+        ((0, 0), (1, 1), "starts must be finite coordinates"),
+        ([(0, 0, 0)], [(0, 0, 0)], "starts must be finite coordinates"),
+        ([(0, 0)], [(0, math.nan)], "goals must be finite coordinates"),
+        ([(math.inf, 0)], [(0, 0)], "starts must be finite coordinates"),
+        ([[(0, 0)]], [[(0, 0)]], "starts must be finite coordinates"),
+        ([(0, 0), (1,)], [(0, 0), (1, 1)], "starts must be finite coordinates"),
+        ("here", "there", "starts must be finite coordinates"),
+        (None, None, "starts must be finite coordinates"),
+    ],
+)
+def test_many_refuses_what_are_no_points(
+    office_planners: dict[str, hn.HybridPlanner], starts: Any, goals: Any, message: str
+) -> None:
+    with pytest.raises(hn.InvalidValueError, match=message) as caught:
+        office_planners["fast"].plan_many(starts, goals)
+    assert str(caught.value).isprintable()
+
+
+# --- blocked ------------------------------------------------------------------------------------
+
+
+def closed_grid(grid: hn.OccupancyGrid, closed: Any) -> hn.OccupancyGrid:
+    """The same free cells but for those that are closed."""
+    classes = grid.classes.copy()
+    classes.ravel()[closed] = hn.CellClass.OCCUPIED
+    probability = np.where(classes == 2, 0.5, classes == 0).astype(np.float32)
+    return hn.OccupancyGrid(probability, grid.frame, corner_cutting=grid.corner_cutting)
+
+
+def random_blocked(topology: hn.TopologicalMap, rng: np.random.Generator) -> Blocked:
+    """A few cells, arcs, places and areas, each often absent."""
+    grid = topology.grid
+    arcs = topology.arc_ids[~topology.level.is_self_loop]
+    counts = rng.integers(0, 3, size=4) * (rng.random(4) < 0.5)
+    low = rng.uniform(0, grid.shape, size=(counts[3], 2))
+    high = low + rng.uniform(0.2, 6, size=low.shape)
+    corners = [[(a, b), (a, d), (c, d), (c, b)] for (a, b), (c, d) in zip(low, high, strict=True)]
+    return Blocked(
+        arcs=rng.permutation(arcs)[: counts[0]].tolist(),
+        places=rng.permutation(topology.place_ids)[: min(counts[1], 1)].tolist(),
+        cells=rng.integers(0, grid.shape, size=(3 * counts[2], 2)),
+        polygons=[grid.frame.points_of_grid(corner) for corner in corners],
+    )
+
+
+def check_blocked(
+    planner: hn.HybridPlanner, ends: tuple[Any, Any], blocked: Any, optimum_m: float
+) -> hn.PlanResult:
+    """A plan round what is closed against the optimum of the grid without those cells."""
+    before = answer(planner.plan(*ends))
+    result = planner.plan(*ends, blocked=blocked)
+    assert answer(planner.plan(*ends)) == before
+    epsilon = planner.preset.planner.epsilon
+    if math.isinf(optimum_m):
+        assert result.status is hn.PlanStatus.NO_PATH
+        assert result.cost == result.lower_bound == math.inf
+        assert result.route is None
+        return result
+    assert result.solved
+    assert result.path is not None
+    assert 0 <= result.lower_bound <= optimum_m * (1 + 1e-9)
+    assert optimum_m <= result.cost * (1 + 1e-9)
+    assert result.cost == pytest.approx(
+        recounted(result.path.cells) * planner.topology.grid.resolution_m, rel=1e-12
+    )
+    if epsilon is not None:
+        assert result.gap <= epsilon + 1e-9
+    if epsilon == 0:
+        assert result.cost == pytest.approx(optimum_m, rel=1e-9)
+    if result.route is not None:
+        assert len(result.route.arcs) == len(result.route.places) - 1
+    return result
+
+
+@given(scene=scenes(max_side=18), corner_cutting=st.booleans())
+@PLAIN
+def test_closed_cells_are_as_good_as_occupied_ones(scene: Scene, corner_cutting: bool) -> None:  # noqa: FBT001
+    topology = scene_map(scene, corner_cutting=corner_cutting)
+    grid, rng = topology.grid, np.random.default_rng(scene.seed)
+    exact = hn.load_preset("certified", overrides=[EXACT])
+    # Where corners may be cut the arcs of the places do not lead everywhere that paths do.
+    chosen: list[Any] = [*PRESETS[1 if corner_cutting else 0 :], exact]
+    planners = [hn.HybridPlanner(topology, preset=preset) for preset in chosen]
+    for pairs in points_in(grid, rng, 6).reshape(-1, 2, 2, 2):
+        blocked = random_blocked(topology, rng)
+        closed = blocked.cells_of(topology)
+        rebuilt = closed_grid(grid, closed)
+        other = hn.HybridPlanner(
+            map_of(rebuilt, merge_distance_m=topology.pyramid.merge_distance_m), preset=exact
+        )
+        search = GridSearch(rebuilt.enterable(), corner_cutting=corner_cutting)
+        for start, goal in pairs:
+            cells = [grid.frame.cell_of(*point) for point in (start, goal)]
+            shut = [cell[0] * grid.shape[1] + cell[1] in set(closed.tolist()) for cell in cells]
+            if any(shut):
+                status = hn.PlanStatus.START_BLOCKED if shut[0] else hn.PlanStatus.GOAL_BLOCKED
+                for planner in planners:
+                    assert planner.plan(start, goal, blocked=blocked).status is status
+                continue
+            found = search.search(*cells).cells
+            optimum = math.inf if found is None else recounted(found) * grid.resolution_m
+            assert other.plan(start, goal).cost == pytest.approx(optimum, rel=1e-9)
+            for planner in planners:
+                result = check_blocked(planner, (start, goal), blocked, optimum)
+                if result.path is not None and not corner_cutting:
+                    assert_legal(result.path.cells, rebuilt.enterable())
+
+
+@given(scene=scenes(max_side=18), corner_cutting=st.booleans())
+@PLAIN
+def test_any_angle_paths_keep_off_what_is_closed(scene: Scene, corner_cutting: bool) -> None:  # noqa: FBT001
+    topology = scene_map(scene, corner_cutting=corner_cutting)
+    grid, rng = topology.grid, np.random.default_rng(scene.seed)
+    planners = [hn.HybridPlanner(topology, preset=preset) for preset in ("fast", "grid-astar")]
+    for start, goal in points_in(grid, rng, 4):
+        blocked = random_blocked(topology, rng)
+        rebuilt = closed_grid(grid, blocked.cells_of(topology))
+        for planner in planners:
+            plain = planner.plan(start, goal, blocked=blocked)
+            result = planner.plan(start, goal, blocked=blocked, smooth="line-of-sight")
+            assert result.status is plain.status
+            if result.path is not None:
+                if not corner_cutting:
+                    assert segment_faults(rebuilt, result.path.points) == ()
+                assert result.lower_bound <= result.cost
+
+
+@presets
+def test_an_any_angle_path_goes_round_a_closed_wall(preset: str) -> None:
+    planner = hn.HybridPlanner(
+        map_of(grid_of(np.ones((9, 20))), merge_distance_m=0.15), preset=preset
+    )
+    grid = planner.topology.grid
+    wall = [(row, 10) for row in range(8)]
+    start, goal = grid.frame.points_of_grid([(1.5, 1.5), (1.5, 18.5)])
+    result = planner.plan(start, goal, smooth="line-of-sight", blocked={"cells": wall})
+    assert result.path is not None
+    assert (
+        segment_faults(closed_grid(grid, [row * 20 + 10 for row, _ in wall]), result.path.points)
+        == ()
+    )
+    assert result.cost == pytest.approx(0.05 * (1 + math.hypot(8.5, 6.5) + math.hypot(7.5, 6.5)))
+    # And without the wall the planner sees straight through again.
+    again = planner.plan(start, goal, smooth="line-of-sight")
+    assert again.cost == pytest.approx(0.05 * 17)
+
+
+@presets
+def test_what_is_closed_may_be_said_in_every_form(preset: str) -> None:
+    planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS), merge_distance_m=0.35), preset=preset)
+    grid = planner.topology.grid
+    start, goal = grid.frame.points_of([(2, 2), (2, 12)])
+    near, far = ((1, 7), (7, 7))
+    square = grid.frame.points_of_grid([(1, 7), (1, 8), (2, 8), (2, 7)])
+    forms: list[Any] = [
+        {"cells": [near]},
+        Blocked(cells=[near]),
+        {"polygons": [square]},
+        shapely.Polygon(square),
+    ]
+    open_cost = planner.plan(start, goal).cost
+    answers = [answer(planner.plan(start, goal, blocked=form)) for form in forms]
+    assert answers[0][0] is hn.PlanStatus.SOLVED
+    assert answers[0][2] > open_cost
+    assert all(other == answers[0] for other in answers[1:])
+    both = planner.plan(start, goal, blocked={"cells": [near, far]})
+    assert both.status is hn.PlanStatus.NO_PATH
+    assert answer(planner.plan(start, goal, blocked={})) == answer(planner.plan(start, goal))
+    assert planner.plan(start, goal).cost == open_cost
+
+
+@presets
+def test_an_end_that_is_closed_is_named(preset: str) -> None:
+    planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS), merge_distance_m=0.35), preset=preset)
+    topology = planner.topology
+    cells = [(2, 2), (2, 12)]
+    start, goal = topology.grid.frame.points_of(cells)
+    here, there = (int(topology.place_ids[topology.place_at(cell)]) for cell in cells)
+    for blocked, status in (
+        ({"cells": cells[:1]}, hn.PlanStatus.START_BLOCKED),
+        ({"cells": cells[1:]}, hn.PlanStatus.GOAL_BLOCKED),
+        ({"cells": cells}, hn.PlanStatus.START_BLOCKED),
+        ({"places": [here]}, hn.PlanStatus.START_BLOCKED),
+        ({"places": [there]}, hn.PlanStatus.GOAL_BLOCKED),
+        (shapely.Point(start).buffer(0.01), hn.PlanStatus.START_BLOCKED),
+        (shapely.Point(goal).buffer(0.01), hn.PlanStatus.GOAL_BLOCKED),
+    ):
+        result = planner.plan(start, goal, blocked=blocked)
+        assert result.status is status
+        assert result.path is None
+        assert result.lower_bound == math.inf
+        with pytest.raises(hn.PlanError, match=str(status)):
+            result.raise_for_status()
+
+
+@presets
+def test_a_door_closed_by_a_polygon_sends_the_route_through_another(
+    office_planners: dict[str, hn.HybridPlanner], preset: str
+) -> None:
+    planner = office_planners[preset]
+    topology, grid = planner.topology, planner.topology.grid
+    search, rerouted = GridSearch(grid.enterable()), 0
+    for pair in sample_pairs(grid, 12, seed=2):
+        ends = grid.frame.points_of([pair.start, pair.goal])
+        before = planner.plan(*ends)
+        if before.path is None:
+            continue
+        # A box of 40 cm round the middle of the path: some close a door, some only part of one.
+        middle = before.path.points[len(before.path.points) // 2]
+        box = shapely.Point(middle).buffer(0.2, cap_style="square")
+        closed = Blocked(polygons=[box]).cells_of(topology)
+        found = search.search(pair.start, pair.goal, blocked=closed).cells
+        optimum = math.inf if found is None else recounted(found) * grid.resolution_m
+        result = check_blocked(planner, (ends[0], ends[1]), box, optimum)
+        if result.path is not None:
+            at = result.path.cells @ np.array([grid.shape[1], 1])
+            assert not np.isin(at, closed).any()
+            distances = shapely.distance(box, shapely.points(result.path.points))
+            assert distances.min() > grid.robot_radius_m - grid.resolution_m
+            if before.route is not None and result.route is not None:
+                rerouted += result.route.arcs != before.route.arcs
+    assert rerouted > 0 or preset == "grid-astar"
+
+
+@presets
+def test_a_closed_arc_is_not_passed(
+    office_planners: dict[str, hn.HybridPlanner], preset: str
+) -> None:
+    planner = office_planners[preset]
+    frame = planner.topology.grid.frame
+    detours = 0
+    for pair in sample_pairs(planner.topology.grid, 8, seed=5, least_distance_m=8.0):
+        ends = frame.points_of([pair.start, pair.goal])
+        before = planner.plan(*ends)
+        if before.route is None or not before.route.arcs:
+            continue
+        arc = before.route.arcs[len(before.route.arcs) // 2]
+        result = planner.plan(*ends, blocked={"arcs": [arc]})
+        if result.route is not None:
+            assert result.solved
+            assert arc not in result.route.arcs
+            detours += 1
+    assert detours > 0 or preset == "grid-astar"
+
+
+@presets
+def test_what_is_closed_far_from_the_path_changes_nothing(
+    office_planners: dict[str, hn.HybridPlanner], preset: str
+) -> None:
+    planner = office_planners[preset]
+    grid = planner.topology.grid
+    for pair in sample_pairs(grid, 8, seed=11):
+        ends = grid.frame.points_of([pair.start, pair.goal])
+        before = planner.plan(*ends)
+        if before.path is None:
+            continue
+        passed = shapely.MultiPoint(before.path.points)
+        corners = grid.frame.points_of(np.argwhere(grid.enterable())[::997])
+        far = corners[shapely.distance(passed, shapely.points(corners)) > 2]
+        boxes = shapely.MultiPolygon([shapely.box(x, y, x + 0.1, y + 0.1) for x, y in far[::3]])
+        result = planner.plan(*ends, blocked=boxes)
+        assert answer(result) == answer(before)
+        assert result.route == before.route
+
+
+@presets
+def test_a_diagonal_past_a_closed_cell_is_not_taken(preset: str) -> None:
+    planner = hn.HybridPlanner(map_of(grid_of(np.ones((3, 3)))), preset=preset)
+    start, goal = planner.topology.grid.frame.points_of([(0, 0), (1, 1)])
+    assert planner.plan(start, goal).cost == pytest.approx(0.05 * math.sqrt(2))
+    result = planner.plan(start, goal, blocked={"cells": [(0, 1)]})
+    assert result.cost == pytest.approx(0.05 * 2)
+    shut = planner.plan(start, goal, blocked={"cells": [(0, 1), (1, 0)]})
+    assert shut.status is hn.PlanStatus.NO_PATH
+
+
+@presets
+@pytest.mark.parametrize(
+    "blocked",
+    [
+        {"doors": [1]},
+        {"cells": [(0, 99)]},
+        {"cells": [(0.5, 1.0)]},
+        {"arcs": [10**6]},
+        {"places": [-1]},
+        {"polygons": [[(0, 0), (1, 1)]]},
+        {"polygons": [[(0, 0), (1, math.nan), (1, 0)]]},
+        shapely.Point(0, 0),
+        "everything",
+        3,
+    ],
+)
+def test_what_cannot_be_closed_is_refused_in_one_line(preset: str, blocked: Any) -> None:
+    planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
+    start, goal = planner.topology.grid.frame.points_of([(2, 2), (2, 12)])
+    with pytest.raises(hn.InvalidValueError) as caught:
+        planner.plan(start, goal, blocked=blocked)
+    assert str(caught.value).isprintable()
+    assert planner.plan(start, goal).solved
+
+
+# --- presets ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("preset", "override", "message"),
+    [
+        ("fast", "planner.epsilon=0.1", "epsilon needs refine: gates"),
+        ("paper", "planner.epsilon=0.1", "epsilon needs refine: gates"),
+        ("grid-astar", "planner.epsilon=0", "epsilon needs refine: gates"),
+        ("paper", "planner.refine=gates", "coarse: portals goes with refine"),
+        ("grid-astar", "planner.refine=stored-paths", "coarse: portals goes with refine"),
+        ("balanced", "planner.coarse=none", "coarse: portals goes with refine"),
+        ("balanced", "planner.coarse=max-distance", "coarse: portals goes with refine"),
+        ("fast", "planner.refine=grid-astar", "coarse: portals goes with refine"),
+        *itertools.product(["paper", "certified"], ["planner.smooth=los"], ["planner.smooth: "]),
+        ("balanced", "planner.smooth=true", "planner.smooth: "),
+        ("balanced", "planner.smooth=", "planner.smooth: "),
+        *(
+            ("certified", f"planner.epsilon={value}", "planner.epsilon: ")
+            for value in ("-0.01", ".nan", "2", ".inf", "yes", "small", "[0.1]")
+        ),
+    ],
+)
+def test_settings_that_do_not_go_together_are_refused(
+    preset: str, override: str, message: str
+) -> None:
+    with pytest.raises(hn.PresetError) as caught:
+        hn.load_preset(preset, overrides=[override])
+    assert message in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 300
+
+
+def test_settings_that_do_go_together_are_taken() -> None:
+    certified = hn.load_preset("certified")
+    assert certified.planner.epsilon == 0.01
+    assert hn.load_preset("certified", overrides=[EXACT]).planner.epsilon == 0
+    assert hn.load_preset("balanced", overrides=["planner.epsilon=1"]).planner.epsilon == 1
+    assert hn.load_preset("certified", overrides=["planner.epsilon="]).planner.epsilon is None
