@@ -109,8 +109,8 @@ class Judge:
                 found[effort] = self.judge_answer(answer, start, goal, optimum)
                 if math.isinf(optimum):
                     continue
-                # Where gates are few a short way is searched on the whole map instead.
-                if not self.search.is_exact and answer.length_cells < SHORT_CELLS:
+                # Short ways are improved on the whole map, but for epsilon.
+                if answer.length_cells < SHORT_CELLS and (epsilon == 0 or effort == "stored"):
                     assert found[effort] == optimum
                 elif effort == "narrow" and epsilon == 0:
                     assert found[effort] == self.best_in_fields(answer, start, goal)

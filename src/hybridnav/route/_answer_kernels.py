@@ -8,12 +8,15 @@ from numba import njit
 from hybridnav.route._first_way_kernels import first_way, side_costs, weigh_sides
 from hybridnav.route._gate_search_kernels import improve, targets_of
 from hybridnav.route._portal_kernels import cells_of_way, field_at
+from hybridnav.search._costs import STRAIGHT
 from hybridnav.search._kernels import octile_cost
 
 STORED = 0
 NARROW = 1
 WIDE = 2
 """How far a first way is improved: not at all; over the gates of its fields; over all gates."""
+SHORT = 256 * STRAIGHT
+"""Up to this cost the choice of a few fields costs much, and a search of all gates little."""
 
 
 @njit(cache=True)
@@ -53,7 +56,7 @@ def answer(portals, tables, cols, start, goal, upper, mode, epsilon, work):
         source, low = targets_of(portals, cols, goal_field, goal, low_goal, by_goal, upper)
         cost, end, bound, expanded = improve(
             portals, tables, cols, start, goal, low_start, by_start, low_goal, landmark, source,
-            low, upper, epsilon, mode == NARROW, work,
+            low, upper, epsilon, mode == NARROW and upper >= SHORT, work,
         )  # fmt: skip
         lower = max(lower, bound)
         if end >= 0:

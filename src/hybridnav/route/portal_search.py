@@ -49,8 +49,6 @@ LEAST_FIELDS = 16
 """With fewer fields of the size asked for, half the size is tried: a field is searched cell by cell
 where start and goal share it."""
 
-_SHORT = 256 * STRAIGHT
-"""Up to this cost a fixed crossing costs much, and a search of cells little."""
 _SHORTEST = math.sqrt(2) * STRAIGHT / DIAGONAL
 """A path is as much shorter than its integer cost says at most: DIAGONAL / STRAIGHT > sqrt 2."""
 _MODES = {"stored": kernels.STORED, "narrow": kernels.NARROW, "wide": kernels.WIDE}
@@ -156,8 +154,9 @@ class PortalSearch:
         start, goal
             Cells that may be entered.
         effort
-            How far the first way is improved: only where it is short ("stored"), to the shortest
-            over gates of its fields ("narrow"), or to the shortest of all ("wide").
+            How far the first way is improved: not at all ("stored"), to the shortest over gates of
+            its fields ("narrow"), or to the shortest of all ("wide"). Ways of less than 256 cells
+            are improved to the shortest of all always.
         epsilon
             "narrow" and "wide" stop once no path can be shorter by more than this part.
         """
@@ -176,7 +175,8 @@ class PortalSearch:
         if cost >= FAR:
             return PortalAnswer(None, np.empty((0, 2)), math.inf, math.inf, gates, expanded)
         better, searched = None, 0
-        if not self.is_exact and (effort == "wide" or cost < _SHORT) and lower < cost:
+        by_cells = effort == "stored" or not self.is_exact
+        if by_cells and lower < cost and (effort == "wide" or cost < kernels.SHORT):
             found = self._search.search(start, goal, limit=cost)
             better, searched = found.cells, found.expanded
             lower = cost if better is None else cost_of(better)
