@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from hybridnav.grid import CellClass
+from hybridnav.route import portal_table
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.topology.portals import build_portals
 from tests.oracle.grid import move_graph
@@ -19,12 +21,18 @@ from tests.strategies import MAX_SIDE, class_grids, occupancy_grid, scenes
 from tests.test_search import block_labels
 
 if TYPE_CHECKING:
+    import pytest
+
     from hybridnav.grid import OccupancyGrid
     from hybridnav.topology.portals import Portals
 
+NAMES = ("spacing_cells", "gate_spacing_cells", "path_spacing_cells")
 SIDE = min(MAX_SIDE, 20)
 KINDS = ("pyramid", "pieces", "pieces", "stairs", "grown", "grown", "one", "cells")
 SPACINGS = ((16, 4), (16, 4), (8, 2), (4, 4), (6, 3), (3, 1), (1, 1), (100, 100))
+"""Of portals, and of gates with stored paths where not all have some."""
+GATES = ("all", "few", "sparse")
+"""All border cells are gates with stored paths, few of them have some, few of them are gates."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,17 @@ class Divided:
         return sparse.coo_array(kept, shape=entries.shape).tocsr()
 
     @cached_property
+    def inside_by_direction(self) -> Any:
+        """bool (8, cells), whether each of the eight moves from each cell stays in its field."""
+        entries, cols = self.inside.tocoo(), self.grid.shape[1]
+        row, col = np.divmod(entries.row, cols)
+        to_row, to_col = np.divmod(entries.col, cols)
+        turn = np.arctan2(to_row - row, to_col - col) / (np.pi / 4)
+        legal = np.zeros((8, self.label.size), dtype=np.bool_)
+        legal[np.round(turn).astype(int) % 8, entries.row] = True
+        return legal
+
+    @cached_property
     def crossings(self) -> Any:
         """Moves between fields: tail, head and cost, each in both directions."""
         entries = self.moves.tocoo()
@@ -73,17 +92,27 @@ class Divided:
         cost = entries.data[apart].astype(np.int64)
         return entries.row[apart].astype(np.int64), entries.col[apart].astype(np.int64), cost
 
-    def portals(self, **options: Any) -> Portals:
+    @cached_property
+    def n_fields(self) -> int:
+        """Fields of the cells that may be entered."""
+        return int(self.label.max(initial=-1)) + 1
+
+    def portals(self, gates: str = "all", **options: Any) -> Portals:
         """What is tested."""
-        spacing, source_spacing = self.spacings
-        return build_portals(
-            self.grid,
-            self.field_of,
-            spacing_cells=spacing,
-            source_spacing_cells=source_spacing,
-            allow_unexplored=self.allow_unexplored,
-            **options,
-        )
+        spacing, path_spacing = self.spacings
+        spacings = {
+            "all": (spacing, 1, 1),
+            "few": (spacing, 1, path_spacing),
+            "sparse": (path_spacing,) * 3,
+        }[gates]
+        options = {**dict(zip(NAMES, spacings, strict=True)), **options}
+        allowed = self.allow_unexplored
+        return build_portals(self.grid, self.field_of, allow_unexplored=allowed, **options)
+
+
+def fields_of(starts: Any) -> Any:
+    """The field of each of what is sorted by field."""
+    return np.repeat(np.arange(len(starts) - 1), np.diff(starts))
 
 
 def costs_from(graph: Any, cells: Any) -> Any:
@@ -92,6 +121,28 @@ def costs_from(graph: Any, cells: Any) -> Any:
     if not len(found):
         return np.empty((0, graph.shape[0]))
     return csgraph.dijkstra(graph, directed=True, indices=found)[back]
+
+
+def gate_graph(portals: Portals) -> Any:
+    """Graph of the gates: paths inside fields as they are stored, and moves between fields."""
+    n = portals.n_gates
+    tail = np.repeat(np.arange(n), np.diff(portals.exit_start))
+    graph = sparse.coo_array((portals.exit_cost.astype(float), (tail, portals.exit_gate)), (n, n))
+    starts = portals.gate_start.tolist()
+    pairs = [itertools.product(range(a, b), repeat=2) for a, b in itertools.pairwise(starts)]
+    ends = np.array([*itertools.chain(*pairs)], dtype=np.int64).reshape(-1, 2).T
+    return (graph + sparse.coo_array((portals.clique.astype(float), (*ends,)), (n, n))).tocsr()
+
+
+def with_rounding(patch: pytest.MonkeyPatch, bits: int) -> None:
+    """Have tables made as if the longest path took so many bits more than there are; 0 for none."""
+    exact = portal_table._tables
+
+    def long(portals: Portals, shift: int) -> Any:
+        route, between, greatest = exact(portals, shift)
+        return route, between, max(greatest, (1 << 31 + bits) - 1 if bits else 0)
+
+    patch.setattr(portal_table, "_tables", long)
 
 
 def pieces_of(divided: Divided) -> Any:

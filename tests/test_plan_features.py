@@ -101,7 +101,7 @@ def check_smooth(planner: hn.HybridPlanner, start: Any, goal: Any) -> hn.PlanRes
     assert result.cost <= length_of_points(over_centres) * (1 + 1e-9) + 1e-12
     assert np.array_equal(result.path.cells, plain.path.cells)
     assert 0 <= result.lower_bound <= result.cost
-    assert result.lower_bound == pytest.approx(math.dist(start, goal), abs=1e-12)
+    assert result.lower_bound >= min(result.cost, math.dist(start, goal)) - 1e-12
     assert result.gap >= 0
     return result
 

@@ -1,8 +1,7 @@
-"""Portals and their table against scipy's searches on the legal moves."""
+"""Portals, and the shortest paths inside fields, against scipy's searches on the legal moves."""
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 from typing import Any
 
@@ -10,11 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import sparse
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.route.portal_table import build_tables
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.topology.portals import (
     PathTooLongError,
@@ -23,20 +20,15 @@ from hybridnav.topology.portals import (
     build_portals,
     compact_labels,
 )
-from hybridnav.topology.thin_portals import beside_sources, thinned
-from tests.divided import Divided, costs_from, halves, partitions
+from tests.divided import GATES, NAMES, Divided, costs_from, fields_of, halves, partitions
 from tests.strategies import drawn, occupancy_grid
 
-AT_GATE = 8
+MOVES = 8
+"""Moves that one stored direction stands for, where it has this bit set."""
 ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1])
 COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1])
 ENOUGH = settings(max_examples=120, derandomize=True, deadline=None)
 FEWER = settings(max_examples=40, derandomize=True, deadline=None)
-
-
-def fields_of(starts: Any) -> Any:
-    """The field of each of what is sorted by field."""
-    return np.repeat(np.arange(len(starts) - 1), np.diff(starts))
 
 
 def position_of(portals: Portals, cells: Any, cols: int) -> Any:
@@ -52,21 +44,35 @@ def exits_of(portals: Portals) -> tuple[Any, Any]:
     return tail, portals.gate_cell[portals.exit_gate].astype(np.int64)
 
 
-def side_moves(divided: Divided, portals: Portals) -> list[tuple[Any, Any, Any]]:
-    """For each side the moves of its portal out of its field, by the definition of portals."""
+def group_of(divided: Divided, low: Any, high: Any, spacing: int) -> Any:
+    """The fields of moves, from the lower one to the higher, and the square of their lower cell."""
+    cols = divided.grid.shape[1]
+    lattice = low // cols // spacing, low % cols // spacing
+    return np.stack([divided.label[low], divided.label[high], *lattice], axis=1)
+
+
+def lower_to_higher(divided: Divided) -> tuple[Any, Any, Any]:
+    """Each move between two fields once: cells in the lower one and in the higher, cost."""
     tail, head, cost = divided.crossings
-    label, cols, spacing = divided.label, divided.grid.shape[1], divided.spacings[0]
-    low = np.where(label[tail] < label[head], tail, head)
-    high = np.where(label[tail] < label[head], head, tail)
-    key = np.stack([label[low], label[high], low // cols // spacing, low % cols // spacing])
+    up = divided.label[tail] < divided.label[head]
+    return tail[up], head[up], cost[up]
+
+
+def middle_cells(divided: Divided, spacing: int) -> list[list[frozenset[int]]]:
+    """Ends of the moves that may stand for each group: those nearest to the middle of all of its
+    lower cells, where a diagonal counts as a cell farther off."""
+    low, high, cost = lower_to_higher(divided)
+    place = np.stack(np.divmod(low, divided.grid.shape[1]), axis=1)
+    groups, group = np.unique(group_of(divided, low, high, spacing), axis=0, return_inverse=True)
     found = []
-    field = fields_of(portals.side_start)
-    for side, p in enumerate(portals.side_portal.tolist()):
-        ends = portals.gate_cell[portals.side_gate[portals.portal_sides[p]]]
-        at = ends[0] // cols // spacing, ends[0] % cols // spacing
-        own = (key == np.array([label[ends[0]], label[ends[1]], *at])[:, None]).all(axis=0)
-        own &= label[tail] == field[side]
-        found.append((tail[own], head[own], cost[own]))
+    for g in range(len(groups)):
+        own = np.flatnonzero(group.ravel() == g)
+        away = np.linalg.norm(place[own] - place[own].mean(axis=0), axis=1)
+        away += cost[own] == DIAGONAL
+        best = own[away <= away.min() + 1e-9]
+        found.append(
+            [frozenset(pair) for pair in zip(low[best].tolist(), high[best].tolist(), strict=True)]
+        )
     return found
 
 
@@ -74,229 +80,182 @@ def side_moves(divided: Divided, portals: Portals) -> list[tuple[Any, Any, Any]]
 
 
 @ENOUGH
-@given(partitions())
-def test_every_move_between_fields_is_an_exit_of_one_portal(divided: Divided) -> None:
-    portals, label, cols = divided.portals(), divided.label, divided.grid.shape[1]
-    tail, head = exits_of(portals)
-    found = list(zip(tail.tolist(), head.tolist(), portals.exit_cost.tolist(), strict=True))
-    expected = zip(*(part.tolist() for part in divided.crossings), strict=True)
+@given(partitions(), st.sampled_from(GATES))
+def test_every_move_between_gates_of_two_fields_is_an_exit(divided: Divided, gates: str) -> None:
+    portals, label = divided.portals(gates), divided.label
+    tail, head, cost = divided.crossings
+    if gates != "sparse":
+        assert np.array_equal(np.sort(portals.gate_cell), np.unique(tail))
+    kept = np.isin(tail, portals.gate_cell) & np.isin(head, portals.gate_cell)
+    expected = zip(tail[kept].tolist(), head[kept].tolist(), cost[kept].tolist(), strict=True)
+    ends = (part.tolist() for part in exits_of(portals))
+    found = zip(*ends, portals.exit_cost.tolist(), strict=True)
     assert sorted(found) == sorted(expected)
-    assert np.array_equal(np.unique(portals.gate_cell), np.unique(tail))
+    assert portals.n_fields == divided.n_fields
+    assert len(np.unique(portals.gate_cell)) == portals.n_gates
     assert (label[portals.gate_cell] == fields_of(portals.gate_start)).all()
-    low = np.where(label[tail] < label[head], tail, head)
-    other = np.maximum(label[tail], label[head])
-    spacing = divided.spacings[0]
-    keys = zip(label[low], other, low // cols // spacing, low % cols // spacing, strict=True)
-    pairs = set(zip(portals.exit_portal.tolist(), keys, strict=True))
-    assert len(pairs) == len({key for _, key in pairs}) == portals.n_portals
+    places = position_of(portals, portals.gate_cell, divided.grid.shape[1])
+    assert (np.diff(places) > 0).all(), "gates do not stand in the order of cells"
 
 
 @ENOUGH
-@given(partitions())
-def test_sides_and_portals_name_each_other(divided: Divided) -> None:
-    portals, label = divided.portals(), divided.label
-    n = portals.n_portals
-    sides, fields = portals.portal_sides, fields_of(portals.side_start)
-    assert portals.n_fields == len(np.unique(label[label >= 0]))
-    assert np.array_equal(np.sort(sides.ravel()), np.arange(2 * n))
-    assert (portals.side_portal[sides] == np.arange(n)[:, None]).all()
-    assert (fields[sides[:, 0]] < fields[sides[:, 1]]).all()
-    assert (label[portals.gate_cell[portals.side_gate]] == fields).all()
-    starts = portals.side_gates_start
-    for side, (tail, head, cost) in enumerate(side_moves(divided, portals)):
-        gates = portals.side_gates[starts[side] : starts[side + 1]]
-        assert (np.diff(gates) > 0).all()
-        assert np.array_equal(np.sort(portals.gate_cell[gates]), np.unique(tail))
-        p = portals.side_portal[side]
-        here, there = portals.side_gate[sides[p] if sides[p, 0] == side else sides[p, ::-1]]
-        own = (tail == portals.gate_cell[here]) & (head == portals.gate_cell[there])
-        assert cost[own].tolist() == [portals.portal_cost[p]]
+@given(partitions(), st.sampled_from(GATES))
+def test_the_sides_of_a_field_are_those_of_its_portals(divided: Divided, gates: str) -> None:
+    portals = divided.portals(gates)
+    low, high, _ = lower_to_higher(divided)
+    spacing = divided.spacings[gates == "sparse"]
+    expected: dict[tuple[int, ...], set[int]] = {}
+    is_gate = np.isin(low, portals.gate_cell) & np.isin(high, portals.gate_cell)
+    keys = group_of(divided, low, high, spacing).tolist()
+    for key, ends, leads in zip(keys, np.stack([low, high], axis=1).tolist(), is_gate, strict=True):
+        for end in (0, 1):
+            gates_of_side = expected.setdefault((key[end], end, *key), set())
+            gates_of_side |= {ends[end]} if leads else set()
+    fields, starts = fields_of(portals.side_start), portals.side_gates_start
+    found = []
+    for side, field in enumerate(fields.tolist()):
+        own = portals.side_gates[starts[side] : starts[side + 1]]
+        assert (np.diff(own) > 0).all()
+        found.append((field, sorted(portals.gate_cell[own].tolist())))
+    assert sorted(found) == sorted((key[0], sorted(cells)) for key, cells in expected.items())
+    assert all(cells for _, cells in found), "a side without a gate"
 
 
 @ENOUGH
-@given(partitions(), st.sampled_from([1, 1, 2, 4]))
-def test_paths_inside_fields_are_those_that_dijkstra_finds(divided: Divided, every: int) -> None:
-    portals, cols = divided.portals(gate_spacing_cells=every), divided.grid.shape[1]
-    label, exact = divided.label, costs_from(divided.inside, portals.gate_cell)
+@given(partitions(), st.sampled_from([(1, 1), (1, 2), (1, 4), (2, 4), (3, 8), (8, 8)]))
+def test_gates_and_paths_are_where_the_middles_are(
+    divided: Divided, spacings: tuple[int, int]
+) -> None:
+    low, high, _ = lower_to_higher(divided)
+    portals = replace(divided, spacings=(8, 1)).portals(
+        gate_spacing_cells=spacings[0], path_spacing_cells=spacings[1]
+    )
+    has_paths = np.diff(portals.row_start) > 0
+    with_paths = set(portals.gate_cell[has_paths].tolist())
+    allowed: dict[int, set[int]] = {}
+    for spacing in {1, *spacings}:
+        border = middle_cells(divided, spacing)
+        ends = with_paths if spacing == spacings[1] else set(portals.gate_cell.tolist())
+        if spacing in spacings:
+            assert all(any(pair <= ends for pair in pairs) for pairs in border)
+        allowed[spacing] = set().union(*(pair for pairs in border for pair in pairs))
+    if spacings[1] == 1:
+        assert with_paths == {*low.tolist(), *high.tolist()}
+    else:
+        assert with_paths <= allowed[spacings[1]]
+    if spacings[0] > 1:
+        assert set(portals.gate_cell.tolist()) <= allowed[spacings[0]] | with_paths
+    # Sources: from where such a move leads up to a higher field.
+    leads = np.isin(low, [*with_paths]) & np.isin(high, [*with_paths])
+    assert np.array_equal(np.sort(portals.gate_cell[portals.source_gate]), np.unique(low[leads]))
+    assert (np.diff(portals.source_gate) > 0).all()
+
+
+@ENOUGH
+@given(partitions(), st.sampled_from(GATES))
+def test_paths_inside_fields_are_those_that_dijkstra_finds(divided: Divided, gates: str) -> None:
+    portals, cols, label = divided.portals(gates), divided.grid.shape[1], divided.label
+    exact = costs_from(divided.inside, portals.gate_cell)
     positions = position_of(portals, np.arange(label.size), cols)
     assert np.array_equal(np.sort(positions[label >= 0]), np.arange((label >= 0).sum()))
     assert (positions[label < 0] == -1).all()
-    legal = divided.moves.astype(bool).todok()
-    steps: set[tuple[int, int]] = set()
+    legal = divided.inside_by_direction
     for gate, field in enumerate(fields_of(portals.gate_start).tolist()):
         cells = np.flatnonzero(label == field)
         place = positions[cells] - portals.field_start[field]
-        row = portals.rows[portals.row_start[gate] : portals.row_start[gate + 1]]
-        assert len(row) == -(-len(cells) // 2)
         assert np.array_equal(np.sort(place), np.arange(len(cells)))
-        towards = row[place // 2] >> place % 2 * 4 & 15
-        assert (towards <= AT_GATE).all()
-        assert np.array_equal(towards == AT_GATE, cells == portals.gate_cell[gate])
-        leads = towards < AT_GATE
-        tail, k = cells[leads], towards[leads]
-        head = tail + ROW_STEP[k] * cols + COL_STEP[k]
-        assert (tail % cols + COL_STEP[k] == head % cols).all()
-        assert (label[head] == field).all()
-        # One step on, what is left is less by exactly that step.
-        step = np.where(k % 2 == 1, DIAGONAL, STRAIGHT)
-        assert (exact[gate, head] + step == exact[gate, tail]).all()
-        steps.update(zip(tail.tolist(), head.tolist(), strict=True))
-    assert steps <= set(legal.keys()), "a direction is no legal move"
+        row = portals.rows[portals.row_start[gate] : portals.row_start[gate + 1]]
+        if not len(row):
+            assert gates == "few"
+            continue
+        assert len(row) == -(-len(cells) // 2)
+        code = row[place // 2] >> place % 2 * 4 & 15
+        away = cells != portals.gate_cell[gate]
+        cells, k, leaps = cells[away], code[away] % 8, code[away] >= 8
+        assert np.array_equal(leaps, may_leap(legal, exact[gate], cells, cols).any(axis=0))
+        for move in range(MOVES):
+            here, k = (cells, k) if move == 0 else (cells[leaps], k[leaps])
+            leaps = leaps if move == 0 else leaps[leaps]
+            assert legal[k, here].all(), "a direction is no legal move inside the field"
+            cells = here + ROW_STEP[k] * cols + COL_STEP[k]
+            # One step on, what is left is less by exactly that step.
+            step = np.where(k % 2 == 1, DIAGONAL, STRAIGHT)
+            assert (exact[gate, cells] + step == exact[gate, here]).all()
     for f in range(portals.n_fields):
         own = slice(portals.gate_start[f], portals.gate_start[f + 1])
         clique = portals.clique[portals.clique_start[f] : portals.clique_start[f + 1]]
         assert np.array_equal(clique, exact[own, portals.gate_cell[own]].ravel())
 
 
+def may_leap(legal: Any, exact: Any, cells: Any, cols: int) -> Any:
+    """bool (8, n), whether a shortest path goes on from each cell for eight moves that way."""
+    goes_on = np.ones((8, len(cells)), dtype=np.bool_)
+    for k in range(8):
+        here = cells.copy()
+        for _ in range(MOVES):
+            goes_on[k] &= legal[k, here]
+            there = np.where(goes_on[k], here + ROW_STEP[k] * cols + COL_STEP[k], here)
+            goes_on[k] &= exact[there] < exact[here]
+            here = there
+        step = MOVES * (DIAGONAL if k % 2 else STRAIGHT)
+        goes_on[k] &= exact[here] + step == exact[cells]
+    return goes_on
+
+
 @ENOUGH
-@given(partitions(), st.sampled_from([1, 1, 2, 4]))
-def test_steps_and_radii_are_true(divided: Divided, every: int) -> None:
-    portals, cols = divided.portals(gate_spacing_cells=every), divided.grid.shape[1]
-    label = divided.label
-    exact = costs_from(divided.inside, portals.gate_cell[portals.side_gate])
+@given(partitions(), st.sampled_from(GATES))
+def test_steps_lead_to_the_nearest_gate_of_each_side(divided: Divided, gates: str) -> None:
+    portals, cols, label = divided.portals(gates), divided.grid.shape[1], divided.label
+    exact, starts = costs_from(divided.inside, portals.gate_cell), portals.side_gates_start
     for f in range(portals.n_fields):
         cells = np.flatnonzero(label == f)
-        sides = np.arange(portals.side_start[f], portals.side_start[f + 1])
+        sides = range(portals.side_start[f], portals.side_start[f + 1])
         stored = portals.steps[portals.steps_start[f] : portals.steps_start[f + 1]]
         stored = stored.reshape(len(cells), len(sides))
         place = position_of(portals, cells, cols) - portals.field_start[f]
-        rounded = exact[np.ix_(sides, cells)].astype(np.int64) >> portals.steps_shift[f]
-        assert np.array_equal(stored[place], rounded.T)
-    for side, (tail, _, _) in enumerate(side_moves(divided, portals)):
-        assert exact[side, tail].max() == portals.side_radius[side]
-
-
-@ENOUGH
-@given(partitions(), st.sampled_from([1, 1, 2, 4]))
-def test_each_gate_has_a_source_of_its_portal_at_a_true_cost(divided: Divided, every: int) -> None:
-    portals, cols = divided.portals(gate_spacing_cells=every), divided.grid.shape[1]
-    at_source = portals.gate_cell[portals.source_gate]
-    lower = portals.side_gate[portals.portal_sides[:, 0]]
-    assert (portals.source_gate[portals.portal_source] == lower).all()
-    inside = costs_from(divided.inside, at_source)
-    true = costs_from(divided.moves, at_source)
-    starts, square = portals.side_gates_start, divided.spacings[1]
-    used: set[int] = set()
-    for side, (tail, head, cost) in enumerate(side_moves(divided, portals)):
-        p = portals.side_portal[side]
-        is_low = portals.portal_sides[p, 0] == side
-        low = tail if is_low else head
-        squares = set(zip(low // cols // square, low % cols // square, strict=True))
-        sources = set()
-        for q in range(starts[side], starts[side + 1]):
-            gate, source = portals.gate_cell[portals.side_gates[q]], portals.side_gates_source[q]
-            stored = portals.side_gates_cost[q]
-            over = np.zeros(1) if is_low else cost[tail == gate]
-            cells = np.array([gate]) if is_low else head[tail == gate]
-            assert stored in (inside[source, cells] + over).tolist(), "the cost of no path"
-            assert stored >= true[source, gate]
-            assert at_source[source] in low
-            sources.add(int(source))
-        if every == 1 and is_low:
-            at = at_source[list(sources)]
-            assert set(zip(at // cols // square, at % cols // square, strict=True)) == squares
-            assert len(sources) == len(squares)
-            assert not sources & used, "a source of two portals"
-            used |= sources
-    assert every > 1 or used == set(range(len(at_source)))
+        for column, side in zip(stored[place].T, sides, strict=True):
+            nearest = exact[portals.side_gates[starts[side] : starts[side + 1]]].min(axis=0)
+            rounded = nearest[cells].astype(np.int64) >> portals.steps_shift[f]
+            assert np.array_equal(column, rounded)
 
 
 def test_fields_that_meet_at_a_point_only_have_a_portal_there() -> None:
     grid = occupancy_grid(drawn("..", ".."))
     portals = build_portals(grid, np.array([[0, 1], [2, 3]], dtype=np.int32))
-    assert portals.n_portals == 6
-    assert np.sort(portals.portal_cost).tolist() == [STRAIGHT] * 4 + [DIAGONAL] * 2
+    assert portals.n_sides == 12
+    assert np.sort(portals.exit_cost).tolist() == [STRAIGHT] * 8 + [DIAGONAL] * 4
     walled = build_portals(occupancy_grid(drawn("#.", "..")), np.array([[0, 1], [2, 3]], np.int32))
-    assert walled.portal_cost.tolist() == [STRAIGHT] * 2
+    assert walled.exit_cost.tolist() == [STRAIGHT] * 4
 
 
-def test_a_portal_lies_in_the_middle_of_its_part_of_the_border() -> None:
-    portals = halves(24, 6, 3).portals()
-    low = portals.gate_cell[portals.side_gate[portals.portal_sides[:, 0]]]
-    assert (low % 6).tolist() == [2, 2, 2]
-    assert np.isin(low // 6 - np.array([0, 8, 16]), [3, 4]).all()
-    assert portals.portal_cost.tolist() == [STRAIGHT] * 3
-    assert len(portals.source_gate) == 6
-
-
-# The table
-
-
-def rounded_down(costs: Any) -> Any:
-    """Float32 values nearest below."""
-    near = costs.astype(np.float32)
-    return np.where(near > costs, np.nextafter(near, np.float32(0)), near)
-
-
-@ENOUGH
-@given(partitions())
-def test_the_table_has_the_costs_of_shortest_paths(divided: Divided) -> None:
-    portals, tables = build_tables(divided.portals())
-    true = costs_from(divided.moves, portals.gate_cell[portals.source_gate])
-    assert np.array_equal(tables.bound, rounded_down(true[:, portals.gate_cell]))
-    assert tables.route is tables.bound
-    assert np.array_equal(tables.gate_field, divided.label[portals.gate_cell])
-    for side, (tail, _, _) in enumerate(side_moves(divided, portals)):
-        source = portals.portal_source[portals.side_portal[side]]
-        assert true[source, tail].max() <= tables.reach[side]
-
-
-@ENOUGH
-@given(partitions(), st.booleans())
-def test_with_fewer_gates_bounds_stay_and_routes_are_no_shorter(
-    divided: Divided,
-    keep_more: bool,  # noqa: FBT001 - drawn
-) -> None:
-    every = divided.portals()
-    kept = beside_sources(every)
-    if keep_more:
-        kept = kept | (np.random.default_rng(every.n_gates).random(every.n_gates) < 0.3)
-    portals, tables = build_tables(every, kept=kept)
-    assert np.array_equal(portals.gate_cell, every.gate_cell[kept])
-    true = costs_from(divided.moves, portals.gate_cell[portals.source_gate])
-    assert np.array_equal(tables.bound, rounded_down(true[:, portals.gate_cell]))
-    assert (tables.route >= tables.bound).all()
-    assert np.array_equal(np.isfinite(tables.route), np.isfinite(tables.bound))
-    # The routes are those of the graph that is left: paths inside fields, and its exits.
-    tail, head = exits_of(portals)
-    entries = portals.exit_cost.astype(float), (tail, head)
-    pairs = [
-        np.array(list(itertools.product(portals.gate_cell[a:b].tolist(), repeat=2)))
-        for a, b in itertools.pairwise(portals.gate_start.tolist())
-    ]
-    u, v = np.concatenate([np.empty((0, 2), int), *(p.reshape(-1, 2) for p in pairs)]).T
-    legs = portals.clique.astype(float), (u, v)
-    size = divided.label.size
-    graph = sparse.coo_array(entries, shape=(size, size)) + sparse.coo_array(legs, (size, size))
-    over_gates = costs_from(graph.tocsr(), portals.gate_cell[portals.source_gate])
-    assert np.array_equal(tables.route, rounded_down(over_gates[:, portals.gate_cell]))
-    names = ("side_radius", "portal_sides", "portal_source", "portal_cost", "position", "steps")
-    for name in names:
-        assert np.array_equal(getattr(portals, name), getattr(every, name)), name
-    assert np.array_equal(every.gate_cell[every.side_gate], portals.gate_cell[portals.side_gate])
-    at_source = every.gate_cell[every.source_gate]
-    assert np.array_equal(at_source, portals.gate_cell[portals.source_gate])
-
-
-def test_keeping_all_gates_changes_nothing() -> None:
-    portals = halves(9, 9, 4).portals()
-    same = thinned(portals, np.ones(portals.n_gates, dtype=np.bool_))
-    for name in Portals._fields:
-        assert np.array_equal(getattr(portals, name), getattr(same, name)), name
+def test_the_gate_of_a_part_of_the_border_lies_in_its_middle() -> None:
+    for gates, every in (("sparse", 8), ("few", 4)):
+        divided = replace(halves(24, 6, 3), spacings=(8, every))
+        portals = divided.portals(gates)
+        has_paths = np.diff(portals.row_start) > 0
+        row, col = np.divmod(portals.gate_cell[has_paths], 6)
+        n = 24 // every
+        assert col.tolist() == [2] * n + [3] * n, "no straight move across"
+        middle = np.isin(row[:n] - np.arange(0, 24, every), [every // 2 - 1, every // 2])
+        assert middle.all()
+        assert np.array_equal(row[n:], row[:n])
+        assert np.array_equal(portals.source_gate, np.flatnonzero(has_paths)[:n])
+        assert portals.n_gates == (2 * n if gates == "sparse" else 48)
+        assert portals.n_sides == 2 * 3
 
 
 # Little maps, and what is refused
 
 
 @pytest.mark.parametrize("drawing", [("#",), ("?",), ("#?", "??"), (".",), ("..", ".."), ("#.#",)])
-def test_without_a_border_there_are_no_portals(drawing: tuple[str, ...]) -> None:
+def test_without_a_border_there_are_no_gates(drawing: tuple[str, ...]) -> None:
     classes = drawn(*drawing)
     free = classes == CellClass.FREE
-    portals = build_portals(occupancy_grid(classes), np.where(free, 4, -1).astype(np.int32))
-    assert portals.n_fields == int(free.any())
-    portals, tables = build_tables(portals, kept=beside_sources(portals))
-    assert portals.n_portals == portals.n_gates == 0
-    assert tables.route.shape == tables.bound.shape == (0, 0)
+    divided = Divided(occupancy_grid(classes), np.where(free, 4, -1).astype(np.int32))
+    for gates in GATES:
+        portals = divided.portals(gates)
+        assert portals.n_fields == int(free.any())
+        assert portals.n_gates == portals.n_sides == len(portals.source_gate) == 0
 
 
 @FEWER
@@ -326,17 +285,11 @@ def test_many_fields_are_numbered_in_32_bits() -> None:
     assert np.array_equal(few, np.where(names < 1000, names, -1))
 
 
-@pytest.mark.parametrize("spacings", [(0, 1, 1), (4, 0, 1), (4, 4, 0), (-8, -4, 1), (16, 5, 1)])
+@pytest.mark.parametrize("spacings", [(0, 1, 1), (4, 0, 1), (4, 4, 0), (-8, -4, 1), (16, 1, 5)])
 def test_spacings_that_make_no_lattice_are_refused(spacings: tuple[int, int, int]) -> None:
     divided = halves(3, 4, 2)
     with pytest.raises(InvalidValueError, match="spacings of at least one cell") as refused:
-        build_portals(
-            divided.grid,
-            divided.field_of,
-            spacing_cells=spacings[0],
-            source_spacing_cells=spacings[1],
-            gate_spacing_cells=spacings[2],
-        )
+        divided.portals("all", **dict(zip(NAMES, spacings, strict=True)))
     assert "\n" not in str(refused.value)
 
 
@@ -381,11 +334,17 @@ def test_a_field_with_too_long_a_path_is_refused(folded: bool) -> None:  # noqa:
 
 
 @FEWER
-@given(partitions())
-def test_portals_that_take_too_much_memory_are_refused(divided: Divided) -> None:
-    portals = divided.portals()
-    size = portals.rows.nbytes + portals.clique.nbytes + portals.steps.nbytes
-    size += 4 * len(portals.source_gate) * portals.n_gates
-    divided.portals(max_bytes=size)
+@given(partitions(), st.sampled_from(GATES))
+def test_portals_that_take_too_much_memory_are_refused(divided: Divided, gates: str) -> None:
+    portals = divided.portals(gates)
+    cells, n_gates = np.diff(portals.field_start), np.diff(portals.gate_start)
+    size = 0.5 * (cells * n_gates).sum() + portals.clique.nbytes + portals.steps.nbytes
+    table = 4 * portals.n_gates * len(portals.source_gate)
+    if gates == "few":  # a table of all gates is made before some are dropped
+        table = 4 * portals.n_gates * len(np.unique(lower_to_higher(divided)[0]))
+    divided.portals(gates, max_bytes=size + table)
+    # Where gates are sparse, other moves between them than those that were chosen may add sources.
+    most = size if gates == "sparse" else size + table
     with pytest.raises(PortalsTooLargeError, match="portals would take 0 MB"):
-        divided.portals(max_bytes=size - 1)
+        divided.portals(gates, max_bytes=most - 1)
+    assert portals.rows.nbytes <= 0.5 * (cells * n_gates).sum() + 0.5 * portals.n_gates

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
 
 _FAR = 1e150
+_MANY = 2.0**40
+"""More cells than any map has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,8 @@ class Frame:
     resolution_m: float = 1.0
     origin_m: tuple[float, float] = (0.0, 0.0)
     yaw_rad: float = 0.0
+    _turned: tuple[float, float, float, float] = field(init=False, repr=False, compare=False)
+    """Cosine and sine of the yaw, and the origin inside the range of numbers."""
 
     def __post_init__(self) -> None:
         # Numbers of numpy may be float32, which would spoil every length made from them.
@@ -56,6 +60,9 @@ class Frame:
             raise InvalidValueError(
                 f"origin and yaw must be finite, got {self.origin_m} and {self.yaw_rad}"
             )
+        x, y = (min(max(along, -_FAR), _FAR) for along in self.origin_m)
+        turned = math.cos(self.yaw_rad), math.sin(self.yaw_rad), x, y
+        object.__setattr__(self, "_turned", turned)
 
     def points_of(self, cells: ArrayLike) -> FloatArray:
         """Centres of cells in the map frame.
@@ -123,7 +130,7 @@ class Frame:
         with np.errstate(over="ignore"):
             position = np.stack([along_y, along_x], axis=-1) / self.resolution_m
         # A centre made by points_of must come back to its cell: 1e-9 of a cell absorbs rounding.
-        cells = np.floor(np.clip(position + 1e-9, -(2.0**40), 2.0**40))
+        cells = np.floor(np.clip(position + 1e-9, -_MANY, _MANY))
         return cells.astype(np.int64)
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
@@ -134,13 +141,22 @@ class Frame:
         x, y
             Finite, in metres, map frame.
         """
-        along = min(max(x, -_FAR), _FAR) - min(max(self.origin_m[0], -_FAR), _FAR)
-        across = min(max(y, -_FAR), _FAR) - min(max(self.origin_m[1], -_FAR), _FAR)
-        cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        col = (cosine * along + sine * across) / self.resolution_m
+        row, col = self.position_of(x, y)
+        row, col = row + 1e-9, col + 1e-9
+        if -_MANY < row < _MANY and -_MANY < col < _MANY:
+            return math.floor(row), math.floor(col)
+        return math.floor(min(max(row, -_MANY), _MANY)), math.floor(min(max(col, -_MANY), _MANY))
+
+    def position_of(self, x: float, y: float) -> tuple[float, float]:
+        """One point as (row, column) in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
+
+        Parameters
+        ----------
+        x, y
+            Finite, in metres, map frame.
+        """
+        cosine, sine, x0, y0 = self._turned
+        along = min(max(x, -_FAR), _FAR) - x0
+        across = min(max(y, -_FAR), _FAR) - y0
         row = (cosine * across - sine * along) / self.resolution_m
-        limit = 2.0**40
-        return (
-            math.floor(min(max(row + 1e-9, -limit), limit)),
-            math.floor(min(max(col + 1e-9, -limit), limit)),
-        )
+        return row, (cosine * along + sine * across) / self.resolution_m

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.refine import GridRefiner
-    from hybridnav.route import Effort
+    from hybridnav.route import Effort, PortalAnswers
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
@@ -118,9 +118,7 @@ class OverPortals:
             allow_unexplored=settings.allow_unexplored,
         )
         self._epsilon = settings.epsilon
-        self._effort: Effort = "stored"
-        if settings.refine == "gates":
-            self._effort = "narrow" if settings.epsilon is None else "wide"
+        self._effort: Effort = "exact" if settings.refine == "gates" else "stored"
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
         """Find a path over portals; see `CellPlanner`."""
@@ -135,3 +133,7 @@ class OverPortals:
             expanded_gates=found.expanded_gates,
             seconds={"portals": time.perf_counter() - began},
         )
+
+    def plan_many(self, starts: LongArray, goals: LongArray) -> PortalAnswers:
+        """The same for many pairs of cells, int64 (n, 2) each, as far as look-ups answer them."""
+        return self.search.many(starts, goals, effort=self._effort, epsilon=self._epsilon or 0.0)

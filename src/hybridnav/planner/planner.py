@@ -13,9 +13,10 @@ import numpy as np
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
 from hybridnav.refine import GridRefiner, LineOfSight
-from hybridnav.result import Path, PlanBatch, PlanResult, PlanStats, PlanStatus, Route
+from hybridnav.result import Path, PlanResult, PlanStats, PlanStatus, Route
 from hybridnav.route import Walks
 from hybridnav.search.octile import path_length_in_cells
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray, PathLike
     from hybridnav.planner.blocked import Blocked
     from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.result import PlanBatch
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
@@ -148,15 +150,8 @@ class HybridPlanner:
         first, last = _points("starts", starts), _points("goals", goals)
         if len(first) != len(last):
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
-        results = [self.plan(*pair, smooth=smooth) for pair in zip(first, last, strict=True)]
-        paths = [r.path.points if r.path else np.empty((0, 2)) for r in results]
-        return PlanBatch(
-            status=np.array([str(r.status) for r in results], dtype=np.str_),
-            cost=np.array([r.cost for r in results], dtype=np.float64),
-            lower_bound=np.array([r.lower_bound for r in results], dtype=np.float64),
-            path_start=np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64),
-            points=np.concatenate([np.empty((0, 2)), *paths]),
-        )
+        finish = self._finish_asked_for(smooth)
+        return plan_many(self, self._cells, first, last, finish)
 
     def _round(self, closed: LongArray, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
         """The plan itself where nothing closed is in its way, else the best path round it all.
@@ -211,7 +206,7 @@ class HybridPlanner:
             length_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
             stats.seconds["smooth"] = time.perf_counter() - began
             path, metric = Path(plan.cells, points, length_m), "any-angle"
-            bound = float(np.hypot(*(ends[1] - ends[0])))
+            bound = self._any_angle_bound(plan.cells, ends)
         else:
             grid = self.topology.grid
             centres = plan.points if plan.points is not None else grid.frame.points_of(plan.cells)
@@ -227,6 +222,16 @@ class HybridPlanner:
             lower_bound=min(bound, length_m),
             stats=stats,
         )
+
+    def _any_angle_bound(self, cells: LongArray, ends: tuple[FloatArray, FloatArray]) -> float:
+        """No any-angle path between two points is shorter, in metres."""
+        if not isinstance(self._cells, OverPortals):
+            return math.dist(*ends)
+        frame = self.topology.grid.frame
+        start, goal = (frame.position_of(float(end[0]), float(end[1])) for end in ends)
+        first, last = tuple(cells[0].tolist()), tuple(cells[-1].tolist())
+        bound = self._cells.search.any_angle_bound(first, last, (start, goal))
+        return bound * frame.resolution_m
 
     def _sight(self, closed: LongArray | None) -> LineOfSight:
         """What shortens paths; with closed cells one made for the query."""

@@ -2,7 +2,7 @@
 
 from hybridnav.route.coarse import CoarseRoute, MaxDistanceSearch
 from hybridnav.route.corridor import Corridor, corridor_of
-from hybridnav.route.portal_search import Effort, PortalSearch
+from hybridnav.route.portal_search import Effort, PortalAnswers, PortalSearch
 from hybridnav.route.walk import Walks
 
 __all__ = [
@@ -10,6 +10,7 @@ __all__ = [
     "Corridor",
     "Effort",
     "MaxDistanceSearch",
+    "PortalAnswers",
     "PortalSearch",
     "Walks",
     "corridor_of",

@@ -1,85 +1,97 @@
-"""Kernels that answer queries over portals: one, or many in a row."""
+"""Kernel that answers queries over portals."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from hybridnav.route._first_way_kernels import first_way, side_costs, weigh_sides
-from hybridnav.route._gate_search_kernels import improve, targets_of
-from hybridnav.route._portal_kernels import cells_of_way, field_at
-from hybridnav.search._costs import STRAIGHT
-from hybridnav.search._kernels import octile_cost
-
-STORED = 0
-NARROW = 1
-WIDE = 2
-"""How far a first way is improved: not at all; over the gates of its fields; over all gates."""
-SHORT = 256 * STRAIGHT
-"""Up to this cost the choice of a few fields costs much, and a search of all gates little."""
+from hybridnav.route._descent_kernels import descend, with_ends
+from hybridnav.route._portal_kernels import FAR, cells_of_way, field_at
+from hybridnav.route._side_kernels import best_gates, side_costs, ways_by_sides
 
 
 @njit(cache=True)
-def answer(portals, tables, cols, start, goal, upper, mode, epsilon, work):
-    """Path over gates between two cells that may be entered, as flat cells, if it costs less than
-    `upper`, the cost of the shortest path inside one field where start and goal share it, else FAR.
+def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon, frame):
+    """Path over gates between two cells that may be entered, if it costs less than `inside`, the
+    cost of the shortest path inside one field where start and goal share it, else FAR.
 
-    Gives the lower cost of the two, the path (empty if it is not cheaper), a lower bound on the
-    cost of any path, and the number of gates expanded. The fields of the first way are marked in
-    `work.passed`.
+    Pairs of sides, one of the start's field and one of the goal's, are looked at in the order of
+    what bounds their ways from below, until no other one can be better by more than `epsilon`, or
+    `pairs` of them were. With `is_exact` all border cells are gates, and what was looked at is no
+    bound any more. Gives the lower cost of the two, a lower bound on the ways over gates and
+    `inside`, how many stored paths were walked to find the ends, and the path's cells and points,
+    which are empty if it costs no less.
     """
-    work.generation[0] += 1
-    stamp = work.generation[0]
-    field, goal_field = field_at(portals, cols, start), field_at(portals, cols, goal)
-    work.passed[field] = stamp
-    path = np.empty(0, np.int64)
-    low_start = side_costs(portals, cols, field, start)
-    low_goal = side_costs(portals, cols, goal_field, goal)
-    if low_start.size == 0 or low_goal.size == 0:
-        return upper, path, upper, 0
-    by_start, by_goal, over, first, last, landmark = weigh_sides(
-        portals, tables, field, goal_field, low_start, low_goal
-    )
-    if first < 0:
-        return upper, path, upper, 0
-    if over < upper:
-        cost, end = first_way(
-            portals, tables, cols, start, goal, low_start, low_goal, first, last, work
-        )
-        if cost < upper:
-            upper = cost
-            path = cells_of_way(portals, tables.gate_field, cols, start, goal, end, work, upper)
-    line = octile_cost(start // cols - goal // cols, start % cols - goal % cols)
-    lower = min(max(by_start.min(), line), upper)
-    expanded = 0
-    if mode != STORED and lower * (1 + epsilon) < upper:
-        source, low = targets_of(portals, cols, goal_field, goal, low_goal, by_goal, upper)
-        cost, end, bound, expanded = improve(
-            portals, tables, cols, start, goal, low_start, by_start, low_goal, landmark, source,
-            low, upper, epsilon, mode == NARROW and upper >= SHORT, work,
+    cells, points = np.empty((0, 2), np.int64), np.empty((0, 2), np.float64)
+    side_start = portals.side_start
+    side_gates_start = portals.side_gates_start
+    gate_field = tables.gate_field
+    ends = np.int64(start), np.int64(goal)
+    fields = field_at(portals, cols, start), field_at(portals, cols, goal)
+    low_start = side_costs(portals, cols, fields[0], start)
+    low_goal = side_costs(portals, cols, fields[1], goal)
+    s0, t0 = side_start[fields[0]], side_start[fields[1]]
+    low = ways_by_sides(tables.between, tables.shift, s0, t0, low_start, low_goal)
+    first_q, last_q = side_gates_start[s0], side_gates_start[t0]
+    known_start = np.full(side_gates_start[side_start[fields[0] + 1]] - first_q, -1, np.int64)
+    known_goal = np.full(side_gates_start[side_start[fields[1] + 1]] - last_q, -1, np.int64)
+    upper = np.int64(inside)
+    lower = upper if is_exact or low.size == 0 else min(upper, low.min())
+    gate, source, across, walked = np.int64(-1), np.int64(-1), np.int64(-1), 0
+    while True:
+        least, best_i, best_j = np.int64(FAR), 0, 0
+        for i in range(low_start.size):
+            for j in range(low_goal.size):
+                if low[i, j] < least:
+                    least, best_i, best_j = low[i, j], i, j
+        if least * (1 + epsilon) >= upper or pairs == 0:
+            lower = min(lower, least)
+            break
+        pairs -= 1
+        low[best_i, best_j] = FAR
+        sides = s0 + best_i, t0 + best_j
+        over, x, s, w, more = best_gates(
+            portals, tables, cols, ends, fields, sides, (low_start[best_i], low_goal[best_j]),
+            known_start[side_gates_start[sides[0]] - first_q :],
+            known_goal[side_gates_start[sides[1]] - last_q :], upper,
         )  # fmt: skip
-        lower = max(lower, bound)
-        if end >= 0:
-            upper = cost
-            path = cells_of_way(portals, tables.gate_field, cols, start, goal, end, work, upper)
-    return upper, path, min(lower, upper), expanded
+        walked += more
+        if over < upper:
+            upper, gate, source, across = over, x, s, w
+    lower = min(lower, upper)
+    if gate < 0:
+        return inside, lower, walked, cells, points
+    out, into, legs, crossings = descend(
+        portals, tables.route, tables.shift, gate_field, gate, source, across
+    )
+    cost = with_ends(portals, gate_field, cols, start, goal, out, into, legs, crossings)
+    if cost >= inside:
+        return inside, lower, walked, cells, points
+    cells, points = cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
+    return cost, lower, walked, cells, points
 
 
 @njit(cache=True)
-def centres(cells, resolution, origin_x, origin_y, cosine, sine):
-    """Centres of (row, col) in the map frame, as `Frame.points_of` has them."""
-    points = np.empty((cells.shape[0], 2), np.float64)
-    for i in range(cells.shape[0]):
-        x, y = (cells[i, 1] + 0.5) * resolution, (cells[i, 0] + 0.5) * resolution
-        points[i, 0] = origin_x + cosine * x - sine * y
-        points[i, 1] = origin_y + sine * x + cosine * y
-    return points
+def answers(portals, tables, cols, starts, goals, pairs, is_exact, epsilon, frame):
+    """`answer` for many pairs of flat cells, int64 (n,) each, as if no two shared a field.
 
-
-@njit(cache=True)
-def unfold(path, cols, resolution, origin_x, origin_y, cosine, sine):
-    """(row, col) of flat cells, and their centres in the map frame."""
-    cells = np.empty((path.size, 2), np.int64)
-    for i in range(path.size):
-        cells[i, 0], cells[i, 1] = path[i] // cols, path[i] % cols
-    return cells, centres(cells, resolution, origin_x, origin_y, cosine, sine)
+    Gives their costs, lower bounds and numbers of stored paths walked, where the points of each
+    path begin (n + 1), and the points of all, float64 (m, 2).
+    """
+    n = starts.size
+    costs = np.empty(n, np.int64)
+    lower = np.empty(n, np.int64)
+    walked = np.empty(n, np.int64)
+    begin = np.zeros(n + 1, np.int64)
+    points = np.empty((1024, 2), np.float64)
+    for i in range(n):
+        costs[i], lower[i], walked[i], _, path = answer(
+            portals, tables, cols, starts[i], goals[i], FAR, pairs, is_exact, epsilon, frame
+        )
+        begin[i + 1] = begin[i] + path.shape[0]
+        if begin[i + 1] > points.shape[0]:
+            larger = np.empty((2 * begin[i + 1], 2), np.float64)
+            larger[: begin[i]] = points[: begin[i]]
+            points = larger
+        points[begin[i] : begin[i + 1]] = path
+    return costs, lower, walked, begin, points[: begin[n]]

@@ -1,6 +1,7 @@
-"""Kernels that portal routes are made of: stored paths, a heap, the cells of a way.
+"""Kernels that portal routes are made of: stored paths, and the cells of a way.
 
-Directions are those of `search._kernels`: 0 to 7, east and on counter-clockwise; 8 is the source.
+Directions are those of `search._kernels`: 0 to 7, east and on counter-clockwise, with `LEAP` set
+where as many moves lead that way.
 """
 
 from __future__ import annotations
@@ -11,83 +12,31 @@ import numpy as np
 from numba import njit
 
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.topology._gate_kernels import LEAP
 
 _ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
 _COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
-SOURCE = 8
+_INVERSE = DIAGONAL % STRAIGHT
 FAR = 1 << 60
 """More than any path costs."""
-
-
-class Work(NamedTuple):
-    """Scratch of one search; G gates, F fields."""
-
-    at: np.ndarray
-    """int64 (G,), cost of the best way found to each gate entered."""
-    seen: np.ndarray
-    """int64 (G,), the generation in which `at` and `ahead` were set."""
-    parent: np.ndarray
-    """int64 (G,), the gate entered before, -1 for the start."""
-    via: np.ndarray
-    """int64 (G,), the gate left to enter this one."""
-    ahead: np.ndarray
-    """int64 (G,), lower bound on the cost from here to the goal."""
-    side_seen: np.ndarray
-    """int64 (2 P,), the generation in which `side_ahead` was set."""
-    side_ahead: np.ndarray
-    """int64 (2 P,), lower bound on the cost from any gate of the side to the goal."""
-    passed: np.ndarray
-    """int64 (F,), the generation in which a field was on the first way."""
-    generation: np.ndarray
-    """int64 (1,)."""
+UNREACHED = np.uint32(0xFFFFFFFF)
 
 
 class Tables(NamedTuple):
-    """What is known between sources and gates; S sources, G gates, P portals."""
+    """What is known between sources and gates; S sources, G gates, R sides."""
 
     route: np.ndarray
-    """float32 (S, G), costs of shortest paths over gates, rounded down; infinite for none."""
-    bound: np.ndarray
-    """float32 (S, G), no path at all costs less: the same array where every border cell is a gate.
-    Empty where nothing is known."""
-    reach: np.ndarray
-    """int64 (2 P,), cost within which every border cell of a side lies from its portal's source."""
+    """uint32 (S, G), costs of shortest paths over gates without their last `shift` bits,
+    `UNREACHED` for none."""
+    between: np.ndarray
+    """uint32 (R, R), the least cost between gates of two of the R sides, likewise: over all border
+    cells, if these were gates before some were dropped."""
+    shift: int
+    """0, but on maps with paths of more than 53,000 cells."""
     gate_field: np.ndarray
     """int32 (G,), the field of each gate."""
-
-
-@njit(cache=True)
-def push(keys, items, count, key, item):
-    """Put an item on a binary heap; the caller has made room."""
-    i = count
-    while i > 0:
-        parent = (i - 1) >> 1
-        if keys[parent] <= key:
-            break
-        keys[i], items[i] = keys[parent], items[parent]
-        i = parent
-    keys[i], items[i] = key, item
-    return count + 1
-
-
-@njit(cache=True)
-def pop(keys, items, count):
-    """Remove the first item of a binary heap; gives the new count. Read it before."""
-    count -= 1
-    key, item = keys[count], items[count]
-    i = 0
-    while True:
-        child = 2 * i + 1
-        if child >= count:
-            break
-        if child + 1 < count and keys[child + 1] < keys[child]:
-            child += 1
-        if keys[child] >= key:
-            break
-        keys[i], items[i] = keys[child], items[child]
-        i = child
-    keys[i], items[i] = key, item
-    return count
+    source_at: np.ndarray
+    """int32 (G,), a source at each gate, -1 for none."""
 
 
 @njit(cache=True)
@@ -100,81 +49,6 @@ def position_of(index, cols, cell):
 
 
 @njit(cache=True)
-def cost_to_gate(index, rows, first, begin, cols, cell):
-    """Cost of the stored path from a cell to a gate; `first` is where its field begins in the
-    order of cells, `begin` the gate's row."""
-    row, col = cell // cols, cell % cols
-    width = np.uint64(cols + 7 >> 3)
-    straight = diagonal = 0
-    while True:
-        r, c = np.uint64(row), np.uint64(col)
-        tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
-        inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
-        at = index[tile << np.uint64(6) | inside] - first
-        k = rows[np.uint64(begin + (at >> 1))] >> ((at & 1) << 2) & 15
-        if k == SOURCE:
-            return straight * STRAIGHT + diagonal * DIAGONAL
-        diagonal += k & 1
-        straight += 1 - (k & 1)
-        row += _ROW_STEP[k]
-        col += _COL_STEP[k]
-
-
-@njit(cache=True)
-def costs_to_gates(index, rows, row_start, first, cols, gates, count, cell, costs):
-    """Costs of the stored paths from a cell to the first `count` of some gates of its field.
-
-    The paths are walked side by side, a step of each in turn: a step waits for memory, and steps of
-    different paths wait together.
-    """
-    width = np.uint64(cols + 7 >> 3)
-    row = np.full(count, cell // cols, np.int64)
-    col = np.full(count, cell % cols, np.int64)
-    begin = np.empty(count, np.int64)
-    place = np.arange(count)
-    for i in range(count):
-        begin[i] = row_start[gates[i]]
-        costs[i] = 0
-    left = count
-    while left > 0:
-        i = 0
-        while i < left:
-            r, c = np.uint64(row[i]), np.uint64(col[i])
-            tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
-            inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
-            at = index[tile << np.uint64(6) | inside] - first
-            k = rows[np.uint64(begin[i] + (at >> 1))] >> ((at & 1) << 2) & 15
-            if k == SOURCE:
-                left -= 1
-                row[i], col[i], begin[i] = row[left], col[left], begin[left]
-                place[i] = place[left]
-                continue
-            costs[place[i]] += STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT)
-            row[i] += _ROW_STEP[k]
-            col[i] += _COL_STEP[k]
-            i += 1
-
-
-@njit(cache=True)
-def follow(index, rows, first, begin, cols, cell, path, count):
-    """Append the cells of the stored path from a cell to a gate; gives the new count."""
-    row, col = cell // cols, cell % cols
-    width = np.uint64(cols + 7 >> 3)
-    while True:
-        path[count] = row * cols + col
-        count += 1
-        r, c = np.uint64(row), np.uint64(col)
-        tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
-        inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
-        at = index[tile << np.uint64(6) | inside] - first
-        k = rows[np.uint64(begin + (at >> 1))] >> ((at & 1) << 2) & 15
-        if k == SOURCE:
-            return count
-        row += _ROW_STEP[k]
-        col += _COL_STEP[k]
-
-
-@njit(cache=True)
 def field_at(portals, cols, cell):
     """The field of a cell that may be entered."""
     index = portals.position
@@ -184,39 +58,142 @@ def field_at(portals, cols, cell):
 
 
 @njit(cache=True)
-def cells_of_way(portals, gate_field, cols, start, goal, last, work, cost):
-    """Cells of the way that a search has left, from start to goal; `cost` is the path's."""
+def costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count, cell, costs):
+    """Costs of the stored paths from a cell to the first `count` of some gates of its field.
+
+    The paths are walked side by side, a step of each in turn: a step waits for memory, and steps of
+    different paths wait together. `first` is where the field begins in the order of cells.
+    """
+    width = np.uint64(cols + 7 >> 3)
+    row = np.full(count, cell // cols, np.int64)
+    col = np.full(count, cell % cols, np.int64)
+    begin = np.empty(count, np.int64)
+    end = np.empty(count, np.int64)
+    place = np.arange(count)
+    for i in range(count):
+        begin[i], end[i] = row_start[gates[i]], gate_cell[gates[i]]
+        costs[i] = 0
+    left = count
+    while left > 0:
+        i = 0
+        while i < left:
+            if row[i] * cols + col[i] == end[i]:
+                left -= 1
+                row[i], col[i], begin[i], end[i] = row[left], col[left], begin[left], end[left]
+                place[i] = place[left]
+                continue
+            r, c = np.uint64(row[i]), np.uint64(col[i])
+            tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
+            inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
+            at = index[tile << np.uint64(6) | inside] - first
+            code = rows[np.uint64(begin[i] + (at >> 1))] >> ((at & 1) << 2)
+            k, n = code & 7, 1 + (LEAP - 1) * (code >> 3 & 1)
+            costs[place[i]] += n * (STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT))
+            row[i] += n * _ROW_STEP[k]
+            col[i] += n * _COL_STEP[k]
+            i += 1
+
+
+@njit(cache=True)
+def cost_to_gate(index, rows, first, begin, end, cols, cell):
+    """Cost of the stored path from a cell to a gate; `first` is where its field begins in the
+    order of cells, `begin` the gate's row, `end` its cell."""
+    row, col = cell // cols, cell % cols
+    width = np.uint64(cols + 7 >> 3)
+    cost = np.int64(0)
+    while row * cols + col != end:
+        r, c = np.uint64(row), np.uint64(col)
+        tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
+        inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
+        at = index[tile << np.uint64(6) | inside] - first
+        code = rows[np.uint64(begin + (at >> 1))] >> ((at & 1) << 2)
+        k, n = code & 7, 1 + (LEAP - 1) * (code >> 3 & 1)
+        cost += n * (STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT))
+        row += n * _ROW_STEP[k]
+        col += n * _COL_STEP[k]
+    return cost
+
+
+@njit(cache=True)
+def moves_of(cost):
+    """Moves of a path of an integer cost."""
+    diagonal = cost % STRAIGHT * _INVERSE % STRAIGHT
+    return (cost - diagonal * DIAGONAL) // STRAIGHT + diagonal
+
+
+@njit(cache=True)
+def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame):
+    """Cells of a way, int64 (n, 2), and their centres, float64 (n, 2).
+
+    The way leaves its fields by the gates `out` and enters the next ones by `into`; `legs` are the
+    costs of its parts, one more. The parts are walked side by side, as in `costs_to_gates`: from
+    where each begins to the gate it ends at, the last one back from the goal.
+    """
     index = portals.position
     rows = portals.rows
     field_start = portals.field_start
     row_start = portals.row_start
     gate_cell = portals.gate_cell
-    parent = work.parent
-    via = work.via
-    n = 0
-    x = last
-    while x >= 0:
-        n += 1
-        x = parent[x]
-    chain = np.empty(n, np.int64)
-    x = last
-    for i in range(n - 1, -1, -1):
-        chain[i] = x
-        x = parent[x]
-    # No move is shorter than a cell, and each leg begins anew.
-    path = np.empty(cost // STRAIGHT + 2 * n + 2, np.int64)
+    n = out.size
+    row = np.empty(n + 1, np.int64)
+    col = np.empty(n + 1, np.int64)
+    begin = np.empty(n + 1, np.int64)
+    first = np.empty(n + 1, np.int64)
+    end = np.empty(n + 1, np.int64)
+    at = np.empty(n + 1, np.int64)
+    onward = np.ones(n + 1, np.int64)
     count = 0
-    cell = start
-    field = field_at(portals, cols, start)
-    for i in range(n):
-        count = follow(
-            index, rows, field_start[field], row_start[via[chain[i]]], cols, cell, path, count
-        )
-        cell = np.int64(gate_cell[chain[i]])
-        field = gate_field[chain[i]]
-    begin = count
-    count = follow(
-        index, rows, field_start[field], row_start[chain[n - 1]], cols, goal, path, count
-    )
-    path[begin:count] = path[begin:count][::-1].copy()
-    return path[:count]
+    for k in range(n + 1):
+        cell = start
+        if k == n:
+            cell = goal
+        elif k > 0:
+            cell = np.int64(gate_cell[into[k - 1]])
+        gate = out[k] if k < n else into[n - 1]
+        row[k], col[k] = cell // cols, cell % cols
+        begin[k], end[k] = row_start[gate], gate_cell[gate]
+        first[k] = field_start[gate_field[gate]]
+        at[k] = count
+        count += moves_of(legs[k]) + 1
+    at[n], onward[n] = count - 1, -1
+    cells = np.empty((count, 2), np.int64)
+    width = np.uint64(cols + 7 >> 3)
+    left = n + 1
+    while left > 0:
+        i = 0
+        while i < left:
+            here = at[i]
+            cells[here, 0], cells[here, 1] = row[i], col[i]
+            if row[i] * cols + col[i] == end[i]:
+                left -= 1
+                row[i], col[i], begin[i], first[i] = row[left], col[left], begin[left], first[left]
+                end[i], at[i], onward[i] = end[left], at[left], onward[left]
+                continue
+            r, c = np.uint64(row[i]), np.uint64(col[i])
+            tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
+            inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
+            position = index[tile << np.uint64(6) | inside] - first[i]
+            code = rows[np.uint64(begin[i] + (position >> 1))] >> ((position & 1) << 2)
+            k = code & 7
+            for _ in range(LEAP - 1 if code & LEAP else 0):
+                row[i] += _ROW_STEP[k]
+                col[i] += _COL_STEP[k]
+                here += onward[i]
+                cells[here, 0], cells[here, 1] = row[i], col[i]
+            row[i] += _ROW_STEP[k]
+            col[i] += _COL_STEP[k]
+            at[i] = here + onward[i]
+            i += 1
+    return cells, centres(cells, frame)
+
+
+@njit(cache=True)
+def centres(cells, frame):
+    """Centres of (row, col) in the map frame, as `Frame.points_of` has them."""
+    resolution, origin_x, origin_y, cosine, sine = frame
+    points = np.empty((cells.shape[0], 2), np.float64)
+    for i in range(cells.shape[0]):
+        x, y = (cells[i, 1] + 0.5) * resolution, (cells[i, 0] + 0.5) * resolution
+        points[i, 0] = origin_x + cosine * x - sine * y
+        points[i, 1] = origin_y + sine * x + cosine * y
+    return points

@@ -5,17 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from hybridnav.route._portal_kernels import FAR, UNREACHED
+
 LANES = 16
 """Portals that are searched from together."""
-FAR = 1 << 60
 
 
 @njit(cache=True)
 def costs_to_gates(
-    sources, field_of, gate_start, clique_start, clique, exit_start, exit_gate, exit_cost, table
-):
-    """Costs of shortest paths from some gates to all gates, `table` (sources, G) float32, rounded
-    down; infinite where there is no path.
+    sources, field_of, gate_start, clique_start, clique, exit_start, exit_gate, exit_cost, shift,
+    table,
+):  # fmt: skip
+    """Costs of shortest paths from some gates to all gates, `table` (sources, G) uint32, without
+    their last `shift` bits; UNREACHED where there is no path. Gives the greatest cost.
 
     Label correction, field by field: what has come to a field's gates across its borders goes on to
     all its other gates at once, as the costs between them are those of whole paths; the field whose
@@ -28,6 +30,7 @@ def costs_to_gates(
     row = np.empty(LANES, np.int64)
     is_news = np.zeros(n_gates, np.bool_)
     is_changed = np.zeros(n_gates, np.bool_)
+    greatest = np.int64(0)
     urgency = np.empty(n_fields, np.int64)
     waiting = np.empty(n_fields, np.int64)
     for first in range(0, sources.size, LANES):
@@ -100,9 +103,8 @@ def costs_to_gates(
             for v in range(n_gates):
                 cost = costs[v * LANES + lane]
                 if cost >= FAR:
-                    table[first + lane, v] = np.inf
+                    table[first + lane, v] = UNREACHED
                 else:
-                    rounded = np.float32(cost)
-                    if np.float64(rounded) > cost:
-                        rounded = np.nextafter(rounded, np.float32(0))
-                    table[first + lane, v] = rounded
+                    table[first + lane, v] = cost >> shift
+                    greatest = max(greatest, cost)
+    return greatest

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from functools import cached_property
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -12,35 +14,42 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.route import _answer_kernels as kernels
-from hybridnav.route._portal_kernels import FAR, Work
+from hybridnav.route._portal_kernels import FAR, centres
+from hybridnav.route.any_angle_bound import AnyAngleBound
 from hybridnav.route.portal_table import build_tables
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search.octile import cost_of, length_of_cost
+from hybridnav.search._kernels import octile_cost
+from hybridnav.search.octile import cost_of, length_in_cells, length_of_cost
 from hybridnav.topology.portals import (
     PathTooLongError,
     PortalsTooLargeError,
     build_portals,
     compact_labels,
 )
-from hybridnav.topology.thin_portals import beside_sources
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import Level
+    from hybridnav.route.any_angle_bound import Position
     from hybridnav.search.grid_search import GridSearch
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.portals import Portals
 
 Cell = tuple[int, int]
-Effort = Literal["stored", "narrow", "wide"]
+Effort = Literal["stored", "exact"]
 
-SPACINGS = (16, 4, 1)
-"""Of portals, sources and gates, in cells, where every border cell can be a gate."""
+SPACING = 16
+"""Of portals, in cells, where every border cell can be a gate."""
+PATH_SPACING = 4
+"""Of gates to which paths are stored, where not all of them are."""
 SPARSE_SPACINGS = (16, 32, 64, 128, 256)
-"""Of all three where that would take too much memory: open floors have long borders."""
+"""Of portals and gates where that would take too much memory: open floors have long borders."""
+ALL_GATES_LEVELS = 2
+"""So many levels are tried with gates everywhere, before fewer gates are."""
 MAX_BYTES_PER_CELL = 640
 MAX_SPARSE_BYTES_PER_CELL = 160
 LEAST_BYTES = 16e6
@@ -49,9 +58,14 @@ LEAST_FIELDS = 16
 """With fewer fields of the size asked for, half the size is tried: a field is searched cell by cell
 where start and goal share it."""
 
+PAIRS = 8
+"""Of sides by which the effort "stored" may leave and arrive, those that it looks at."""
+SHORT = 256 * STRAIGHT
+"""Up to this cost the choice of a few fields costs much, and a search of all cells little."""
+ENOUGH = 0.005
+"""What is proved to be so near the optimum is not searched for something shorter."""
 _SHORTEST = math.sqrt(2) * STRAIGHT / DIAGONAL
 """A path is as much shorter than its integer cost says at most: DIAGONAL / STRAIGHT > sqrt 2."""
-_MODES = {"stored": kernels.STORED, "narrow": kernels.NARROW, "wide": kernels.WIDE}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +84,21 @@ class PortalAnswer:
     """Cells that were expanded."""
 
 
+@dataclass(frozen=True, eq=False)
+class PortalAnswers:
+    """Paths of many queries over portals, arrays of n."""
+
+    is_done: BoolArray
+    """bool (n,), whether `PortalSearch.path` answers the same; others need a search of cells."""
+    length_cells: FloatArray
+    """float64 (n,), infinite where there is no path."""
+    lower_bound_cells: FloatArray
+    path_start: LongArray
+    """int64 (n + 1,), where the points of each path begin."""
+    points: FloatArray
+    """float64 (m, 2), centres of cells in the map frame."""
+
+
 class PortalSearch:
     """Paths over portals, and lower bounds on all paths.
 
@@ -83,7 +112,7 @@ class PortalSearch:
     cell_search
         Searches inside fields, over cells that paths may use.
     all_gates
-        Whether paths may cross borders at all cells, not only beside sources.
+        Whether paths may cross borders at all cells, if that takes not too much memory.
     allow_unexplored
         Whether unexplored cells may be entered; as in `cell_search`.
     """
@@ -100,18 +129,11 @@ class PortalSearch:
         self._cols = grid.shape[1]
         self._search = cell_search
         enterable = grid.enterable(allow_unexplored=allow_unexplored)
-        n_cells = max(int(enterable.sum()), 1)
-        for level in _routing_levels(topology):
-            self._field_of = compact_labels(level.field_of, enterable)
-            portals = self._fitting(grid, n_cells, allow_unexplored=allow_unexplored)
-            if portals is not None:
-                break
-        else:
-            raise InvalidValueError("no level of the map makes portals of an acceptable size")
+        self._field_of, portals, self._has_all_gates = _portals_of(
+            topology, enterable, PATH_SPACING if not all_gates else 1, allow_unexplored
+        )
+        self.portals, self.tables = build_tables(portals)
         self.is_exact = all_gates and self._has_all_gates
-        kept = None if all_gates or not self._has_all_gates else beside_sources(portals)
-        self.portals, self.tables = build_tables(portals, kept=kept, bounded=self._has_all_gates)
-        self._work = _work_of(self.portals)
         frame = grid.frame
         self._frame = (
             frame.resolution_m,
@@ -119,30 +141,6 @@ class PortalSearch:
             math.cos(frame.yaw_rad),
             math.sin(frame.yaw_rad),
         )
-
-    def _fitting(
-        self, grid: OccupancyGrid, n_cells: int, *, allow_unexplored: bool
-    ) -> Portals | None:
-        """The portals with the closest spacing that fit into memory."""
-        sparse = [(spacing,) * 3 for spacing in SPARSE_SPACINGS]
-        for spacings in (SPACINGS, *sparse):
-            self._has_all_gates = spacings is SPACINGS
-            limit = MAX_BYTES_PER_CELL if self._has_all_gates else MAX_SPARSE_BYTES_PER_CELL
-            try:
-                return build_portals(
-                    grid,
-                    self._field_of,
-                    spacing_cells=spacings[0],
-                    source_spacing_cells=spacings[1],
-                    gate_spacing_cells=spacings[2],
-                    allow_unexplored=allow_unexplored,
-                    max_bytes=max(limit * n_cells, LEAST_BYTES),
-                )
-            except PortalsTooLargeError:
-                continue
-            except PathTooLongError:
-                break
-        return None
 
     def path(
         self, start: Cell, goal: Cell, *, effort: Effort, epsilon: float = 0.0
@@ -154,78 +152,139 @@ class PortalSearch:
         start, goal
             Cells that may be entered.
         effort
-            How far the first way is improved: not at all ("stored"), to the shortest over gates of
-            its fields ("narrow"), or to the shortest of all ("wide"). Ways of less than 256 cells
-            are improved to the shortest of all always.
+            "stored" looks at the eight pairs of sides that may be best, and improves ways of less
+            than 256 cells that are not proved to be within 0.5 % by a search of cells. "exact"
+            looks at all pairs: where paths cross borders at all cells that finds a shortest one;
+            elsewhere a search of cells goes on from there.
         epsilon
-            "narrow" and "wide" stop once no path can be shorter by more than this part.
+            "exact" stops once no path can be shorter by more than this part.
         """
         cols, expanded = self._cols, 0
         upper, inside = FAR, None
         if self._field_of[start] == self._field_of[goal]:
             one = np.zeros(self.portals.n_fields, dtype=np.bool_)
             one[self._field_of[start]] = True
-            inside, expanded = self._inside(start, goal, one, None)
+            found = self._search.search(start, goal, field_of=self._field_of, in_corridor=one)
+            inside, expanded = found.cells, found.expanded
             upper = FAR if inside is None else cost_of(inside)
-        cost, path, lower, gates = kernels.answer(
-            self.portals, self.tables, cols, start[0] * cols + start[1],
-            goal[0] * cols + goal[1], upper,
-            _MODES[effort] if self.is_exact else kernels.STORED, epsilon, self._work,
+        cost, lower, walked, cells, points = kernels.answer(
+            self.portals, self.tables, cols, start[0] * cols + start[1], goal[0] * cols + goal[1],
+            upper, PAIRS if effort == "stored" else -1, self.is_exact, epsilon, self._frame,
         )  # fmt: skip
+        line = octile_cost(start[0] - goal[0], start[1] - goal[1])
+        lower = max(line, lower) if self._has_all_gates else line
+        lower = min(lower, cost)
         if cost >= FAR:
-            return PortalAnswer(None, np.empty((0, 2)), math.inf, math.inf, gates, expanded)
-        better, searched = None, 0
-        by_cells = effort == "stored" or not self.is_exact
-        if by_cells and lower < cost and (effort == "wide" or cost < kernels.SHORT):
+            return PortalAnswer(None, np.empty((0, 2)), math.inf, math.inf, walked, expanded)
+        if _needs_search(effort, lower, cost, epsilon):
             found = self._search.search(start, goal, limit=cost)
-            better, searched = found.cells, found.expanded
-            lower = cost if better is None else cost_of(better)
-        elif effort == "narrow" and not self.is_exact:
-            better, searched = self._inside(start, goal, self.fields_passed(), cost)
-        expanded += searched
-        if better is not None:
-            path, inside, cost = np.empty(0, np.int64), better, cost_of(better)
-            lower = min(lower, cost)
-        if len(path) or inside is None:
-            cells, points = kernels.unfold(path, cols, *self._frame)
-        else:
-            cells, points = inside, kernels.centres(inside, *self._frame)
+            expanded += found.expanded
+            cells = np.empty((0, 2), np.int64) if found.cells is not None else cells
+            inside = inside if found.cells is None else found.cells
+            cost = lower = cost if found.cells is None else cost_of(found.cells)
+        if inside is not None and not len(cells):
+            cells, points = inside, centres(inside, self._frame)
         length = length_of_cost(cost)
         bound = length if lower >= cost else lower / STRAIGHT * _SHORTEST
-        return PortalAnswer(cells, points, length, bound, gates, expanded)
+        return PortalAnswer(cells, points, length, bound, walked, expanded)
 
-    def fields_passed(self) -> BoolArray:
-        """bool (F,), fields of the first way of the last query."""
-        passed: BoolArray = self._work.passed == self._work.generation[0]
-        return passed
+    def many(
+        self, starts: LongArray, goals: LongArray, *, effort: Effort, epsilon: float = 0.0
+    ) -> PortalAnswers:
+        """`path` for many pairs of cells, as far as look-ups answer them.
 
-    def _inside(
-        self, start: Cell, goal: Cell, fields: BoolArray, limit: int | None
-    ) -> tuple[LongArray | None, int]:
-        """The shortest path on the cells of some fields, if it costs less than a limit."""
-        found = self._search.search(
-            start, goal, field_of=self._field_of, in_corridor=fields, limit=limit
-        )
-        return found.cells, found.expanded
+        Parameters
+        ----------
+        starts, goals
+            int64 (n, 2), cells that may be entered.
+        effort, epsilon
+            As in `path`.
+        """
+        rows = np.array([self._cols, 1])
+        costs, lower, _, begin, points = kernels.answers(
+            self.portals, self.tables, self._cols, starts @ rows, goals @ rows,
+            PAIRS if effort == "stored" else -1, self.is_exact, epsilon, self._frame,
+        )  # fmt: skip
+        away = np.abs(starts - goals)
+        line = away.max(axis=1) * STRAIGHT + away.min(axis=1) * (DIAGONAL - STRAIGHT)
+        lower = np.minimum(np.maximum(line, lower) if self._has_all_gates else line, costs)
+        share = self._field_of[tuple(starts.T)] == self._field_of[tuple(goals.T)]
+        is_done = ~_needs_search(effort, lower, costs, epsilon) & ~share
+        length, bound = length_in_cells(costs), lower / STRAIGHT * _SHORTEST
+        unreached = costs >= FAR
+        length[unreached] = bound[unreached] = math.inf
+        bound = np.where(lower >= costs, length, bound)
+        return PortalAnswers(is_done, length, bound, begin, points)
+
+    def any_angle_bound(
+        self, start: Cell, goal: Cell, positions: tuple[Position, Position]
+    ) -> float:
+        """No any-angle path between two points is shorter, in cells.
+
+        Parameters
+        ----------
+        start, goal
+            The cells that hold the points.
+        positions
+            The points as (row, column) in grid units: cell (0, 0) spans [0, 1] x [0, 1].
+        """
+        fields = int(self._field_of[start]), int(self._field_of[goal])
+        if not self._has_all_gates:
+            return math.dist(*positions)
+        return self._any_angle_bound.of(*fields, *positions)
+
+    @cached_property
+    def _any_angle_bound(self) -> AnyAngleBound:
+        return AnyAngleBound(self.portals)
 
 
-def _work_of(portals: Portals) -> Work:
-    gates, sides, fields = portals.n_gates, 2 * portals.n_portals, portals.n_fields
+def _needs_search(effort: Effort, lower: Any, cost: Any, epsilon: float) -> Any:
+    """Whether cells are searched for shorter paths: for one query, or elementwise."""
+    if effort == "exact":
+        return lower * (1 + epsilon) < cost
+    return (lower * (1 + ENOUGH) < cost) & (cost < SHORT)
 
-    def whole(count: int) -> LongArray:
-        return np.zeros(count, dtype=np.int64)
 
-    return Work(
-        at=whole(gates),
-        seen=whole(gates),
-        parent=whole(gates),
-        via=whole(gates),
-        ahead=whole(gates),
-        side_seen=whole(sides),
-        side_ahead=whole(sides),
-        passed=whole(fields),
-        generation=whole(1),
-    )
+def _portals_of(
+    topology: TopologicalMap,
+    enterable: BoolArray,
+    path_spacing: int,
+    allow_unexplored: bool,  # noqa: FBT001
+) -> tuple[NDArray[np.int16 | np.int32], Portals, bool]:
+    """Fields to route on and their portals, the first that fit into memory, and whether every
+    border cell is a gate."""
+    n_cells = max(int(enterable.sum()), 1)
+    for level, spacings in _choices(topology, path_spacing):
+        field_of = compact_labels(level.field_of, enterable)
+        has_all_gates = spacings[1] == 1
+        limit = MAX_BYTES_PER_CELL if has_all_gates else MAX_SPARSE_BYTES_PER_CELL
+        try:
+            portals = build_portals(
+                topology.grid,
+                field_of,
+                spacing_cells=spacings[0],
+                gate_spacing_cells=spacings[1],
+                path_spacing_cells=spacings[2],
+                allow_unexplored=allow_unexplored,
+                max_bytes=max(limit * n_cells, LEAST_BYTES),
+            )
+        except (PortalsTooLargeError, PathTooLongError):
+            continue
+        return field_of, portals, has_all_gates
+    raise InvalidValueError("no level of the map makes portals of an acceptable size")
+
+
+def _choices(
+    topology: TopologicalMap, path_spacing: int
+) -> Iterator[tuple[Level, tuple[int, int, int]]]:
+    """Levels and spacings of portals, gates and paths: those with gates everywhere first."""
+    levels = _routing_levels(topology)
+    first = list(islice(levels, ALL_GATES_LEVELS))
+    for level in first:
+        yield level, (SPACING, 1, path_spacing)
+    for level in chain(first, levels):
+        for spacing in SPARSE_SPACINGS:
+            yield level, (spacing,) * 3
 
 
 def _routing_levels(topology: TopologicalMap) -> Iterator[Level]:

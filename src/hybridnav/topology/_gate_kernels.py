@@ -1,7 +1,7 @@
 """Kernels that prepare portals: shortest paths inside fields, from many gates at once.
 
-Directions are those of `search._kernels`: 0 to 7, east and on counter-clockwise; 8 is the source.
-Cells of a field are numbered from 0, `n` stands for "no such neighbour".
+Directions are those of `search._kernels`: 0 to 7, east and on counter-clockwise. Cells of a field
+are numbered from 0, `n` stands for "no such neighbour".
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ FAR = 1 << 30
 """No path inside a field may cost as much; a diagonal more still fits int32."""
 _STRAIGHT = np.int32(STRAIGHT)
 _DIAGONAL = np.int32(DIAGONAL)
-SOURCE = 8
+LEAP = 8
+"""A stored direction with this bit set stands for as many moves, so paths have few steps."""
+_STRAIGHTS = np.int32(LEAP * STRAIGHT)
+_DIAGONALS = np.int32(LEAP * DIAGONAL)
 
 
 @njit(cache=True)
@@ -35,6 +38,19 @@ def neighbours_in_field(moves, cols, index, cells, first, out):
                 j = index[cell + _ROW_STEP[k] * cols + _COL_STEP[k]] - first
                 if 0 <= j < n:
                     out[i, k] = j
+
+
+@njit(cache=True)
+def leaps_in_field(near, n, out):
+    """Fill `out[i]` with the cells `LEAP` moves away in each direction, inside the field."""
+    for k in range(8):
+        for i in range(n):
+            j = i
+            for _ in range(LEAP):
+                j = near[j, k]
+                if j == n:
+                    break
+            out[i, k] = j
 
 
 @njit(cache=True)
@@ -139,8 +155,13 @@ def relax(near, n, order, prefix, cost, row, stale, lanes):
 
 
 @njit(cache=True)
-def directions(near, n, cost, row, lanes, out):
-    """First direction of the path from each cell to each lane's source, `out` (LANES, n)."""
+def directions(near, far, n, cost, row, lanes, out):
+    """First direction of the path from each cell to each lane's source, `out` (LANES, n).
+
+    With `LEAP` added where the path goes on so for as many moves; such a path is taken before
+    others of the same cost. A straight line of legal moves between two cells is the only shortest
+    path, so it is part of one to the source if the costs at its ends differ by its length.
+    """
     width = np.uint64(lanes)
     for i in range(n):
         cell = np.uint64(i)
@@ -148,12 +169,15 @@ def directions(near, n, cost, row, lanes, out):
         e, ne = np.uint64(near[cell, 0]) * width, np.uint64(near[cell, 1]) * width
         nn, nw = np.uint64(near[cell, 2]) * width, np.uint64(near[cell, 3]) * width
         w, sw = np.uint64(near[cell, 4]) * width, np.uint64(near[cell, 5]) * width
-        s, se = np.uint64(near[cell, 6]) * width, np.uint64(near[cell, 7]) * width
+        s = np.uint64(near[cell, 6]) * width
+        e8, ne8 = np.uint64(far[cell, 0]) * width, np.uint64(far[cell, 1]) * width
+        nn8, nw8 = np.uint64(far[cell, 2]) * width, np.uint64(far[cell, 3]) * width
+        w8, sw8 = np.uint64(far[cell, 4]) * width, np.uint64(far[cell, 5]) * width
+        s8, se8 = np.uint64(far[cell, 6]) * width, np.uint64(far[cell, 7]) * width
         for lane in range(width):
-            straight = cost[at + lane] - _STRAIGHT
-            diagonal = cost[at + lane] - _DIAGONAL
-            k = np.int32(SOURCE)
-            k = np.int32(7) if cost[se + lane] == diagonal else k
+            here = cost[at + lane]
+            straight, diagonal = here - _STRAIGHT, here - _DIAGONAL
+            k = np.int32(7)
             k = np.int32(5) if cost[sw + lane] == diagonal else k
             k = np.int32(3) if cost[nw + lane] == diagonal else k
             k = np.int32(1) if cost[ne + lane] == diagonal else k
@@ -161,6 +185,15 @@ def directions(near, n, cost, row, lanes, out):
             k = np.int32(4) if cost[w + lane] == straight else k
             k = np.int32(2) if cost[nn + lane] == straight else k
             k = np.int32(0) if cost[e + lane] == straight else k
+            straight, diagonal = here - _STRAIGHTS, here - _DIAGONALS
+            k = np.int32(LEAP + 7) if cost[se8 + lane] == diagonal else k
+            k = np.int32(LEAP + 5) if cost[sw8 + lane] == diagonal else k
+            k = np.int32(LEAP + 3) if cost[nw8 + lane] == diagonal else k
+            k = np.int32(LEAP + 1) if cost[ne8 + lane] == diagonal else k
+            k = np.int32(LEAP + 6) if cost[s8 + lane] == straight else k
+            k = np.int32(LEAP + 4) if cost[w8 + lane] == straight else k
+            k = np.int32(LEAP + 2) if cost[nn8 + lane] == straight else k
+            k = np.int32(LEAP) if cost[e8 + lane] == straight else k
             row[lane] = k
         for lane in range(lanes):
             out[lane, i] = row[lane]
@@ -185,21 +218,33 @@ def shift_of(cost):
 
 
 @njit(cache=True)
-def fill_field(near, n, gates, row_start, rows, border, costs, begin, columns, steps, scratch):
+def _lower_steps(cost, n, lanes, sides, count, shift, steps):
+    """Set steps[i, side] to the least of itself and the shifted costs of some lanes."""
+    for i in range(n):
+        for q in range(count):
+            there = cost[i * LANES + lanes[q]] >> shift
+            if there < steps[i, sides[q]]:
+                steps[i, sides[q]] = there
+
+
+@njit(cache=True)
+def fill_field(near, far, n, gates, row_start, rows, clique, begin, side, steps, scratch):
     """Paths from all gates of a field.
 
-    `rows` gets their directions, two cells a byte; `costs` one row a gate, to all border cells;
-    `steps` (n * R) one column for each of the R sides: the columns of gate c are
-    `columns[begin[c]:begin[c + 1]]`. Gates and border are local cells. Gives the bits that `steps`
-    lack, -1 where a path is too long.
+    `rows` gets their directions, two cells a byte, where there is room between two of `row_start`;
+    `clique` the costs from gate to gate; `steps` (n, R) those from each cell to the nearest gate of
+    each side: gate c is one of the sides `side[begin[c]:begin[c + 1]]`. Gates are local cells.
+    Gives the bits that `steps` lack, -1 where a path is too long.
     """
     cost, first_cost, ring, order, row, stale, heading, member, gate_at = scratch
-    n_columns = columns.size
     if wave(near, n, gates[0], first_cost, ring, order) < n:
         return -1
     shift = shift_of(first_cost[:n])
     if 2 * np.int64(first_cost[:n].max()) >= FAR:
         return -1
+    steps[:] = np.iinfo(np.uint16).max
+    lane_of = np.empty(side.size, np.int64)
+    side_of = np.empty(side.size, np.int64)
     gate_at[:n] = -1
     for c in range(gates.size):
         gate_at[gates[c]] = c
@@ -224,13 +269,22 @@ def fill_field(near, n, gates, row_start, rows, border, costs, begin, columns, s
         for lane in range(lanes):
             cost[np.int64(gates[member[lane]]) * LANES + lane] = 0
         relax(near, n, order, prefix, cost, row, stale, LANES)
-        directions(near, n, cost, row, LANES, heading)
+        is_stored = False
+        count = 0
         for lane in range(lanes):
             c = member[lane]
-            _pack(heading[lane], n, rows, row_start[c])
-            for b in range(border.size):
-                costs[c, b] = cost[np.int64(border[b]) * LANES + lane]
-            for j in range(begin[c], begin[c + 1]):
-                for i in range(n):
-                    steps[i * n_columns + columns[j]] = cost[i * LANES + lane] >> shift
+            is_stored |= row_start[c] < row_start[c + 1]
+            for b in range(gates.size):
+                clique[c, b] = cost[np.int64(gates[b]) * LANES + lane]
+            for q in range(begin[c], begin[c + 1]):
+                lane_of[count], side_of[count] = lane, side[q]
+                count += 1
+        _lower_steps(cost, n, lane_of, side_of, count, shift, steps)
+        if not is_stored:
+            continue
+        directions(near, far, n, cost, row, LANES, heading)
+        for lane in range(lanes):
+            c = member[lane]
+            if row_start[c] < row_start[c + 1]:
+                _pack(heading[lane], n, rows, row_start[c])
     return shift

@@ -21,23 +21,15 @@ class Crossings(NamedTuple):
     high: LongArray
     diagonal: BoolArray
     portal: LongArray
-    source: LongArray
     is_gate: BoolArray
     """Whether both ends are gates."""
-    stands: BoolArray
-    """Whether it stands for its portal."""
-    is_source: BoolArray
-    """Whether its lower end is its source."""
+    has_paths: BoolArray
+    """Whether both ends are gates with stored paths."""
 
     @property
     def n_portals(self) -> int:
         """Groups by portal."""
         return int(self.portal.max(initial=-1)) + 1
-
-    @property
-    def n_sources(self) -> int:
-        """Groups by source."""
-        return int(self.source.max(initial=-1)) + 1
 
     @property
     def ends(self) -> LongArray:
@@ -64,10 +56,9 @@ def find_crossings(
     cols
         Columns of the map.
     spacings
-        Sides of the lattice squares of portals, sources and gates, in cells. With gates in squares
-        of one cell all moves are between gates.
+        Sides of the lattice squares of portals, of gates, and of gates with stored paths, in cells.
+        With squares of one cell all moves are between gates.
     """
-    spacing, source_spacing, gate_spacing = spacings
     low, high, diagonal = _moves_between(moves, label, cols)
     position = np.stack([low // cols, low % cols])
     fields = label[low] * (label.max(initial=0) + np.int64(1)) + label[high]
@@ -81,21 +72,17 @@ def find_crossings(
         group[order] = np.cumsum(new) - 1
         return group
 
-    portal, source = groups(spacing), groups(source_spacing)
-    is_gate = np.ones(len(low), dtype=np.bool_)
-    if gate_spacing > 1:
-        is_gate[:] = False
-        is_gate[_middles(groups(gate_spacing), position, diagonal)] = True
-    middles = _middles(portal, position, diagonal)
-    stands = np.zeros(len(low), dtype=np.bool_)
-    stands[middles] = True
-    # Where the move that stands for a portal is in a source's square, it is the source too.
-    centres = _middles(source, position, diagonal)
-    centres[source[middles]] = middles
-    is_source = np.zeros(len(low), dtype=np.bool_)
-    is_source[centres] = True
-    is_gate |= is_source
-    return Crossings(low, high, diagonal, portal, source, is_gate, stands, is_source)
+    def middles(side: int) -> BoolArray:
+        if side == 1:
+            return np.ones(len(low), dtype=np.bool_)
+        chosen = np.zeros(len(low), dtype=np.bool_)
+        chosen[_middles(groups(side), position, diagonal)] = True
+        return chosen
+
+    has_paths = middles(spacings[2])
+    return Crossings(
+        low, high, diagonal, groups(spacings[0]), middles(spacings[1]) | has_paths, has_paths
+    )
 
 
 def _moves_between(

@@ -60,22 +60,11 @@ class Layout:
         return starts_of(self.label[self.cells], self.n_fields)
 
     @cached_property
-    def border(self) -> LongArray:
-        """int64, flat border cells, in the order of their positions."""
-        cells = np.unique(self.crossings.ends)
+    def gate_cell(self) -> LongArray:
+        """int64 (G,), flat cells, in the order of their positions."""
+        cells = np.unique(self.crossings.ends[np.tile(self.crossings.is_gate, 2)])
         ordered: LongArray = cells[np.argsort(self.index[cells], kind="stable")]
         return ordered
-
-    @cached_property
-    def is_gate(self) -> BoolArray:
-        """bool, which border cells are gates."""
-        gates = self.crossings.ends[np.tile(self.crossings.is_gate, 2)]
-        return np.isin(self.border, gates)
-
-    @cached_property
-    def gate_cell(self) -> LongArray:
-        """int64 (G,), flat cells."""
-        return self.border[self.is_gate]
 
     @cached_property
     def gate_of(self) -> IntArray:
@@ -90,10 +79,25 @@ class Layout:
         return starts_of(self.label[self.gate_cell], self.n_fields)
 
     @cached_property
+    def is_exit(self) -> BoolArray:
+        """bool, which crossings lead from gate to gate."""
+        low, high = self.gate_of[self.crossings.ends].reshape(2, -1)
+        is_exit: BoolArray = (low >= 0) & (high >= 0)
+        return is_exit
+
+    @cached_property
+    def has_paths(self) -> BoolArray:
+        """bool (G,), whether the paths to a gate are stored."""
+        gates = self.gate_of[self.crossings.ends[np.tile(self.crossings.has_paths, 2)]]
+        has_paths = np.zeros(len(self.gate_cell), dtype=np.bool_)
+        has_paths[gates] = True
+        return has_paths
+
+    @cached_property
     def row_start(self) -> LongArray:
         """int64 (G + 1,), first byte of each gate's row of directions."""
         sizes = np.diff(self.field_start)[self.label[self.gate_cell]]
-        return offsets_of((sizes + 1) // 2)
+        return offsets_of(np.where(self.has_paths, (sizes + 1) // 2, 0))
 
     @cached_property
     def side_order(self) -> LongArray:
@@ -128,34 +132,40 @@ class Layout:
         return starts_of(field, self.n_fields)
 
     @cached_property
-    def side_gate(self) -> IntArray:
-        """int32 (2 P,), the gate that stands for the portal on each side."""
-        stands = np.tile(self.crossings.stands, 2)
-        gate = np.empty(len(self.side_order), dtype=np.int32)
-        gate[self.side_of_end[stands]] = self.gate_of[self.crossings.ends[stands]]
-        return gate
+    def side_gates(self) -> tuple[LongArray, LongArray]:
+        """Gates of each side, each once: starts, and gates."""
+        gate = self.gate_of[self.crossings.ends]
+        is_exit = np.tile(self.is_exit, 2)
+        n_gates = max(len(self.gate_cell), 1)
+        pairs = np.unique(self.side_of_end[is_exit] * n_gates + gate[is_exit])
+        return starts_of(pairs // n_gates, len(self.side_order)), pairs % n_gates
 
     @cached_property
-    def side_border(self) -> tuple[LongArray, LongArray]:
-        """Border cells of each side, each once: starts, and positions in `border`."""
-        place = np.searchsorted(self.index[self.border], self.index[self.crossings.ends])
-        pairs = np.unique(np.stack([self.side_of_end, place], axis=1), axis=0)
-        return starts_of(pairs[:, 0], len(self.side_order)), pairs[:, 1]
+    def side_box(self) -> IntArray:
+        """int32 (R, 4), first and last row, first and last column of the ends of each side."""
+        order = np.argsort(self.side_of_end, kind="stable")
+        row, col = np.divmod(self.crossings.ends[order], self.cols)
+        if not len(order):
+            return np.empty((0, 4), dtype=np.int32)
+        at = starts_of(self.side_of_end[order], len(self.side_order))[:-1]
+        box = [edge.reduceat(x, at) for x in (row, col) for edge in (np.minimum, np.maximum)]
+        return np.stack(box, axis=1).astype(np.int32)
 
     @cached_property
     def source_gate(self) -> IntArray:
-        """int32 (S,), the gate that each source lies at."""
-        crossings = self.crossings
-        gate = np.empty(crossings.n_sources, dtype=np.int32)
-        low = crossings.low[crossings.is_source]
-        gate[crossings.source[crossings.is_source]] = self.gate_of[low]
-        return gate
+        """int32 (S,), the gates with paths in the lower field of a crossing between such gates."""
+        low, high = self.gate_of[self.crossings.ends].reshape(2, -1)[:, self.is_exit]
+        gates: IntArray = np.unique(low[self.has_paths[low] & self.has_paths[high]])
+        return gates
 
     @property
     def n_bytes(self) -> float:
-        """What paths, costs between gates, and a table from sources to gates will take."""
+        """What paths to all gates, costs between them, and a table of those of a lower field to all
+        will take."""
         sizes, gates = np.diff(self.field_start), np.diff(self.gate_start)
+        rows = 0.5 * (sizes * gates).sum()
         steps = 2.0 * (sizes * np.diff(self.side_start)).sum()
         cliques = 4.0 * (gates.astype(np.float64) ** 2).sum()
-        table = 4.0 * self.crossings.n_sources * len(self.gate_cell)
-        return float(self.row_start[-1] + cliques + steps + table)
+        lower = len(np.unique(self.crossings.low[self.crossings.is_gate]))
+        table = 4.0 * lower * len(self.gate_cell)
+        return float(rows + cliques + steps + table)

@@ -39,8 +39,8 @@ class PathTooLongError(InvalidValueError):
 class Portals(NamedTuple):
     """Portals of a partition of the cells that may be entered, and the paths inside its fields.
 
-    F fields, G gates, P portals, S sources. Costs are the integers of `search._costs`. A portal
-    has two sides, one in each of its fields. Flat cells are `row * cols + col`; gates are sorted by
+    F fields, G gates, R sides, S sources. Costs are the integers of `search._costs`. A portal has
+    two sides, one in each of its fields. Flat cells are `row * cols + col`; gates are sorted by
     field, sides too: those of field f are `side_start[f]` to `side_start[f + 1]`, and likewise for
     gates.
     """
@@ -54,46 +54,38 @@ class Portals(NamedTuple):
     gate_cell: IntArray
     """int32 (G,), flat cell of each gate."""
     row_start: LongArray
-    """int64 (G + 1,), first byte of each gate's row of `rows`."""
+    """int64 (G + 1,), first byte of each gate's row of `rows`; nothing where none is stored."""
     rows: ByteArray
-    """uint8, for each cell of the gate's field four bits: direction of the path to the gate."""
+    """uint8, for each cell of the gate's field four bits: direction of the path to the gate, 8 more
+    where its next eight moves are that way; anything at the gate itself."""
     clique_start: LongArray
     """int64 (F + 1,), where the costs between the gates of each field begin, row by row."""
     clique: IntArray
     """int32, those costs: exact, of paths inside the field."""
     exit_start: LongArray
-    """int64 (G + 1,), the moves out of each gate's field are positions of the next three."""
+    """int64 (G + 1,), the moves out of each gate's field are positions of the next two."""
     exit_gate: IntArray
     exit_cost: IntArray
-    exit_portal: IntArray
     side_start: LongArray
-    side_portal: IntArray
-    side_gate: IntArray
-    """int32 (2 P,), the gate that stands for the portal on this side."""
-    side_radius: IntArray
-    """int32 (2 P,), no border cell of the side is farther from that gate, inside the field."""
+    """int64 (F + 1,)."""
     side_gates_start: LongArray
+    """int64 (R + 1,), where the gates of each side begin."""
     side_gates: IntArray
-    """int32, the gates of each side from which a move of its portal leads to a gate."""
-    side_gates_source: IntArray
-    """int32, source beside each of these gates."""
-    side_gates_cost: IntArray
-    """int32, cost of a path from that source to the gate."""
+    """int32, the gates from which moves of the side's portal lead to gates."""
     steps_start: LongArray
     """int64 (F + 1,), where the rows of `steps` begin, one a cell, one column a side."""
     steps_shift: LongArray
     """int64 (F,), bits that `steps` lack."""
     steps: NDArray[np.uint16]
-    """uint16, costs from each cell to its field's sides, rounded down to so many bits."""
-    portal_sides: IntArray
-    """int32 (P, 2), the sides of each portal, in its lower and its higher field."""
-    portal_cost: IntArray
-    """int32 (P,), of the move between the gates that stand for it."""
-    portal_source: IntArray
-    """int32 (P,), the source at the lower of these gates."""
+    """uint16, costs from each cell to the nearest gate of its field's sides, rounded down to so
+    many bits."""
     source_gate: IntArray
-    """int32 (S,), gates in the lower field of their portal, a few cells apart, from which costs to
-    all gates of the map are worth knowing."""
+    """int32 (S,), gates with paths in the lower field of a move to another such gate: every such
+    move begins or ends at one."""
+    portal_sides: IntArray
+    """int32 (P, 2), the two sides of each portal."""
+    side_box: IntArray
+    """int32 (R, 4), first and last row, first and last column of each side's border cells."""
 
     @property
     def n_fields(self) -> int:
@@ -106,9 +98,9 @@ class Portals(NamedTuple):
         return len(self.gate_cell)
 
     @property
-    def n_portals(self) -> int:
-        """P."""
-        return len(self.portal_cost)
+    def n_sides(self) -> int:
+        """R."""
+        return len(self.side_gates_start) - 1
 
 
 def build_portals(  # noqa: PLR0913 - independent choices
@@ -116,8 +108,8 @@ def build_portals(  # noqa: PLR0913 - independent choices
     field_of: NDArray[np.int16 | np.int32],
     *,
     spacing_cells: int = 16,
-    source_spacing_cells: int = 4,
     gate_spacing_cells: int = 1,
+    path_spacing_cells: int = 1,
     allow_unexplored: bool = False,
     max_bytes: float = math.inf,
 ) -> Portals:
@@ -131,11 +123,11 @@ def build_portals(  # noqa: PLR0913 - independent choices
         (rows, cols), the field of each free cell, such as `Level.field_of`.
     spacing_cells
         Side of the lattice squares of portals.
-    source_spacing_cells
-        Side of the squares in each of which a portal has one source; it divides `spacing_cells`.
     gate_spacing_cells
         1 makes every border cell a gate, so that nothing is lost; more keeps, of the moves in each
         square of this side, only the middle one.
+    path_spacing_cells
+        Likewise for the gates to which paths are stored, which are gates always.
     allow_unexplored
         Whether unexplored cells are entered too.
     max_bytes
@@ -155,11 +147,11 @@ def build_portals(  # noqa: PLR0913 - independent choices
     PathTooLongError
         When a path inside a field may be longer than 6,600 cells, or a field is not connected.
     """
-    spacings = spacing_cells, source_spacing_cells, gate_spacing_cells
-    if min(spacings) < 1 or spacing_cells % source_spacing_cells:
+    spacings = spacing_cells, gate_spacing_cells, path_spacing_cells
+    if min(spacings) < 1 or spacing_cells % path_spacing_cells:
         raise InvalidValueError(
-            "portals, sources and gates need spacings of at least one cell, the second a divisor "
-            f"of the first, got {spacings}"
+            "portals, gates and paths need spacings of at least one cell, the first a multiple of "
+            f"the last, got {spacings}"
         )
     free = grid.enterable(allow_unexplored=allow_unexplored)
     label = compact_labels(field_of, free).astype(np.int32).ravel()
@@ -212,46 +204,41 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
     rows = np.empty(layout.row_start[-1], dtype=np.uint8)
     clique = np.empty(clique_start[-1], dtype=np.int32)
     steps = np.empty(steps_start[-1], dtype=np.uint16)
-    radius = np.empty(layout.side_start[-1], dtype=np.int32)
     shift = np.zeros(layout.n_fields, dtype=np.int64)
-    border_start = starts_of(layout.label[layout.border], layout.n_fields)
-    busy = np.flatnonzero(np.diff(border_start))
+    busy = np.flatnonzero(np.diff(gate_start))
     largest = int(sizes[busy].max(initial=0))
-    near = np.empty((largest + 1, 8), dtype=np.int32)
+    near, leaps = (np.empty((largest + 1, 8), dtype=np.int32) for _ in range(2))
     scratch = _scratch(largest)
     index = layout.index
+    side_gates_start, side_gates = layout.side_gates
     for f in busy.tolist():
         first, last = layout.field_start[f : f + 2]
         gates, sides = slice(*gate_start[f : f + 2]), slice(*layout.side_start[f : f + 2])
-        borders = slice(*border_start[f : f + 2])
         own = layout.cells[first:last]
         kernels.neighbours_in_field(moves, layout.cols, index, own, first, near)
-        stands = layout.side_gate[sides] - gate_start[f]
-        columns = np.argsort(stands, kind="stable")
-        costs = np.empty((gates.stop - gates.start, borders.stop - borders.start), dtype=np.int32)
+        kernels.leaps_in_field(near, last - first, leaps)
+        n_gates = gates.stop - gates.start
+        of_sides = side_gates_start[sides.start : sides.stop + 1]
+        members = side_gates[of_sides[0] : of_sides[-1]] - gates.start
+        order = np.argsort(members, kind="stable")
+        side = np.repeat(np.arange(len(of_sides) - 1), np.diff(of_sides))[order]
         shift[f] = kernels.fill_field(
             near,
+            leaps,
             last - first,
             index[layout.gate_cell[gates]] - first,
-            layout.row_start[gates],
+            layout.row_start[gates.start : gates.stop + 1],
             rows,
-            index[layout.border[borders]] - first,
-            costs,
-            starts_of(stands[columns], len(costs)),
-            columns,
-            steps[steps_start[f] : steps_start[f + 1]],
+            clique[clique_start[f] : clique_start[f + 1]].reshape(n_gates, n_gates),
+            starts_of(members[order], n_gates),
+            side,
+            steps[steps_start[f] : steps_start[f + 1]].reshape(last - first, -1),
             scratch,
         )
         if shift[f] < 0:
             raise PathTooLongError(
                 "a field is not connected, or a path inside it may be longer than 6,600 cells"
             )
-        clique[clique_start[f] : clique_start[f + 1]] = costs[:, layout.is_gate[borders]].ravel()
-        start, member = layout.side_border
-        at = start[sides.start : sides.stop + 1]
-        of_side = np.repeat(stands, np.diff(at))
-        far = costs[of_side, member[at[0] : at[-1]] - borders.start]
-        radius[sides] = np.maximum.reduceat(far, at[:-1] - at[0])
     return {
         "rows": rows,
         "clique_start": clique_start,
@@ -259,7 +246,6 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
         "steps_start": steps_start,
         "steps_shift": shift,
         "steps": steps,
-        "side_radius": radius,
     }
 
 
@@ -280,68 +266,30 @@ def _scratch(largest: int) -> tuple[NDArray[Any], ...]:
 
 
 def _assembled(layout: Layout, filled: dict[str, NDArray[Any]]) -> Portals:
-    crossings, n_portals = layout.crossings, layout.crossings.n_portals
-    cost, stands = crossings.cost, crossings.stands
-    portal_cost, portal_source = (np.empty(n_portals, dtype=np.int32) for _ in range(2))
-    portal_cost[crossings.portal[stands]] = cost[stands]
-    portal_source[crossings.portal[stands]] = crossings.source[stands]
+    crossings = layout.crossings
+    tail, head = layout.gate_of[crossings.ends].reshape(2, -1)
+    tail, head = np.concatenate([tail, head]), np.concatenate([head, tail])
+    kept = np.flatnonzero(np.tile(layout.is_exit, 2))
+    order = kept[np.argsort(tail[kept], kind="stable")]
+    side_gates_start, side_gates = layout.side_gates
+    n_portals = crossings.n_portals
     return Portals(
         position=_tiled(layout.index.reshape(-1, layout.cols)),
         field_start=layout.field_start,
         gate_start=layout.gate_start,
         gate_cell=layout.gate_cell.astype(np.int32),
         row_start=layout.row_start,
+        exit_start=starts_of(tail[order], len(layout.gate_cell)),
+        exit_gate=head[order],
+        exit_cost=np.tile(crossings.cost, 2)[order],
         side_start=layout.side_start,
-        side_portal=(layout.side_order % max(n_portals, 1)).astype(np.int32),
-        side_gate=layout.side_gate,
+        side_gates_start=side_gates_start,
+        side_gates=side_gates.astype(np.int32),
         source_gate=layout.source_gate,
-        portal_sides=np.ascontiguousarray(layout.side_rank.reshape(2, -1).T, dtype=np.int32),
-        portal_cost=portal_cost,
-        portal_source=portal_source,
-        **_exits(layout),
-        **_beside(layout, filled),
+        portal_sides=np.ascontiguousarray(layout.side_rank.reshape(2, n_portals).T, dtype=np.int32),
+        side_box=layout.side_box,
         **filled,
     )
-
-
-def _exits(layout: Layout) -> dict[str, NDArray[Any]]:
-    """Moves between gates, by the gate they start from."""
-    crossings = layout.crossings
-    tail, head = layout.gate_of[crossings.ends].reshape(2, -1)
-    tail, head = np.concatenate([tail, head]), np.concatenate([head, tail])
-    kept = np.flatnonzero((tail >= 0) & (head >= 0))
-    order = kept[np.argsort(tail[kept], kind="stable")]
-    return {
-        "exit_start": starts_of(tail[order], len(layout.gate_cell)),
-        "exit_gate": head[order],
-        "exit_cost": np.tile(crossings.cost, 2)[order],
-        "exit_portal": np.tile(crossings.portal, 2)[order].astype(np.int32),
-    }
-
-
-def _beside(layout: Layout, filled: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Gates of each side, and for each a source with the cost of a path between the two."""
-    crossings = layout.crossings
-    low, high = layout.gate_of[crossings.ends].reshape(2, -1)
-    kept = np.flatnonzero((low >= 0) & (high >= 0))
-    field = layout.label[crossings.low[kept]]
-    first = layout.gate_start[field]
-    other = layout.source_gate[crossings.source[kept]] - first
-    row = (low[kept] - first) * np.diff(layout.gate_start)[field]
-    leg = filled["clique"][filled["clique_start"][field] + row + other].astype(np.int64)
-    costs = np.concatenate([leg, leg + crossings.cost[kept]])
-    side = layout.side_of_end.reshape(2, -1)[:, kept].ravel()
-    gate = np.concatenate([low[kept], high[kept]])
-    order = np.lexsort((costs, gate, side))
-    new = np.ones(len(order), dtype=np.bool_)
-    new[1:] = (np.diff(side[order]) != 0) | (np.diff(gate[order]) != 0)
-    best = order[new]
-    return {
-        "side_gates_start": starts_of(side[best], 2 * crossings.n_portals),
-        "side_gates": gate[best],
-        "side_gates_source": np.tile(crossings.source[kept], 2)[best].astype(np.int32),
-        "side_gates_cost": costs[best].astype(np.int32),
-    }
 
 
 def _tiled(index: IntArray) -> IntArray:

@@ -1,0 +1,65 @@
+"""Many queries at once: in one kernel what look-ups answer, one by one what is left."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.grid import CellClass
+from hybridnav.planner.cell_plans import OverPortals
+from hybridnav.result import PlanBatch, PlanStatus
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.planner import HybridPlanner, Smooth
+
+
+def plan_many(
+    planner: HybridPlanner,
+    cell_planner: CellPlanner,
+    starts: FloatArray,
+    goals: FloatArray,
+    smooth: Smooth,
+) -> PlanBatch:
+    """What `planner.plan` answers to each pair of points, float64 (n, 2) each, in arrays."""
+    n = len(starts)
+    status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
+    cost, bound = np.full(n, np.inf), np.full(n, np.inf)
+    paths: list[FloatArray] = [np.empty((0, 2))] * n
+    left = np.ones(n, dtype=np.bool_)
+    if n and smooth == "none" and isinstance(cell_planner, OverPortals):
+        grid = planner.topology.grid
+        first, last = grid.frame.cells_of(starts), grid.frame.cells_of(goals)
+        asked = np.flatnonzero(_are_free(planner, first) & _are_free(planner, last))
+        found = cell_planner.plan_many(first[asked], last[asked])
+        done = asked[found.is_done]
+        left[done] = False
+        cost[done] = found.length_cells[found.is_done] * grid.resolution_m
+        bound[done] = found.lower_bound_cells[found.is_done] * grid.resolution_m
+        bound[done] = np.minimum(bound[done], cost[done])
+        status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
+        for i, k in zip(done.tolist(), np.flatnonzero(found.is_done).tolist(), strict=True):
+            paths[i] = found.points[found.path_start[k] : found.path_start[k + 1]]
+    for i in np.flatnonzero(left).tolist():
+        result = planner.plan(starts[i], goals[i], smooth=smooth)
+        status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
+        if result.path is not None:
+            paths[i] = result.path.points
+    return PlanBatch(
+        status=status,
+        cost=cost,
+        lower_bound=bound,
+        path_start=np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64),
+        points=np.concatenate([np.empty((0, 2)), *paths]),
+    )
+
+
+def _are_free(planner: HybridPlanner, cells: LongArray) -> BoolArray:
+    """Whether cells (n, 2) lie on the map and are free."""
+    classes = planner.topology.grid.classes
+    inside = ((cells >= 0) & (cells < classes.shape)).all(axis=1)
+    free = np.zeros(len(cells), dtype=np.bool_)
+    free[inside] = classes[tuple(cells[inside].T)] == CellClass.FREE
+    return free

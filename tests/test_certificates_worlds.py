@@ -1,0 +1,158 @@
+"""The bound is a theorem: on floors, in worlds, on real maps, and what the presets promise."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from hybridnav.grid.worlds import figure1_world, office_world
+from hybridnav.harness.pairs import sample_pairs
+from tests.certificates import (
+    Cell,
+    built,
+    check_pairs,
+    check_plan,
+    planned,
+    planners_of,
+    portals_every,
+    random_pairs,
+)
+from tests.oracle.grid import components
+from tests.strategies import Scene
+
+UNEXPLORED_TOO = "planner.allow_unexplored=true"
+
+SOME_MAPS = {
+    "aws_small_warehouse/005/map.yaml",
+    "giraff_homes/UMA_236_237.yaml",
+    "nav2/maps/depot.yaml",
+    "radish_grids/freiburg-079.yaml",
+    "movingai/cities/Berlin_0_256.map",
+    "movingai/da2/ht_chantry.map",
+    "movingai/dao/lak303d.map",
+    "movingai/mapf/warehouse-10-20-10-2-1.map",
+}
+"""Maps of the reference data that are always tested; the other ones with `full` only."""
+
+
+# --- floors, worlds, and a frame that is turned -------------------------------------------------
+
+
+@pytest.mark.parametrize("spacing", [None, 16, 64])
+def test_bounds_hold_on_an_open_floor(spacing: int | None) -> None:
+    classes = np.ones((260, 300), dtype=np.uint8)
+    classes[60:64, 40:260] = classes[130:200, 150:152] = 0
+    topology = built(Scene(classes, 0.05, 2.0, 0))
+    with portals_every(spacing):
+        planners = planners_of(topology)
+    pairs = random_pairs(topology.grid.enterable(), np.random.default_rng(1), 40)
+    check_pairs(planners, pairs, by_scipy=False)
+
+
+@pytest.fixture(scope="module")
+def office() -> list[hn.HybridPlanner]:
+    """A planner for each of the choices, on the office."""
+    grid = office_world().grid(robot_radius_m=0.25)
+    return planners_of(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+
+
+def pairs_of(grid: hn.OccupancyGrid, count: int, seed: int) -> list[tuple[Cell, Cell]]:
+    """Pairs of all distances, some across components, and some of neighbours."""
+    near = random_pairs(grid.enterable(), np.random.default_rng(seed), count // 4)
+    sampled = sample_pairs(grid, count // 2, seed=seed, least_distance_m=grid.resolution_m)
+    return near + [(pair.start, pair.goal) for pair in sampled]
+
+
+def test_bounds_hold_in_the_office(office: list[hn.HybridPlanner]) -> None:
+    check_pairs(office, pairs_of(office[0].topology.grid, 400, 5), by_scipy=False)
+
+
+def test_bounds_hold_in_the_office_with_sparse_portals(office: list[hn.HybridPlanner]) -> None:
+    topology = office[0].topology
+    with portals_every(32):
+        planners = planners_of(topology)
+    check_pairs(planners, pairs_of(topology.grid, 120, 6), by_scipy=False)
+
+
+@pytest.mark.parametrize("overrides", [(), (UNEXPLORED_TOO,)])
+def test_bounds_hold_in_figure_1(overrides: tuple[str, ...]) -> None:
+    grid = figure1_world().grid(robot_radius_m=0.0)
+    enterable = grid.enterable(allow_unexplored=bool(overrides))
+    for distance_m in (0.3, 1.0, 10.0):
+        topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=distance_m))
+        pairs = random_pairs(enterable, np.random.default_rng(2), 50)
+        check_pairs(planners_of(topology, *overrides), pairs, by_scipy=True)
+
+
+def test_bounds_are_lengths_in_metres_whatever_the_frame() -> None:
+    probability = office_world().grid(robot_radius_m=0.25).classes != hn.CellClass.FREE
+    frame = hn.Frame(0.1, origin_m=(431_207.3, -12.5), yaw_rad=2.3)
+    grid = hn.OccupancyGrid(probability[:120, :160].astype(np.float32), frame)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=3.0))
+    check_pairs(planners_of(topology), pairs_of(grid, 60, 7), by_scipy=False)
+
+
+# --- what the presets owe each other ------------------------------------------------------------
+
+
+def test_a_smaller_epsilon_proves_more(office: list[hn.HybridPlanner]) -> None:
+    by_epsilon = {p.preset.planner.epsilon: p for p in office if p.preset.name == "certified"}
+    steps = [0.1, 0.01, 0.0]
+    gaps = []
+    for pair in pairs_of(office[0].topology.grid, 200, 8):
+        results = [planned(by_epsilon[step], *pair) for step in steps]
+        if results[0].solved:
+            gaps.append([result.gap for result in results])
+    assert (np.max(gaps, axis=0) <= np.array(steps) + 1e-9).all()
+    means = np.mean(gaps, axis=0)
+    assert means[0] > means[1] > means[2] == 0
+
+
+def test_the_bound_is_worth_having(office: list[hn.HybridPlanner]) -> None:
+    planner = next(p for p in office if p.preset.name == "balanced")
+    gaps = [planned(planner, *pair).gap for pair in pairs_of(planner.topology.grid, 300, 9)]
+    assert np.nanpercentile(gaps, 95) < 0.05
+
+
+# --- the reference data -------------------------------------------------------------------------
+
+
+def reference_maps() -> list[Any]:
+    """Every map of the reference data; one that cannot be there without it."""
+    folder = Path(os.environ.get("HYBRIDNAV_DATA", ""))
+    table = folder / "maps.tsv"
+    if not table.is_file():
+        return ["none"]
+    rows = [line.split("\t") for line in table.read_text().splitlines()[1:]]
+    names = [name for name, kind in rows if kind == "map"]
+    games = (folder / "movingai").glob("**/*.map")
+    names += sorted(file.relative_to(folder).as_posix() for file in games)
+    return [
+        pytest.param(name, marks=() if name in SOME_MAPS else pytest.mark.full) for name in names
+    ]
+
+
+@pytest.mark.parametrize("name", reference_maps())
+def test_bounds_hold_on_real_maps(data: Path, name: str) -> None:
+    game = name.endswith(".map")
+    with warnings.catch_warnings():
+        # Some maps call grey free; they are planned on all the same.
+        warnings.simplefilter("ignore", hn.MapWarning)
+        grid = hn.load_map(data / name, robot_radius_m=0.0 if game else 0.25)
+    distance_m = 40.0 if game else 4.0
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=distance_m))
+    planners = planners_of(topology)
+    check_pairs(planners, pairs_of(grid, 100, 3), by_scipy=False)
+    one = components(grid.enterable())
+    labels = np.unique(one[one > 0])
+    if len(labels) > 1:
+        ends = [tuple(np.argwhere(one == label)[0].tolist()) for label in labels[:2]]
+        for planner in planners:
+            check_plan(planner, ends[0], ends[1], math.inf)

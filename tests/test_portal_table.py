@@ -1,0 +1,278 @@
+"""The portal table against scipy's searches: sources to gates, sides to sides, ways down a row."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hybridnav.route import portal_table
+from hybridnav.route._descent_kernels import descend
+from hybridnav.route._portal_kernels import FAR, UNREACHED
+from hybridnav.route.portal_table import build_tables
+from hybridnav.search._costs import STRAIGHT
+from hybridnav.topology.portals import Portals
+from hybridnav.topology.thin_portals import with_paths_only
+from tests.divided import (
+    GATES,
+    Divided,
+    costs_from,
+    fields_of,
+    gate_graph,
+    halves,
+    partitions,
+    with_rounding,
+)
+
+ENOUGH = settings(max_examples=120, derandomize=True, deadline=None)
+FEWER = settings(max_examples=60, derandomize=True, deadline=None)
+ROUNDED = st.sampled_from([0, 0, 1, 3, 9])
+"""Bits that costs lose, as on maps with paths that are too long for the table."""
+
+
+def made(divided: Divided, gates: str, bits: int = 0) -> tuple[Portals, Portals, Any]:
+    """All portals, those that are left, and their tables."""
+    portals = divided.portals(gates)
+    with pytest.MonkeyPatch.context() as patch:
+        with_rounding(patch, bits)
+        if portals.n_gates % 2:  # else one part is enough for maps as small as these
+            patch.setattr(portal_table, "AT_ONCE", 1 + portals.n_gates % 19)
+        left, tables = build_tables(portals)
+    assert tables.shift == bits
+    return portals, left, tables
+
+
+def stored(costs: Any, bits: int) -> Any:
+    """What a table says of costs, which may be infinite."""
+    found = np.full(costs.shape, UNREACHED)
+    reached = np.isfinite(costs)
+    found[reached] = costs[reached].astype(np.int64) >> bits
+    return found
+
+
+def gates_of_side(portals: Portals, side: int) -> Any:
+    return portals.side_gates[slice(*portals.side_gates_start[side : side + 2])]
+
+
+def moves_into(portals: Portals, gate: int) -> Any:
+    """Gates in other fields next to one, and what it costs to come from there."""
+    exits = slice(*portals.exit_start[gate : gate + 2])
+    return portals.exit_gate[exits], portals.exit_cost[exits]
+
+
+def between_sides(portals: Portals, costs: Any) -> Any:
+    """Least costs from any gate of a side to any of another that is entered there: a gate that is
+    the lower end of a move counts as entered, whatever the way to it."""
+    own = [gates_of_side(portals, side) for side in range(portals.n_sides)]
+    lowest = [costs[gates].min(axis=0) for gates in own]
+    from_side = np.array(lowest).reshape(portals.n_sides, portals.n_gates)
+    field = fields_of(portals.gate_start)
+    entered = np.full(from_side.shape, np.inf)
+    for gate in range(portals.n_gates):
+        others, steps = moves_into(portals, gate)
+        if (field[others] > field[gate]).any():
+            entered[:, gate] = from_side[:, gate]
+        elif len(others):
+            entered[:, gate] = (from_side[:, others] + steps).min(axis=1)
+    lowest = [entered[:, gates].min(axis=1) for gates in own]
+    return np.array(lowest).reshape(portals.n_sides, portals.n_sides).T
+
+
+@ENOUGH
+@given(partitions(), st.sampled_from(GATES), ROUNDED)
+def test_the_table_has_the_costs_of_shortest_paths(divided: Divided, gates: str, bits: int) -> None:
+    every, portals, tables = made(divided, gates, bits)
+    costs = costs_from(gate_graph(portals), portals.source_gate)
+    assert np.array_equal(tables.route, stored(costs, bits))
+    true = costs_from(divided.moves, portals.gate_cell[portals.source_gate])[:, portals.gate_cell]
+    if gates == "all":
+        assert portals is every
+        assert np.array_equal(costs, true)
+    assert (costs >= true).all()
+    assert np.array_equal(np.isfinite(costs), np.isfinite(true)), "too few gates to get there"
+    assert tables.route.dtype == tables.between.dtype == np.uint32
+    assert np.array_equal(tables.gate_field, divided.label[portals.gate_cell])
+    sources = np.full(portals.n_gates, -1)
+    sources[portals.source_gate] = np.arange(len(portals.source_gate))
+    assert np.array_equal(tables.source_at, sources)
+
+
+@ENOUGH
+@given(partitions(), st.sampled_from(GATES), ROUNDED)
+def test_costs_between_sides_are_the_least_of_those_of_all_gates(
+    divided: Divided, gates: str, bits: int
+) -> None:
+    every, _, tables = made(divided, gates, bits)
+    costs = costs_from(gate_graph(every), np.arange(every.n_gates))
+    if gates != "sparse":
+        true = costs_from(divided.moves, every.gate_cell)[:, every.gate_cell]
+        assert np.array_equal(costs, true)
+    exact = between_sides(every, costs)
+    if bits == 0:
+        assert np.array_equal(tables.between, stored(exact, 0))
+        return
+    # The cost of the last move is rounded down by itself.
+    assert np.array_equal(tables.between == UNREACHED, np.isinf(exact))
+    reached = np.isfinite(exact)
+    rounded = tables.between[reached].astype(np.int64) << bits
+    assert (rounded <= exact[reached]).all()
+    assert (rounded > exact[reached] - 2 * (1 << bits)).all()
+
+
+@FEWER
+@given(partitions(), st.sampled_from(GATES), st.integers(0, 2**32 - 1))
+def test_no_way_over_two_sides_costs_less_than_the_table_says(
+    divided: Divided, gates: str, seed: int
+) -> None:
+    every, _, tables = made(divided, gates)
+    costs = costs_from(gate_graph(every), np.arange(every.n_gates))
+    field = fields_of(every.gate_start)
+    sides = np.arange(every.n_sides)
+    if len(sides) > 20:
+        sides = np.random.default_rng(seed).choice(sides, 20, replace=False)
+    for last in sides.tolist():
+        into = gates_of_side(every, last)
+        moves = [(*pair, v) for v in into for pair in zip(*moves_into(every, v), strict=True)]
+        assert all(field[u] != field[v] for u, _, v in moves)
+        for first in sides.tolist():
+            out = gates_of_side(every, first)
+            over = min((costs[out, u] + step).min() for u, step, _ in moves)
+            assert tables.between[first, last] <= over
+            assert tables.between[first, last] >= stored(costs[np.ix_(out, into)].min(), 0)
+
+
+@FEWER
+@given(partitions())
+def test_costs_between_sides_do_not_depend_on_where_paths_are(divided: Divided) -> None:
+    few, all_gates = made(divided, "few")[2], made(divided, "all")[2]
+    assert np.array_equal(few.between, all_gates.between)
+
+
+@ENOUGH
+@given(partitions(), st.sampled_from(GATES), ROUNDED, st.integers(0, 2**32 - 1))
+def test_ways_down_the_table_cost_what_it_says(
+    divided: Divided, gates: str, bits: int, seed: int
+) -> None:
+    _, portals, tables = made(divided, gates, bits)
+    costs = costs_from(gate_graph(portals), portals.source_gate)
+    rng, n = np.random.default_rng(seed), portals.n_gates
+    sources = range(len(portals.source_gate))
+    for source in rng.choice(sources, min(8, len(sources)), replace=False) if n else ():
+        others, steps = moves_into(portals, portals.source_gate[source])
+        lasts = [(-1, 0), *zip(others.tolist(), steps.tolist(), strict=True)]
+        for gate in rng.choice(n, min(12, n), replace=False).tolist():
+            last, step = lasts[rng.integers(len(lasts))]
+            way = descend(portals, tables.route, bits, tables.gate_field, gate, source, last)
+            cost = costs[source, gate] + step
+            if np.isinf(cost):
+                assert way[-1] >= FAR
+                continue
+            found = cost_of_way(portals, gate, portals.source_gate[source], last, way)
+            assert found == cost if bits == 0 else found >= cost
+
+
+def cost_of_way(portals: Portals, gate: int, goal: int, last: int, way: Any) -> int:
+    """What a way costs, after a look at each of its parts: its legs inside fields, and its moves
+    between them."""
+    out, into, legs, over = way
+    field = fields_of(portals.gate_start)
+    assert len(out) == len(into) == len(legs) - 1
+    left, crossed = [*out.tolist()], 0
+    for a, b in zip(left, into.tolist(), strict=True):
+        others, steps = moves_into(portals, a)
+        assert b in others
+        crossed += int(steps[others == b][0])
+    assert crossed == over
+    begins = [gate, *into.tolist()]
+    ends = [*left, into[-1] if last >= 0 else goal]
+    if last >= 0:
+        assert into[-1] == last
+        assert left[-1] == goal
+    for begin, end, leg in zip(begins, ends, legs.tolist(), strict=True):
+        f = field[begin]
+        assert f == field[end]
+        row = portals.clique[portals.clique_start[f] : portals.clique_start[f + 1]]
+        first, size = portals.gate_start[f], portals.gate_start[f + 1] - portals.gate_start[f]
+        assert row.reshape(size, size)[begin - first, end - first] == leg
+    return int(legs.sum() + over)
+
+
+# Gates that go
+
+
+@ENOUGH
+@given(partitions(), st.sampled_from(GATES))
+def test_gates_without_paths_go_and_all_else_stays(divided: Divided, gates: str) -> None:
+    every = divided.portals(gates)
+    kept = np.diff(every.row_start) > 0
+    portals, tables = build_tables(every)
+    assert np.array_equal(portals.gate_cell, every.gate_cell[kept]), "a gate without paths is left"
+    assert tables.route.shape == (len(every.source_gate), kept.sum())
+    for name in ("position", "field_start", "side_start", "steps", "steps_start", "steps_shift"):
+        assert np.array_equal(getattr(portals, name), getattr(every, name)), name
+    assert np.array_equal(portals.rows, every.rows)
+    assert np.array_equal(np.diff(portals.row_start), np.diff(every.row_start)[kept])
+    field = fields_of(every.gate_start)
+    assert np.array_equal(fields_of(portals.gate_start), field[kept])
+    for f in range(every.n_fields):
+        own = kept[field == f]
+        square = every.clique[every.clique_start[f] : every.clique_start[f + 1]]
+        square = square.reshape(len(own), len(own))[own][:, own]
+        left = portals.clique[portals.clique_start[f] : portals.clique_start[f + 1]]
+        assert np.array_equal(left, square.ravel())
+    for new, old in enumerate(np.flatnonzero(kept).tolist()):
+        others, steps = moves_into(every, old)
+        stay = kept[others]
+        left_others, left_steps = moves_into(portals, new)
+        assert np.array_equal(portals.gate_cell[left_others], every.gate_cell[others[stay]])
+        assert np.array_equal(left_steps, steps[stay])
+    for side in range(every.n_sides):
+        own = gates_of_side(every, side)
+        left = portals.gate_cell[gates_of_side(portals, side)]
+        assert np.array_equal(left, every.gate_cell[own[kept[own]]])
+        assert len(left), "a side without a gate"
+    at_source = every.gate_cell[every.source_gate]
+    assert np.array_equal(at_source, portals.gate_cell[portals.source_gate])
+
+
+def test_a_gate_without_paths_goes_even_if_all_lower_ones_have_some() -> None:
+    field_of = np.ones((5, 5), dtype=np.int32)
+    field_of[2, 2] = 0
+    divided = Divided(halves(5, 5, 0).grid, field_of, (16, 4))
+    every, portals, tables = made(divided, "few")
+    assert every.n_gates == 9
+    assert portals.gate_cell[0] == 12
+    assert portals.n_gates == 2
+    assert (np.diff(portals.row_start) > 0).all()
+    assert tables.route.shape == (1, 2)
+
+
+def test_where_all_gates_have_paths_none_goes() -> None:
+    portals = halves(9, 9, 4).portals()
+    same = with_paths_only(portals)
+    for name in Portals._fields:
+        assert np.array_equal(getattr(portals, name), getattr(same, name)), name
+        assert getattr(portals, name).dtype == getattr(same, name).dtype, name
+
+
+def test_a_little_table_is_as_counted_by_hand() -> None:
+    # Rows of two cells, the left one of each in field 0: gates 0, 1, 2, and 3, 4, 5 to their right.
+    portals, tables = build_tables(halves(3, 2, 1).portals())
+    assert portals.gate_cell.tolist() == [0, 2, 4, 1, 3, 5]
+    assert portals.source_gate.tolist() == [0, 1, 2]
+    straight = (tables.route // STRAIGHT).tolist()
+    assert straight == [[0, 1, 2, 1, 1, 2], [1, 0, 1, 1, 1, 1], [2, 1, 0, 2, 1, 1]]
+    # One side each. From the left one: at the left it stays, to the right it takes a step; and
+    # from the right one a step to the left, from where another leads back.
+    assert tables.between.tolist() == [[0, STRAIGHT], [STRAIGHT, 2 * STRAIGHT]]
+
+
+def test_a_map_without_gates_has_empty_tables() -> None:
+    one_field = Divided(halves(3, 3, 3).grid, np.zeros((3, 3), dtype=np.int32))
+    for gates in GATES:
+        portals, tables = build_tables(one_field.portals(gates))
+        assert portals.n_gates == 0
+        assert tables.route.shape == tables.between.shape == (0, 0)
