@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray, PathLike
     from hybridnav.planner.blocked import Blocked
     from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
@@ -72,6 +73,7 @@ class HybridPlanner:
             self._cells = OverPortals(topology, self._refiner, settings)
         else:
             self._cells = WholeMap(self._refiner)
+        self._ompl = self._with_ompl() if settings.refine == "ompl" else None
 
     def plan(
         self,
@@ -87,7 +89,9 @@ class HybridPlanner:
         ----------
         start, goal
             `(x, y)` in metres, map frame. The path runs between the centres of the cells that hold
-            them, an any-angle one between the points; nothing is snapped to free space.
+            them, an any-angle one between the points; nothing is snapped to free space. With OMPL
+            in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis;
+            elsewhere a heading may be given and means nothing.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one; None as the preset says.
         blocked
@@ -104,7 +108,8 @@ class HybridPlanner:
         InvalidValueError
             When a point is not two finite numbers, or what is blocked is not on the map.
         """
-        ends = _point("start", start), _point("goal", goal)
+        poses = self._pose("start", start), self._pose("goal", goal)
+        ends = poses[0][:2], poses[1][:2]
         finish = self._finish_asked_for(smooth)
         closed = None if blocked is None else self._closed(blocked)
         first, last = self._cell_of(ends[0]), self._cell_of(ends[1])
@@ -126,6 +131,8 @@ class HybridPlanner:
         plan = self._cells.plan(first, last)
         if closed is not None and plan.cells is not None:
             plan = self._round(closed, plan, first, last)
+        if self._ompl is not None and plan.cells is not None:
+            return self._by_ompl(self._ompl, plan, poses, closed)
         return self._result(plan, ends, finish, closed)
 
     def plan_many(
@@ -228,6 +235,55 @@ class HybridPlanner:
             stats=stats,
         )
 
+    def _pose(self, name: str, given: ArrayLike) -> FloatArray:
+        """Position and, with OMPL, heading; float64 (2,) or (3,)."""
+        if self._ompl is None:
+            return _point(name, given)
+        return _pose(name, given, needs_heading=self._ompl.ompl.has_heading)
+
+    def _with_ompl(self) -> OmplPlanner:
+        # Loads what only these presets need, and says what to install where it is missing.
+        from hybridnav.planner.ompl_plans import OmplPlanner  # noqa: PLC0415
+
+        field_of = None
+        if isinstance(self._cells, OverPortals):
+            field_of = self._cells.search.field_of
+        elif isinstance(self._cells, MaxDistance):
+            field_of = self.topology.level.field_of
+        return OmplPlanner(self.topology.grid, self.preset.planner, field_of)
+
+    def _by_ompl(
+        self,
+        planner: OmplPlanner,
+        plan: CellPlan,
+        poses: tuple[FloatArray, FloatArray],
+        closed: LongArray | None,
+    ) -> PlanResult:
+        """The coarse path refined by OMPL."""
+        assert plan.cells is not None  # noqa: S101 - the caller has looked
+        began = time.perf_counter()
+        found = planner.plan(plan.cells, poses, closed, spent_s=sum(plan.seconds.values()))
+        seconds = {**plan.seconds, "ompl": time.perf_counter() - began}
+        source = plan.route_source
+        if source is None and self.preset.planner.coarse == "portals":
+            source = partial(self._walked, plan.cells)
+        return self._answer(
+            found.status,
+            metric=found.metric,
+            path=found.path,
+            route_source=source,
+            lower_bound=found.lower_bound,
+            weighted_cost=found.weighted_cost,
+            refinement=found.refinement,
+            stats=PlanStats(
+                expanded=plan.expanded,
+                expanded_places=plan.expanded_places,
+                expanded_gates=plan.expanded_gates,
+                corridor_cells=plan.corridor_cells,
+                seconds=seconds,
+            ),
+        )
+
     def _sight(self, closed: LongArray | None) -> LineOfSight:
         """What shortens paths; with closed cells one made for the query."""
         if closed is None:
@@ -316,6 +372,23 @@ def _point(name: str, point: ArrayLike) -> FloatArray:
             f"{name} must be two finite coordinates (x, y) in metres, got {point!r:.80}"
         )
     return xy
+
+
+def _pose(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray:
+    """Position and heading, float64 (3,); the heading is 0 where none is needed or given."""
+    try:
+        size = np.size(np.asarray(given, dtype=np.float64))
+    except (TypeError, ValueError, OverflowError):
+        size = 0
+    if size != 3 and not needs_heading:  # noqa: PLR2004
+        return np.append(_point(name, given), 0.0)
+    pose = np.asarray(given, dtype=np.float64) if size else np.empty(0)
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        raise InvalidValueError(
+            f"{name} must be three finite numbers (x, y, yaw) in metres and radians, "
+            f"got {given!r:.80}"
+        )
+    return pose
 
 
 def _points(name: str, points: ArrayLike) -> FloatArray:

@@ -27,6 +27,8 @@ from hybridnav.topology.thin_portals import beside_sources
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import Level
@@ -119,6 +121,11 @@ class PortalSearch:
             math.cos(frame.yaw_rad),
             math.sin(frame.yaw_rad),
         )
+
+    @property
+    def field_of(self) -> NDArray[np.int16 | np.int32]:
+        """int16 or int32 (rows, cols), the field of each cell, -1 for none."""
+        return self._field_of
 
     def _fitting(
         self, grid: OccupancyGrid, n_cells: int, *, allow_unexplored: bool
