@@ -88,14 +88,14 @@ def _tau_omega(u, v, xi, eta, phi):
 
 
 @njit(cache=True)
-def _three_pieces(x, y, phi, kinds, lengths, best, mirror, flip):
+def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     """Words of an arc, a straight line and an arc."""
-    xi, eta = x - math.sin(phi), y - 1 + math.cos(phi)
-    u, t = math.hypot(xi, eta), math.atan2(eta, xi)
+    xi, eta = x - sine, y - 1 + cosine
+    u, t = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
     v = _wrapped(phi - t)
     if t >= -_ROUNDING and v >= -_ROUNDING:
         best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, 1), (t, u, v))
-    xi, eta = x + math.sin(phi), y - 1 - math.cos(phi)
+    xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
     if squared >= 4:
         u = math.sqrt(squared - 4)
@@ -107,17 +107,18 @@ def _three_pieces(x, y, phi, kinds, lengths, best, mirror, flip):
 
 
 @njit(cache=True)
-def _four_arcs(x, y, phi, kinds, lengths, best, mirror, flip):
+def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     """Words of four arcs, the middle two equally long."""
-    xi, eta = x + math.sin(phi), y - 1 - math.cos(phi)
-    rho = (2 + math.hypot(xi, eta)) / 4
+    xi, eta = x + sine, y - 1 - cosine
+    squared = xi * xi + eta * eta
+    rho = (2 + math.sqrt(squared)) / 4
     if rho <= 1:
         u = math.acos(rho)
         t, v = _tau_omega(u, -u, xi, eta, phi)
         if t >= -_ROUNDING and v <= _ROUNDING:
             word = (1, -1, 1, -1)
             best = _take(kinds, lengths, best, mirror, flip, False, word, (t, u, -u, v))
-    rho = (20 - xi * xi - eta * eta) / 16
+    rho = (20 - squared) / 16
     if 0 <= rho <= 1:
         u = -math.acos(rho)
         t, v = _tau_omega(u, u, xi, eta, phi)
@@ -128,10 +129,10 @@ def _four_arcs(x, y, phi, kinds, lengths, best, mirror, flip):
 
 
 @njit(cache=True)
-def _quarter_turns(x, y, phi, kinds, lengths, best, mirror, flip):
+def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     """Words with a straight line between two quarter turns."""
     quarter = math.pi / 2
-    xi, eta = x + math.sin(phi), y - 1 - math.cos(phi)
+    xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
     if squared >= 4:
         u = 4 - math.sqrt(squared - 4)
@@ -145,11 +146,11 @@ def _quarter_turns(x, y, phi, kinds, lengths, best, mirror, flip):
 
 
 @njit(cache=True)
-def _turned(x, y, phi, kinds, lengths, best, mirror, flip, back):
+def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     """Words that may also be driven from their end: three arcs, or one quarter turn."""
     quarter = math.pi / 2
-    xi, eta = x - math.sin(phi), y - 1 + math.cos(phi)
-    distance, angle = math.hypot(xi, eta), math.atan2(eta, xi)
+    xi, eta = x - sine, y - 1 + cosine
+    distance, angle = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
     if distance <= 4:
         u = -2 * math.asin(distance / 4)
         t = _wrapped(angle + u / 2 + math.pi)
@@ -164,10 +165,10 @@ def _turned(x, y, phi, kinds, lengths, best, mirror, flip, back):
         if t >= -_ROUNDING and u <= _ROUNDING and v <= _ROUNDING:
             word, pieces = (1, -1, 0, 1), (t, -quarter, u, v)
             best = _take(kinds, lengths, best, mirror, flip, back, word, pieces)
-    xi, eta = x + math.sin(phi), y - 1 - math.cos(phi)
-    distance, t = math.hypot(xi, eta), math.atan2(xi, -eta)
+    xi, eta = x + sine, y - 1 - cosine
+    distance = math.sqrt(xi * xi + eta * eta)
     if distance >= 2:
-        u = 2 - distance
+        u, t = 2 - distance, math.atan2(xi, -eta)
         v = _wrapped(t + quarter - phi)
         if t >= -_ROUNDING and v <= _ROUNDING:
             word, pieces = (1, -1, 0, -1), (t, -quarter, u, v)
@@ -183,16 +184,18 @@ def _reeds_shepp(x, y, phi, kinds, lengths):
     the words of section 8, each also mirrored, driven the other way, and from its end.
     """
     best = np.inf
+    sine, cosine = math.sin(phi), math.cos(phi)
     for flip in (1, -1):
         for mirror in (1, -1):
-            a, b, turn = flip * x, mirror * y, flip * mirror * phi
-            best = _three_pieces(a, b, turn, kinds, lengths, best, mirror, flip)
-            best = _four_arcs(a, b, turn, kinds, lengths, best, mirror, flip)
-            best = _quarter_turns(a, b, turn, kinds, lengths, best, mirror, flip)
-            best = _turned(a, b, turn, kinds, lengths, best, mirror, flip, False)
-            cosine, sine = math.cos(turn), math.sin(turn)
-            from_end_x, from_end_y = a * cosine + b * sine, a * sine - b * cosine
-            best = _turned(from_end_x, from_end_y, turn, kinds, lengths, best, mirror, flip, True)
+            a, b, turn, turn_sine = flip * x, mirror * y, flip * mirror * phi, flip * mirror * sine
+            pose = (a, b, turn, turn_sine, cosine)
+            best = _three_pieces(*pose, kinds, lengths, best, mirror, flip)
+            best = _four_arcs(*pose, kinds, lengths, best, mirror, flip)
+            best = _quarter_turns(*pose, kinds, lengths, best, mirror, flip)
+            best = _turned(*pose, kinds, lengths, best, mirror, flip, False)
+            a, b = a * cosine + b * turn_sine, a * turn_sine - b * cosine
+            pose = (a, b, turn, turn_sine, cosine)
+            best = _turned(*pose, kinds, lengths, best, mirror, flip, True)
     return best
 
 

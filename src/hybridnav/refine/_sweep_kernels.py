@@ -31,7 +31,8 @@ _DIGITS = 2.0**24
 _ROUNDING = 1 / _DIGITS
 _WIDEST = 1.0
 """Margin in cells above which a motion is halved at once."""
-_HALF_DIAGONAL = 0.70710679
+_HALF_DIAGONAL = 0.7075
+"""Of a cell, with some slack for distances that are stored as float32."""
 _FARTHEST = 255
 
 

@@ -12,13 +12,13 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame
 from hybridnav.refine import _motion_kernels as kernels
 from hybridnav.refine._sweep_kernels import look_ahead
-from hybridnav.refine.footprint import Footprint
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import BoolArray, ByteArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.refine.footprint import Footprint
 
 _FARTHEST_CELLS = 5000
 
@@ -73,7 +73,7 @@ class MotionCheck:
         self._allow_unexplored = allow_unexplored
         self._place = _place_of(grid.frame)
         self._is_disc = footprint is None
-        self._body = _body_of(grid, None if footprint is None else Footprint.of(footprint))
+        self._body = _no_body() if footprint is None else _body_of(grid, footprint)
         self._marks = self._marks_of(inside, closed)
 
     def confined(self, *, inside: BoolArray | None = None, closed: LongArray | None = None) -> Self:
@@ -236,7 +236,7 @@ class MotionCheck:
                     f"the mask of a corridor must have the map's shape {free.shape}, "
                     f"got {inside.shape}"
                 )
-            stand = free & inside
+            stand = free & inside.astype(np.bool_, copy=False)
         if self._grid.corner_cutting:
             free = np.ones_like(free)
         return free.view(np.uint8) + stand.view(np.uint8)
@@ -250,12 +250,19 @@ def _place_of(frame: Frame) -> FloatArray:
     return np.array([*frame.origin_m, *per_metre, frame.yaw_rad, 1 / frame.resolution_m])
 
 
-def _body_of(grid: OccupancyGrid, footprint: Footprint | None) -> tuple[Any, ...]:
+def _no_body() -> tuple[Any, ...]:
+    """A disc, as the kernels want it: nothing but its base."""
+    nowhere = np.zeros((0, 0), dtype=np.bool_)
+    distance = nowhere.astype(np.float32)
+    offsets = np.zeros(1, dtype=np.int64)
+    return look_ahead(nowhere), distance, np.empty((0, 2)), offsets, np.zeros(2)
+
+
+def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ...]:
     """A footprint and what it must not meet, as the kernels want it."""
-    if footprint is None:
-        nowhere = np.zeros((0, 0), dtype=np.bool_)
-        distance, parts, radii = nowhere.astype(np.float32), [np.empty((0, 2))], np.zeros(2)
-        return look_ahead(nowhere), distance, parts[0], np.zeros(1, dtype=np.int64), radii
+    from hybridnav.refine.footprint import Footprint  # noqa: PLC0415 - loads shapely
+
+    footprint = Footprint.of(shape)
     radii = np.array([footprint.inscribed_radius_m, footprint.circumscribed_radius_m])
     radii /= grid.resolution_m
     if radii[1] > _FARTHEST_CELLS:
