@@ -21,14 +21,16 @@ from hybridnav.refine.ompl.spaces import StateSpace
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.refine.ompl.corridor import Corridor
-    from hybridnav.refine.ompl.messages import Query, Setup
+    from hybridnav._typing import FloatArray
+    from hybridnav.refine.ompl.corridor import Base, Corridor
+    from hybridnav.refine.ompl.messages import Query
 
 _KEPT = 0.03
 """Part of the time that is kept for the way back."""
 _FIRST = 0.7
 """Part of what is left in which a corridor that is not the last must give a path."""
+_CHAIN = 0.5
+"""Part of it that a chain of poses gets before the corridor is searched as one problem."""
 _SEARCHED = 0.9
 """Part of what is left that improving planners get where the path is simplified after."""
 _ENOUGH = 1 + 1e-4
@@ -40,10 +42,8 @@ class Answering:
 
     Parameters
     ----------
-    setup
-        Map and settings.
-    boxes
-        Boxes of the fields, see `boxes_of`.
+    base
+        The map, and what the worker made of it.
     query
         The problem.
     send
@@ -52,18 +52,18 @@ class Answering:
 
     def __init__(
         self,
-        setup: Setup,
-        boxes: LongArray | None,
+        base: Base,
         query: Query,
         send: Callable[[Reply], None],
     ) -> None:
         began = time.monotonic()
+        setup = base.setup
         self.setup, self.query, self.settings = setup, query, setup.settings
         kept_s = _KEPT * (query.deadline_s - began)
         self.budget = Budget(began, query.deadline_s - kept_s, setup.settings.iterations)
         self.search = Search() if query.tells_search else None
         self.bound_m = 0.0
-        self._boxes = boxes
+        self._base = base
         self._send = send
         self._steps: list[str] = []
         self._trace: list[tuple[float, float]] = []
@@ -75,7 +75,7 @@ class Answering:
         """Try the corridors in turn; the last reply."""
         last = len(self.query.corridors) - 1
         for number, (name, fields) in enumerate(self.query.corridors):
-            corridor = corridor_of(self.setup, self._boxes, self.query, fields)
+            corridor = corridor_of(self._base, self.query, fields)
             self._attempt(corridor, part=1.0 if number == last else _FIRST)
             outcome = self._outcome()
             self._steps.append(f"{name}: {outcome}")
@@ -105,9 +105,13 @@ class Answering:
         self.bound_m = whole.length(np.stack([self.query.start, self.query.goal]))
         self.objective = Objective(whole)
         if self.settings.confine == "chain" and corridor.inside is not None:
-            chain.attempt(self, corridor, whole, part=part)
-        else:
-            self._at_once(corridor, whole, part=part)
+            # Legs between poses may be too short for a turning circle or a long robot.
+            first_part = part * _CHAIN if self.settings.has_heading else part
+            if chain.attempt(self, corridor, whole, part=first_part):
+                return
+            if not self.settings.has_heading:
+                return
+        self._at_once(corridor, whole, part=part)
 
     def _at_once(self, corridor: Corridor, whole: StateSpace, *, part: float) -> None:
         """The whole corridor as one problem."""
@@ -142,7 +146,8 @@ class Answering:
         return simplify(whole, points, self.budget, self.objective, self.better)
 
     def _note_cost(self, cost: float) -> None:
-        if cost < self._cost and math.isfinite(cost):
+        # In SE2 OMPL adds the turns to the length, so its cost is not ours.
+        if cost < self._cost and math.isfinite(cost) and self.settings.space != "se2":
             self._trace.append((self.budget.seconds(), cost))
 
     def _note(self, x: float, y: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -39,24 +40,23 @@ class Budget:
         """Seconds since it began."""
         return time.monotonic() - self.began_s
 
-    def seconds_left(self, part: float) -> float:
-        """Seconds in a part of what is left; also where iterations are counted."""
-        return max(part * (self._deadline_s - time.monotonic()), 0.0)
-
     def spend(self, iterations: int) -> None:
         """Count iterations that no stopper saw."""
         self.iterations += iterations
 
-    def stopper(self, part: float) -> Callable[[], bool]:
+    def stopper(self, part: float, *, most: int | None = None) -> Callable[[], bool]:
         """What planners ask once an iteration: whether a part of what is left now is spent.
 
         Parameters
         ----------
         part
             Of what is left, in (0, 1].
+        most
+            Iterations that it may be at most; None for no limit.
         """
+        until = sys.maxsize if most is None else self.iterations + most
         if self._most is not None:
-            until = self.iterations + max(int(part * (self._most - self.iterations)), 1)
+            until = min(until, self.iterations + max(int(part * (self._most - self.iterations)), 1))
 
             def is_spent() -> bool:
                 self.iterations += 1
@@ -69,6 +69,6 @@ class Budget:
 
             def is_spent() -> bool:
                 self.iterations += 1
-                return clock() >= end
+                return clock() >= end or self.iterations > until
 
         return is_spent

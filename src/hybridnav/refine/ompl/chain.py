@@ -11,9 +11,13 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ompl import geometric
 
 from hybridnav.refine.ompl.corridor import bounds_of
 from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
+from hybridnav.refine.ompl.poses import Poses
+from hybridnav.refine.ompl.simplify import simplified
+from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
@@ -21,6 +25,13 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.corridor import Box, Corridor
     from hybridnav.refine.ompl.spaces import StateSpace
 
+_WINDING, _SHORT_CELLS = 1.2, 4
+"""A leg is cut in two where its cells' way is longer than this times the straight line, and so
+many cells; what is shorter, in passages one cell wide, is walked from centre to centre."""
+_TRIES = 10
+"""Iterations for each cell of a leg before it is cut in two."""
+_LONGER = 1.05
+"""A leg that is longer than this times its cells' way has taken another door."""
 _LEG = 0.5
 """Part of its share of the time that a leg may take before it is cut in two."""
 _WINDOW = 0.02
@@ -30,7 +41,7 @@ _ROUNDS_WITHOUT_GAIN = 2
 _LEAST_GAIN = 2e-4
 
 
-def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float) -> None:
+def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float) -> bool:
     """Solve leg after leg, join them, simplify, and improve windows of the path.
 
     Parameters
@@ -43,30 +54,41 @@ def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part
         State space of the whole corridor.
     part
         How much of what is left the legs may take.
+
+    Returns
+    -------
+    bool
+        Whether there is a path.
     """
-    points = _legs(answering, corridor, part=part)
+    points = _legs(answering, corridor, whole, part=part)
     if points is None:
-        return
+        return False
     points = answering.finish(whole, points)
     if answering.settings.planner in IMPROVING:
-        _improve(answering, corridor, points)
+        _improve(answering, corridor, whole, points)
+    return True
 
 
-def _legs(answering: Answering, corridor: Corridor, *, part: float) -> FloatArray | None:
+def _legs(
+    answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float
+) -> FloatArray | None:
     """The legs, solved and joined; None where one has no path."""
     cells = answering.query.cells
-    stops = _stops(answering, cells)
+    poses = Poses(answering.query, corridor, whole)
+    stops = [index for index in _stops(answering, cells) if poses.at(index) is not None]
     waiting = list(itertools.pairwise(stops))[::-1]
     joined = [answering.query.start[None]]
+    stop_at = (1 - part) * answering.budget.left()
     while waiting:
         first, last = waiting.pop()
-        ends = _pose(answering, first), _pose(answering, last)
-        share = part * _LEG / (len(waiting) + 1)
-        found = _leg(answering, corridor, cells[first : last + 1], ends, share)
+        share = _LEG / (len(waiting) + 1)
+        found = _leg(answering, corridor, cells[first : last + 1], poses.pair(first, last), share)
+        middle = (first + last) // 2
         if found is not None:
             joined.append(found[1:])
-        elif last - first > 1 and answering.budget.left() > 0:
-            middle = (first + last) // 2
+        elif (
+            last - first > 1 and poses.at(middle) is not None and answering.budget.left() > stop_at
+        ):
             waiting += [(middle, last), (first, middle)]
         else:
             answering.partial(np.concatenate(joined))
@@ -75,23 +97,26 @@ def _legs(answering: Answering, corridor: Corridor, *, part: float) -> FloatArra
 
 
 def _stops(answering: Answering, cells: LongArray) -> list[int]:
-    """Where the path of cells goes over from one field to the next, and its ends."""
+    """Where the path of cells goes over from one field to the next, its ends, and points between
+    until no leg winds."""
     last = len(cells) - 1
     field_of = answering.setup.field_of
-    if field_of is None:
-        return [0, last]
-    fields = field_of[cells[:, 0], cells[:, 1]]
-    return sorted({0, *(np.flatnonzero(np.diff(fields)) + 1).tolist(), last})
-
-
-def _pose(answering: Answering, index: int) -> FloatArray:
-    """The state at a cell of the path; the ends are those of the query."""
-    query = answering.query
-    last = len(query.cells) - 1
-    if index in {0, last}:
-        return query.start if index == 0 else query.goal
-    centre = answering.setup.grid.frame.points_of(query.cells[index])
-    return np.array([*centre, 0.0])
+    crossings: list[int] = []
+    if field_of is not None:
+        fields = field_of[cells[:, 0], cells[:, 1]]
+        crossings = (np.flatnonzero(np.diff(fields)) + 1).tolist()
+    waiting = list(itertools.pairwise(sorted({0, *crossings, last})))[::-1]
+    stops = [0]
+    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
+    while waiting:
+        first, end = waiting.pop()
+        straight = math.hypot(*(cells[end] - cells[first]))
+        if at[end] - at[first] > _WINDING * straight + _SHORT_CELLS:
+            middle = (first + end) // 2
+            waiting += [(middle, end), (first, middle)]
+        else:
+            stops.append(end)
+    return stops
 
 
 def _leg(
@@ -101,18 +126,27 @@ def _leg(
     ends: tuple[FloatArray, FloatArray],
     share: float,
 ) -> FloatArray | None:
-    """A path between two states near each other, float64 (n, 3)."""
-    (x0, y0, _), (x1, y1, _) = ends
-    if corridor.check.motion_valid(x0, y0, x1, y1):
-        return np.stack(ends)
+    """A path between two states near each other, float64 (n, 3); None where there is none that is
+    not much longer than the cells' way."""
+    flat, straight = not answering.settings.has_heading, np.stack(ends)
+    if flat and corridor.check.path_valid(straight[:, :2]):
+        return straight
+    if flat and len(cells) <= _SHORT_CELLS:
+        return None
     space = answering.space(corridor, *_bounds(corridor, cells))
+    objective = answering.objective.of(space)
     found = solve(
-        Problem(space, *ends, answering.objective.of(space)),
+        Problem(space, *ends, objective),
         answering.settings,
-        answering.budget.stopper(share),
+        answering.budget.stopper(share, most=_TRIES * len(cells) if flat else None),
         search=answering.search,
     )
-    return found.points if found.is_exact else None
+    if not found.is_exact or not flat:
+        return found.points if found.is_exact else None
+    simplifier = geometric.PathSimplifier(space.information, None, objective)
+    points = simplified(space, simplifier, found.points)
+    limit_m = _LONGER * path_length_in_cells(cells) * corridor.grid.resolution_m
+    return points if space.length(points) <= limit_m else None
 
 
 _MARGIN_CELLS = 8
@@ -131,7 +165,9 @@ def _bounds(corridor: Corridor, cells: LongArray) -> tuple[FloatArray, FloatArra
     return bounds_of(corridor.grid, box)
 
 
-def _improve(answering: Answering, corridor: Corridor, points: FloatArray) -> None:
+def _improve(
+    answering: Answering, corridor: Corridor, whole: StateSpace, points: FloatArray
+) -> None:
     """Give windows of the path to the planner again, each with the ellipse that can shorten it."""
     budget = answering.budget
     cost_of = answering.objective.cost
@@ -140,7 +176,7 @@ def _improve(answering: Answering, corridor: Corridor, points: FloatArray) -> No
         before = cost
         for number in range(2 * window - 1):
             along = number / (2 * window), (number + 2) / (2 * window)
-            points = _window(answering, corridor, points, along)
+            points = _window(answering, corridor, whole, points, along)
             if budget.left() <= 0:
                 break
         cost = cost_of(points)
@@ -152,36 +188,33 @@ def _improve(answering: Answering, corridor: Corridor, points: FloatArray) -> No
 def _window(
     answering: Answering,
     corridor: Corridor,
+    whole: StateSpace,
     points: FloatArray,
     along: tuple[float, float],
 ) -> FloatArray:
     """The path with a part of it, given as parts of its length, searched anew."""
-    cost_of = answering.objective.cost
-    before, inner, after = _cut(points, along)
-    cost = cost_of(inner)
-    straight = float(np.hypot(*(inner[-1] - inner[0])[:2]))
-    if cost <= straight * (1 + _LEAST_GAIN):
+    first, last = _between(points, along)
+    if last - first < 2:  # noqa: PLR2004 - one motion
+        return points
+    cost_of, inner = answering.objective.cost, points[first : last + 1]
+    cost, least = cost_of(inner), whole.length(inner[[0, -1]])
+    if cost <= least * (1 + _LEAST_GAIN):
         return points
     space = answering.space(corridor, *_ellipse(corridor, inner, cost))
-    enough = straight * (1 + _LEAST_GAIN)
-    problem = Problem(space, inner[0], inner[-1], answering.objective.of(space), enough)
+    objective = answering.objective.of(space)
+    problem = Problem(space, inner[0], inner[-1], objective, least * (1 + _LEAST_GAIN))
     found = solve(problem, answering.settings, answering.budget.stopper(_WINDOW))
     if not found.is_exact or cost_of(found.points) >= cost:
         return points
-    return np.concatenate([before, found.points, after])
+    return np.concatenate([points[:first], found.points, points[last + 1 :]])
 
 
-def _cut(
-    points: FloatArray, along: tuple[float, float]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A path before, inside and after a part of its length; the middle part has both its ends."""
-    steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    at = np.concatenate([[0.0], np.cumsum(steps)])
-    low, high = along[0] * at[-1], along[1] * at[-1]
-    ends = [np.array([np.interp(s, at, points[:, axis]) for axis in range(3)]) for s in (low, high)]
-    before, after = points[at < low], points[at > high]
-    between = points[(at > low) & (at < high)]
-    return before, np.concatenate([ends[0][None], between, ends[1][None]]), after
+def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:
+    """The states just before and after a part of a path's length."""
+    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    first = int(np.searchsorted(at, along[0] * at[-1], side="right")) - 1
+    last = int(np.searchsorted(at, along[1] * at[-1]))
+    return max(first, 0), min(last, len(points) - 1)
 
 
 def _ellipse(corridor: Corridor, inner: FloatArray, cost: float) -> tuple[FloatArray, FloatArray]:

@@ -35,6 +35,26 @@ def boxes_of(field_of: NDArray[np.int16 | np.int32]) -> LongArray:
     return boxes
 
 
+class Base:
+    """What the worker makes of the map once.
+
+    Parameters
+    ----------
+    setup
+        What the worker was told.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        field_of = setup.field_of
+        self.boxes = np.empty((0, 4), np.int64) if field_of is None else boxes_of(field_of)
+        self.check = MotionCheck(
+            setup.grid,
+            footprint=setup.settings.footprint,
+            allow_unexplored=setup.allow_unexplored,
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Corridor:
     """Where a query may search."""
@@ -44,6 +64,7 @@ class Corridor:
     """bool (rows, cols); None for the whole map."""
     box: Box
     check: MotionCheck
+    allow_unexplored: bool
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -54,10 +75,11 @@ class Corridor:
     def cells(self) -> LongArray:
         """int64 (n, 2), its cells that may be entered."""
         top, bottom, left, right = self.box
-        free = self.grid.enterable()[top:bottom, left:right]
+        free = self.grid.enterable(allow_unexplored=self.allow_unexplored)[top:bottom, left:right]
         if self.inside is not None:
             free &= self.inside[top:bottom, left:right]
-        return np.argwhere(free) + np.array([top, left])
+        cells: LongArray = np.argwhere(free) + np.array([top, left])
+        return cells
 
 
 def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
@@ -68,14 +90,12 @@ def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def corridor_of(
-    setup: Setup, boxes: LongArray | None, query: Query, fields: BoolArray | None
-) -> Corridor:
+def corridor_of(base: Base, query: Query, fields: BoolArray | None) -> Corridor:
     """The corridor of some fields; of all cells without fields."""
-    grid, inside = setup.grid, None
+    setup, grid, inside = base.setup, base.setup.grid, None
     box: Box = (0, grid.shape[0], 0, grid.shape[1])
-    if fields is not None and setup.field_of is not None and boxes is not None:
-        chosen = boxes[fields]
+    if fields is not None and setup.field_of is not None:
+        chosen = base.boxes[fields]
         box = (
             int(chosen[:, 0].min()),
             int(chosen[:, 1].max()),
@@ -86,7 +106,5 @@ def corridor_of(
         inside = np.zeros(grid.shape, dtype=np.bool_)
         # -1, no field, reads the last entry, which is False.
         inside[box[0] : box[1], box[2] : box[3]] = np.append(fields, False)[part]
-    check = MotionCheck(
-        grid, inside=inside, closed=query.closed, allow_unexplored=setup.allow_unexplored
-    )
-    return Corridor(grid, inside, box, check)
+    check = base.check.confined(inside=inside, closed=query.closed)
+    return Corridor(grid, inside, box, check, setup.allow_unexplored)

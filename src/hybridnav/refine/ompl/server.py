@@ -19,12 +19,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.refine.motions import MotionCheck
-from hybridnav.refine.ompl.corridor import boxes_of
+from hybridnav.refine.ompl.corridor import Base
 from hybridnav.refine.ompl.messages import Reply
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
     from hybridnav.refine.ompl.messages import Query, Setup
 
 GRACE = 0.03
@@ -37,8 +35,8 @@ def serve(connection: Connection) -> None:
     from ompl import util  # noqa: PLC0415 - after the map, which the other side is waiting to send
 
     util.setLogLevel(util.LOG_NONE)
-    boxes = None if setup.field_of is None else boxes_of(setup.field_of)
-    _warm_up(setup)
+    base = Base(setup)
+    _warm_up(base)
     gc.freeze()
     connection.send(None)
     while True:
@@ -46,19 +44,27 @@ def serve(connection: Connection) -> None:
             query: Query = connection.recv()
         except EOFError:
             return
-        connection.send(_answer(setup, boxes, query))
+        connection.send(_answer(base, query))
 
 
-def _warm_up(setup: Setup) -> None:
+def _warm_up(base: Base) -> None:
     """Load modules and kernels, so that forks need not."""
     import hybridnav.refine.ompl.answer  # noqa: F401, PLC0415
 
-    check = MotionCheck(setup.grid, allow_unexplored=setup.allow_unexplored)
-    check.state_valid(0.0, 0.0)
-    check.motion_valid(0.0, 0.0, 1.0, 1.0)
+    inside = np.ones(base.setup.grid.shape, dtype=np.bool_)
+    check = base.check.confined(inside=inside, closed=np.empty(0, dtype=np.int64))
+    x, y = base.setup.grid.frame.points_of((0, 0)).tolist()
+    check.state_valid(x, y)
+    check.motion_valid(x, y, x, y)
+    check.path_valid(np.array([[x, y]]))
+    radius_m = base.setup.settings.turning_radius_m
+    if base.setup.settings.has_heading:
+        check.turn_valid(x, y, 0.0, x, y, 1.0)
+    if radius_m is not None:
+        check.dubins_valid(x, y, 0.0, x, y, 1.0, radius_m)
 
 
-def _answer(setup: Setup, boxes: LongArray | None, query: Query) -> Reply:
+def _answer(base: Base, query: Query) -> Reply:
     """Fork, wait, kill where it takes too long; the best reply that came."""
     left_s = query.deadline_s - time.monotonic()
     kill_s = query.deadline_s + GRACE * max(left_s, 0.0)
@@ -66,7 +72,7 @@ def _answer(setup: Setup, boxes: LongArray | None, query: Query) -> Reply:
     child = os.fork()
     if child == 0:
         os.close(reading)
-        _run(setup, boxes, query, Connection(writing, readable=False))
+        _run(base, query, Connection(writing, readable=False))
     os.close(writing)
     with Connection(reading, writable=False) as replies:
         best = _last_reply(replies, kill_s)
@@ -90,15 +96,15 @@ def _last_reply(replies: Connection, kill_s: float) -> Reply:
     return replace(best, steps=(*best.steps, error), error=error)
 
 
-def _run(setup: Setup, boxes: LongArray | None, query: Query, replies: Connection) -> None:
+def _run(base: Base, query: Query, replies: Connection) -> None:
     """What a fork does; it never returns."""
     try:
         from ompl import util  # noqa: PLC0415
 
         from hybridnav.refine.ompl.answer import Answering  # noqa: PLC0415
 
-        util.RNG.setSeed(setup.settings.seed)
-        replies.send(Answering(setup, boxes, query, replies.send).run())
+        util.RNG.setSeed(base.setup.settings.seed)
+        replies.send(Answering(base, query, replies.send).run())
     except BaseException:  # noqa: BLE001 - whatever it is, it ends here
         text = traceback.format_exc().strip().splitlines()
         replies.send(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,6 +53,7 @@ class StateSpace:
         for axis in range(2):
             bounds.setLow(axis, float(low[axis]))
             bounds.setHigh(axis, float(max(high[axis], low[axis] + 1e-9)))
+        self._check = check
         self._is_straight = settings.space in {"r2", "se2"}
         self.dimension = _STATES[settings.space]
         self.space = _space_of(settings)
@@ -59,17 +61,12 @@ class StateSpace:
         self.information = base.SpaceInformation(self.space)
         is_flat = self.dimension == 2  # noqa: PLR2004
         self._is_valid = _flat_check(check, note) if is_flat else _heading_check(check, note)
-        self._motions = _motions_of(settings, check, self.information, self.space)
+        self._motions = _motions_of(settings, check, self.information)
         self.information.setStateValidityChecker(self._is_valid)
         self.information.setMotionValidator(self._motions)
         self.information.setStateValidityCheckingResolution(FINE)
         self.information.setup()
         self._kept: list[Any] = []
-
-    @property
-    def has_straight_motions(self) -> bool:
-        """Whether motions are straight lines in the plane."""
-        return self._is_straight
 
     def keep(self, thing: Any) -> None:
         """Keep something alive as long as the space: OMPL holds no references to Python objects."""
@@ -97,6 +94,14 @@ class StateSpace:
         else:
             rows = [(state.getX(), state.getY(), state.getYaw()) for state in states]
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+    def is_valid(self, points: FloatArray) -> bool:
+        """Whether every state and motion of a path is valid, joints between motions included."""
+        if self.dimension == 2:  # noqa: PLR2004
+            return self._check.path_valid(points[:, :2])
+        states = [self.state(point) for point in points]
+        valid, runs = self.information.isValid, self.information.checkMotion
+        return all(map(valid, states)) and all(runs(*pair) for pair in itertools.pairwise(states))
 
     def length(self, points: FloatArray) -> float:
         """Metres along a path of states: what the robot's base covers."""
@@ -156,6 +161,25 @@ class _Straight(base.MotionValidator):  # type: ignore[misc]  # the bindings hav
         return self._valid(first[0], first[1], second[0], second[1])
 
 
-def _motions_of(settings: OmplSettings, check: MotionCheck, information: Any, space: Any) -> Any:
-    del settings, space
-    return _Straight(information, check)
+class _Turning(base.MotionValidator):  # type: ignore[misc]
+    """Motions between poses, whatever lies between them."""
+
+    def __init__(self, information: Any, valid: Callable[..., bool]) -> None:
+        super().__init__(information)
+        self._valid = valid
+
+    def checkMotion(self, first: Any, second: Any) -> bool:  # noqa: N802
+        return self._valid(
+            first.getX(), first.getY(), first.getYaw(),
+            second.getX(), second.getY(), second.getYaw(),
+        )  # fmt: skip
+
+
+def _motions_of(settings: OmplSettings, check: MotionCheck, information: Any) -> Any:
+    if settings.space == "r2":
+        return _Straight(information, check)
+    if settings.space == "se2":
+        return _Turning(information, check.turn_valid)
+    assert settings.turning_radius_m is not None  # noqa: S101 - the settings are checked
+    curve = check.dubins_valid if settings.space == "dubins" else check.reeds_shepp_valid
+    return _Turning(information, partial(curve, radius_m=settings.turning_radius_m))
