@@ -209,18 +209,20 @@ def door(width_cells: int, wall_cells: int = 1, robot_radius_m: float = 0.3) -> 
 def test_truck_drives_through_its_door_and_no_narrower_one() -> None:
     y = 5.0
     wide = MotionCheck(door(18), footprint=TRUCK)
-    assert wide.turn_valid(3, y, 0, 7, y, 0)
-    assert wide.turn_valid(3, y, 0.05, 7, y, -0.05)
+    assert wide.turn_valid(3.0, y, 0.0, 7.0, y, 0.0)
+    assert wide.turn_valid(3.0, y, 0.05, 7.0, y, -0.05)
     # Backwards, and sideways where the disc of the base would pass.
-    assert wide.turn_valid(3, y, math.pi, 7, y, math.pi)
-    assert wide.motion_valid(3, y, 7, y)
-    assert not wide.turn_valid(3, y, math.pi / 2, 7, y, math.pi / 2)
-    assert not wide.turn_valid(3, y, 0, 7, y, 1.5)
+    assert wide.turn_valid(3.0, y, math.pi, 7.0, y, math.pi)
+    assert wide.motion_valid(3.0, y, 7.0, y)
+    assert not wide.turn_valid(3.0, y, math.pi / 2.0, 7.0, y, math.pi / 2.0)
+    assert not wide.turn_valid(3.0, y, 0.0, 7.0, y, 1.5)
     # Sides that touch the jambs all along; one cell less is too narrow.
     tight, narrow = door(12, 3, robot_radius_m=0), door(11, 3, robot_radius_m=0)
-    assert MotionCheck(tight, footprint=TRUCK).turn_valid(3, y, 0, 7, y, 0)
-    assert not MotionCheck(narrow, footprint=TRUCK).turn_valid(3, y, 0, 7, y, 0)
-    assert not MotionCheck(narrow, footprint=TRUCK).turn_valid(3, y - 0.025, 0, 7, y - 0.025, 0)
+    assert MotionCheck(tight, footprint=TRUCK).turn_valid(3.0, y, 0.0, 7.0, y, 0.0)
+    assert not MotionCheck(narrow, footprint=TRUCK).turn_valid(3.0, y, 0.0, 7.0, y, 0.0)
+    assert not MotionCheck(narrow, footprint=TRUCK).turn_valid(
+        3.0, y - 0.025, 0.0, 7.0, y - 0.025, 0.0
+    )
 
 
 def test_post_as_thin_as_a_cell_stops_every_motion_over_it() -> None:
@@ -228,23 +230,23 @@ def test_post_as_thin_as_a_cell_stops_every_motion_over_it() -> None:
     occupied[50, 50] = 1
     check = MotionCheck(OccupancyGrid(occupied, frame=Frame(CELL_M)), footprint=TRUCK)
     x, y = 2.525, 2.525
-    assert not check.turn_valid(x - 1.5, y, 0, x + 1.5, y, 0)
-    assert not check.turn_valid(x, y - 1, 0, x, y + 1, 0)
+    assert not check.turn_valid(x - 1.5, y, 0.0, x + 1.5, y, 0.0)
+    assert not check.turn_valid(x, y - 1.0, 0.0, x, y + 1.0, 0.0)
     # Half a turn on the spot: free at both ends, the post on the way of the long side.
-    assert not check.turn_valid(x, y - 0.7, 0, x, y - 0.7, math.pi)
-    assert check.turn_valid(x, y - 1.0, 0, x, y - 1.0, math.pi)
+    assert not check.turn_valid(x, y - 0.7, 0.0, x, y - 0.7, math.pi)
+    assert check.turn_valid(x, y - 1.0, 0.0, x, y - 1.0, math.pi)
     # A circle round (x, y - 1.2) whose upper half runs over the post.
     kinds, quarter_m = np.array([1]), np.array([math.pi / 2])
-    assert not check.curve_valid(x, y - 2.2, 0, kinds, 3 * quarter_m, 1.0)
-    assert not check.curve_valid(x, y - 2.2, 0, kinds, -3 * quarter_m, 1.0)
-    assert check.curve_valid(x, y - 2.2, 0, kinds, quarter_m, 1.0)
+    assert not check.curve_valid(x, y - 2.2, 0.0, kinds, 3 * quarter_m, 1.0)
+    assert not check.curve_valid(x, y - 2.2, 0.0, kinds, -3 * quarter_m, 1.0)
+    assert check.curve_valid(x, y - 2.2, 0.0, kinds, quarter_m, 1.0)
 
 
 def test_heading_turns_the_short_way_over_the_seam() -> None:
     check = MotionCheck(door(18), footprint=TRUCK)
-    assert check.turn_valid(3.9, 1, math.pi - 0.1, 3.9, 1, -math.pi + 0.1)
-    assert check.turn_valid(3.9, 1, math.pi - 0.1, 3.9, 1, 9 * math.pi + 0.1)
-    assert not check.turn_valid(4.6, 1, math.pi / 2, 4.6, 1, -math.pi / 2)
+    assert check.turn_valid(3.9, 1.0, math.pi - 0.1, 3.9, 1.0, -math.pi + 0.1)
+    assert check.turn_valid(3.9, 1.0, math.pi - 0.1, 3.9, 1.0, 9 * math.pi + 0.1)
+    assert not check.turn_valid(4.6, 1.0, math.pi / 2.0, 4.6, 1.0, -math.pi / 2.0)
 
 
 @given(class_grids(max_side=12), seeds)
@@ -278,34 +280,34 @@ def test_check_in_another_corridor_keeps_the_footprint() -> None:
     check = MotionCheck(grid, footprint=TRUCK)
     left = check.confined(inside=inside)
     for other in (left, MotionCheck(grid, footprint=TRUCK, inside=inside)):
-        assert other.turn_valid(2, 5, 0, 3, 5, 0)
-        assert not other.turn_valid(3, 5, 0, 7, 5, 0)
+        assert other.turn_valid(2.0, 5.0, 0.0, 3.0, 5.0, 0.0)
+        assert not other.turn_valid(3.0, 5.0, 0.0, 7.0, 5.0, 0.0)
         # The base stays in the corridor, the body may reach out of it.
-        assert other.state_valid(4.95, 5, 0)
-        assert not other.state_valid(4.95, 5, 1.5)
-    assert check.turn_valid(3, 5, 0, 7, 5, 0)
-    assert left.confined().turn_valid(3, 5, 0, 7, 5, 0)
+        assert other.state_valid(4.95, 5.0, 0.0)
+        assert not other.state_valid(4.95, 5.0, 1.5)
+    assert check.turn_valid(3.0, 5.0, 0.0, 7.0, 5.0, 0.0)
+    assert left.confined().turn_valid(3.0, 5.0, 0.0, 7.0, 5.0, 0.0)
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, 1e300])
 def test_poses_and_curves_that_make_no_sense_are_not_valid(wrong: float) -> None:
     check = MotionCheck(door(18), footprint=TRUCK)
     kinds, lengths_m = np.array([1, 0]), np.array([1.0, 0.5])
-    assert check.curve_valid(2, 5, 0, kinds, lengths_m, 1.5)
-    assert not check.curve_valid(2, 5, 0, kinds, np.array([1.0, wrong]), 1.5)
-    assert not check.curve_valid(2, 5, 0, kinds, np.array([wrong, 1.0]), 1.5)
-    assert not check.curve_valid(wrong, 5, 0, kinds, lengths_m, 1.5)
-    assert not check.curve_valid(2, 5, 0, kinds, lengths_m, 0.0)
-    assert not check.curve_valid(2, 5, 0, kinds, lengths_m, -1.0)
-    assert not check.curve_valid(2, 5, 0, kinds, lengths_m, math.nan)
+    assert check.curve_valid(2.0, 5.0, 0.0, kinds, lengths_m, 1.5)
+    assert not check.curve_valid(2.0, 5.0, 0.0, kinds, np.array([1.0, wrong]), 1.5)
+    assert not check.curve_valid(2.0, 5.0, 0.0, kinds, np.array([wrong, 1.0]), 1.5)
+    assert not check.curve_valid(wrong, 5.0, 0.0, kinds, lengths_m, 1.5)
+    assert not check.curve_valid(2.0, 5.0, 0.0, kinds, lengths_m, 0.0)
+    assert not check.curve_valid(2.0, 5.0, 0.0, kinds, lengths_m, -1.0)
+    assert not check.curve_valid(2.0, 5.0, 0.0, kinds, lengths_m, math.nan)
     # Round and round.
-    assert not check.curve_valid(2, 5, 0, kinds[:1], np.array([30.0]), 1.5)
-    assert not check.dubins_valid(2, 5, 0, wrong, 5, 0, 1.5)
-    assert not check.reeds_shepp_valid(2, 5, 0, 3, 5, 0, 0.0)
-    assert not check.turn_valid(2, 5, 0, 3, wrong, 0)
+    assert not check.curve_valid(2.0, 5.0, 0.0, kinds[:1], np.array([30.0]), 1.5)
+    assert not check.dubins_valid(2.0, 5.0, 0.0, wrong, 5.0, 0.0, 1.5)
+    assert not check.reeds_shepp_valid(2.0, 5.0, 0.0, 3.0, 5.0, 0.0, 0.0)
+    assert not check.turn_valid(2.0, 5.0, 0.0, 3.0, wrong, 0.0)
     if not math.isfinite(wrong):
-        assert not check.state_valid(4.5, 5, wrong)
-        assert not check.turn_valid(2, 5, 0, 3, 5, wrong)
+        assert not check.state_valid(4.5, 5.0, wrong)
+        assert not check.turn_valid(2.0, 5.0, 0.0, 3.0, 5.0, wrong)
 
 
 def test_footprint_of_thousands_of_cells_is_refused() -> None:

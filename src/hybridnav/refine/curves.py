@@ -112,7 +112,9 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
     3.141593
     """
     kinds, lengths_m = np.empty(5, dtype=np.int64), np.empty(5)
-    n = shortest_word(*start, *goal, radius_m, reverses, kinds, lengths_m)
+    # Whole numbers would make another version of the kernel.
+    x0, y0, yaw0, x1, y1, yaw1 = map(float, (*start, *goal))
+    n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, float(radius_m), bool(reverses), kinds, lengths_m)
     if n == 0:
         raise InvalidValueError(
             f"no curve of radius {radius_m} m goes from {start} to {goal}: poses must be finite "
