@@ -90,11 +90,11 @@ def test_no_way_has_no_length(reverses: bool) -> None:  # noqa: FBT001
     assert curve.poses(0.1)[-1] == pytest.approx((1, 2, 3))
 
 
-@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, 1e300])
 def test_poses_and_radii_that_make_no_sense_are_refused(wrong: float) -> None:
     with pytest.raises(InvalidValueError, match="poses must be finite"):
-        shortest_curve((0, 0, 0), (wrong, 0, 0), radius_m=1, reverses=False)
-    for radius_m in (0, -1, wrong):
+        shortest_curve((0, 0, 0), (0, 0, wrong), radius_m=1, reverses=False)
+    for radius_m in (0, -1, math.nan, math.inf):
         with pytest.raises(InvalidValueError, match="radius positive"):
             shortest_curve((0, 0, 0), (1, 0, 0), radius_m=radius_m, reverses=True)
     curve = shortest_curve((0, 0, 0), (9, 0, 0), radius_m=1, reverses=False)

@@ -305,9 +305,11 @@ def test_poses_and_curves_that_make_no_sense_are_not_valid(wrong: float) -> None
     assert not check.dubins_valid(2.0, 5.0, 0.0, wrong, 5.0, 0.0, 1.5)
     assert not check.reeds_shepp_valid(2.0, 5.0, 0.0, 3.0, 5.0, 0.0, 0.0)
     assert not check.turn_valid(2.0, 5.0, 0.0, 3.0, wrong, 0.0)
-    if not math.isfinite(wrong):
-        assert not check.state_valid(4.5, 5.0, wrong)
-        assert not check.turn_valid(2.0, 5.0, 0.0, 3.0, 5.0, wrong)
+    assert not check.turn_valid(2.0, 5.0, 0.0, 3.0, 5.0, wrong)
+    assert not check.dubins_valid(2.0, 5.0, wrong, 3.0, 5.0, 0.0, 1.5)
+    assert not check.reeds_shepp_valid(2.0, 5.0, 0.0, 3.0, 5.0, wrong, 1.5)
+    assert not check.state_valid(4.5, 5.0, wrong)
+    assert not check.curve_valid(2.0, 5.0, wrong, kinds, lengths_m, 1.5)
 
 
 def test_footprint_of_thousands_of_cells_is_refused() -> None:

@@ -14,6 +14,8 @@ from numba import njit
 _FULL = 2 * math.pi
 _ROUNDING = 1e-9
 """Angles and lengths below this are none: of an arc of nothing rounding makes a full turn."""
+LARGEST_HEADING = 1e6
+"""Headings in radians above which too few digits are left."""
 
 
 @njit(cache=True)
@@ -204,12 +206,14 @@ def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
     """Shortest curve between two poses, with lengths in the unit of the radius.
 
     Fills `kinds` and `lengths`, of five each, and returns how many pieces the word has: 0 where
-    there is none, for what is not finite has none.
+    there is none, for what is not finite or turns round a million times has none.
     """
     if not 0.0 < radius < np.inf:
         return 0
     x, y = (x1 - x0) / radius, (y1 - y0) / radius
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw1 - yaw0)):
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return 0
+    if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
         return 0
     cosine, sine = math.cos(yaw0), math.sin(yaw0)
     x, y, phi = cosine * x + sine * y, cosine * y - sine * x, _wrapped(yaw1 - yaw0)

@@ -12,8 +12,9 @@ import math
 import numpy as np
 from numba import njit
 
-from hybridnav.refine._curve_kernels import shortest_word
+from hybridnav.refine._curve_kernels import LARGEST_HEADING, shortest_word
 from hybridnav.refine._sweep_kernels import (
+    OPEN,
     arc_runs,
     body_fits,
     body_sweeps,
@@ -63,10 +64,10 @@ def _legal_bend(marks, positions, i):
     r, c = int(row), int(col)
     if r == 0 or c == 0 or r == rows or c == cols:
         return True
-    south_west, south_east = marks[r - 1, c - 1] > 0, marks[r - 1, c] > 0
-    if south_west == south_east or south_west != (marks[r, c] > 0):
+    south_west, south_east = marks[r - 1, c - 1] >= OPEN, marks[r - 1, c] >= OPEN
+    if south_west == south_east or south_west != (marks[r, c] >= OPEN):
         return True
-    if south_east != (marks[r, c - 1] > 0):
+    if south_east != (marks[r, c - 1] >= OPEN):
         return True
     hand = 1.0 if south_west else -1.0
     came = positions[i - 1, 0] - row + hand * (positions[i - 1, 1] - col)
@@ -105,6 +106,8 @@ def body_stands(marks, place, body, x, y, yaw):
     row, col = _position(place, x, y)
     if not in_map(marks, row, col) or not stands(marks, row, col):
         return False
+    if not abs(yaw) <= LARGEST_HEADING:
+        return False
     return body_fits(body, row, col, yaw - place[6])
 
 
@@ -115,9 +118,9 @@ def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
     b_row, b_col = _position(place, x1, y1)
     if not runs(marks, row, col, b_row, b_col):
         return False
-    turn = yaw1 - yaw0
-    if not math.isfinite(turn):
+    if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
         return False
+    turn = yaw1 - yaw0
     turn -= 2 * math.pi * np.rint(turn / (2 * math.pi))
     return body_sweeps(
         body,
@@ -150,7 +153,7 @@ def body_drives(
     """
     row, col = _position(place, x0, y0)
     heading = yaw0 - place[6]
-    if not math.isfinite(heading) or not 0.0 < radius < np.inf:
+    if not abs(yaw0) <= LARGEST_HEADING or not 0.0 < radius < np.inf:
         return False
     if not in_map(marks, row, col) or not stands(marks, row, col):
         return False

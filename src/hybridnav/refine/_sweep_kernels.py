@@ -93,6 +93,19 @@ def moved(row, col, heading, d_row, d_col, turn, radius, share):
 
 
 @njit(cache=True)
+def _following(part, level):
+    """Part after one that is free, as large as it can be; level 0 where that was the last.
+
+    A motion has 2^level parts on each level, and a part that is not free is halved.
+    """
+    part += 1
+    while level > 0 and part & 1 == 0:
+        part >>= 1
+        level -= 1
+    return part, level
+
+
+@njit(cache=True)
 def _place(corners, row, col, heading, placed):
     """Rounded positions of the corners of a body."""
     cosine, sine = math.cos(heading), math.sin(heading)
@@ -189,8 +202,6 @@ def body_fits(body, row, col, heading):
     ahead, clearance, corners, offsets, radii = body
     if offsets.size == 1:
         return True
-    if not math.isfinite(heading):
-        return False
     at_least, at_most = _near(clearance, row, col)
     if at_least >= radii[1]:
         return True
@@ -234,10 +245,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
             if not free and last:
                 return False
         if free:
-            part += 1
-            while level > 0 and part & 1 == 0:
-                part >>= 1
-                level -= 1
+            part, level = _following(part, level)
             if level == 0:
                 return True
             continue
@@ -287,10 +295,7 @@ def arc_runs(marks, row, col, heading, turn, radius):
         else:
             free = margin <= _WIDEST and _sliver_stands(marks, a_row, a_col, b_row, b_col, margin)
         if free:
-            part += 1
-            while level > 0 and part & 1 == 0:
-                part >>= 1
-                level -= 1
+            part, level = _following(part, level)
             if level == 0:
                 return True
             continue

@@ -104,7 +104,7 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
     Raises
     ------
     InvalidValueError
-        When a number is not finite or the radius not positive.
+        When a number is not finite, a heading a million or more, or the radius not positive.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
     n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, float(radius_m), bool(reverses), kinds, lengths_m)
     if n == 0:
         raise InvalidValueError(
-            f"no curve of radius {radius_m} m goes from {start} to {goal}: poses must be finite "
-            "and the radius positive"
+            f"no curve of radius {radius_m} m goes from {start} to {goal}: poses must be finite, "
+            "headings below a million, and the radius positive"
         )
     return Curve(start, kinds[:n], lengths_m[:n], radius_m)

@@ -28,15 +28,15 @@ class MotionCheck:
 
     A disc robot is a point on a grid that was inflated by its radius. It stays in the union of the
     closed squares of the cells that it may stand on, and never passes between two blocked cells
-    that meet at a corner (unless the grid allows corner cutting). What is not a finite number, or
-    lies outside the map, is not valid. Points are rounded to 2^-24 of a cell; every test of a
-    straight line between rounded points is exact.
+    that meet at a corner (unless the grid allows corner cutting). Numbers that are not finite,
+    points outside the map and headings of more than a million are not valid. Points are rounded to
+    2^-24 of a cell; every test of a straight line between rounded points is exact.
 
     With a footprint the base keeps these rules, on a grid inflated by no more than the inscribed
     radius, and the footprint must not meet the inside of a cell that is occupied without inflation
     (`OccupancyGrid.measured`). As with the disc, unexplored and closed cells and the ground outside
     the map stop the base alone. A motion is valid only where every state on it is: motions without
-    a turn are decided exactly, turns but for what a thousandth of a cell more would hit.
+    a turn are decided exactly, others but for what a hundredth of a cell more would hit.
 
     Parameters
     ----------
