@@ -38,7 +38,7 @@ def main() -> None:
         ("5 m straight, disc", disc.motion_valid, (3.0, 5.0, 8.0, 6.0)),
         ("state in the open", truck.state_valid, (5.0, 5.0, 0.3)),
         ("state in the door", truck.state_valid, (10.0, 10.0, 0.05)),
-        ("state across the wall", truck.state_valid, (9.6, 10.0, 1.5)),
+        ("state beside the wall", truck.state_valid, (9.6, 5.0, 1.5)),
         ("1 m with a turn in the open", truck.turn_valid, (5.0, 5.0, 0.3, 6.0, 5.5, 0.5)),
         ("4 m straight through the door", truck.turn_valid, (8.0, 10.0, 0.0, 12.0, 10.0, 0.0)),
         ("4 m with a turn through it", truck.turn_valid, (8.0, 10.0, 0.04, 12.0, 10.0, -0.04)),
