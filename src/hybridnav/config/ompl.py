@@ -196,6 +196,11 @@ class OmplSettings(BaseModel):
             raise PydanticCustomError(
                 "turning_radius", "turning_radius_m goes with space: dubins or reeds-shepp"
             )
+        if self.objective == "clearance" and (curved or self.planner in {"PRM", "PRMstar"}):
+            raise PydanticCustomError(
+                "objective",
+                "objective: clearance goes with space: r2 or se2, and not with PRM or PRMstar",
+            )
         if self.footprint is not None and self.space == "r2":
             raise PydanticCustomError(
                 "footprint", "a footprint needs a space with headings: se2, dubins or reeds-shepp"

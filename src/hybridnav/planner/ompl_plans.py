@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from dataclasses import dataclass
@@ -10,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.refine import LineOfSight
-from hybridnav.refine.ompl import Query, Setup, Worker
+from hybridnav.refine import LineOfSight, MotionCheck
+from hybridnav.refine.curves import shortest_curve
+from hybridnav.refine.ompl import Clearance, Query, Setup, Worker
 from hybridnav.result import Path, PlanStatus, Refinement
 
 if TYPE_CHECKING:
@@ -77,6 +79,7 @@ class OmplPlanner:
         self.ompl = settings.ompl
         self._field_of = field_of
         self._worker = Worker(Setup(grid, field_of, self.ompl, settings.allow_unexplored))
+        self._warm_up()
 
     def plan(
         self,
@@ -107,20 +110,23 @@ class OmplPlanner:
             start=ends[0],
             goal=ends[1],
             cells=cells,
-            deadline_s=time.monotonic() + self.ompl.budget_s - spent_s,
+            deadline_s=time.monotonic() + max(self.ompl.budget_s - spent_s, 0.0),
             corridors=self._corridors(cells),
             closed=closed,
             tells_search=tells_search,
         )
-        reply = self._worker.ask(query)
+        self._worker.send(query)
+        # Made while the worker is at it, so that there is a path when its time is over.
+        by_line = None
+        if self._worker.is_late():
+            by_line = self._by_line_of_sight(cells, ends, closed)
+        reply = self._worker.reply()
         steps, by_grid = list(reply.steps), False
-        path = None
-        if len(reply.points):
-            headings = reply.points[:, 2].copy() if self.ompl.has_heading else None
-            path = Path(cells, reply.points[:, :2].copy(), reply.length_m, headings)
+        path = self._path(cells, reply) if len(reply.points) else None
         status = _STATUS[reply.outcome]
         if status is not PlanStatus.SOLVED:
-            by_line = self._by_line_of_sight(cells, ends, closed)
+            if by_line is None:
+                by_line = self._by_line_of_sight(cells, ends, closed)
             steps.append(f"grid path by line of sight: {'no' if by_line is None else 'solved'}")
             if by_line is not None:
                 path, status, by_grid = by_line, PlanStatus.SOLVED, True
@@ -128,11 +134,22 @@ class OmplPlanner:
             status,
             self._metric,
             path,
-            reply.cost if self.ompl.objective == "clearance" and not by_grid else None,
+            self._weighted_cost(path) if status is PlanStatus.SOLVED else None,
             self._bound(reply, path, ends),
             Refinement(tuple(steps), by_grid, reply.trace, reply.iterations),
             reply.search,
         )
+
+    def _warm_up(self) -> None:
+        """Make what is made once, so that no query's time includes it."""
+        if self._field_of is not None:
+            _ = self._beside
+        free = np.argwhere(self._grid.enterable())[:1]
+        if len(free):
+            centre = self._grid.frame.points_of(free[0])
+            pose = np.append(centre, 0.0)
+            path = self._by_line_of_sight(free, (pose, pose), None)
+            self._weighted_cost(path)
 
     @property
     def _metric(self) -> Metric:
@@ -183,11 +200,24 @@ class OmplPlanner:
         pairs = np.unique(np.concatenate(keys))
         return pairs // max(self._n_fields, 1), pairs % max(self._n_fields, 1)
 
+    def _path(self, cells: LongArray, reply: Reply) -> Path:
+        """The states of a reply, and along curves poses one cell apart."""
+        states, radius_m = reply.points, self.ompl.turning_radius_m
+        if radius_m is not None:
+            reverses = self.ompl.space == "reeds-shepp"
+            pieces = [states[:1]]
+            for first, second in itertools.pairwise(states.tolist()):
+                curve = shortest_curve(first, second, radius_m=radius_m, reverses=reverses)
+                pieces.append(curve.poses(self._grid.resolution_m)[1:])
+            states = np.concatenate(pieces)
+        headings = states[:, 2].copy() if self.ompl.has_heading else None
+        return Path(cells, states[:, :2].copy(), reply.length_m, headings)
+
     def _by_line_of_sight(
         self, cells: LongArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
     ) -> Path | None:
         """The grid's path, shortened; None where the robot cannot drive it."""
-        if self.ompl.objective != "length" or self.ompl.has_heading:
+        if self.ompl.turning_radius_m is not None:
             return None
         sight = self._sight
         if closed is not None:
@@ -195,7 +225,34 @@ class OmplPlanner:
             sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=closed)
         points = sight.shorten(cells, ends[0][:2], ends[1][:2])
         steps = np.diff(points, axis=0)
-        return Path(cells, points, math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist()))
+        length_m = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
+        if not self.ompl.has_heading:
+            return Path(cells, points, length_m)
+        # Turn on the spot at every bend, drive ahead between.
+        ahead = np.repeat(np.arctan2(steps[:, 1], steps[:, 0]), 2)
+        headings = np.concatenate([[ends[0][2]], ahead, [ends[1][2]]])
+        points = np.repeat(points, 2, axis=0)
+        poses = np.column_stack([points, headings])
+        if not self._check.confined(closed=closed).path_valid(poses):
+            return None
+        return Path(cells, points, length_m, headings)
+
+    def _weighted_cost(self, path: Path | None) -> float | None:
+        if path is None or self._clearance is None:
+            return None
+        return self._clearance.cost_of(path.points)
+
+    @cached_property
+    def _clearance(self) -> Clearance | None:
+        if self.ompl.objective != "clearance":
+            return None
+        allowed = self._settings.allow_unexplored
+        return Clearance(self._grid, self.ompl, allow_unexplored=allowed)
+
+    @cached_property
+    def _check(self) -> MotionCheck:
+        allowed = self._settings.allow_unexplored
+        return MotionCheck(self._grid, footprint=self.ompl.footprint, allow_unexplored=allowed)
 
     @cached_property
     def _sight(self) -> LineOfSight:

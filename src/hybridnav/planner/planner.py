@@ -250,7 +250,12 @@ class HybridPlanner:
             field_of = self._cells.search.field_of
         elif isinstance(self._cells, MaxDistance):
             field_of = self.topology.level.field_of
-        return OmplPlanner(self.topology.grid, self.preset.planner, field_of)
+        settings = self.preset.planner
+        free = np.argwhere(self.topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
+        if len(free):  # kernels that load at the first query would eat up its budget
+            row, col = free[0].tolist()
+            self._cells.plan((row, col), (row, col))
+        return OmplPlanner(self.topology.grid, settings, field_of)
 
     def _by_ompl(
         self,

@@ -103,7 +103,7 @@ class Answering:
     def _attempt(self, corridor: Corridor, *, part: float) -> None:
         whole = self._whole = self.space(corridor, *corridor.bounds)
         self.bound_m = whole.length(np.stack([self.query.start, self.query.goal]))
-        self.objective = Objective(whole)
+        self.objective = Objective(whole, self._base.clearance)
         if self.settings.confine == "chain" and corridor.inside is not None:
             # Legs between poses may be too short for a turning circle or a long robot.
             first_part = part * _CHAIN if self.settings.has_heading else part

@@ -25,9 +25,12 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.corridor import Box, Corridor
     from hybridnav.refine.ompl.spaces import StateSpace
 
-_WINDING, _SHORT_CELLS = 1.2, 4
+_WINDING, _SLACK_CELLS = 1.2, 4
 """A leg is cut in two where its cells' way is longer than this times the straight line, and so
-many cells; what is shorter, in passages one cell wide, is walked from centre to centre."""
+many cells."""
+_SHORT_CELLS = 8
+"""Legs of so many cells that are not straight are walked from centre to centre by a disc: in a
+maze with ways one cell wide every bend is one, and planners of batches take a millisecond each."""
 _TRIES = 10
 """Iterations for each cell of a leg before it is cut in two."""
 _LONGER = 1.05
@@ -111,7 +114,7 @@ def _stops(answering: Answering, cells: LongArray) -> list[int]:
     while waiting:
         first, end = waiting.pop()
         straight = math.hypot(*(cells[end] - cells[first]))
-        if at[end] - at[first] > _WINDING * straight + _SHORT_CELLS:
+        if at[end] - at[first] > _WINDING * straight + _SLACK_CELLS:
             middle = (first + end) // 2
             waiting += [(middle, end), (first, middle)]
         else:
@@ -145,6 +148,8 @@ def _leg(
         return found.points if found.is_exact else None
     simplifier = geometric.PathSimplifier(space.information, None, objective)
     points = simplified(space, simplifier, found.points)
+    if answering.settings.objective != "length":
+        return points
     limit_m = _LONGER * path_length_in_cells(cells) * corridor.grid.resolution_m
     return points if space.length(points) <= limit_m else None
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.refine.motions import MotionCheck
+from hybridnav.refine.ompl.clearance import Clearance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,6 +54,11 @@ class Base:
             footprint=setup.settings.footprint,
             allow_unexplored=setup.allow_unexplored,
         )
+        self.clearance: Clearance | None = None
+        if setup.settings.objective == "clearance":
+            self.clearance = Clearance(
+                setup.grid, setup.settings, allow_unexplored=setup.allow_unexplored
+            )
 
 
 @dataclass(frozen=True, eq=False)

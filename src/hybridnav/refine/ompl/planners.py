@@ -121,9 +121,9 @@ def _watched(
     return watched
 
 
-_GROWTH_ASKS = 100
-"""Iterations by which a roadmap grows before it is asked for a path."""
-_ASK_S = 0.002
+_FIRST_GROWTH, _MOST_GROWTH = 25, 5000
+"""Iterations by which a roadmap grows before it is asked for a path; twice as many each time."""
+_ASK_S = 0.001
 
 
 def _grow(
@@ -139,18 +139,9 @@ def _grow(
     condition in Python would wait there for ever, because the bindings never release the
     interpreter. So roadmaps grow under conditions in Python and are asked under ones by the clock.
     """
-    best, asks = math.inf, _GROWTH_ASKS
-    while True:
-        planner.solve(base.timedPlannerTerminationCondition(_ASK_S))
-        if _found(problem, definition).is_exact:
-            cost = definition.getSolutionPath().cost(problem.objective).value()
-            if cost < best:
-                best = cost
-                if on_cost is not None:
-                    on_cost(cost)
-            if cost <= problem.enough:
-                return
-        left, over = asks, False
+    best, growth, over = math.inf, _FIRST_GROWTH, False
+    while not over:
+        left = growth
 
         def grown() -> bool:
             nonlocal left, over
@@ -159,10 +150,14 @@ def _grow(
             return over or left < 0
 
         planner.growRoadmapPtc(base.PlannerTerminationCondition(grown))
-        if over:
-            planner.solve(base.timedPlannerTerminationCondition(_ASK_S))
-            return
-        asks = min(2 * asks, 5000)
+        planner.solve(base.timedPlannerTerminationCondition(_ASK_S))
+        if _found(problem, definition).is_exact:
+            cost = definition.getSolutionPath().cost(problem.objective).value()
+            if cost < best and on_cost is not None:
+                on_cost(cost)
+            best = min(cost, best)
+            over = over or cost <= problem.enough
+        growth = min(2 * growth, _MOST_GROWTH)
 
 
 def _found(problem: Problem, definition: Any) -> Found:

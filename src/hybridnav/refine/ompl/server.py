@@ -41,10 +41,10 @@ def serve(connection: Connection) -> None:
     connection.send(None)
     while True:
         try:
-            query: Query = connection.recv()
+            number, query = connection.recv()
         except EOFError:
             return
-        connection.send(_answer(base, query))
+        connection.send((number, _answer(base, query)))
 
 
 def _warm_up(base: Base) -> None:
@@ -57,6 +57,8 @@ def _warm_up(base: Base) -> None:
     check.state_valid(x, y)
     check.motion_valid(x, y, x, y)
     check.path_valid(np.array([[x, y]]))
+    if base.clearance is not None:
+        base.clearance.cost(x, y, x, y)
     radius_m = base.setup.settings.turning_radius_m
     if base.setup.settings.has_heading:
         check.turn_valid(x, y, 0.0, x, y, 1.0)

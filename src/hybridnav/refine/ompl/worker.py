@@ -8,6 +8,7 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 import time
 import weakref
 from multiprocessing.connection import Connection
@@ -22,9 +23,13 @@ from hybridnav.refine.ompl.messages import Reply
 if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query, Setup
 
-_GRACE = 0.09
-"""Part of a query's time after its end at which the worker itself is given up. It has killed its
-fork before that, unless it is stopped or swapped out."""
+_GRACE = 0.08
+"""Part of a query's time after its end at which the worker is no longer waited for. It has killed
+its fork before that, unless the machine is busy."""
+_PATIENCE_S = 5.0
+"""How long the worker may owe an answer before it is given up."""
+_LATE = 0.3
+"""Part of a query's time before its end at which its reply is late."""
 _START_S = 120.0
 _PACKAGES = Path(__file__).parents[3]
 
@@ -61,32 +66,55 @@ class Worker:
     def __init__(self, setup: Setup) -> None:
         require_ompl()
         self._setup = setup
+        self._until = self._late = 0.0
+        self._number = self._answered = 0
+        self._reply: Reply | None = None
         self._start()
 
-    def ask(self, query: Query) -> Reply:
-        """Have a query answered within its time, a tenth of it at most on top.
+    def send(self, query: Query) -> None:
+        """Give the process a query; `reply` waits for what comes of it."""
+        left_s = query.deadline_s - time.monotonic()
+        self._until = query.deadline_s + _GRACE * max(left_s, 0.0)
+        self._late = query.deadline_s - _LATE * max(left_s, 0.0)
+        self._number += 1
+        with contextlib.suppress(OSError):
+            self._connection.send((self._number, query))
+
+    def is_late(self) -> bool:
+        """Wait for the reply until most of the time is over; whether it still has not come."""
+        return self._received(self._late) is None
+
+    def reply(self) -> Reply:
+        """The reply to the query that was sent, at most a tenth of its time too late; where none
+        comes, one that says so."""
+        reply = self._received(self._until)
+        if reply is not None:
+            return reply
+        problem = "the worker did not answer in time"
+        return Reply("timeout", np.empty((0, 3)), np.inf, steps=(problem,), error=problem)
+
+    def _received(self, until_s: float) -> Reply | None:
+        """The reply to the last query; those to earlier ones, which came too late, are dropped."""
+        try:
+            while self._answered < self._number:
+                if not self._connection.poll(max(until_s - time.monotonic(), 0.0)):
+                    return None
+                self._answered, self._reply = self._connection.recv()
+        except (EOFError, OSError):
+            self.close()
+            return None
+        return self._reply
+
+    def ensure(self) -> None:
+        """Have a process that answers: a new one where it died, or owes an answer for long.
 
         Raises
         ------
         OmplError
-            When the process is lost and cannot be started anew.
+            When it does not start.
         """
-        left_s = query.deadline_s - time.monotonic()
-        until = query.deadline_s + _GRACE * max(left_s, 0.0)
-        try:
-            self._connection.send(query)
-            if self._connection.poll(max(until - time.monotonic(), 0.0)):
-                reply: Reply = self._connection.recv()
-                return reply
-            problem = "the worker did not answer and was given up"
-        except (EOFError, OSError):
-            problem = "the worker was lost"
-        self.close()
-        return Reply("timeout", np.empty((0, 3)), np.inf, steps=(problem,), error=problem)
-
-    def ensure(self) -> None:
-        """Start the process where there is none."""
-        if not self._finalizer.alive or self._process.poll() is not None:
+        dead = not self._finalizer.alive or self._process.poll() is not None
+        if dead or (self._received(0.0) is None and time.monotonic() > self._until + _PATIENCE_S):
             self.close()
             self._start()
 
@@ -99,6 +127,7 @@ class Worker:
         with theirs:
             self._process = _launch(theirs.fileno())
         self._connection = Connection(ours.detach())
+        self._answered = self._number
         self._finalizer = weakref.finalize(self, _end, self._process, self._connection)
         try:
             self._connection.send(self._setup)
@@ -130,4 +159,4 @@ def _end(process: subprocess.Popen[bytes], connection: Connection) -> None:
     with contextlib.suppress(OSError):
         connection.close()
     process.kill()
-    process.wait()
+    threading.Thread(target=process.wait, daemon=True).start()
