@@ -316,3 +316,20 @@ def test_footprint_of_thousands_of_cells_is_refused() -> None:
     grid = OccupancyGrid(np.zeros((3, 3), dtype=np.float32), frame=Frame(1e-4))
     with pytest.raises(InvalidValueError, match=r"reaches 0\.948683 m on cells of 0\.0001 m"):
         MotionCheck(grid, footprint=TRUCK)
+
+
+def test_a_body_that_turns_is_checked_between_different_corners_too() -> None:
+    """The hull of two poses can have an edge from a rear corner of one to a front corner of the
+    other; this robot would cut a door's jamb by 1.6 cm half-way."""
+    occupied = np.zeros((100, 200), dtype=np.float32)
+    occupied[:, 120:123] = 1
+    occupied[40:58, 120:123] = 0
+    grid = OccupancyGrid(occupied, Frame(0.05), robot_radius_m=0.3)
+    footprint = [[0.9, 0.3], [0.9, -0.3], [-0.9, -0.3], [-0.9, 0.3]]
+    check = MotionCheck(grid, footprint=footprint)
+    first, second = (5.3978755, 2.32446213, 0.32920898), (6.66782561, 2.7793473, 0.3940011)
+    middle = tuple(0.5 * (np.array(first) + second))
+    assert check.state_valid(*first)
+    assert check.state_valid(*second)
+    assert not check.state_valid(*middle)
+    assert not check.turn_valid(*first, *second)

@@ -105,6 +105,10 @@ class OmplPlanner:
         tells_search
             Whether the states and trees of the search are wanted too.
         """
+        refused = self._refused(ends)
+        if refused is not None:
+            nothing = Refinement((), by_grid=False, trace=(), iterations=0)
+            return OmplPlan(refused, self._metric, None, None, math.inf, nothing)
         self._worker.ensure()
         query = Query(
             start=ends[0],
@@ -140,6 +144,17 @@ class OmplPlanner:
             reply.search,
         )
 
+    def _refused(self, ends: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
+        """Status of a query at one of whose ends the footprint does not fit."""
+        if self.ompl.footprint is None:
+            return None
+        for pose, status in zip(
+            ends, (PlanStatus.START_OCCUPIED, PlanStatus.GOAL_OCCUPIED), strict=True
+        ):
+            if not self._check.state_valid(*pose.tolist()):
+                return status
+        return None
+
     def _warm_up(self) -> None:
         """Make what is made once, so that no query's time includes it."""
         if self._field_of is not None:
@@ -150,6 +165,7 @@ class OmplPlanner:
             pose = np.append(centre, 0.0)
             path = self._by_line_of_sight(free, (pose, pose), None)
             self._weighted_cost(path)
+            self._refused((pose, pose))
 
     @property
     def _metric(self) -> Metric:

@@ -27,6 +27,8 @@ from hybridnav.refine._segment_kernels import is_legal
 
 BLOCKED, OPEN, STAND = 0, 1, 2
 """What a cell is to a query: not free, free but outside the corridor, or one to stand on."""
+STAYS, SHIFTS, TURNS = 0, 1, 2
+"""What a body does between two of its states."""
 _DIGITS = 2.0**24
 _ROUNDING = 1 / _DIGITS
 _WIDEST = 1.0
@@ -135,11 +137,57 @@ def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
 
 
 @njit(cache=True)
+def _turns_right(points, size, row, col):
+    """Whether the way over the last two of some points to another turns right or goes straight."""
+    a_row, a_col = points[size - 2]
+    b_row, b_col = points[size - 1]
+    return (b_col - a_col) * (row - b_row) - (b_row - a_row) * (col - b_col) <= 0.0
+
+
+@njit(cache=True)
+def _hull(before, after, first, last):
+    """Corners of the convex hull of a polygon in two places, the first again at the end.
+
+    A. M. Andrew: Another efficient algorithm for convex hulls in two dimensions, 1979.
+    """
+    n = 2 * (last - first)
+    ordered, points = np.empty((n, 2)), np.empty((2 * n + 1, 2))
+    for i in range(n):
+        at = first + i // 2
+        col, row = before[at, 1], before[at, 0]
+        if i % 2 == 1:
+            col, row = after[at, 1], after[at, 0]
+        j = i
+        while j > 0 and (
+            ordered[j - 1, 1] > col or (ordered[j - 1, 1] == col and ordered[j - 1, 0] > row)
+        ):
+            ordered[j, 0], ordered[j, 1] = ordered[j - 1, 0], ordered[j - 1, 1]
+            j -= 1
+        ordered[j, 0], ordered[j, 1] = row, col
+    size = 0
+    for k in range(n):
+        row, col = ordered[k]
+        while size >= 2 and _turns_right(points, size, row, col):
+            size -= 1
+        points[size, 0], points[size, 1] = row, col
+        size += 1
+    lower = size + 1
+    for k in range(n - 2, -1, -1):
+        row, col = ordered[k]
+        while size >= lower and _turns_right(points, size, row, col):
+            size -= 1
+        points[size, 0], points[size, 1] = row, col
+        size += 1
+    return points[:size]
+
+
+@njit(cache=True)
 def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
     """Whether the hull of a convex polygon in two places meets no occupied cell, with a margin.
 
     Its corners are those from `first` to `last`. Each row of cells sees one run of columns of the
-    hull, and their ends are those of the polygon's edges and of the lines that its corners move on.
+    hull. Where the polygon does not turn, their ends are those of its edges and of the lines that
+    its corners move on; where it does, an edge of the hull may join two different corners.
     """
     rows, cols = ahead.shape
     low, high = np.inf, -np.inf
@@ -149,11 +197,18 @@ def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
     low_row, end_row = max(math.floor(low - margin), 0), min(math.ceil(high + margin), rows)
     for k in range(end_row - low_row):
         columns[k, 0], columns[k, 1] = np.inf, -np.inf
+    if moves == TURNS:
+        hull = _hull(before, after, first, last)
+        for j in range(1, hull.shape[0]):
+            i_row, i_col = hull[j - 1]
+            j_row, j_col = hull[j]
+            _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+        last = first
     i = last - 1
     for j in range(first, last):
         i_row, i_col, j_row, j_col = before[i, 0], before[i, 1], before[j, 0], before[j, 1]
         _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
-        if moves:
+        if moves == SHIFTS:
             i_row, i_col = after[j, 0], after[j, 1]
             _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
             j_row, j_col = after[i, 0], after[i, 1]
@@ -210,7 +265,7 @@ def body_fits(body, row, col, heading):
     placed = np.empty(corners.shape)
     _place(corners, row, col, heading, placed)
     columns = _room(ahead.shape[0], radii[1], 0.0)
-    return _is_free(ahead, offsets, placed, placed, 0.0, False, columns)
+    return _is_free(ahead, offsets, placed, placed, 0.0, STAYS, columns)
 
 
 @njit(cache=True)
@@ -223,6 +278,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     length = abs(radius * turn) if radius != 0.0 else math.hypot(d_row, d_col)
     before, after, middle = np.empty(corners.shape), np.empty(corners.shape), corners.copy()
     columns = _room(ahead.shape[0], reach, length)
+    moves = SHIFTS if turn == 0.0 else TURNS
     part, level = 0, 0
     while True:
         share = 1.0 / (1 << level)
@@ -241,7 +297,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
             )
             _place(corners, at_row, at_col, at, after)
             last = margin <= _ROUNDING
-            free = _is_free(ahead, offsets, before, after, 0.0 if last else margin, True, columns)
+            free = _is_free(ahead, offsets, before, after, 0.0 if last else margin, moves, columns)
             if not free and last:
                 return False
         if free:
@@ -253,7 +309,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
             return False
         if at_least < reach:
             _place(corners, mid_row, mid_col, mid_heading, middle)
-            if not _is_free(ahead, offsets, middle, middle, 0.0, False, columns):
+            if not _is_free(ahead, offsets, middle, middle, 0.0, STAYS, columns):
                 return False
         part <<= 1
         level += 1

@@ -104,7 +104,11 @@ class Answering:
         whole = self._whole = self.space(corridor, *corridor.bounds)
         self.bound_m = whole.length(np.stack([self.query.start, self.query.goal]))
         self.objective = Objective(whole, self._base.clearance)
-        if self.settings.confine == "chain" and corridor.inside is not None:
+        if np.array_equal(self.query.start, self.query.goal):
+            self.better(self.query.start[None], 0.0)
+            return
+        has_legs = corridor.inside is not None and len(self.query.cells) > 1
+        if self.settings.confine == "chain" and has_legs:
             # Legs between poses may be too short for a turning circle or a long robot.
             first_part = part * _CHAIN if self.settings.has_heading else part
             if chain.attempt(self, corridor, whole, part=first_part):

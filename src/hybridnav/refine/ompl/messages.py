@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 Outcome = Literal["solved", "approximate", "timeout"]
 
 
+SEARCH_S = 60.0
+"""Seconds beyond its time that a query may take where the trees of the search are wanted too."""
+
+
 @dataclass(frozen=True, eq=False)
 class Setup:
     """What a worker is told once."""

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.refine.ompl.corridor import Base
-from hybridnav.refine.ompl.messages import Reply
+from hybridnav.refine.ompl.messages import SEARCH_S, Reply
 
 if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query, Setup
@@ -70,6 +70,8 @@ def _answer(base: Base, query: Query) -> Reply:
     """Fork, wait, kill where it takes too long; the best reply that came."""
     left_s = query.deadline_s - time.monotonic()
     kill_s = query.deadline_s + GRACE * max(left_s, 0.0)
+    if query.tells_search:
+        kill_s += SEARCH_S
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:

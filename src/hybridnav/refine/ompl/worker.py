@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import OmplError
-from hybridnav.refine.ompl.messages import Reply
+from hybridnav.refine.ompl.messages import SEARCH_S, Reply
 
 if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query, Setup
@@ -75,6 +75,8 @@ class Worker:
         """Give the process a query; `reply` waits for what comes of it."""
         left_s = query.deadline_s - time.monotonic()
         self._until = query.deadline_s + _GRACE * max(left_s, 0.0)
+        if query.tells_search:
+            self._until += SEARCH_S
         self._late = query.deadline_s - _LATE * max(left_s, 0.0)
         self._number += 1
         with contextlib.suppress(OSError):
@@ -114,7 +116,9 @@ class Worker:
             When it does not start.
         """
         dead = not self._finalizer.alive or self._process.poll() is not None
-        if dead or (self._received(0.0) is None and time.monotonic() > self._until + _PATIENCE_S):
+        self._received(0.0)
+        owes = self._answered < self._number
+        if dead or (owes and time.monotonic() > self._until + _PATIENCE_S):
             self.close()
             self._start()
 
@@ -127,7 +131,7 @@ class Worker:
         with theirs:
             self._process = _launch(theirs.fileno())
         self._connection = Connection(ours.detach())
-        self._answered = self._number
+        self._answered, self._reply = self._number, None
         self._finalizer = weakref.finalize(self, _end, self._process, self._connection)
         try:
             self._connection.send(self._setup)
