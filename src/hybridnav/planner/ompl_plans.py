@@ -166,6 +166,8 @@ class OmplPlanner:
             path = self._by_line_of_sight(free, (pose, pose), None)
             self._weighted_cost(path)
             self._refused((pose, pose))
+            if self.ompl.has_heading:
+                self._check.turn_valid(*pose, *pose)
 
     @property
     def _metric(self) -> Metric:
