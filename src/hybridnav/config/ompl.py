@@ -227,6 +227,6 @@ def _check_parameter(name: str, value: Any) -> None:
     if not good:
         raise PydanticCustomError(
             "parameter",
-            "parameter {name}: expected {expected}, got {value}",
+            "parameter {name}: expected {expected}, not {value}",
             {"name": name, "expected": expected, "value": repr(value)[:80]},
         )

@@ -95,7 +95,9 @@ def solve(
 def make(settings: OmplSettings, information: Any) -> Any:
     """A planner with its parameters."""
     planner = getattr(geometric, settings.planner)(information)
-    for name, value in settings.parameters.items():
+    # Just-in-time sampling is refused while BIT* takes k nearest neighbours.
+    ordered = sorted(settings.parameters.items(), key=lambda item: item[0] != "use_k_nearest")
+    for name, value in ordered:
         set_value = getattr(planner, PARAMETERS[settings.planner][name])
         set_value(float(value) if name in REAL else value)
     return planner
