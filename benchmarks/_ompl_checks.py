@@ -46,7 +46,7 @@ def footprint_runs(runs: int, *, seed: int = 0) -> dict[str, dict[str, Any]]:
     many were solved and how many poses of their paths touch a wall."""
     grid = rooms()
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    walls = _Walls(grid)
+    walls = Walls(grid)
     rng = np.random.default_rng(seed)
     counts = {}
     for space, share in (("se2", 0.5), ("reeds-shepp", 0.3), ("dubins", 0.2)):
@@ -70,7 +70,7 @@ def footprint_runs(runs: int, *, seed: int = 0) -> dict[str, dict[str, Any]]:
             solved += 1
             by_grid += bool(result.refinement and result.refinement.by_grid)
             poses = np.column_stack([result.path.points, result.path.headings_rad])
-            faults += walls.touched(poses)
+            faults += walls.touched(poses, curved=space != "se2")
         counts[space] = {
             "runs": len(seconds),
             "solved": solved,
@@ -82,8 +82,8 @@ def footprint_runs(runs: int, *, seed: int = 0) -> dict[str, dict[str, Any]]:
     return counts
 
 
-class _Walls:
-    """The raw occupied cells, asked by shapely alone."""
+class Walls:
+    """The raw occupied cells of a map whose frame is at the origin, asked by shapely alone."""
 
     def __init__(self, grid: hn.OccupancyGrid) -> None:
         low = np.argwhere(grid.measured == hn.CellClass.OCCUPIED)[:, ::-1] * grid.resolution_m
@@ -104,16 +104,29 @@ class _Walls:
             if not any(self.collides(*(pose + shift)) for shift in _SHIFTS):
                 return pose
 
-    def touched(self, poses: Any) -> int:
-        """Poses in collision, of those `FINE_M` apart on straight turns between some poses."""
+    def touched(self, poses: Any, *, curved: bool) -> int:
+        """Poses in collision, of those `FINE_M` apart between some poses: on a straight line with
+        an even turn, or on the arc that joins them."""
         count = 0
         for first, second in itertools.pairwise(poses):
             turn = math.remainder(second[2] - first[2], math.tau)
-            steps = math.ceil(math.hypot(*(second - first)[:2], turn) / FINE_M) + 1
+            offset = (second - first)[:2]
+            steps = math.ceil(math.hypot(*offset, turn) / FINE_M) + 1
             for along in np.linspace(0, 1, steps):
-                x, y = (first + along * (second - first))[:2]
-                count += self.collides(x, y, first[2] + along * turn)
+                yaw = first[2] + along * turn
+                x, y = first[:2] + along * offset
+                if curved and abs(turn) > 1e-9:
+                    x, y = first[:2] + _on_arc(first[2], turn, offset, along)
+                count += self.collides(x, y, yaw)
         return count
+
+
+def _on_arc(heading: float, turn: float, chord: Any, along: float) -> Any:
+    """Where a share of the turn leads on the arc over a chord, from its start."""
+    middle = np.array([math.cos(heading + turn / 2), math.sin(heading + turn / 2)])
+    radius = float(chord @ middle) / (2 * math.sin(turn / 2))
+    now = heading + along * turn
+    return radius * np.array([math.sin(now) - math.sin(heading), math.cos(heading) - math.cos(now)])
 
 
 _SHIFTS = 0.05 * np.array([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import shapely
+from benchmarks._ompl_checks import CORNERS, Walls
+from benchmarks._ompl_checks import rooms as rooms_with_doors
 
 import hybridnav as hn
 from hybridnav.config import load_preset
@@ -31,8 +33,7 @@ pytest.importorskip("ompl")
 
 PRESETS = [name for name in hn.preset_names() if name.startswith("ompl-")]
 ENDS = (1.0, 13.2), (40.6, 19.4)
-ROBOT = "[[0.9, 0.3], [0.9, -0.3], [-0.9, -0.3], [-0.9, 0.3]]"
-DOOR_M = 0.9
+ROBOT = str([list(corner) for corner in CORNERS])
 
 
 @pytest.fixture(scope="module")
@@ -42,22 +43,8 @@ def office() -> hn.TopologicalMap:
 
 @pytest.fixture(scope="module")
 def rooms() -> hn.TopologicalMap:
-    """Six rooms of 20 x 12 m in all with doors of 0.9 m, for a robot 0.6 m wide."""
-    resolution_m = 0.05
-    occupied = np.zeros((240, 400), dtype=np.float32)
-    occupied[:2] = occupied[-2:] = occupied[:, :2] = occupied[:, -2:] = 1
-    door = round(DOOR_M / resolution_m)
-    walls = [(120, (40, 160)), (260, (60, 180))]
-    for col, _ in walls:
-        occupied[:, col : col + 3] = 1
-    occupied[120:123] = 1
-    for col, doors in walls:
-        for row in doors:
-            occupied[row : row + door, col : col + 3] = 0
-    for col in (60, 180, 320):
-        occupied[120:123, col : col + door] = 0
-    grid = hn.OccupancyGrid(occupied, hn.Frame(resolution_m), robot_radius_m=0.3, name="rooms")
-    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    """Rooms with doors of 0.9 m, for a robot of 0.6 x 1.8 m."""
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(rooms_with_doors()))
 
 
 @pytest.fixture(scope="module")
@@ -74,26 +61,6 @@ def planner_of(office: hn.TopologicalMap) -> Iterator[Any]:
 
     yield make
     made.clear()
-
-
-def oracle_faults(grid: hn.OccupancyGrid, corners: Any, poses: Any, step_m: float) -> int:
-    """Poses in collision along straight turns between poses, by shapely on the raw cells."""
-    blocked = np.argwhere(grid.measured == hn.CellClass.OCCUPIED)
-    low = blocked[:, ::-1] * grid.resolution_m
-    cells = shapely.STRtree(shapely.box(*low.T, *(low + grid.resolution_m).T))
-    faults = 0
-    for first, second in itertools.pairwise(poses):
-        turn = math.remainder(second[2] - first[2], math.tau)
-        count = max(int(math.hypot(*(second - first)[:2], turn) / step_m), 1)
-        for along in np.linspace(0, 1, count + 1):
-            x, y = (first + along * (second - first))[:2]
-            yaw = first[2] + along * turn
-            cosine, sine = math.cos(yaw), math.sin(yaw)
-            turned = corners @ np.array([[cosine, sine], [-sine, cosine]]) + (x, y)
-            # What is within 1e-3 of a cell of a wall touches it only.
-            body = shapely.Polygon(turned).buffer(-1e-3 * grid.resolution_m)
-            faults += bool(len(cells.query(body, predicate="intersects")))
-    return faults
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -249,8 +216,7 @@ def test_a_long_robot_goes_through_doors_without_touching(
     np.testing.assert_allclose(poses[0], start, atol=1e-6)
     np.testing.assert_allclose(poses[-1][:2], goal[:2], atol=1e-6)
     assert math.remainder(poses[-1][2] - goal[2], math.tau) == pytest.approx(0, abs=1e-6)
-    corners = np.array([[0.9, 0.3], [0.9, -0.3], [-0.9, -0.3], [-0.9, 0.3]])
-    assert oracle_faults(rooms.grid, corners, poses, 0.01) == 0
+    assert Walls(rooms.grid).touched(poses, curved=space != "se2") == 0
     assert math.dist(start[:2], goal[:2]) <= result.lower_bound <= result.cost
     blocked_pose = made.plan((0.5, 3.0, 0.0), goal)
     assert blocked_pose.status is hn.PlanStatus.START_OCCUPIED
