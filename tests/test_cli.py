@@ -267,7 +267,7 @@ ENDS = ("--start", "1,1", "--goal", "2,2")
         (["plan", FIGURE, *ENDS, "--fast"], ["--fast"]),
         (["plan", FIGURE, FIGURE, *ENDS], ["unexpected"]),
         (["plan", FIGURE, "--start", "1", "--goal", "2,2"], ["'--start'", "X,Y", "'1'"]),
-        (["plan", FIGURE, "--start", "1,1", "--goal", "2,2,2,2"], ["'--goal'", "'2,2,2'"]),
+        (["plan", FIGURE, "--start", "1,1", "--goal", "2,2,2,2"], ["'--goal'", "'2,2,2,2'"]),
         (["plan", FIGURE, "--start", "[m],1", "--goal", "2,2"], ["'[m],1'"]),
         (["plan", FIGURE, "--start", "nan,1", "--goal", "2,2"], ["finite", "'nan,1'"]),
         (["plan", FIGURE, "--start", "1,-inf", "--goal", "2,2"], ["finite", "'1,-inf'"]),
