@@ -92,7 +92,10 @@ def movingai_maps(data: Path) -> list[Path]:
 
 def run(data: Path, folder: Path, pairs: int, workers: int) -> None:
     """All queries of the study."""
-    presets = tuple(name for name in hn.preset_names() if name != "grid-astar")
+    # OMPL's paths are no cell paths, by which the harness judges: `benchmarks.ompl` measures them.
+    presets = tuple(
+        name for name in hn.preset_names() if name != "grid-astar" and not name.startswith("ompl-")
+    )
     total = len(ROS_MAPS) + N_MOVINGAI
     maps: list[tuple[Path, str | None]] = [(data / name, None) for name in ROS_MAPS]
     maps += [(path, f"{path}.scen") for path in movingai_maps(data)]

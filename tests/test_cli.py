@@ -241,7 +241,9 @@ def test_a_preset_may_be_a_file_of_ones_own(cli, rooms, tmp_path):
 def test_the_preset_commands(cli, rooms, tmp_path):
     lines = cli("preset", "list").out.splitlines()
     assert [line.split()[0] for line in lines] == hn.preset_names()
-    assert "paper       max-distance arcs, corridor, grid A*" in lines
+    assert any(
+        " ".join(line.split()) == "paper max-distance arcs, corridor, grid A*" for line in lines
+    )
     assert cli("preset", "check", "paper").out == "paper: valid\n"
     # What is shown is a preset file itself.
     copy = tmp_path / "copy.yaml"
@@ -265,12 +267,12 @@ ENDS = ("--start", "1,1", "--goal", "2,2")
         (["plan", FIGURE, *ENDS, "--fast"], ["--fast"]),
         (["plan", FIGURE, FIGURE, *ENDS], ["unexpected"]),
         (["plan", FIGURE, "--start", "1", "--goal", "2,2"], ["'--start'", "X,Y", "'1'"]),
-        (["plan", FIGURE, "--start", "1,1", "--goal", "2,2,2"], ["'--goal'", "'2,2,2'"]),
+        (["plan", FIGURE, "--start", "1,1", "--goal", "2,2,2,2"], ["'--goal'", "'2,2,2,2'"]),
         (["plan", FIGURE, "--start", "[m],1", "--goal", "2,2"], ["'[m],1'"]),
         (["plan", FIGURE, "--start", "nan,1", "--goal", "2,2"], ["finite", "'nan,1'"]),
         (["plan", FIGURE, "--start", "1,-inf", "--goal", "2,2"], ["finite", "'1,-inf'"]),
-        (["plan", FIGURE, *ENDS, "--preset", "best"], ["'best'", "grid-astar, paper"]),
-        (["plan", FIGURE, *ENDS, "--preset", ""], ["''", "grid-astar, paper"]),
+        (["plan", FIGURE, *ENDS, "--preset", "best"], ["'best'", "grid-astar, ompl-bitstar"]),
+        (["plan", FIGURE, *ENDS, "--preset", ""], ["''", "grid-astar, ompl-bitstar"]),
         (["plan", FIGURE, *ENDS, "--preset", "a\nb"], ["'a\\nb'"]),
         (["plan", FIGURE, *ENDS, "--set", "pyramid.speed=3"], ["pyramid.speed", "seed"]),
         (["plan", FIGURE, *ENDS, "--set", "pyramid.seed"], ["'pyramid.seed'"]),
@@ -287,7 +289,7 @@ ENDS = ("--start", "1,1", "--goal", "2,2")
         (["show", FIGURE, "--level", "-99"], ["--level", "-99"]),
         (["show", FIGURE, "--level", "top"], ["--level"]),
         (["preset", "list", "all"], ["all", "hybridnav preset list --help"]),
-        (["preset", "check", "best"], ["'best'", "grid-astar, paper"]),
+        (["preset", "check", "best"], ["'best'", "grid-astar, ompl-bitstar"]),
         (["preset", "show"], ["NAME|FILE"]),
     ],
 )

@@ -82,7 +82,7 @@ def test_the_files_state_both_sections_and_only_known_keys(name):
 
 def test_an_unknown_name_lists_the_names_there_are(monkeypatch, write):
     monkeypatch.chdir(write("planner: {}\n", "mine.yaml").parent)
-    with pytest.raises(hn.PresetNotFoundError, match=r"'mine'.*grid-astar, paper.*with \.yaml"):
+    with pytest.raises(hn.PresetNotFoundError, match=r"'mine'.*grid-astar, ompl-.*with \.yaml"):
         hn.load_preset("mine")
     with pytest.raises(FileNotFoundError, match="''"):
         hn.load_preset("")
@@ -168,7 +168,7 @@ def test_a_preset_is_a_frozen_value(write):
             "planner: {coarse: fast}\n",
             ["planner.coarse", "'max-distance', 'portals' or 'none'", "'fast'"],
         ),
-        ("planner: {refine: ompl}\n", ["planner.refine", "'grid-astar'", "got 'ompl'"]),
+        ("planner: {refine: rrt}\n", ["planner.refine", "'grid-astar'", "got 'rrt'"]),
         ("planner: {allow_unexplored: maybe}\n", ["planner.allow_unexplored", "got 'maybe'"]),
         ("planner: {allow_unexplored: 2}\n", ["planner.allow_unexplored", "got 2"]),
         ("", ["expected a mapping"]),

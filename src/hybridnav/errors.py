@@ -25,6 +25,10 @@ class PresetNotFoundError(PresetError, FileNotFoundError):
     """No preset has this name and no file this path."""
 
 
+class OmplError(HybridNavError, RuntimeError):
+    """OMPL is needed and not installed, or its process does not start."""
+
+
 class PlanError(HybridNavError, RuntimeError):
     """A plan ended without a path and the caller asked for one (`raise_for_status`)."""
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import AnyArray, FloatArray, LongArray
 
-Metric = Literal["octile", "any-angle"]
+Metric = Literal["octile", "any-angle", "clearance-weighted", "dubins", "reeds-shepp"]
 
 
 class PlanStatus(StrEnum):
@@ -33,6 +33,10 @@ class PlanStatus(StrEnum):
     START_BLOCKED = "start blocked"
     GOAL_BLOCKED = "goal blocked"
     NO_PATH = "no path"
+    APPROXIMATE = "approximate"
+    """A sampling-based planner came near the goal and not to it."""
+    TIMEOUT = "timeout"
+    """A sampling-based planner found nothing in its time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +52,9 @@ class Path:
     where an any-angle path turns."""
     length_m: float
     """Length in metres, of a cell path counted as a + b sqrt 2 cells from the moves."""
+    headings_rad: FloatArray | None = None
+    """float64 (m,), heading at each point, counter-clockwise from the x axis; None where the state
+    space has none."""
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False
@@ -62,6 +69,20 @@ class Route:
     """Ids of the places, from the start's to the goal's."""
     arcs: tuple[int, ...]
     """Ids of the arcs, one fewer than places."""
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How a sampling-based planner came to its path."""
+
+    steps: tuple[str, ...]
+    """What was tried in turn, and how it ended: `corridor: timeout`, `widened corridor: solved`."""
+    by_grid: bool
+    """Whether the path is the grid's, shortened by line of sight, because all of that failed."""
+    trace: tuple[tuple[float, float], ...]
+    """Seconds and cost of each better path."""
+    iterations: int
+    """Of planners and simplification."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +133,8 @@ class PlanBatch:
 
 @dataclass(frozen=True, eq=False)
 class PlanResult:
-    """Outcome of one query; `path` and `route` are None unless it is solved."""
+    """Outcome of one query; `path` and `route` are None unless it is solved. Of an approximate one
+    the path ends short of the goal."""
 
     status: PlanStatus
     metric: Metric = "octile"
@@ -124,6 +146,10 @@ class PlanResult:
     stats: PlanStats = field(default_factory=PlanStats)
     settings: dict[str, Any] = field(default_factory=dict)
     """Preset, and how the pyramid was built."""
+    weighted_cost: float | None = None
+    """Cost in a metric that is not the length; None where it is."""
+    refinement: Refinement | None = None
+    """With OMPL: how the path came about."""
 
     @cached_property
     def route(self) -> Route | None:
@@ -137,13 +163,15 @@ class PlanResult:
 
     @property
     def cost(self) -> float:
-        """Cost in the metric, metres; infinite where there is no path."""
-        return self.path.length_m if self.path is not None else math.inf
+        """Cost in the metric, metres; infinite where there is no path to the goal."""
+        if self.path is None or not self.solved:
+            return math.inf
+        return self.path.length_m if self.weighted_cost is None else self.weighted_cost
 
     @property
     def gap(self) -> float:
         """Proved distance from the optimum, cost / lower bound - 1; NaN where there is no path."""
-        if self.path is None:
+        if self.path is None or not self.solved:
             return math.nan
         return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
 
@@ -165,11 +193,14 @@ class PlanResult:
             "status": str(self.status),
             "metric": self.metric,
             "length_m": self.path.length_m if self.path else None,
-            "lower_bound_m": self.lower_bound if self.path else None,
-            "gap": self.gap if self.path else None,
+            "cost": self.cost if self.solved else None,
+            "lower_bound_m": self.lower_bound if self.solved else None,
+            "gap": self.gap if self.solved else None,
             "places": list(self.route.places) if self.route else None,
             "arcs": list(self.route.arcs) if self.route else None,
             "points_m": np.round(self.path.points, 6).tolist() if self.path else None,
+            "headings_rad": _headings(self.path),
+            "steps": list(self.refinement.steps) if self.refinement else None,
             "expanded": self.stats.expanded,
             "expanded_places": self.stats.expanded_places,
             "expanded_gates": self.stats.expanded_gates,
@@ -177,6 +208,13 @@ class PlanResult:
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "settings": _finite(self.settings),
         }
+
+
+def _headings(path: Path | None) -> list[float] | None:
+    if path is None or path.headings_rad is None:
+        return None
+    rounded: list[float] = np.round(path.headings_rad, 6).tolist()
+    return rounded
 
 
 def _finite(value: Any) -> Any:

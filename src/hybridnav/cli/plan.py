@@ -33,7 +33,7 @@ from hybridnav.config.yaml_file import printable
 if TYPE_CHECKING:
     from pathlib import Path
 
-Point = tuple[float, float]
+Point = tuple[float, ...]
 
 _OPTIMAL = 1e-9
 """Gap of a path that equals its bound, lengths being sums of rounded numbers."""
@@ -41,19 +41,23 @@ _OPTIMAL = 1e-9
 
 def _point(text: str) -> Point:
     try:
-        x, y = (float(part) for part in text.split(","))
+        point = tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise typer.BadParameter(f"expected X,Y in metres, got {text!r}") from None
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise typer.BadParameter(f"expected two finite numbers of metres, got {text!r}")
-    return x, y
+        point = ()
+    if len(point) not in {2, 3}:
+        raise typer.BadParameter(f"expected X,Y in metres, or X,Y,YAW, got {text!r}")
+    if not all(map(math.isfinite, point)):
+        raise typer.BadParameter(f"expected finite numbers of metres and radians, got {text!r}")
+    return point
 
 
 StartOption = Annotated[
-    Any, typer.Option(metavar="X,Y", parser=_point, help="Start in metres, map frame.")
+    Any,
+    typer.Option(metavar="X,Y", parser=_point, help="Start in metres; ,YAW in radians for OMPL."),
 ]
 GoalOption = Annotated[
-    Any, typer.Option(metavar="X,Y", parser=_point, help="Goal in metres, map frame.")
+    Any,
+    typer.Option(metavar="X,Y", parser=_point, help="Goal in metres; ,YAW in radians for OMPL."),
 ]
 CompareOption = Annotated[
     bool, typer.Option("--compare", help="Also plan on the whole grid, and tell the loss.")
@@ -104,9 +108,17 @@ def _compare(
     result: hn.PlanResult,
 ) -> dict[str, Any]:
     """Plan on the whole grid too and set the result against it."""
-    whole = settings.planner.model_copy(update={"coarse": "none", "smooth": "none"})
+    whole = settings.planner.model_copy(
+        update={
+            "coarse": "none",
+            "smooth": "none",
+            "refine": "grid-astar",
+            "ompl": None,
+            "epsilon": None,
+        }
+    )
     baseline = settings.model_copy(update={"name": "grid-astar", "planner": whole})
-    grid_result = hn.HybridPlanner(topology, preset=baseline).plan(*ends)
+    grid_result = hn.HybridPlanner(topology, preset=baseline).plan(ends[0][:2], ends[1][:2])
     optimum_m, loss = None, None
     if grid_result.solved:
         optimum_m = grid_result.cost
@@ -129,12 +141,12 @@ def _draw(
 ) -> None:
     from hybridnav.viz import plot_plan, save_figure  # noqa: PLC0415 - matplotlib on demand
 
-    ax = plot_plan(topology, result, start=ends[0], goal=ends[1], optimum_m=optimum_m)
+    ax = plot_plan(topology, result, start=ends[0][:2], goal=ends[1][:2], optimum_m=optimum_m)
     save_figure(ax, path)
 
 
 def _summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str, Any]) -> str:
-    start, goal = (f"({x:.10g}, {y:.10g})" for x, y in ends)
+    start, goal = (f"({', '.join(f'{value:.10g}' for value in end)})" for end in ends)
     radius = f"robot radius {grid.robot_radius_m:g} m"
     lines = [
         f"query      {printable(grid.name)}, {start} to {goal}, {radius}",
@@ -142,9 +154,13 @@ def _summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[st
     ]
     if "outside" in figures["status"]:
         lines.append(f"extent     {extent(grid)}")
-    if figures["length_m"] is not None:
+    if figures["length_m"] is not None and figures["lower_bound_m"] is None:
+        lines.append(f"length     {figures['length_m']:.2f} m, short of the goal")
+    elif figures["length_m"] is not None:
         lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
         lines.append(f"bound      {_bound(figures['lower_bound_m'], figures['gap'])}")
+    if figures["steps"] is not None:
+        lines.append(f"steps      {'; '.join(figures['steps'])}")
     if figures["places"] is not None:
         for key in ("places", "arcs"):
             ids = figures[key]

@@ -1,5 +1,6 @@
 """Configuration: presets and the safe reading of YAML."""
 
+from hybridnav.config.ompl import OmplSettings
 from hybridnav.config.preset import (
     PlannerSettings,
     Preset,
@@ -8,4 +9,11 @@ from hybridnav.config.preset import (
     preset_names,
 )
 
-__all__ = ["PlannerSettings", "Preset", "PyramidSettings", "load_preset", "preset_names"]
+__all__ = [
+    "OmplSettings",
+    "PlannerSettings",
+    "Preset",
+    "PyramidSettings",
+    "load_preset",
+    "preset_names",
+]

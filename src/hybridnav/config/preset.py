@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import reprlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from types import NoneType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 import yaml
 from pydantic import (
@@ -18,6 +19,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from hybridnav.config.ompl import OmplSettings  # noqa: TC001 - pydantic reads it
 from hybridnav.config.yaml_file import printable, read_yaml
 from hybridnav.errors import PresetError, PresetNotFoundError
 
@@ -70,9 +72,11 @@ class PlannerSettings(_Section):
     of fields of its own; `none` makes the whole map the corridor."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields the refiner may stand on: those of the route, or also their neighbours'."""
-    refine: Literal["grid-astar", "gates", "stored-paths"] = "grid-astar"
+    refine: Literal["grid-astar", "gates", "stored-paths", "ompl"] = "grid-astar"
     """How a path is found inside the corridor: cell by cell, or, over portals, by a search on the
-    border cells of the fields or by the stored paths alone."""
+    border cells of the fields or by the stored paths alone, or by a sampling-based planner."""
+    ompl: OmplSettings | None = None
+    """With `refine: ompl`, section of its own; null elsewhere."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
     """With `gates`: the corridor widens until no path can be shorter by more than this part; 0 for
     the optimum. Null keeps to the corridor."""
@@ -81,8 +85,25 @@ class PlannerSettings(_Section):
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _ompl_has_settings(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("refine") == "ompl" and given.get("ompl") is None:
+            return {**given, "ompl": {}}
+        return given
+
     @model_validator(mode="after")
     def _go_together(self) -> Self:
+        if self.ompl is not None and self.refine != "ompl":
+            raise PydanticCustomError("ompl_needed", "section ompl goes with refine: ompl")
+        if self.refine == "ompl":
+            if self.smooth != "none":
+                raise PydanticCustomError(
+                    "no_smooth", "smooth goes with grid paths: with refine: ompl set it to none"
+                )
+            if self.epsilon is not None:
+                raise PydanticCustomError("gates_needed", "epsilon needs refine: gates")
+            return self
         if (self.refine == "grid-astar") == (self.coarse == "portals"):
             raise PydanticCustomError(
                 "portals_needed",
@@ -193,8 +214,15 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         raise PresetError(
             f"setting {override[:_MAX_SHOWN]!r}: expected section.key=value, section {sections}"
         )
+    *inner, name = name.split(".")
+    branch = tree[section]
+    for part in inner:
+        if part in branch and not isinstance(branch[part], dict | None):
+            raise PresetError(f"setting {printable(key)}: unknown key; {part} is no section")
+        branch[part] = branch.get(part) or {}
+        branch = branch[part]
     try:
-        tree[section][name] = yaml.safe_load(text)
+        branch[name] = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError):
         raise PresetError(
             f"setting {printable(key)}: the value is not YAML: {text[:_MAX_SHOWN]!r}"
@@ -219,6 +247,8 @@ def _first_problem(error: ValidationError) -> str:
     else:
         text = problem["msg"].partition(", unable to")[0].partition(", got")[0]
         expected = text[:1].lower() + text[1:]
+    if isinstance(given, dict):  # a check of several keys names what it found itself
+        return f"{key}: {expected.removeprefix('input ')}"
     shown = "nothing" if given is None else reprlib.repr(given)
     return f"{key}: {expected.removeprefix('input ')}, got {shown}"
 
@@ -226,6 +256,8 @@ def _first_problem(error: ValidationError) -> str:
 def _known_keys(section: tuple[int | str, ...]) -> str:
     model: Any = Preset
     for part in section:
-        model = model.model_fields[str(part)].annotation
+        annotation = model.model_fields[str(part)].annotation
+        models = [kind for kind in get_args(annotation) if kind is not NoneType]
+        model = models[0] if models else annotation
     names = [name for name in model.model_fields if name != "name"]
     return f"known are {', '.join(names)}"

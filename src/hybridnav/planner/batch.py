@@ -18,12 +18,15 @@ if TYPE_CHECKING:
 
 def plan_many(
     planner: HybridPlanner,
-    cell_planner: CellPlanner,
+    cell_planner: CellPlanner | None,
     starts: FloatArray,
     goals: FloatArray,
     smooth: Smooth,
 ) -> PlanBatch:
-    """What `planner.plan` answers to each pair of points, float64 (n, 2) each, in arrays."""
+    """What `planner.plan` answers to each pair of points, float64 (n, 2) each, in arrays.
+
+    `cell_planner` answers what it can alone; None leaves all to `planner`.
+    """
     n = len(starts)
     status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)

@@ -15,6 +15,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
+from hybridnav.planner.ends import read_point, read_points, read_pose
 from hybridnav.refine import GridRefiner, LineOfSight
 from hybridnav.result import Path, PlanResult, PlanStats, PlanStatus, Route
 from hybridnav.route import Walks
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray, PathLike
     from hybridnav.planner.blocked import Blocked
     from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import PlanBatch
     from hybridnav.topology import TopologicalMap
 
@@ -74,6 +76,7 @@ class HybridPlanner:
             self._cells = OverPortals(topology, self._refiner, settings)
         else:
             self._cells = WholeMap(self._refiner)
+        self._ompl = self._with_ompl() if settings.refine == "ompl" else None
 
     def plan(
         self,
@@ -89,7 +92,9 @@ class HybridPlanner:
         ----------
         start, goal
             `(x, y)` in metres, map frame. The path runs between the centres of the cells that hold
-            them, an any-angle one between the points; nothing is snapped to free space.
+            them, an any-angle one between the points; nothing is snapped to free space. With OMPL
+            in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis;
+            elsewhere a heading may be given and means nothing.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one; None as the preset says.
         blocked
@@ -106,7 +111,8 @@ class HybridPlanner:
         InvalidValueError
             When a point is not two finite numbers, or what is blocked is not on the map.
         """
-        ends = _point("start", start), _point("goal", goal)
+        poses = self._pose("start", start), self._pose("goal", goal)
+        ends = poses[0][:2], poses[1][:2]
         finish = self._finish_asked_for(smooth)
         closed = None if blocked is None else self._closed(blocked)
         first, last = self._cell_of(ends[0]), self._cell_of(ends[1])
@@ -128,6 +134,8 @@ class HybridPlanner:
         plan = self._cells.plan(first, last)
         if closed is not None and plan.cells is not None:
             plan = self._round(closed, plan, first, last)
+        if self._ompl is not None and plan.cells is not None:
+            return self._by_ompl(self._ompl, plan, poses, closed)
         return self._result(plan, ends, finish, closed)
 
     def plan_many(
@@ -147,11 +155,12 @@ class HybridPlanner:
         InvalidValueError
             When the shapes differ or a coordinate is not finite.
         """
-        first, last = _points("starts", starts), _points("goals", goals)
+        first, last = read_points("starts", starts), read_points("goals", goals)
         if len(first) != len(last):
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
         finish = self._finish_asked_for(smooth)
-        return plan_many(self, self._cells, first, last, finish)
+        cells = self._cells if self._ompl is None else None
+        return plan_many(self, cells, first, last, finish)
 
     def _round(self, closed: LongArray, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
         """The plan itself where nothing closed is in its way, else the best path round it all.
@@ -233,6 +242,64 @@ class HybridPlanner:
         bound = self._cells.search.any_angle_bound(first, last, (start, goal))
         return bound * frame.resolution_m
 
+    def _pose(self, name: str, given: ArrayLike) -> FloatArray:
+        """Position and, with OMPL, heading; float64 (2,) or (3,)."""
+        if self._ompl is None:
+            return read_point(name, given)
+        return read_pose(name, given, needs_heading=self._ompl.ompl.has_heading)
+
+    def _with_ompl(self) -> OmplPlanner:
+        # Loads what only these presets need, and says what to install where it is missing.
+        from hybridnav.planner.ompl_plans import OmplPlanner  # noqa: PLC0415
+
+        field_of = None
+        if isinstance(self._cells, OverPortals):
+            field_of = self._cells.search.field_of
+        elif isinstance(self._cells, MaxDistance):
+            field_of = self.topology.level.field_of
+        settings = self.preset.planner
+        free = np.argwhere(self.topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
+        if len(free):  # kernels that load at the first query would eat up its budget
+            row, col = free[0].tolist()
+            self._cells.plan((row, col), (row, col))
+        return OmplPlanner(self.topology.grid, settings, field_of)
+
+    def _by_ompl(
+        self,
+        planner: OmplPlanner,
+        plan: CellPlan,
+        poses: tuple[FloatArray, FloatArray],
+        closed: LongArray | None,
+    ) -> PlanResult:
+        """The coarse path refined by OMPL."""
+        assert plan.cells is not None  # noqa: S101 - the caller has looked
+        ends = poses[0][:2], poses[1][:2]
+        began = time.perf_counter()
+        found = planner.plan(plan.cells, poses, closed, spent_s=sum(plan.seconds.values()))
+        seconds = {**plan.seconds, "ompl": time.perf_counter() - began}
+        source = plan.route_source
+        if source is None and self.preset.planner.coarse == "portals":
+            source = partial(self._walked, plan.cells)
+        bound = max(found.lower_bound, self._any_angle_bound(plan.cells, ends))
+        if found.path is not None:
+            bound = min(bound, found.weighted_cost or found.path.length_m)
+        return self._answer(
+            found.status,
+            metric=found.metric,
+            path=found.path,
+            route_source=source,
+            lower_bound=bound,
+            weighted_cost=found.weighted_cost,
+            refinement=found.refinement,
+            stats=PlanStats(
+                expanded=plan.expanded,
+                expanded_places=plan.expanded_places,
+                expanded_gates=plan.expanded_gates,
+                corridor_cells=plan.corridor_cells,
+                seconds=seconds,
+            ),
+        )
+
     def _sight(self, closed: LongArray | None) -> LineOfSight:
         """What shortens paths; with closed cells one made for the query."""
         if closed is None:
@@ -309,32 +376,6 @@ class HybridPlanner:
                 "robot_radius_m": pyramid.grid.robot_radius_m,
             },
         }
-
-
-def _point(name: str, point: ArrayLike) -> FloatArray:
-    try:
-        xy = np.asarray(point, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        xy = np.empty(0)
-    if xy.shape != (2,) or not (math.isfinite(xy[0]) and math.isfinite(xy[1])):
-        raise InvalidValueError(
-            f"{name} must be two finite coordinates (x, y) in metres, got {point!r:.80}"
-        )
-    return xy
-
-
-def _points(name: str, points: ArrayLike) -> FloatArray:
-    try:
-        xy = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        xy = np.full(1, np.nan)
-    if xy.shape in {(0,), (0, 2)}:
-        return np.empty((0, 2))
-    if xy.ndim != 2 or xy.shape[1] != 2 or not np.isfinite(xy).all():  # noqa: PLR2004
-        raise InvalidValueError(
-            f"{name} must be finite coordinates (x, y) in metres, shape (n, 2), got {points!r:.80}"
-        )
-    return xy
 
 
 def _is_in(sorted_cells: LongArray, cell: int) -> bool:

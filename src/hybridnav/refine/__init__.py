@@ -2,5 +2,6 @@
 
 from hybridnav.refine.grid import GridRefiner, Refiner
 from hybridnav.refine.line_of_sight import LineOfSight
+from hybridnav.refine.motions import MotionCheck
 
-__all__ = ["GridRefiner", "LineOfSight", "Refiner"]
+__all__ = ["GridRefiner", "LineOfSight", "MotionCheck", "Refiner"]

@@ -10,7 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
-from hybridnav.refine._taut_kernels import FREE, tighten, turn_of
+from hybridnav.refine._segment_kernels import is_legal
+from hybridnav.refine._taut_kernels import FREE, tighten
 
 _ROUND = 2.0**20
 _WIDEST = 8
@@ -122,56 +123,6 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
 
 
 @njit(cache=True)
-def _is_legal(marks, a_row, a_col, b_row, b_col):
-    """Whether a segment, which is not a point, stays in the closed free cells; exact.
-
-    Walks the cells that it enters (J. Amanatides, A. Woo: A fast voxel traversal algorithm for ray
-    tracing, 1987); a segment along a line between cells needs one of the two free at each step.
-    """
-    rows, cols = marks.shape
-    if a_row == b_row or a_col == b_col:
-        lies = a_row == b_row
-        low, high = (
-            (min(a_col, b_col), max(a_col, b_col))
-            if lies
-            else (min(a_row, b_row), max(a_row, b_row))
-        )
-        fixed = a_row if lies else a_col
-        before_first = before_second = True
-        for k in range(math.floor(low), math.ceil(high)):
-            line = math.floor(fixed)
-            first = line < (rows if lies else cols) and (
-                (marks[line, k] >= FREE) if lies else (marks[k, line] >= FREE)
-            )
-            second = (
-                fixed == line
-                and line > 0
-                and ((marks[line - 1, k] >= FREE) if lies else (marks[k, line - 1] >= FREE))
-            )
-            # Out of one free cell into the other across the corner between them is no way.
-            if not (first and before_first) and not (second and before_second):
-                return False
-            before_first, before_second = first, second
-        return True
-    if b_col < a_col:
-        a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
-    up = b_row > a_row
-    turn = 1 if up else -1
-    row, col = math.floor(a_row) if up else math.ceil(a_row) - 1, math.floor(a_col)
-    last_row, last_col = math.ceil(b_row) - 1 if up else math.floor(b_row), math.ceil(b_col) - 1
-    while marks[row, col] >= FREE:
-        if row == last_row and col == last_col:
-            return True
-        # On which side of the segment the corner ahead lies.
-        side = turn * turn_of(a_row, a_col, b_row, b_col, row + 0.0 + up, col + 1.0)
-        if side == 0 and not (marks[row, col + 1] >= FREE) and not (marks[row + turn, col] >= FREE):
-            return False
-        row += turn * (side >= 0)
-        col += side <= 0
-    return False
-
-
-@njit(cache=True)
 def _length(string, first, last):
     """Length of a part of a string."""
     total = 0.0
@@ -214,8 +165,8 @@ def improve(marks, string, n, budget):
                     continue
                 legal = True
                 for k in range(size - 1):
-                    legal = legal and _is_legal(
-                        marks, way[k, 0], way[k, 1], way[k + 1, 0], way[k + 1, 1]
+                    legal = legal and is_legal(
+                        marks, way[k, 0], way[k, 1], way[k + 1, 0], way[k + 1, 1], FREE, FREE
                     )
                 if not legal:
                     continue

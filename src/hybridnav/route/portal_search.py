@@ -142,6 +142,11 @@ class PortalSearch:
             math.sin(frame.yaw_rad),
         )
 
+    @property
+    def field_of(self) -> NDArray[np.int16 | np.int32]:
+        """int16 or int32 (rows, cols), the field of each cell, -1 for none."""
+        return self._field_of
+
     def path(
         self, start: Cell, goal: Cell, *, effort: Effort, epsilon: float = 0.0
     ) -> PortalAnswer:

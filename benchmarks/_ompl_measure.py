@@ -1,0 +1,175 @@
+"""What `benchmarks.ompl` measures of a map: each planner, on the whole map and in the corridor."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import hybridnav as hn
+from hybridnav.config import load_preset
+from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.records import environment, map_digest
+from hybridnav.metrics import segment_faults, shorten
+from hybridnav.planner.ompl_plans import OmplPlanner
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav.harness.pairs import Pair
+
+Record = dict[str, Any]
+
+MAPS = (
+    "willow/willow-2010-02-18-0.10.yaml",
+    "bwi_gdc/3/3.yaml",
+    "strands/tsc_y4/tsc_1701.yaml",
+    "radish_grids/intel.yaml",
+    "nav2/maps/depot.yaml",
+    "aws_small_warehouse/002/map.yaml",
+    "movingai/mazes/maze512-8-5.map",
+    "movingai/rooms/32room_005.map",
+)
+PLANNERS = ("RRTConnect", "InformedRRTstar", "BITstar")
+BUDGETS_S = (0.25, 1.0, 5.0)
+CONFINEMENTS = (("RRTConnect", "chain"), ("RRTConnect", "mask"), ("BITstar", "chain"),
+                ("BITstar", "mask"), ("PRMstar", "chain"), ("PRMstar", "prm"))  # fmt: skip
+NEAR = 1.02
+"""A path is near the best that is known when it is no longer than this times it."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A planner of OMPL, where it may search, and for how long."""
+
+    planner: str
+    scope: str
+    """`whole map`, or how the corridor is kept: `chain`, `mask` or `prm`."""
+    budget_s: float
+
+    @property
+    def name(self) -> str:
+        """What tables call it."""
+        return f"{self.planner}, {self.scope}, {self.budget_s:g} s"
+
+
+def methods(*, confinements: bool = False) -> list[Method]:
+    """Those of the table, or those of the comparison of confinements."""
+    if confinements:
+        return [Method(planner, scope, 1.0) for planner, scope in CONFINEMENTS]
+    return [
+        Method(planner, scope, budget_s)
+        for planner in PLANNERS
+        for scope in ("whole map", "chain")
+        for budget_s in BUDGETS_S
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A pair of a map with its coarse path and the best any-angle length that is known."""
+
+    pair: Pair
+    poses: tuple[FloatArray, FloatArray]
+    cells: LongArray
+    best_m: float
+
+
+class Bench:
+    """A map with its problems, and what every method is asked with.
+
+    Parameters
+    ----------
+    path
+        The map's file.
+    pairs, seed
+        As `sample_pairs` takes them; pairs without a way are left out.
+    """
+
+    def __init__(self, path: Path, *, pairs: int, seed: int) -> None:
+        is_movingai = path.suffix == ".map"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", hn.MapWarning)
+            self.grid = hn.load_map(path, robot_radius_m=0.0 if is_movingai else 0.25)
+        self.sha = map_digest(self.grid)
+        pyramid = hn.DualGraphPyramid.build(
+            self.grid, merge_distance_m=40.0 if is_movingai else 4.0
+        )
+        topology = hn.TopologicalMap(pyramid)
+        self._coarse = hn.HybridPlanner(topology, preset="fast")
+        optimal = hn.HybridPlanner(topology, preset="grid-astar")
+        self.problems: list[Problem] = []
+        for pair in sample_pairs(self.grid, pairs, seed=seed):
+            points = self.grid.frame.points_of(np.array([pair.start, pair.goal]))
+            coarse, best = self._coarse.plan(*points), optimal.plan(*points)
+            if coarse.path is None or best.path is None:
+                continue
+            known = [shorten(self.grid, path.cells) for path in (coarse.path, best.path)]
+            length_m = min(float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in known)
+            poses = np.column_stack([points, np.zeros(2)])
+            self.problems.append(Problem(pair, (poses[0], poses[1]), coarse.path.cells, length_m))
+
+    def planner(self, method: Method) -> OmplPlanner:
+        """The planner of a method; its process runs until it is dropped."""
+        whole = method.scope == "whole map"
+        confine = "mask" if whole else method.scope
+        overrides = {
+            "planner": method.planner,
+            "confine": confine,
+            "budget_s": method.budget_s,
+        }
+        preset = load_preset(
+            "ompl-rrtconnect",
+            overrides=[f"planner.ompl={{{', '.join(f'{k}: {v}' for k, v in overrides.items())}}}"],
+        )
+        cells: Any = self._coarse._cells  # noqa: SLF001 - the planner's own fields, built once
+        return OmplPlanner(self.grid, preset.planner, None if whole else cells.search.field_of)
+
+    def records(self, method: Method, there: set[str]) -> Iterator[Record]:
+        """Records of a method that are not there yet."""
+        missing = [p for p in self.problems if self.record_id(method, p) not in there]
+        if not missing:
+            return
+        planner = self.planner(method)
+        planner.plan(missing[0].cells, missing[0].poses, None)  # loads what is loaded once
+        for problem in missing:
+            yield self._record(method, problem, planner)
+
+    def record_id(self, method: Method, problem: Problem) -> str:
+        """The same for equal map, method and pair."""
+        return f"{self.sha[:12]}/{method.name}/{problem.pair.key}"
+
+    def _record(self, method: Method, problem: Problem, planner: OmplPlanner) -> Record:
+        began = time.perf_counter()
+        found = planner.plan(problem.cells, problem.poses, None)
+        seconds = time.perf_counter() - began
+        by_grid = found.refinement.by_grid
+        own = found.path if not by_grid and found.status == "solved" else None
+        trace = found.refinement.trace
+        near = [s for s, cost in trace if cost <= NEAR * problem.best_m]
+        return {
+            "id": self.record_id(method, problem),
+            "type": "ompl",
+            "map": self.grid.name,
+            "map_sha": self.sha,
+            "method": method.name,
+            "method_sha": "",
+            "planner": method.planner,
+            "scope": method.scope,
+            "budget_s": method.budget_s,
+            "status": "line of sight" if by_grid else str(found.status),
+            "steps": list(found.refinement.steps),
+            "length_m": None if own is None else own.length_m,
+            "fallback_m": found.path.length_m if by_grid and found.path is not None else None,
+            "best_m": problem.best_m,
+            "first_s": trace[0][0] if trace and own is not None else None,
+            "near_s": near[0] if near and own is not None else None,
+            "seconds": seconds,
+            "faults": [] if own is None else list(segment_faults(self.grid, own.points)),
+            "environment": environment(),
+        }

@@ -1,0 +1,232 @@
+"""Section `planner.ompl` of a preset: which OMPL planner, in which state space, for how long."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+PARAMETERS: dict[str, dict[str, str]] = {
+    "RRTConnect": {"intermediate_states": "setIntermediateStates", "range": "setRange"},
+    "RRTstar": {
+        "delay_collision_checking": "setDelayCC",
+        "focus_search": "setFocusSearch",
+        "goal_bias": "setGoalBias",
+        "informed_sampling": "setInformedSampling",
+        "new_state_rejection": "setNewStateRejection",
+        "number_sampling_attempts": "setNumSamplingAttempts",
+        "ordered_sampling": "setOrderedSampling",
+        "ordering_batch_size": "setBatchSize",
+        "prune_threshold": "setPruneThreshold",
+        "pruned_measure": "setPrunedMeasure",
+        "range": "setRange",
+        "rewire_factor": "setRewireFactor",
+        "sample_rejection": "setSampleRejection",
+        "tree_pruning": "setTreePruning",
+        "use_admissible_heuristic": "setAdmissibleCostToCome",
+        "use_k_nearest": "setKNearest",
+    },
+    "InformedRRTstar": {
+        "delay_collision_checking": "setDelayCC",
+        "goal_bias": "setGoalBias",
+        "number_sampling_attempts": "setNumSamplingAttempts",
+        "ordered_sampling": "setOrderedSampling",
+        "ordering_batch_size": "setBatchSize",
+        "prune_threshold": "setPruneThreshold",
+        "range": "setRange",
+        "rewire_factor": "setRewireFactor",
+        "use_k_nearest": "setKNearest",
+    },
+    "BITstar": {
+        "delay_rewiring_to_first_solution": "setDelayRewiringUntilInitialSolution",
+        "drop_unconnected_samples_on_prune": "setDropSamplesOnPrune",
+        "find_approximate_solutions": "setConsiderApproximateSolutions",
+        "prune_threshold_as_fractional_cost_change": "setPruneThresholdFraction",
+        "rewire_factor": "setRewireFactor",
+        "samples_per_batch": "setSamplesPerBatch",
+        "stop_on_each_solution_improvement": "setStopOnSolnImprovement",
+        "use_graph_pruning": "setPruning",
+        "use_just_in_time_sampling": "setJustInTimeSampling",
+        "use_k_nearest": "setUseKNearest",
+        "use_strict_queue_ordering": "setStrictQueueOrdering",
+    },
+    "PRM": {"max_nearest_neighbors": "setMaxNearestNeighbors"},
+    "PRMstar": {},
+    "RRT": {
+        "goal_bias": "setGoalBias",
+        "intermediate_states": "setIntermediateStates",
+        "range": "setRange",
+    },
+}
+"""The planners, and of each the parameters by OMPL's names with the methods that set them; the
+bindings have no parameter sets."""
+
+WHOLE = {
+    "max_nearest_neighbors",
+    "number_sampling_attempts",
+    "ordering_batch_size",
+    "samples_per_batch",
+}
+"""Parameters that are counts."""
+REAL = {
+    "goal_bias",
+    "prune_threshold",
+    "prune_threshold_as_fractional_cost_change",
+    "range",
+    "rewire_factor",
+}
+"""Parameters that are real numbers; all others are switches."""
+_LIMITS = {"goal_bias": (0.0, 1.0), "prune_threshold": (0.0, 1.0), "rewire_factor": (1.0, 100.0)}
+_MOST = 1_000_000
+
+Space = Literal["r2", "se2", "dubins", "reeds-shepp"]
+Confinement = Literal["chain", "mask", "prm"]
+
+
+def _no_boolean(value: Any) -> Any:
+    """Refuse a YAML `yes` or `on` where a number belongs; Python would call it 1."""
+    if isinstance(value, bool):
+        raise PydanticCustomError("number_type", "input should be a number")
+    return value
+
+
+def _corners(value: Any) -> Any:
+    """Corners of a footprint given as a shapely polygon or in Nav2's form, a string of a list."""
+    exterior = getattr(value, "exterior", None)
+    if exterior is not None:
+        return [list(map(float, corner)) for corner in exterior.coords[:-1]]
+    if isinstance(value, str) and value.strip().startswith("["):
+        try:
+            return json.loads(value)
+        except ValueError:
+            raise PydanticCustomError(
+                "footprint", "expected corners as [[x, y], ...] in metres"
+            ) from None
+    if isinstance(value, str):
+        from shapely import GEOSException, wkt  # noqa: PLC0415 - half a second, rarely needed
+
+        try:
+            return _corners(wkt.loads(value))
+        except (GEOSException, RecursionError):
+            pass
+        raise PydanticCustomError(
+            "footprint", "expected corners as [[x, y], ...] in metres, or POLYGON ((x y, ...))"
+        )
+    return value
+
+
+_Float = Annotated[float, BeforeValidator(_no_boolean)]
+_Int = Annotated[int, BeforeValidator(_no_boolean)]
+_Coordinate = Annotated[_Float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
+
+
+class OmplSettings(BaseModel):
+    """Section `ompl` of the planner: sampling-based search inside the corridor."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    planner: str = "RRTConnect"
+    """OMPL's name of the planner, one of `PARAMETERS`."""
+    parameters: dict[str, bool | int | float] = Field(default_factory=dict)
+    """Its parameters by OMPL's names; OMPL's own values for those that are not given."""
+    space: Space = "r2"
+    """State space: a disc that moves in any direction, a footprint that may turn on the spot, or
+    one that drives curves, forwards (`dubins`) or both ways (`reeds-shepp`)."""
+    footprint: Annotated[
+        tuple[tuple[_Coordinate, _Coordinate], ...] | None, BeforeValidator(_corners)
+    ] = Field(default=None, min_length=3, max_length=1000)
+    """Corners in metres in the robot's frame, x ahead: a list, Nav2's string of it, or a shapely
+    polygon or its WKT. Null for the disc that the map was inflated for."""
+    turning_radius_m: Annotated[_Float, Field(gt=0, le=1e4)] | None = None
+    """Of `dubins` and `reeds-shepp`."""
+    budget_s: Annotated[_Float, Field(ge=0.01, le=3600)] = 1.0
+    """Seconds that a query may take; kept to within 10 %."""
+    iterations: Annotated[_Int, Field(ge=1, le=1_000_000_000)] | None = None
+    """Iterations of planners and of simplification that a query may take, instead of the seconds,
+    which stay as a limit: what is reached before it repeats for equal seeds."""
+    seed: Annotated[_Int, Field(ge=1, lt=2**31)] = 1
+    """Of OMPL's random numbers."""
+    objective: Literal["length", "clearance"] = "length"
+    """What is made small: the length, or the length weighted by nearness to obstacles."""
+    clearance_m: Annotated[_Float, Field(gt=0, le=1e4)] = 0.5
+    """With `clearance`: how far obstacles are felt."""
+    clearance_weight: Annotated[_Float, Field(ge=0, le=1e3)] = 2.0
+    """With `clearance`: a metre beside an obstacle costs 1 + this, `clearance_m` away 1."""
+    confine: Confinement = "chain"
+    """How the search is kept in the corridor: as a chain of small problems, field by field; as one
+    problem whose states and motions are refused outside (`mask`); or by drawing the states of PRM
+    and PRMstar from the corridor's cells (`prm`)."""
+    simplify: bool = True
+    """Whether paths are shortened and smoothed by OMPL's PathSimplifier."""
+
+    @model_validator(mode="after")
+    def _planner_is_known(self) -> Self:
+        known = PARAMETERS.get(self.planner)
+        if known is None:
+            raise PydanticCustomError(
+                "planner",
+                "unknown OMPL planner {planner}; known are {known}",
+                {"planner": repr(self.planner)[:80], "known": ", ".join(sorted(PARAMETERS))},
+            )
+        for name, value in self.parameters.items():
+            if name not in known:
+                text = "unknown parameter {name} of {planner}; " + (
+                    "known are {known}" if known else "it has none"
+                )
+                raise PydanticCustomError(
+                    "parameter",
+                    text,
+                    {
+                        "name": repr(name)[:80],
+                        "planner": self.planner,
+                        "known": ", ".join(sorted(known)),
+                    },
+                )
+            _check_parameter(name, value)
+        if self.confine == "prm" and self.planner not in {"PRM", "PRMstar"}:
+            raise PydanticCustomError("prm", "confine: prm goes with planner PRM or PRMstar")
+        return self
+
+    @model_validator(mode="after")
+    def _space_is_whole(self) -> Self:
+        curved = self.space in {"dubins", "reeds-shepp"}
+        if curved != (self.turning_radius_m is not None):
+            raise PydanticCustomError(
+                "turning_radius", "turning_radius_m goes with space: dubins or reeds-shepp"
+            )
+        if self.objective == "clearance" and (curved or self.planner in {"PRM", "PRMstar"}):
+            raise PydanticCustomError(
+                "objective",
+                "objective: clearance goes with space: r2 or se2, and not with PRM or PRMstar",
+            )
+        if self.footprint is not None and self.space == "r2":
+            raise PydanticCustomError(
+                "footprint", "a footprint needs a space with headings: se2, dubins or reeds-shepp"
+            )
+        return self
+
+    @property
+    def has_heading(self) -> bool:
+        """Whether states have a heading."""
+        return self.space != "r2"
+
+
+def _check_parameter(name: str, value: Any) -> None:
+    """Refuse what OMPL would take and hang or crash on."""
+    if name in WHOLE:
+        good = type(value) is int and 1 <= value <= _MOST
+        expected = f"a whole number from 1 to {_MOST}"
+    elif name in REAL:
+        low, high = _LIMITS.get(name, (0.0, 1e6))
+        good = type(value) in {int, float} and low <= value <= high
+        expected = f"a number from {low:g} to {high:g}"
+    else:
+        good, expected = type(value) is bool, "true or false"
+    if not good:
+        raise PydanticCustomError(
+            "parameter",
+            "parameter {name}: expected {expected}, not {value}",
+            {"name": name, "expected": expected, "value": repr(value)[:80]},
+        )

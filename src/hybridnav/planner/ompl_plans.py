@@ -1,0 +1,277 @@
+"""How the presets with OMPL turn a coarse path into one of the robot's state space."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.refine import LineOfSight, MotionCheck
+from hybridnav.refine.curves import shortest_curve
+from hybridnav.refine.ompl import Clearance, Query, Setup, Worker
+from hybridnav.result import Path, PlanStatus, Refinement
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.config import PlannerSettings
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.refine.ompl import Reply, Search
+    from hybridnav.result import Metric
+
+_STATUS = {
+    "solved": PlanStatus.SOLVED,
+    "approximate": PlanStatus.APPROXIMATE,
+    "timeout": PlanStatus.TIMEOUT,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class OmplPlan:
+    """What came out of a query."""
+
+    status: PlanStatus
+    metric: Metric
+    path: Path | None
+    weighted_cost: float | None
+    lower_bound: float
+    refinement: Refinement
+    search: Search | None = None
+
+
+class OmplPlanner:
+    """OMPL inside the fields that a coarse path passes, and nowhere else.
+
+    Where it finds no path there, the fields beside are taken in; where it still finds none, the
+    grid's own path is shortened by line of sight.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    settings
+        With a section `ompl`.
+    field_of
+        int16 or int32 (rows, cols), the field of each cell; None where the whole map is the
+        corridor.
+
+    Raises
+    ------
+    OmplError
+        When OMPL is not installed or its process does not start.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        settings: PlannerSettings,
+        field_of: NDArray[np.int16 | np.int32] | None,
+    ) -> None:
+        assert settings.ompl is not None  # noqa: S101 - the preset is checked
+        self._grid = grid
+        self._settings = settings
+        self.ompl = settings.ompl
+        self._field_of = field_of
+        self._worker = Worker(Setup(grid, field_of, self.ompl, settings.allow_unexplored))
+        self._warm_up()
+
+    def plan(
+        self,
+        cells: LongArray,
+        ends: tuple[FloatArray, FloatArray],
+        closed: LongArray | None,
+        *,
+        spent_s: float = 0.0,
+        tells_search: bool = False,
+    ) -> OmplPlan:
+        """Find a path of the state space along a path of cells.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), a legal path from the cell of the start to that of the goal.
+        ends
+            Start and goal, float64 (3,): metres and radians, map frame.
+        closed
+            int64 (m,), flat cells that may not be entered; None for none.
+        spent_s
+            Seconds of the budget that are gone already.
+        tells_search
+            Whether the states and trees of the search are wanted too.
+        """
+        refused = self._refused(ends)
+        if refused is not None:
+            nothing = Refinement((), by_grid=False, trace=(), iterations=0)
+            return OmplPlan(refused, self._metric, None, None, math.inf, nothing)
+        self._worker.ensure()
+        query = Query(
+            start=ends[0],
+            goal=ends[1],
+            cells=cells,
+            deadline_s=time.monotonic() + max(self.ompl.budget_s - spent_s, 0.0),
+            corridors=self._corridors(cells),
+            closed=closed,
+            tells_search=tells_search,
+        )
+        self._worker.send(query)
+        # Made while the worker is at it, so that there is a path when its time is over.
+        by_line = None
+        if self._worker.is_late():
+            by_line = self._by_line_of_sight(cells, ends, closed)
+        reply = self._worker.reply()
+        steps, by_grid = list(reply.steps), False
+        path = self._path(cells, reply) if len(reply.points) else None
+        status = _STATUS[reply.outcome]
+        if status is not PlanStatus.SOLVED:
+            if by_line is None:
+                by_line = self._by_line_of_sight(cells, ends, closed)
+            steps.append(f"grid path by line of sight: {'no' if by_line is None else 'solved'}")
+            if by_line is not None:
+                path, status, by_grid = by_line, PlanStatus.SOLVED, True
+        return OmplPlan(
+            status,
+            self._metric,
+            path,
+            self._weighted_cost(path) if status is PlanStatus.SOLVED else None,
+            self._bound(reply, path, ends),
+            Refinement(tuple(steps), by_grid, reply.trace, reply.iterations),
+            reply.search,
+        )
+
+    def _refused(self, ends: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
+        """Status of a query at one of whose ends the footprint does not fit."""
+        if self.ompl.footprint is None:
+            return None
+        for pose, status in zip(
+            ends, (PlanStatus.START_OCCUPIED, PlanStatus.GOAL_OCCUPIED), strict=True
+        ):
+            if not self._check.state_valid(*pose.tolist()):
+                return status
+        return None
+
+    def _warm_up(self) -> None:
+        """Make what is made once, so that no query's time includes it."""
+        if self._field_of is not None:
+            _ = self._beside
+        free = np.argwhere(self._grid.enterable())[:1]
+        if len(free):
+            centre = self._grid.frame.points_of(free[0])
+            pose = np.append(centre, 0.0)
+            path = self._by_line_of_sight(free, (pose, pose), None)
+            self._weighted_cost(path)
+            self._refused((pose, pose))
+            if self.ompl.has_heading:
+                self._check.turn_valid(*pose, *pose)
+
+    @property
+    def _metric(self) -> Metric:
+        if self.ompl.objective == "clearance":
+            return "clearance-weighted"
+        if self.ompl.space == "dubins":
+            return "dubins"
+        return "reeds-shepp" if self.ompl.space == "reeds-shepp" else "any-angle"
+
+    def _bound(self, reply: Reply, path: Path | None, ends: tuple[FloatArray, FloatArray]) -> float:
+        """What no path in the metric is shorter than: the way without obstacles."""
+        straight = float(np.hypot(*(ends[1] - ends[0])[:2]))
+        bound = max(straight, reply.bound_m)
+        return bound if path is None else min(bound, path.length_m)
+
+    def _corridors(self, cells: LongArray) -> tuple[tuple[str, BoolArray | None], ...]:
+        if self._field_of is None:
+            return (("whole map", None),)
+        passed = np.zeros(self._n_fields, dtype=np.bool_)
+        passed[self._field_of[cells[:, 0], cells[:, 1]]] = True
+        tails, heads = self._beside
+        wider = passed.copy()
+        wider[heads[passed[tails]]] = True
+        wider[tails[passed[heads]]] = True
+        widened = ("widened corridor", wider)
+        if self._settings.corridor == "neighbours":
+            return (widened,)
+        return (("corridor", passed), widened)
+
+    @cached_property
+    def _n_fields(self) -> int:
+        assert self._field_of is not None  # noqa: S101 - only asked for where it is
+        return int(self._field_of.max(initial=-1)) + 1
+
+    @cached_property
+    def _beside(self) -> tuple[LongArray, LongArray]:
+        """Pairs of fields that have cells beside each other, each pair once."""
+        assert self._field_of is not None  # noqa: S101
+        fields = self._field_of
+        keys = []
+        for one, other in ((fields[:, :-1], fields[:, 1:]), (fields[:-1], fields[1:])):
+            differ = (one != other) & (one >= 0) & (other >= 0)
+            low, high = (
+                np.minimum(one[differ], other[differ]),
+                np.maximum(one[differ], other[differ]),
+            )
+            keys.append(low.astype(np.int64) * self._n_fields + high)
+        pairs = np.unique(np.concatenate(keys))
+        return pairs // max(self._n_fields, 1), pairs % max(self._n_fields, 1)
+
+    def _path(self, cells: LongArray, reply: Reply) -> Path:
+        """The states of a reply, and along curves poses one cell apart."""
+        states, radius_m = reply.points, self.ompl.turning_radius_m
+        if radius_m is not None:
+            reverses = self.ompl.space == "reeds-shepp"
+            pieces = [states[:1]]
+            for first, second in itertools.pairwise(states.tolist()):
+                curve = shortest_curve(first, second, radius_m=radius_m, reverses=reverses)
+                pieces.append(curve.poses(self._grid.resolution_m)[1:])
+            states = np.concatenate(pieces)
+        headings = states[:, 2].copy() if self.ompl.has_heading else None
+        return Path(cells, states[:, :2].copy(), reply.length_m, headings)
+
+    def _by_line_of_sight(
+        self, cells: LongArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
+    ) -> Path | None:
+        """The grid's path, shortened; None where the robot cannot drive it."""
+        if self.ompl.turning_radius_m is not None:
+            return None
+        sight = self._sight
+        if closed is not None:
+            allowed = self._settings.allow_unexplored
+            sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=closed)
+        points = sight.shorten(cells, ends[0][:2], ends[1][:2])
+        steps = np.diff(points, axis=0)
+        length_m = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
+        if not self.ompl.has_heading:
+            return Path(cells, points, length_m)
+        # Turn on the spot at every bend, drive ahead between.
+        ahead = np.repeat(np.arctan2(steps[:, 1], steps[:, 0]), 2)
+        headings = np.concatenate([[ends[0][2]], ahead, [ends[1][2]]])
+        points = np.repeat(points, 2, axis=0)
+        poses = np.column_stack([points, headings])
+        if not self._check.confined(closed=closed).path_valid(poses):
+            return None
+        return Path(cells, points, length_m, headings)
+
+    def _weighted_cost(self, path: Path | None) -> float | None:
+        if path is None or self._clearance is None:
+            return None
+        return self._clearance.cost_of(path.points)
+
+    @cached_property
+    def _clearance(self) -> Clearance | None:
+        if self.ompl.objective != "clearance":
+            return None
+        allowed = self._settings.allow_unexplored
+        return Clearance(self._grid, self.ompl, allow_unexplored=allowed)
+
+    @cached_property
+    def _check(self) -> MotionCheck:
+        allowed = self._settings.allow_unexplored
+        return MotionCheck(self._grid, footprint=self.ompl.footprint, allow_unexplored=allowed)
+
+    @cached_property
+    def _sight(self) -> LineOfSight:
+        return LineOfSight(self._grid, allow_unexplored=self._settings.allow_unexplored)

@@ -1,0 +1,231 @@
+"""Kernels of the shortest curves of a vehicle with a turning circle, forwards or both ways.
+
+A word is a row of pieces: kinds (1 for an arc to the left, 0 for straight on, -1 to the right) and
+signed lengths, negative backwards, in turning radii unless something else is said.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+_FULL = 2 * math.pi
+_ROUNDING = 1e-9
+"""Angles and lengths below this are none: of an arc of nothing rounding makes a full turn."""
+LARGEST_HEADING = 1e6
+"""Headings in radians above which too few digits are left."""
+
+
+@njit(cache=True)
+def _forward(angle):
+    """Bring an angle to [0, 2 pi)."""
+    angle -= _FULL * math.floor(angle / _FULL)
+    return 0.0 if angle > _FULL - _ROUNDING else angle
+
+
+@njit(cache=True)
+def _wrapped(angle):
+    """Bring an angle to [-pi, pi]; of the two ends the upper one."""
+    angle -= _FULL * np.rint(angle / _FULL)
+    return angle + _FULL if angle < -math.pi + _ROUNDING else angle
+
+
+@njit(cache=True)
+def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
+    """Keep a word if it is shorter than the best, mirrored, driven the other way, from its end."""
+    total = 0.0
+    for piece in pieces:
+        total += abs(piece)
+    if total >= best:
+        return best
+    n = len(pieces)
+    for i in range(n):
+        j = n - 1 - i if back else i
+        kinds[j], lengths[j] = mirror * word[i], flip * pieces[i]
+    for i in range(n, 5):
+        kinds[i], lengths[i] = 0, 0.0
+    return total
+
+
+@njit(cache=True)
+def _dubins(x, y, phi, kinds, lengths):
+    """Shortest word forwards from the origin to a pose (L. E. Dubins, 1957); its length.
+
+    An arc, then the tangent of two circles or a long arc between them, then an arc.
+    """
+    best = np.inf
+    for s in (1, -1):
+        for e in (1, -1):
+            # From the centre of the first circle to that of the last.
+            d_x, d_y = x - e * math.sin(phi), y + e * math.cos(phi) - s
+            distance, angle = math.hypot(d_x, d_y), math.atan2(d_y, d_x)
+            if s == e:
+                t, p, q = _forward(s * angle), distance, _forward(s * (phi - angle))
+                best = _take(kinds, lengths, best, 1, 1, False, (s, 0, e), (t, p, q))
+                if distance <= 4 + _ROUNDING:
+                    p = _FULL - 2 * math.asin(min(distance / 4, 1.0))
+                    t = _forward(s * angle + p / 2)
+                    q = _forward(s * phi - t + p)
+                    best = _take(kinds, lengths, best, 1, 1, False, (s, -s, s), (t, p, q))
+            elif distance >= 2 - _ROUNDING:
+                angle += s * math.asin(min(2 / distance, 1.0))
+                t, q = _forward(s * angle), _forward(e * (phi - angle))
+                p = math.sqrt(max(distance * distance - 4, 0.0))
+                best = _take(kinds, lengths, best, 1, 1, False, (s, 0, e), (t, p, q))
+    return best
+
+
+@njit(cache=True)
+def _tau_omega(u, v, xi, eta, phi):
+    """First and last arc of four, the middle two being u and v."""
+    delta = _wrapped(u - v)
+    a, b = math.sin(u) - math.sin(delta), math.cos(u) - math.cos(delta) - 1
+    tau = math.atan2(eta * a - xi * b, xi * a + eta * b)
+    if 2 * (math.cos(delta) - math.cos(v) - math.cos(u)) + 3 < 0:
+        tau += math.pi
+    tau = _wrapped(tau)
+    return tau, _wrapped(tau - u + v - phi)
+
+
+@njit(cache=True)
+def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
+    """Words of an arc, a straight line and an arc."""
+    xi, eta = x - sine, y - 1 + cosine
+    u, t = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
+    v = _wrapped(phi - t)
+    if t >= -_ROUNDING and v >= -_ROUNDING:
+        best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, 1), (t, u, v))
+    xi, eta = x + sine, y - 1 - cosine
+    squared = xi * xi + eta * eta
+    if squared >= 4:
+        u = math.sqrt(squared - 4)
+        t = _wrapped(math.atan2(eta, xi) + math.atan2(2.0, u))
+        v = _wrapped(t - phi)
+        if t >= -_ROUNDING and v >= -_ROUNDING:
+            best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, -1), (t, u, v))
+    return best
+
+
+@njit(cache=True)
+def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
+    """Words of four arcs, the middle two equally long."""
+    xi, eta = x + sine, y - 1 - cosine
+    squared = xi * xi + eta * eta
+    rho = (2 + math.sqrt(squared)) / 4
+    if rho <= 1:
+        u = math.acos(rho)
+        t, v = _tau_omega(u, -u, xi, eta, phi)
+        if t >= -_ROUNDING and v <= _ROUNDING:
+            word = (1, -1, 1, -1)
+            best = _take(kinds, lengths, best, mirror, flip, False, word, (t, u, -u, v))
+    rho = (20 - squared) / 16
+    if 0 <= rho <= 1:
+        u = -math.acos(rho)
+        t, v = _tau_omega(u, u, xi, eta, phi)
+        if t >= -_ROUNDING and v >= -_ROUNDING:
+            word = (1, -1, 1, -1)
+            best = _take(kinds, lengths, best, mirror, flip, False, word, (t, u, u, v))
+    return best
+
+
+@njit(cache=True)
+def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
+    """Words with a straight line between two quarter turns."""
+    quarter = math.pi / 2
+    xi, eta = x + sine, y - 1 - cosine
+    squared = xi * xi + eta * eta
+    if squared >= 4:
+        u = 4 - math.sqrt(squared - 4)
+        if u <= 0:
+            t = _wrapped(math.atan2((4 - u) * xi - 2 * eta, -2 * xi + (u - 4) * eta))
+            v = _wrapped(t - phi)
+            if t >= -_ROUNDING and v >= -_ROUNDING:
+                word, pieces = (1, -1, 0, 1, -1), (t, -quarter, u, -quarter, v)
+                best = _take(kinds, lengths, best, mirror, flip, False, word, pieces)
+    return best
+
+
+@njit(cache=True)
+def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
+    """Words that may also be driven from their end: three arcs, or one quarter turn."""
+    quarter = math.pi / 2
+    xi, eta = x - sine, y - 1 + cosine
+    distance, angle = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
+    if distance <= 4:
+        u = -2 * math.asin(distance / 4)
+        t = _wrapped(angle + u / 2 + math.pi)
+        v = _wrapped(phi - t + u)
+        if t >= -_ROUNDING:
+            best = _take(kinds, lengths, best, mirror, flip, back, (1, -1, 1), (t, u, v))
+    if distance >= 2:
+        r = math.sqrt(distance * distance - 4)
+        u = 2 - r
+        t = _wrapped(angle + math.atan2(r, -2.0))
+        v = _wrapped(phi - quarter - t)
+        if t >= -_ROUNDING and u <= _ROUNDING and v <= _ROUNDING:
+            word, pieces = (1, -1, 0, 1), (t, -quarter, u, v)
+            best = _take(kinds, lengths, best, mirror, flip, back, word, pieces)
+    xi, eta = x + sine, y - 1 - cosine
+    distance = math.sqrt(xi * xi + eta * eta)
+    if distance >= 2:
+        u, t = 2 - distance, math.atan2(xi, -eta)
+        v = _wrapped(t + quarter - phi)
+        if t >= -_ROUNDING and v <= _ROUNDING:
+            word, pieces = (1, -1, 0, -1), (t, -quarter, u, v)
+            best = _take(kinds, lengths, best, mirror, flip, back, word, pieces)
+    return best
+
+
+@njit(cache=True)
+def _reeds_shepp(x, y, phi, kinds, lengths):
+    """Shortest word forwards and backwards from the origin to a pose; its length.
+
+    J. A. Reeds, L. A. Shepp: Optimal paths for a car that goes both forwards and backwards, 1990:
+    the words of section 8, each also mirrored, driven the other way, and from its end.
+    """
+    best = np.inf
+    sine, cosine = math.sin(phi), math.cos(phi)
+    for flip in (1, -1):
+        for mirror in (1, -1):
+            a, b, turn, turn_sine = flip * x, mirror * y, flip * mirror * phi, flip * mirror * sine
+            pose = (a, b, turn, turn_sine, cosine)
+            best = _three_pieces(*pose, kinds, lengths, best, mirror, flip)
+            best = _four_arcs(*pose, kinds, lengths, best, mirror, flip)
+            best = _quarter_turns(*pose, kinds, lengths, best, mirror, flip)
+            best = _turned(*pose, kinds, lengths, best, mirror, flip, False)
+            a, b = a * cosine + b * turn_sine, a * turn_sine - b * cosine
+            pose = (a, b, turn, turn_sine, cosine)
+            best = _turned(*pose, kinds, lengths, best, mirror, flip, True)
+    return best
+
+
+@njit(cache=True)
+def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
+    """Shortest curve between two poses, with lengths in the unit of the radius.
+
+    Fills `kinds` and `lengths`, of five each, and returns how many pieces the word has: 0 where
+    there is none, for what is not finite or turns round a million times has none.
+    """
+    if not 0.0 < radius < np.inf:
+        return 0
+    x, y = (x1 - x0) / radius, (y1 - y0) / radius
+    if not (math.isfinite(x) and math.isfinite(y)):
+        return 0
+    if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
+        return 0
+    cosine, sine = math.cos(yaw0), math.sin(yaw0)
+    x, y, phi = cosine * x + sine * y, cosine * y - sine * x, _wrapped(yaw1 - yaw0)
+    if reverses:
+        best = _reeds_shepp(x, y, phi, kinds, lengths)
+    else:
+        best = _dubins(x, y, phi, kinds, lengths)
+    if best == np.inf:
+        return 0
+    n = 5
+    while n > 1 and lengths[n - 1] == 0.0:
+        n -= 1
+    for i in range(n):
+        lengths[i] *= radius
+    return n

@@ -1,0 +1,225 @@
+"""Kernels of the motion check: states and motions of a robot, one call each.
+
+Points are metres and headings radians in the map frame. `place` says where the grid lies there: its
+origin (x, y), then what a metre along x and y is in rows and in columns, its yaw, and cells in a
+metre. `body` is that of `_sweep_kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hybridnav.refine._curve_kernels import LARGEST_HEADING, shortest_word
+from hybridnav.refine._sweep_kernels import (
+    OPEN,
+    arc_runs,
+    body_fits,
+    body_sweeps,
+    in_map,
+    moved,
+    rounded,
+    runs,
+    stands,
+)
+
+_LONGEST_TURN = 2 * math.pi + 1e-6
+
+
+@njit(cache=True)
+def _position(place, x, y):
+    """Position (row, col) of a point, rounded."""
+    x -= place[0]
+    y -= place[1]
+    return rounded(place[2] * x + place[3] * y), rounded(place[4] * x + place[5] * y)
+
+
+@njit(cache=True)
+def point_stands(marks, place, x, y):
+    """Whether a point may be stood on."""
+    row, col = _position(place, x, y)
+    return in_map(marks, row, col) and stands(marks, row, col)
+
+
+@njit(cache=True)
+def point_runs(marks, place, x0, y0, x1, y1):
+    """Whether a point may run straight from one place to another."""
+    a_row, a_col = _position(place, x0, y0)
+    b_row, b_col = _position(place, x1, y1)
+    return runs(marks, a_row, a_col, b_row, b_col)
+
+
+@njit(cache=True)
+def _legal_bend(marks, positions, i):
+    """Whether a polyline that bends at a corner of the lattice does not change sides there.
+
+    Between two cells whose corner may not be passed no line runs, straight or bent.
+    """
+    row, col = positions[i]
+    rows, cols = marks.shape
+    if row != math.floor(row) or col != math.floor(col):
+        return True
+    r, c = int(row), int(col)
+    if r == 0 or c == 0 or r == rows or c == cols:
+        return True
+    south_west, south_east = marks[r - 1, c - 1] >= OPEN, marks[r - 1, c] >= OPEN
+    if south_west == south_east or south_west != (marks[r, c] >= OPEN):
+        return True
+    if south_east != (marks[r, c - 1] >= OPEN):
+        return True
+    hand = 1.0 if south_west else -1.0
+    came = positions[i - 1, 0] - row + hand * (positions[i - 1, 1] - col)
+    goes = positions[i + 1, 0] - row + hand * (positions[i + 1, 1] - col)
+    return (came > 0) == (goes > 0)
+
+
+@njit(cache=True)
+def polyline_runs(marks, place, points):
+    """Whether a point may run along a polyline of one or more points, bends included."""
+    positions = np.empty((points.shape[0], 2))
+    n = 0
+    for i in range(points.shape[0]):
+        row, col = _position(place, points[i, 0], points[i, 1])
+        # Points that repeat would hide a bend.
+        if n == 0 or positions[n - 1, 0] != row or positions[n - 1, 1] != col:
+            positions[n, 0], positions[n, 1] = row, col
+            n += 1
+    if n == 1:
+        return in_map(marks, positions[0, 0], positions[0, 1]) and stands(
+            marks, positions[0, 0], positions[0, 1]
+        )
+    for i in range(n - 1):
+        a_row, a_col = positions[i]
+        b_row, b_col = positions[i + 1]
+        if not runs(marks, a_row, a_col, b_row, b_col):
+            return False
+        if i > 0 and not _legal_bend(marks, positions, i):
+            return False
+    return True
+
+
+@njit(cache=True)
+def body_stands(marks, place, body, x, y, yaw):
+    """Whether a body may be at a point with a heading."""
+    row, col = _position(place, x, y)
+    if not in_map(marks, row, col) or not stands(marks, row, col):
+        return False
+    if not abs(yaw) <= LARGEST_HEADING:
+        return False
+    return body_fits(body, row, col, yaw - place[6])
+
+
+@njit(cache=True)
+def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
+    """Whether a body may go straight from one place to another while it turns the short way."""
+    row, col = _position(place, x0, y0)
+    b_row, b_col = _position(place, x1, y1)
+    if not runs(marks, row, col, b_row, b_col):
+        return False
+    if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
+        return False
+    turn = yaw1 - yaw0
+    turn -= 2 * math.pi * np.rint(turn / (2 * math.pi))
+    return body_sweeps(
+        body,
+        row,
+        col,
+        yaw0 - place[6],
+        b_row - row,
+        b_col - col,
+        turn,
+        0.0,
+    )
+
+
+@njit(cache=True)
+def body_drives(
+    marks,
+    place,
+    body,
+    x0,
+    y0,
+    yaw0,
+    kinds,
+    lengths,
+    radius,
+):
+    """Whether a body may drive a curve of arcs and straight lines, tangent to one another.
+
+    `kinds` are 1 for an arc to the left, 0 for straight on, -1 to the right; `lengths`, in metres
+    like `radius`, are negative backwards. No arc may be longer than a full turn.
+    """
+    row, col = _position(place, x0, y0)
+    heading = yaw0 - place[6]
+    if not abs(yaw0) <= LARGEST_HEADING or not 0.0 < radius < np.inf:
+        return False
+    if not in_map(marks, row, col) or not stands(marks, row, col):
+        return False
+    for k in range(kinds.size):
+        length = lengths[k] * place[7]
+        if kinds[k] == 0:
+            d_row, d_col, turn, signed = (
+                length * math.sin(heading),
+                length * math.cos(heading),
+                0.0,
+                0.0,
+            )
+            if not runs(
+                marks, rounded(row), rounded(col), rounded(row + d_row), rounded(col + d_col)
+            ):
+                return False
+        else:
+            signed = radius * place[7] if kinds[k] > 0 else -radius * place[7]
+            turn = length / signed
+            d_row = d_col = 0.0
+            if not abs(turn) <= _LONGEST_TURN or not arc_runs(
+                marks, row, col, heading, turn, signed
+            ):
+                return False
+        if not body_sweeps(
+            body,
+            row,
+            col,
+            heading,
+            d_row,
+            d_col,
+            turn,
+            signed,
+        ):
+            return False
+        row, col, heading = moved(row, col, heading, d_row, d_col, turn, signed, 1.0)
+    return True
+
+
+@njit(cache=True)
+def body_steers(
+    marks,
+    place,
+    body,
+    x0,
+    y0,
+    yaw0,
+    x1,
+    y1,
+    yaw1,
+    radius,
+    reverses,
+):
+    """Whether a body may drive the shortest curve of its turning radius between two poses."""
+    kinds, lengths = np.empty(5, np.int64), np.empty(5)
+    n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths)
+    if n == 0:
+        return False
+    return body_drives(
+        marks,
+        place,
+        body,
+        x0,
+        y0,
+        yaw0,
+        kinds[:n],
+        lengths[:n],
+        radius,
+    )

@@ -1,0 +1,65 @@
+"""The exact test of a segment against the cells of a grid.
+
+Positions are those of `_taut_kernels`: (row, col) in grid units, rounded to 2^-24 of a cell.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from hybridnav.refine._taut_kernels import turn_of
+
+
+@njit(cache=True)
+def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
+    """Whether a segment, which is not a point, stays in the closed cells it may stand on; exact.
+
+    A cell may be stood on from the mark `stand` upwards, and lets lines pass through its corners
+    from the mark `pass_by` upwards, which is no higher: no line runs between two cells below it.
+    Walks the cells that the segment enters (J. Amanatides, A. Woo: A fast voxel traversal algorithm
+    for ray tracing, 1987); one along a line between cells needs one of the two at each step. Both
+    ends lie in the map.
+    """
+    rows, cols = marks.shape
+    if a_row == b_row or a_col == b_col:
+        lies = a_row == b_row
+        low, high = (
+            (min(a_col, b_col), max(a_col, b_col))
+            if lies
+            else (min(a_row, b_row), max(a_row, b_row))
+        )
+        fixed = a_row if lies else a_col
+        line = math.floor(fixed)
+        has_first, has_second = line < (rows if lies else cols), fixed == line and line > 0
+        past_first = past_second = True
+        for k in range(math.floor(low), math.ceil(high)):
+            first = second = -1
+            if has_first:
+                first = int(marks[line, k] if lies else marks[k, line])
+            if has_second:
+                second = int(marks[line - 1, k] if lies else marks[k, line - 1])
+            if first < stand and second < stand:
+                return False
+            # Out of one cell into the other across the corner between them is no way.
+            if not (first >= pass_by and past_first) and not (second >= pass_by and past_second):
+                return False
+            past_first, past_second = first >= pass_by, second >= pass_by
+        return True
+    if b_col < a_col:
+        a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
+    up = b_row > a_row
+    turn = 1 if up else -1
+    row, col = math.floor(a_row) if up else math.ceil(a_row) - 1, math.floor(a_col)
+    last_row, last_col = math.ceil(b_row) - 1 if up else math.floor(b_row), math.ceil(b_col) - 1
+    while marks[row, col] >= stand:
+        if row == last_row and col == last_col:
+            return True
+        # On which side of the segment the corner ahead lies.
+        side = turn * turn_of(a_row, a_col, b_row, b_col, row + 0.0 + up, col + 1.0)
+        if side == 0 and marks[row, col + 1] < pass_by and marks[row + turn, col] < pass_by:
+            return False
+        row += turn * (side >= 0)
+        col += side <= 0
+    return False

@@ -1,0 +1,363 @@
+"""Kernels of bodies in motion: what convex polygons and points sweep over, against cells.
+
+Positions are those of `_taut_kernels`; angles are counter-clockwise from the axis of the columns to
+that of the rows. A motion moves the base along a straight line while the heading turns evenly
+(`radius` 0), or along an arc about a fixed centre, to the left where its signed `radius` in cells
+is positive.
+
+A body is `(ahead, clearance, corners, offsets, radii)`: columns to the next occupied cell of each
+row, cells from each centre to the nearest occupied one, corners (n, 2) in cells along the heading
+and to its left, where each convex part of them begins and the last ends (none for a disc), and the
+inscribed and the circumscribed radius in cells.
+
+Between two of its states a body lies in the hull of the two, but for a margin: a chord is nowhere
+farther from its arc than radius * angle^2 / 8. So a motion is free where the hull with its margin
+is, a part of it whose middle state collides is not, and what is neither is halved, until margins
+are smaller than the rounding of positions. No state in between is left out.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hybridnav.refine._segment_kernels import is_legal
+
+BLOCKED, OPEN, STAND = 0, 1, 2
+"""What a cell is to a query: not free, free but outside the corridor, or one to stand on."""
+STAYS, SHIFTS, TURNS = 0, 1, 2
+"""What a body does between two of its states."""
+_DIGITS = 2.0**24
+_ROUNDING = 1 / _DIGITS
+_WIDEST = 1.0
+"""Margin in cells above which a motion is halved at once."""
+_HALF_DIAGONAL = 0.7075
+"""Of a cell, with some slack for distances that are stored as float32."""
+_FARTHEST = 255
+
+
+@njit(cache=True)
+def rounded(value):
+    """Round a coordinate so that tests on it are exact."""
+    return np.rint(value * _DIGITS) / _DIGITS
+
+
+@njit(cache=True)
+def in_map(marks, row, col):
+    """Whether a position lies in the map, rim included; what is not a number does not."""
+    return 0.0 <= row <= marks.shape[0] and 0.0 <= col <= marks.shape[1]
+
+
+@njit(cache=True)
+def stands(marks, row, col):
+    """Whether a position of the map lies in the closed square of a cell that may be stood on."""
+    for r in range(max(math.ceil(row) - 1, 0), min(math.floor(row) + 1, marks.shape[0])):
+        for c in range(max(math.ceil(col) - 1, 0), min(math.floor(col) + 1, marks.shape[1])):
+            if marks[r, c] >= STAND:
+                return True
+    return False
+
+
+@njit(cache=True)
+def runs(marks, a_row, a_col, b_row, b_col):
+    """Whether a point may run straight from one position to another; exact for rounded ones."""
+    if not in_map(marks, a_row, a_col) or not in_map(marks, b_row, b_col):
+        return False
+    if a_row == b_row and a_col == b_col:
+        return stands(marks, a_row, a_col)
+    return is_legal(marks, a_row, a_col, b_row, b_col, STAND, OPEN)
+
+
+@njit(cache=True)
+def look_ahead(occupied):
+    """Columns from each cell to the next occupied one of its row, or to none within reach."""
+    rows, cols = occupied.shape
+    ahead = np.empty((rows, cols), np.uint8)
+    for row in range(rows):
+        count = _FARTHEST
+        for col in range(cols - 1, -1, -1):
+            count = 0 if occupied[row, col] else min(count + 1, _FARTHEST)
+            ahead[row, col] = count
+    return ahead
+
+
+@njit(cache=True)
+def moved(row, col, heading, d_row, d_col, turn, radius, share):
+    """Base and heading after a share of a motion."""
+    now = heading + share * turn
+    if radius == 0.0:
+        return row + share * d_row, col + share * d_col, now
+    row += radius * (math.cos(heading) - math.cos(now))
+    col += radius * (math.sin(now) - math.sin(heading))
+    return row, col, now
+
+
+@njit(cache=True)
+def _following(part, level):
+    """Part after one that is free, as large as it can be; level 0 where that was the last.
+
+    A motion has 2^level parts on each level, and a part that is not free is halved.
+    """
+    part += 1
+    while level > 0 and part & 1 == 0:
+        part >>= 1
+        level -= 1
+    return part, level
+
+
+@njit(cache=True)
+def _place(corners, row, col, heading, placed):
+    """Rounded positions of the corners of a body."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    for i in range(corners.shape[0]):
+        x, y = corners[i, 0], corners[i, 1]
+        placed[i, 0] = rounded(row + sine * x + cosine * y)
+        placed[i, 1] = rounded(col + cosine * x - sine * y)
+
+
+@njit(cache=True)
+def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
+    """Widen the columns that each row from `first` to `end` sees by those of an edge."""
+    if b_row < a_row:
+        a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
+    slope = (b_col - a_col) / (b_row - a_row) if b_row > a_row else 0.0
+    for row in range(max(math.floor(a_row - margin), first), min(math.ceil(b_row + margin), end)):
+        left, right = a_col, b_col
+        if row - margin > a_row:
+            left = a_col + (row - margin - a_row) * slope
+        if row + 1 + margin < b_row:
+            right = a_col + (row + 1 + margin - a_row) * slope
+        if left > right:
+            left, right = right, left
+        k = row - first
+        columns[k, 0] = min(columns[k, 0], left)
+        columns[k, 1] = max(columns[k, 1], right)
+
+
+@njit(cache=True)
+def _turns_right(points, size, row, col):
+    """Whether the way over the last two of some points to another turns right or goes straight."""
+    a_row, a_col = points[size - 2]
+    b_row, b_col = points[size - 1]
+    return (b_col - a_col) * (row - b_row) - (b_row - a_row) * (col - b_col) <= 0.0
+
+
+@njit(cache=True)
+def _hull(before, after, first, last):
+    """Corners of the convex hull of a polygon in two places, the first again at the end.
+
+    A. M. Andrew: Another efficient algorithm for convex hulls in two dimensions, 1979.
+    """
+    n = 2 * (last - first)
+    ordered, points = np.empty((n, 2)), np.empty((2 * n + 1, 2))
+    for i in range(n):
+        at = first + i // 2
+        col, row = before[at, 1], before[at, 0]
+        if i % 2 == 1:
+            col, row = after[at, 1], after[at, 0]
+        j = i
+        while j > 0 and (
+            ordered[j - 1, 1] > col or (ordered[j - 1, 1] == col and ordered[j - 1, 0] > row)
+        ):
+            ordered[j, 0], ordered[j, 1] = ordered[j - 1, 0], ordered[j - 1, 1]
+            j -= 1
+        ordered[j, 0], ordered[j, 1] = row, col
+    size = 0
+    for k in range(n):
+        row, col = ordered[k]
+        while size >= 2 and _turns_right(points, size, row, col):
+            size -= 1
+        points[size, 0], points[size, 1] = row, col
+        size += 1
+    lower = size + 1
+    for k in range(n - 2, -1, -1):
+        row, col = ordered[k]
+        while size >= lower and _turns_right(points, size, row, col):
+            size -= 1
+        points[size, 0], points[size, 1] = row, col
+        size += 1
+    return points[:size]
+
+
+@njit(cache=True)
+def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
+    """Whether the hull of a convex polygon in two places meets no occupied cell, with a margin.
+
+    Its corners are those from `first` to `last`. Each row of cells sees one run of columns of the
+    hull. Where the polygon does not turn, their ends are those of its edges and of the lines that
+    its corners move on; where it does, an edge of the hull may join two different corners.
+    """
+    rows, cols = ahead.shape
+    low, high = np.inf, -np.inf
+    for i in range(first, last):
+        low = min(low, before[i, 0], after[i, 0])
+        high = max(high, before[i, 0], after[i, 0])
+    low_row, end_row = max(math.floor(low - margin), 0), min(math.ceil(high + margin), rows)
+    for k in range(end_row - low_row):
+        columns[k, 0], columns[k, 1] = np.inf, -np.inf
+    if moves == TURNS:
+        hull = _hull(before, after, first, last)
+        for j in range(1, hull.shape[0]):
+            i_row, i_col = hull[j - 1]
+            j_row, j_col = hull[j]
+            _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+        last = first
+    i = last - 1
+    for j in range(first, last):
+        i_row, i_col, j_row, j_col = before[i, 0], before[i, 1], before[j, 0], before[j, 1]
+        _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+        if moves == SHIFTS:
+            i_row, i_col = after[j, 0], after[j, 1]
+            _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+            j_row, j_col = after[i, 0], after[i, 1]
+            _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+        i = j
+    for row in range(low_row, end_row):
+        k = row - low_row
+        col = max(math.floor(columns[k, 0] - margin), 0)
+        end = min(math.ceil(columns[k, 1] + margin), cols)
+        while col < end:
+            step = int(ahead[row, col])
+            if step == 0:
+                return False
+            col += step
+    return True
+
+
+@njit(cache=True)
+def _is_free(ahead, offsets, before, after, margin, moves, columns):
+    """Whether the hulls of all convex parts of a body meet no occupied cell."""
+    for k in range(offsets.size - 1):
+        first, last = offsets[k], offsets[k + 1]
+        if not _part_is_free(ahead, before, after, first, last, margin, moves, columns):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _room(rows, reach, length):
+    """Where `_part_is_free` notes the columns of a body that moves so far."""
+    return np.empty((int(min(float(rows), 2 * reach + length)) + 6, 2))
+
+
+@njit(cache=True)
+def _near(clearance, row, col):
+    """Bounds on the distance to the nearest occupied square and to its centre from a position."""
+    r = min(max(math.floor(row), 0), clearance.shape[0] - 1)
+    c = min(max(math.floor(col), 0), clearance.shape[1] - 1)
+    offset = math.hypot(row - r - 0.5, col - c - 0.5)
+    return clearance[r, c] - offset - _HALF_DIAGONAL, clearance[r, c] + offset
+
+
+@njit(cache=True)
+def body_fits(body, row, col, heading):
+    """Whether a body meets no occupied cell with its base at a position of the map."""
+    ahead, clearance, corners, offsets, radii = body
+    if offsets.size == 1:
+        return True
+    at_least, at_most = _near(clearance, row, col)
+    if at_least >= radii[1]:
+        return True
+    if at_most < radii[0]:
+        return False
+    placed = np.empty(corners.shape)
+    _place(corners, row, col, heading, placed)
+    columns = _room(ahead.shape[0], radii[1], 0.0)
+    return _is_free(ahead, offsets, placed, placed, 0.0, STAYS, columns)
+
+
+@njit(cache=True)
+def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
+    """Whether a body meets no occupied cell all along a motion whose base stays in the map."""
+    ahead, clearance, corners, offsets, radii = body
+    if offsets.size == 1:
+        return True
+    reach = radii[1]
+    length = abs(radius * turn) if radius != 0.0 else math.hypot(d_row, d_col)
+    before, after, middle = np.empty(corners.shape), np.empty(corners.shape), corners.copy()
+    columns = _room(ahead.shape[0], reach, length)
+    moves = SHIFTS if turn == 0.0 else TURNS
+    part, level = 0, 0
+    while True:
+        share = 1.0 / (1 << level)
+        angle = turn * share
+        mid_row, mid_col, mid_heading = moved(
+            row, col, heading, d_row, d_col, turn, radius, (part + 0.5) * share
+        )
+        at_least, at_most = _near(clearance, mid_row, mid_col)
+        free = at_least >= reach + 0.5 * length * share
+        margin = (abs(radius) + reach) * angle * angle / 8
+        if not free and margin <= _WIDEST:
+            at_row, at_col, at = moved(row, col, heading, d_row, d_col, turn, radius, part * share)
+            _place(corners, at_row, at_col, at, before)
+            at_row, at_col, at = moved(
+                row, col, heading, d_row, d_col, turn, radius, (part + 1) * share
+            )
+            _place(corners, at_row, at_col, at, after)
+            last = margin <= _ROUNDING
+            free = _is_free(ahead, offsets, before, after, 0.0 if last else margin, moves, columns)
+            if not free and last:
+                return False
+        if free:
+            part, level = _following(part, level)
+            if level == 0:
+                return True
+            continue
+        if at_most < radii[0]:
+            return False
+        if at_least < reach:
+            _place(corners, mid_row, mid_col, mid_heading, middle)
+            if not _is_free(ahead, offsets, middle, middle, 0.0, STAYS, columns):
+                return False
+        part <<= 1
+        level += 1
+
+
+@njit(cache=True)
+def _sliver_stands(marks, a_row, a_col, b_row, b_col, margin):
+    """Whether all cells may be stood on that a segment comes nearer to than a margin."""
+    rows, cols = marks.shape
+    low, high = min(a_row, b_row) - margin, max(a_row, b_row) + margin
+    if low < 0 or high > rows:
+        return False
+    if min(a_col, b_col) < margin or max(a_col, b_col) > cols - margin:
+        return False
+    column = np.empty((1, 2))
+    for row in range(math.floor(low), math.ceil(high)):
+        column[0, 0], column[0, 1] = np.inf, -np.inf
+        _cover(column, row, row + 1, a_row, a_col, b_row, b_col, margin)
+        for col in range(math.floor(column[0, 0] - margin), math.ceil(column[0, 1] + margin)):
+            if marks[row, col] < STAND:
+                return False
+    return True
+
+
+@njit(cache=True)
+def arc_runs(marks, row, col, heading, turn, radius):
+    """Whether a point may run along an arc."""
+    part, level = 0, 0
+    while True:
+        share = 1.0 / (1 << level)
+        angle = turn * share
+        a_row, a_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, part * share)
+        b_row, b_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, (part + 1) * share)
+        margin = abs(radius) * angle * angle / 8
+        if margin <= _ROUNDING:
+            if not runs(marks, rounded(a_row), rounded(a_col), rounded(b_row), rounded(b_col)):
+                return False
+            free = True
+        else:
+            free = margin <= _WIDEST and _sliver_stands(marks, a_row, a_col, b_row, b_col, margin)
+        if free:
+            part, level = _following(part, level)
+            if level == 0:
+                return True
+            continue
+        mid_row, mid_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, (part + 0.5) * share)
+        mid_row, mid_col = rounded(mid_row), rounded(mid_col)
+        if not in_map(marks, mid_row, mid_col) or not stands(marks, mid_row, mid_col):
+            return False
+        part <<= 1
+        level += 1

@@ -1,0 +1,123 @@
+"""Shortest curves of a vehicle with a turning circle: Dubins forwards, Reeds-Shepp both ways."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.refine._curve_kernels import shortest_word
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, LongArray
+
+Pose = tuple[float, float, float]
+"""`(x, y, yaw)`, metres and radians, map frame."""
+_MAX_POSES = 10_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Arcs of one radius and straight lines, each tangent to the next."""
+
+    start: Pose
+    kinds: LongArray
+    """int64 (n,): 1 for an arc to the left, 0 for straight on, -1 for an arc to the right."""
+    lengths_m: FloatArray
+    """float64 (n,), metres, negative backwards."""
+    radius_m: float
+
+    @property
+    def length_m(self) -> float:
+        """Metres along the curve, backwards counted like forwards."""
+        return math.fsum(np.abs(self.lengths_m).tolist())
+
+    def poses(self, step_m: float) -> FloatArray:
+        """Poses along the curve, no farther apart than a step, ends of pieces among them.
+
+        Parameters
+        ----------
+        step_m
+            Metres, positive.
+
+        Returns
+        -------
+        FloatArray
+            float64 (n, 3), `(x, y, yaw)`, metres and radians; the yaw is not wrapped.
+
+        Raises
+        ------
+        InvalidValueError
+            When the step is not positive, or so small that there were more than ten million.
+        """
+        if not step_m > 0 or self.length_m / step_m > _MAX_POSES:
+            raise InvalidValueError(
+                f"step must be a length in metres above 0 and not far below the curve's, "
+                f"got {step_m} on {self.length_m:.3g} m"
+            )
+        pieces = [np.array([self.start])]
+        for kind, length_m in zip(self.kinds.tolist(), self.lengths_m.tolist(), strict=True):
+            count = math.ceil(abs(length_m) / step_m)
+            along = length_m * np.arange(1, count + 1) / max(count, 1)
+            pieces.append(self._ahead(pieces[-1][-1], kind, along))
+        return np.concatenate(pieces)
+
+    def _ahead(self, pose: FloatArray, kind: int, along_m: FloatArray) -> FloatArray:
+        """Poses so many metres along an arc or a straight line."""
+        if not len(along_m):
+            return pose[None]
+        x, y, yaw = pose.tolist()
+        if kind == 0:
+            xs, ys = x + along_m * math.cos(yaw), y + along_m * math.sin(yaw)
+            return np.stack([xs, ys, np.full(len(along_m), yaw)], axis=1)
+        radius_m = kind * self.radius_m
+        yaws = yaw + along_m / radius_m
+        xs = x + radius_m * (np.sin(yaws) - math.sin(yaw))
+        ys = y + radius_m * (math.cos(yaw) - np.cos(yaws))
+        return np.stack([xs, ys, yaws], axis=1)
+
+
+def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) -> Curve:
+    """Shortest curve between two poses of a vehicle with a turning radius.
+
+    L. E. Dubins: On curves of minimal length with a constraint on average curvature, 1957;
+    J. A. Reeds, L. A. Shepp: Optimal paths for a car that goes both forwards and backwards, 1990.
+
+    Parameters
+    ----------
+    start, goal
+        `(x, y, yaw)`, metres and radians.
+    radius_m
+        Turning radius, positive.
+    reverses
+        Whether the vehicle may go backwards too.
+
+    Returns
+    -------
+    Curve
+        As long as that of OMPL's `DubinsStateSpace` or `ReedsSheppStateSpace`; of several that are
+        equally long, OMPL may take another.
+
+    Raises
+    ------
+    InvalidValueError
+        When a number is not finite, a heading a million or more, or the radius not positive.
+
+    Examples
+    --------
+    >>> round(shortest_curve((0, 0, 0), (0, 2, 3.14159265), radius_m=1, reverses=False).length_m, 6)
+    3.141593
+    """
+    kinds, lengths_m = np.empty(5, dtype=np.int64), np.empty(5)
+    # Whole numbers would make another version of the kernel.
+    x0, y0, yaw0, x1, y1, yaw1 = map(float, (*start, *goal))
+    n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, float(radius_m), bool(reverses), kinds, lengths_m)
+    if n == 0:
+        raise InvalidValueError(
+            f"no curve of radius {radius_m} m goes from {start} to {goal}: poses must be finite, "
+            "headings below a million, and the radius positive"
+        )
+    return Curve(start, kinds[:n], lengths_m[:n], radius_m)

@@ -1,0 +1,291 @@
+"""Exact validity of states and motions of a robot against the free space of a grid."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass, Frame
+from hybridnav.refine import _motion_kernels as kernels
+from hybridnav.refine._sweep_kernels import look_ahead
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, ByteArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.refine.footprint import Footprint
+
+_FARTHEST_CELLS = 5000
+
+
+class MotionCheck:
+    """Exact validity of states and motions of a robot against free space, in the map frame.
+
+    A disc robot is a point on a grid that was inflated by its radius. It stays in the union of the
+    closed squares of the cells that it may stand on, and never passes between two blocked cells
+    that meet at a corner (unless the grid allows corner cutting). Numbers that are not finite,
+    points outside the map and headings of more than a million are not valid. Points are rounded to
+    2^-24 of a cell; every test of a straight line between rounded points is exact.
+
+    With a footprint the base keeps these rules, on a grid inflated by no more than the inscribed
+    radius, and the footprint must not meet the inside of a cell that is occupied without inflation
+    (`OccupancyGrid.measured`). As with the disc, unexplored and closed cells and the ground outside
+    the map stop the base alone. A motion is valid only where every state on it is: motions without
+    a turn are decided exactly, others but for what a hundredth of a cell more would hit.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    footprint
+        Outline of the robot, see `Footprint.of`; None for a disc.
+    inside
+        bool (rows, cols), the cells that the base may stand on (a corridor); None for all.
+        Whether a cell is blocked is judged on the whole map: a line may pass through the corner
+        between two free cells outside.
+    closed
+        int64 (n,), flat cells that the base may not enter either; None for none.
+    allow_unexplored
+        Whether the base may enter unexplored cells.
+
+    Raises
+    ------
+    InvalidValueError
+        When `inside` does not have the shape of the map, a closed cell lies outside it, or the
+        footprint is refused or reaches more than 5000 cells.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        *,
+        footprint: ArrayLike | Footprint | None = None,
+        inside: BoolArray | None = None,
+        closed: LongArray | None = None,
+        allow_unexplored: bool = False,
+    ) -> None:
+        self._grid = grid
+        self._allow_unexplored = allow_unexplored
+        self._place = _place_of(grid.frame)
+        self._is_disc = footprint is None
+        self._body = _no_body() if footprint is None else _body_of(grid, footprint)
+        self._marks = self._marks_of(inside, closed)
+
+    def confined(self, *, inside: BoolArray | None = None, closed: LongArray | None = None) -> Self:
+        """The same robot on the same map in another corridor, without the work on the footprint.
+
+        Parameters
+        ----------
+        inside, closed
+            As of the class; they replace those of this check.
+        """
+        other = copy.copy(self)
+        other._marks = self._marks_of(inside, closed)  # noqa: SLF001 - of the same class
+        return other
+
+    def state_valid(self, x: float, y: float, yaw: float = 0.0) -> bool:
+        """Whether the robot may be at a point.
+
+        Parameters
+        ----------
+        x, y
+            Metres, map frame.
+        yaw
+            Heading in radians, counter-clockwise from the x axis; of no effect on a disc.
+        """
+        valid: bool
+        if self._is_disc:
+            valid = kernels.point_stands(self._marks, self._place, x, y)
+        else:
+            valid = kernels.body_stands(self._marks, self._place, self._body, x, y, yaw)
+        return valid
+
+    def motion_valid(self, x0: float, y0: float, x1: float, y1: float) -> bool:
+        """Whether a disc robot, or the base of another, may drive straight from point to point.
+
+        Parameters
+        ----------
+        x0, y0, x1, y1
+            Metres, map frame.
+        """
+        valid: bool = kernels.point_runs(self._marks, self._place, x0, y0, x1, y1)
+        return valid
+
+    def turn_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
+        self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float
+    ) -> bool:
+        """Whether the robot may go straight from pose to pose while it turns evenly, the short way.
+
+        The interpolation of OMPL's `SE2StateSpace`.
+
+        Parameters
+        ----------
+        x0, y0, x1, y1
+            Metres, map frame.
+        yaw0, yaw1
+            Headings in radians.
+        """
+        valid: bool = kernels.body_turns(
+            self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1
+        )
+        return valid
+
+    def curve_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
+        self,
+        x0: float,
+        y0: float,
+        yaw0: float,
+        kinds: LongArray,
+        lengths_m: FloatArray,
+        radius_m: float,
+    ) -> bool:
+        """Whether the robot may drive a curve of arcs and straight lines.
+
+        Parameters
+        ----------
+        x0, y0, yaw0
+            Where it starts, metres and radians, map frame.
+        kinds
+            int64 (n,), 1 for an arc to the left, 0 for straight on, -1 for an arc to the right.
+        lengths_m
+            float64 (n,), metres, negative backwards. No arc may exceed a full turn.
+        radius_m
+            Of every arc, positive.
+        """
+        valid: bool = kernels.body_drives(
+            self._marks, self._place, self._body, x0, y0, yaw0, kinds, lengths_m, radius_m
+        )
+        return valid
+
+    def dubins_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
+        self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius_m: float
+    ) -> bool:
+        """Whether the robot may drive the shortest curve forwards; see `shortest_curve`.
+
+        Parameters
+        ----------
+        x0, y0, yaw0, x1, y1, yaw1
+            Poses, metres and radians, map frame.
+        radius_m
+            Turning radius.
+        """
+        valid: bool = kernels.body_steers(
+            self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1, radius_m, False
+        )
+        return valid
+
+    def reeds_shepp_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
+        self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius_m: float
+    ) -> bool:
+        """Whether the robot may drive the shortest curve that may go backwards too.
+
+        Parameters are those of `dubins_valid`.
+        """
+        valid: bool = kernels.body_steers(
+            self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1, radius_m, True
+        )
+        return valid
+
+    def path_valid(self, points: ArrayLike) -> bool:
+        """Whether the robot may go along a polyline.
+
+        Parameters
+        ----------
+        points
+            `(x, y)` in metres for a disc, (n, 2), n >= 1, bends at corners of cells included; or
+            `(x, y, yaw)` for a robot that turns between them as in `turn_valid`, (n, 3).
+
+        Raises
+        ------
+        InvalidValueError
+            When the points have another shape.
+        """
+        path = np.ascontiguousarray(points, dtype=np.float64)
+        if path.ndim != 2 or path.shape[1] not in {2, 3} or not len(path):  # noqa: PLR2004
+            raise InvalidValueError(
+                f"a path needs points (n, 2) or (n, 3), n >= 1, got {path.shape}"
+            )
+        if not kernels.polyline_runs(self._marks, self._place, path):
+            return False
+        if path.shape[1] == 2:  # noqa: PLR2004
+            return True
+        poses = path.tolist()
+        turns = itertools.pairwise(poses)
+        return self.state_valid(*poses[0]) and all(self.turn_valid(*a, *b) for a, b in turns)
+
+    def _marks_of(self, inside: BoolArray | None, closed: LongArray | None) -> ByteArray:
+        """What each cell is to the base of the robot, uint8 (rows, cols)."""
+        free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
+        if closed is not None:
+            cells = np.asarray(closed, dtype=np.int64)
+            if cells.size and (cells.min() < 0 or cells.max() >= free.size):
+                raise InvalidValueError(
+                    f"closed cells must be flat indices below {free.size}, "
+                    f"got {cells.min()} to {cells.max()}"
+                )
+            free.flat[cells] = False
+        stand = free
+        if inside is not None:
+            if inside.shape != free.shape:
+                raise InvalidValueError(
+                    f"the mask of a corridor must have the map's shape {free.shape}, "
+                    f"got {inside.shape}"
+                )
+            stand = free & inside.astype(np.bool_, copy=False)
+        if self._grid.corner_cutting:
+            free = np.ones_like(free)
+        return free.view(np.uint8) + stand.view(np.uint8)
+
+
+def _place_of(frame: Frame) -> FloatArray:
+    """Where a grid lies in the map frame, as the kernels want it, float64 (8,)."""
+    # The frame at the origin gives the two axes without the rounding of a far origin.
+    axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
+    per_metre = (axes / frame.resolution_m**2).ravel()
+    return np.array([*frame.origin_m, *per_metre, frame.yaw_rad, 1 / frame.resolution_m])
+
+
+def _no_body() -> tuple[Any, ...]:
+    """A disc, as the kernels want it: nothing but its base."""
+    nowhere = np.zeros((0, 0), dtype=np.bool_)
+    distance = nowhere.astype(np.float32)
+    offsets = np.zeros(1, dtype=np.int64)
+    return look_ahead(nowhere), distance, np.empty((0, 2)), offsets, np.zeros(2)
+
+
+def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ...]:
+    """A footprint and what it must not meet, as the kernels want it."""
+    from hybridnav.refine.footprint import Footprint  # noqa: PLC0415 - loads shapely
+
+    footprint = Footprint.of(shape)
+    radii = np.array([footprint.inscribed_radius_m, footprint.circumscribed_radius_m])
+    radii /= grid.resolution_m
+    if radii[1] > _FARTHEST_CELLS:
+        raise InvalidValueError(
+            f"a footprint may reach {_FARTHEST_CELLS} cells, this one reaches "
+            f"{footprint.circumscribed_radius_m:g} m on cells of {grid.resolution_m:g} m"
+        )
+    parts = footprint.convex_parts()
+    offsets = np.cumsum([0, *map(len, parts)])
+    occupied = grid.measured == CellClass.OCCUPIED
+    return (
+        look_ahead(occupied),
+        _distance_cells(occupied),
+        np.concatenate(parts) / grid.resolution_m,
+        offsets.astype(np.int64),
+        radii,
+    )
+
+
+def _distance_cells(occupied: BoolArray) -> Any:
+    """Cells from each centre to the nearest occupied one, float32 (rows, cols)."""
+    if not occupied.any():
+        return np.full(occupied.shape, np.inf, dtype=np.float32)
+    from scipy import ndimage  # noqa: PLC0415 - half a second that a disc does not need
+
+    return ndimage.distance_transform_edt(~occupied).astype(np.float32)

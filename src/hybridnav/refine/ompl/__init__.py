@@ -1,0 +1,11 @@
+"""Refinement by OMPL's sampling-based planners, in a process of its own.
+
+I. Sucan, M. Moll, L. Kavraki: The Open Motion Planning Library, 2012. Only the worker process
+imports `ompl`; this package works, up to the first query, without it.
+"""
+
+from hybridnav.refine.ompl.clearance import Clearance
+from hybridnav.refine.ompl.messages import Query, Reply, Search, Setup
+from hybridnav.refine.ompl.worker import Worker, require_ompl
+
+__all__ = ["Clearance", "Query", "Reply", "Search", "Setup", "Worker", "require_ompl"]

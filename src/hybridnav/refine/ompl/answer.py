@@ -1,0 +1,185 @@
+"""One query answered: corridor after corridor, until a path is found or the time is over."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.refine.ompl import chain
+from hybridnav.refine.ompl.budget import Budget
+from hybridnav.refine.ompl.corridor import corridor_of
+from hybridnav.refine.ompl.messages import Reply, Search
+from hybridnav.refine.ompl.objectives import Objective
+from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
+from hybridnav.refine.ompl.sampler import draw_from
+from hybridnav.refine.ompl.simplify import simplify
+from hybridnav.refine.ompl.spaces import StateSpace
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav._typing import FloatArray
+    from hybridnav.refine.ompl.corridor import Base, Corridor
+    from hybridnav.refine.ompl.messages import Query
+
+_KEPT = 0.03
+"""Part of the time that is kept for the way back."""
+_FIRST = 0.7
+"""Part of what is left in which a corridor that is not the last must give a path."""
+_CHAIN = 0.5
+"""Part of it that a chain of poses gets before the corridor is searched as one problem."""
+_SEARCHED = 0.9
+"""Part of what is left that improving planners get where the path is simplified after."""
+_ENOUGH = 1 + 1e-4
+"""A path that is no longer than this times the lower bound needs no improvement."""
+
+
+class Answering:
+    """The state of one query: budget, best path so far, what was tried.
+
+    Parameters
+    ----------
+    base
+        The map, and what the worker made of it.
+    query
+        The problem.
+    send
+        Called with each better path.
+    """
+
+    def __init__(
+        self,
+        base: Base,
+        query: Query,
+        send: Callable[[Reply], None],
+    ) -> None:
+        began = time.monotonic()
+        setup = base.setup
+        self.setup, self.query, self.settings = setup, query, setup.settings
+        kept_s = _KEPT * (query.deadline_s - began)
+        self.budget = Budget(began, query.deadline_s - kept_s, setup.settings.iterations)
+        self.search = Search() if query.tells_search else None
+        self.bound_m = 0.0
+        self._base = base
+        self._send = send
+        self._steps: list[str] = []
+        self._trace: list[tuple[float, float]] = []
+        self._best = np.empty((0, 3))
+        self._cost = math.inf
+        self._near: FloatArray = np.empty((0, 3))
+
+    def run(self) -> Reply:
+        """Try the corridors in turn; the last reply."""
+        last = len(self.query.corridors) - 1
+        for number, (name, fields) in enumerate(self.query.corridors):
+            corridor = corridor_of(self._base, self.query, fields)
+            self._attempt(corridor, part=1.0 if number == last else _FIRST)
+            outcome = self._outcome()
+            self._steps.append(f"{name}: {outcome}")
+            if outcome == "solved" or self.budget.left() <= 0:
+                break
+        return self._reply(is_last=True)
+
+    def better(self, points: FloatArray, cost: float) -> None:
+        """Note a path, and send it, where it is better than the best so far."""
+        if cost < self._cost:
+            self._best, self._cost = points, cost
+            self._trace.append((self.budget.seconds(), cost))
+            self._send(self._reply(is_last=False))
+
+    def partial(self, points: FloatArray) -> None:
+        """Note a path that ends elsewhere, where it ends nearer to the goal than others."""
+        if len(points) and self._miss(points) < self._miss(self._near):
+            self._near = points
+
+    def space(self, corridor: Corridor, low: FloatArray, high: FloatArray) -> StateSpace:
+        """A state space of the query inside some bounds."""
+        note = None if self.search is None else self._note
+        return StateSpace(self.settings, corridor.check, low, high, note=note)
+
+    def _attempt(self, corridor: Corridor, *, part: float) -> None:
+        whole = self._whole = self.space(corridor, *corridor.bounds)
+        self.bound_m = whole.length(np.stack([self.query.start, self.query.goal]))
+        self.objective = Objective(whole, self._base.clearance)
+        if np.array_equal(self.query.start, self.query.goal):
+            self.better(self.query.start[None], 0.0)
+            return
+        has_legs = corridor.inside is not None and len(self.query.cells) > 1
+        if self.settings.confine == "chain" and has_legs:
+            # Legs between poses may be too short for a turning circle or a long robot.
+            first_part = part * _CHAIN if self.settings.has_heading else part
+            if chain.attempt(self, corridor, whole, part=first_part):
+                return
+            if not self.settings.has_heading:
+                return
+        self._at_once(corridor, whole, part=part)
+
+    def _at_once(self, corridor: Corridor, whole: StateSpace, *, part: float) -> None:
+        """The whole corridor as one problem."""
+        if self.settings.confine == "prm":
+            draw_from(corridor, whole)
+        improves = self.settings.planner in IMPROVING
+        problem = Problem(
+            whole,
+            self.query.start,
+            self.query.goal,
+            self.objective.of(whole),
+            _ENOUGH * self.bound_m if improves else math.inf,
+        )
+        share = part * (_SEARCHED if improves and self.settings.simplify else 1.0)
+        found = solve(
+            problem,
+            self.settings,
+            self.budget.stopper(share),
+            on_cost=self._note_cost,
+            search=self.search,
+        )
+        if found.is_exact:
+            self.finish(whole, found.points)
+        else:
+            self.partial(found.points)
+
+    def finish(self, whole: StateSpace, points: FloatArray) -> FloatArray:
+        """Note a path from start to goal and simplify it; the path that came out."""
+        self.better(points, self.objective.cost(points))
+        if not self.settings.simplify:
+            return points
+        return simplify(whole, points, self.budget, self.objective, self.better)
+
+    def _note_cost(self, cost: float) -> None:
+        # In SE2 OMPL adds the turns to the length, so its cost is not ours.
+        if cost < self._cost and math.isfinite(cost) and self.settings.space != "se2":
+            self._trace.append((self.budget.seconds(), cost))
+
+    def _note(self, x: float, y: float) -> None:
+        assert self.search is not None  # noqa: S101 - only called where it is
+        self.search.states.append((x, y))
+
+    def _miss(self, points: FloatArray) -> float:
+        if not len(points):
+            return math.inf
+        return float(np.hypot(*(points[-1] - self.query.goal)[:2]))
+
+    def _outcome(self) -> Any:
+        if len(self._best):
+            return "solved"
+        return "approximate" if len(self._near) else "timeout"
+
+    def _reply(self, *, is_last: bool) -> Reply:
+        outcome = self._outcome()
+        points = self._best if outcome == "solved" else self._near
+        return Reply(
+            outcome,
+            points,
+            self._cost,
+            length_m=self._whole.length(points),
+            bound_m=self.bound_m,
+            steps=tuple(self._steps),
+            trace=tuple(self._trace),
+            iterations=self.budget.iterations,
+            is_last=is_last,
+            search=self.search if is_last else None,
+        )

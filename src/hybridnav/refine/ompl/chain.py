@@ -1,0 +1,235 @@
+"""A corridor as a chain of small problems, field by field along the coarse path.
+
+OMPL's bindings let no Python code draw the states of tree planners, and of the box round a winding
+corridor most states lie outside it. The box round one field holds little else.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from ompl import geometric
+
+from hybridnav.refine.ompl.corridor import bounds_of
+from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
+from hybridnav.refine.ompl.poses import Poses
+from hybridnav.refine.ompl.simplify import simplified
+from hybridnav.search.octile import path_length_in_cells
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav.refine.ompl.answer import Answering
+    from hybridnav.refine.ompl.corridor import Box, Corridor
+    from hybridnav.refine.ompl.spaces import StateSpace
+
+_WINDING, _SLACK_CELLS = 1.2, 4
+"""A leg is cut in two where its cells' way is longer than this times the straight line, and so
+many cells."""
+_SHORT_CELLS = 8
+"""Legs of so many cells that are not straight are walked from centre to centre by a disc: in a
+maze with ways one cell wide every bend is one, and planners of batches take a millisecond each."""
+_TRIES = 10
+"""Iterations for each cell of a leg before it is cut in two."""
+_LONGER = 1.05
+"""A leg that is longer than this times its cells' way has taken another door."""
+_LEG = 0.5
+"""Part of its share of the time that a leg may take before it is cut in two."""
+_WINDOW = 0.02
+"""Part of the time that is left for one window; windows are fewer where that is too short."""
+_LEAST_WINDOWS = 4
+_ROUNDS_WITHOUT_GAIN = 2
+_LEAST_GAIN = 2e-4
+
+
+def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float) -> bool:
+    """Solve leg after leg, join them, simplify, and improve windows of the path.
+
+    Parameters
+    ----------
+    answering
+        The query.
+    corridor
+        Where it may search.
+    whole
+        State space of the whole corridor.
+    part
+        How much of what is left the legs may take.
+
+    Returns
+    -------
+    bool
+        Whether there is a path.
+    """
+    points = _legs(answering, corridor, whole, part=part)
+    if points is None:
+        return False
+    points = answering.finish(whole, points)
+    if answering.settings.planner in IMPROVING:
+        _improve(answering, corridor, whole, points)
+    return True
+
+
+def _legs(
+    answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float
+) -> FloatArray | None:
+    """The legs, solved and joined; None where one has no path."""
+    cells = answering.query.cells
+    poses = Poses(answering.query, corridor, whole)
+    stops = [index for index in _stops(answering, cells) if poses.at(index) is not None]
+    waiting = list(itertools.pairwise(stops))[::-1]
+    joined = [answering.query.start[None]]
+    stop_at = (1 - part) * answering.budget.left()
+    while waiting:
+        first, last = waiting.pop()
+        share = _LEG / (len(waiting) + 1)
+        found = _leg(answering, corridor, cells[first : last + 1], poses.pair(first, last), share)
+        middle = (first + last) // 2
+        if found is not None:
+            joined.append(found[1:])
+        elif (
+            last - first > 1 and poses.at(middle) is not None and answering.budget.left() > stop_at
+        ):
+            waiting += [(middle, last), (first, middle)]
+        else:
+            answering.partial(np.concatenate(joined))
+            return None
+    return np.concatenate(joined)
+
+
+def _stops(answering: Answering, cells: LongArray) -> list[int]:
+    """Where the path of cells goes over from one field to the next, its ends, and points between
+    until no leg winds."""
+    last = len(cells) - 1
+    field_of = answering.setup.field_of
+    crossings: list[int] = []
+    if field_of is not None:
+        fields = field_of[cells[:, 0], cells[:, 1]]
+        crossings = (np.flatnonzero(np.diff(fields)) + 1).tolist()
+    waiting = list(itertools.pairwise(sorted({0, *crossings, last})))[::-1]
+    stops = [0]
+    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
+    while waiting:
+        first, end = waiting.pop()
+        straight = math.hypot(*(cells[end] - cells[first]))
+        if at[end] - at[first] > _WINDING * straight + _SLACK_CELLS:
+            middle = (first + end) // 2
+            waiting += [(middle, end), (first, middle)]
+        else:
+            stops.append(end)
+    return stops
+
+
+def _leg(
+    answering: Answering,
+    corridor: Corridor,
+    cells: LongArray,
+    ends: tuple[FloatArray, FloatArray],
+    share: float,
+) -> FloatArray | None:
+    """A path between two states near each other, float64 (n, 3); None where there is none that is
+    not much longer than the cells' way."""
+    flat, straight = not answering.settings.has_heading, np.stack(ends)
+    if flat and corridor.check.path_valid(straight[:, :2]):
+        return straight
+    if flat and len(cells) <= _SHORT_CELLS:
+        return None
+    space = answering.space(corridor, *_bounds(corridor, cells))
+    objective = answering.objective.of(space)
+    found = solve(
+        Problem(space, *ends, objective),
+        answering.settings,
+        answering.budget.stopper(share, most=_TRIES * len(cells) if flat else None),
+        search=answering.search,
+    )
+    if not found.is_exact or not flat:
+        return found.points if found.is_exact else None
+    simplifier = geometric.PathSimplifier(space.information, None, objective)
+    points = simplified(space, simplifier, found.points)
+    if answering.settings.objective != "length":
+        return points
+    limit_m = _LONGER * path_length_in_cells(cells) * corridor.grid.resolution_m
+    return points if space.length(points) <= limit_m else None
+
+
+_MARGIN_CELLS = 8
+
+
+def _bounds(corridor: Corridor, cells: LongArray) -> tuple[FloatArray, FloatArray]:
+    """Bounds round some cells with a margin, inside the corridor's."""
+    low, high = cells.min(axis=0), cells.max(axis=0) + 1
+    margin = _MARGIN_CELLS + int((high - low).max()) // 4
+    box: Box = (
+        max(int(low[0]) - margin, corridor.box[0]),
+        min(int(high[0]) + margin, corridor.box[1]),
+        max(int(low[1]) - margin, corridor.box[2]),
+        min(int(high[1]) + margin, corridor.box[3]),
+    )
+    return bounds_of(corridor.grid, box)
+
+
+def _improve(
+    answering: Answering, corridor: Corridor, whole: StateSpace, points: FloatArray
+) -> None:
+    """Give windows of the path to the planner again, each with the ellipse that can shorten it."""
+    budget = answering.budget
+    cost_of = answering.objective.cost
+    cost, fruitless, window = cost_of(points), 0, _LEAST_WINDOWS
+    while fruitless < _ROUNDS_WITHOUT_GAIN and budget.left() > 0 and len(points) > 2:  # noqa: PLR2004
+        before = cost
+        for number in range(2 * window - 1):
+            along = number / (2 * window), (number + 2) / (2 * window)
+            points = _window(answering, corridor, whole, points, along)
+            if budget.left() <= 0:
+                break
+        cost = cost_of(points)
+        answering.better(points, cost)
+        fruitless = 0 if cost < before * (1 - _LEAST_GAIN) else fruitless + 1
+        window = max(window // 2, 1) if fruitless else window
+
+
+def _window(
+    answering: Answering,
+    corridor: Corridor,
+    whole: StateSpace,
+    points: FloatArray,
+    along: tuple[float, float],
+) -> FloatArray:
+    """The path with a part of it, given as parts of its length, searched anew."""
+    first, last = _between(points, along)
+    if last - first < 2:  # noqa: PLR2004 - one motion
+        return points
+    cost_of, inner = answering.objective.cost, points[first : last + 1]
+    cost, least = cost_of(inner), whole.length(inner[[0, -1]])
+    if cost <= least * (1 + _LEAST_GAIN):
+        return points
+    space = answering.space(corridor, *_ellipse(corridor, inner, cost))
+    objective = answering.objective.of(space)
+    problem = Problem(space, inner[0], inner[-1], objective, least * (1 + _LEAST_GAIN))
+    found = solve(problem, answering.settings, answering.budget.stopper(_WINDOW))
+    if not found.is_exact or cost_of(found.points) >= cost:
+        return points
+    return np.concatenate([points[:first], found.points, points[last + 1 :]])
+
+
+def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:
+    """The states just before and after a part of a path's length."""
+    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    first = int(np.searchsorted(at, along[0] * at[-1], side="right")) - 1
+    last = int(np.searchsorted(at, along[1] * at[-1]))
+    return max(first, 0), min(last, len(points) - 1)
+
+
+def _ellipse(corridor: Corridor, inner: FloatArray, cost: float) -> tuple[FloatArray, FloatArray]:
+    """Bounds of the ellipse whose points lie on some path not longer than a cost, between the ends
+    of a part (J. Gammell and others: Informed RRT*, 2014), inside the corridor's bounds."""
+    offset = (inner[-1] - inner[0])[:2]
+    straight = float(np.hypot(*offset))
+    across = math.sqrt(max(cost**2 - straight**2, 0.0)) / 2
+    direction = offset / straight if straight > 0 else np.array([1.0, 0.0])
+    half = np.sqrt((cost / 2 * direction) ** 2 + (across * direction[::-1]) ** 2)
+    middle = (inner[0] + inner[-1])[:2] / 2
+    low, high = corridor.bounds
+    return np.maximum(middle - half, low), np.minimum(middle + half, high)

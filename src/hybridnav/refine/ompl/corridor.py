@@ -1,0 +1,116 @@
+"""A corridor as the worker sees it: cells, bounds, and the checks of states and motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.refine.motions import MotionCheck
+from hybridnav.refine.ompl.clearance import Clearance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.refine.ompl.messages import Query, Setup
+
+Box = tuple[int, int, int, int]
+"""Rows from, to and columns from, to, the ends not in it."""
+
+
+def boxes_of(field_of: NDArray[np.int16 | np.int32]) -> LongArray:
+    """The smallest box of each field, int64 (n_fields, 4): rows from, to, columns from, to."""
+    n_fields = int(field_of.max(initial=-1)) + 1
+    boxes = np.zeros((n_fields, 4), dtype=np.int64)
+    boxes[:, 0], boxes[:, 2] = field_of.shape
+    rows, cols = np.nonzero(field_of >= 0)
+    fields = field_of[rows, cols]
+    np.minimum.at(boxes[:, 0], fields, rows)
+    np.maximum.at(boxes[:, 1], fields, rows + 1)
+    np.minimum.at(boxes[:, 2], fields, cols)
+    np.maximum.at(boxes[:, 3], fields, cols + 1)
+    return boxes
+
+
+class Base:
+    """What the worker makes of the map once.
+
+    Parameters
+    ----------
+    setup
+        What the worker was told.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        field_of = setup.field_of
+        self.boxes = np.empty((0, 4), np.int64) if field_of is None else boxes_of(field_of)
+        self.check = MotionCheck(
+            setup.grid,
+            footprint=setup.settings.footprint,
+            allow_unexplored=setup.allow_unexplored,
+        )
+        self.clearance: Clearance | None = None
+        if setup.settings.objective == "clearance":
+            self.clearance = Clearance(
+                setup.grid, setup.settings, allow_unexplored=setup.allow_unexplored
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Corridor:
+    """Where a query may search."""
+
+    grid: OccupancyGrid
+    inside: BoolArray | None
+    """bool (rows, cols); None for the whole map."""
+    box: Box
+    check: MotionCheck
+    allow_unexplored: bool
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest x and y, float64 (2,) each, metres, map frame."""
+        return bounds_of(self.grid, self.box)
+
+    @cached_property
+    def cells(self) -> LongArray:
+        """int64 (n, 2), its cells that may be entered."""
+        top, bottom, left, right = self.box
+        free = self.grid.enterable(allow_unexplored=self.allow_unexplored)[top:bottom, left:right]
+        if self.inside is not None:
+            free &= self.inside[top:bottom, left:right]
+        cells: LongArray = np.argwhere(free) + np.array([top, left])
+        return cells
+
+
+def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest x and y of a box of cells, float64 (2,) each."""
+    top, bottom, left, right = box
+    corners = np.array([[top, left], [top, right], [bottom, left], [bottom, right]])
+    points = grid.frame.points_of_grid(corners)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def corridor_of(base: Base, query: Query, fields: BoolArray | None) -> Corridor:
+    """The corridor of some fields; of all cells without fields."""
+    setup, grid, inside = base.setup, base.setup.grid, None
+    box: Box = (0, grid.shape[0], 0, grid.shape[1])
+    if fields is not None and setup.field_of is not None:
+        chosen = base.boxes[fields]
+        box = (
+            int(chosen[:, 0].min()),
+            int(chosen[:, 1].max()),
+            int(chosen[:, 2].min()),
+            int(chosen[:, 3].max()),
+        )
+        part = setup.field_of[box[0] : box[1], box[2] : box[3]]
+        inside = np.zeros(grid.shape, dtype=np.bool_)
+        # -1, no field, reads the last entry, which is False.
+        inside[box[0] : box[1], box[2] : box[3]] = np.append(fields, False)[part]
+    check = base.check.confined(inside=inside, closed=query.closed)
+    return Corridor(grid, inside, box, check, setup.allow_unexplored)

@@ -1,0 +1,79 @@
+"""Motions of a robot judged by shapely, state by state in fine steps, in the map frame."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from hybridnav.grid import CellClass
+
+if TYPE_CHECKING:
+    from hybridnav.grid import OccupancyGrid
+
+
+class ShapelyRobot:
+    """A robot and a map as shapely geometries: the outline, occupied ground, ground for the base.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    corners_m
+        Corners of the outline, robot frame; None for a disc on an inflated grid.
+    inside
+        Cells that the base may stand on, None for all.
+    """
+
+    def __init__(self, grid: OccupancyGrid, corners_m: Any, inside: Any = None) -> None:
+        stand = grid.enterable() if inside is None else grid.enterable() & inside
+        self.corners_m = corners_m
+        self.occupied = _ground(grid, grid.measured == CellClass.OCCUPIED)
+        self.stand = _ground(grid, stand)
+
+    def is_hit(self, poses: Any, *, grown_m: float) -> bool:
+        """Whether the robot, grown or shrunk by a little, fails in any of some poses.
+
+        Parameters
+        ----------
+        poses
+            `(x, y, yaw)`, (n, 3).
+        grown_m
+            Below 0 only what goes deeper than that counts, above 0 what comes as near as that too.
+        """
+        bases = shapely.points(poses[:, :2])
+        ground = self.stand.buffer(max(-grown_m, 0), join_style="mitre")
+        reach = bases if grown_m <= 0 else shapely.buffer(bases, grown_m)
+        shapely.prepare(ground)
+        if not shapely.covers(ground, reach).all():
+            return True
+        if self.corners_m is None:
+            return False
+        bodies = shapely.buffer(self._outlines(poses), grown_m, join_style="mitre")
+        shapely.prepare(self.occupied)
+        return bool(shapely.intersects(self.occupied, bodies).any())
+
+    def _outlines(self, poses: Any) -> Any:
+        cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+        x, y = np.transpose(self.corners_m)
+        xs = poses[:, 0, None] + cosine * x - sine * y
+        ys = poses[:, 1, None] + sine * x + cosine * y
+        return shapely.polygons(np.stack([xs, ys], axis=-1))
+
+
+def turning_poses(start: Any, goal: Any, n: int) -> Any:
+    """Poses of an even motion that turns the short way, (n, 3)."""
+    share = np.linspace(0, 1, n)[:, None]
+    way = np.subtract(goal, start)
+    way[2] = math.remainder(way[2], math.tau)
+    return np.asarray(start) + share * way
+
+
+def _ground(grid: OccupancyGrid, cells: Any) -> Any:
+    low = np.argwhere(cells)
+    around = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
+    corners = grid.frame.points_of_grid(low[:, None] + around)
+    # Rounding must not leave gaps between neighbours.
+    return shapely.union_all(shapely.polygons(corners), grid_size=1e-9)
