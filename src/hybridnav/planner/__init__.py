@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.planner.planner import HybridPlanner
+from hybridnav.planner.tour import Tour, plan_tour
 
 if TYPE_CHECKING:
     from hybridnav.planner.blocked import Blocked
 
-__all__ = ["Blocked", "HybridPlanner"]
+__all__ = ["Blocked", "HybridPlanner", "Tour", "plan_tour"]
 
 
 def __getattr__(name: str) -> Any:
