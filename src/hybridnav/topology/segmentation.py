@@ -1,0 +1,92 @@
+"""Rooms that the map itself shows: segmentation of free space at its narrow passages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import NO_ROOM, RoomLabels
+from hybridnav.grid.rooms import MAX_ROOMS
+from hybridnav.topology.merging import Pieces, grown
+from hybridnav.topology.pieces import contracted_pieces, wall_line_pieces, watershed_pieces
+
+if TYPE_CHECKING:
+    from hybridnav._typing import IntArray
+    from hybridnav.grid import OccupancyGrid
+
+Segmentation = Literal["walls", "watershed", "contraction"]
+
+_PIECES = {
+    "walls": wall_line_pieces,
+    "watershed": watershed_pieces,
+    "contraction": contracted_pieces,
+}
+_SOLIDITY = 0.8
+_OPEN = 0.6
+_WALL_REACH_M = 0.25
+"""How far rooms reach into walls: so far robots of any radius see them change at doors."""
+
+
+def find_rooms(
+    grid: OccupancyGrid, *, method: Segmentation = "walls", least_area_m2: float = 2.0
+) -> RoomLabels:
+    """Find the rooms of a map.
+
+    Parameters
+    ----------
+    grid
+        The map. Its cells count as they were measured: the robot's radius changes no room.
+    method
+        Where free space is cut: `"walls"`, along the lines of walls that continue behind an
+        opening; `"watershed"`, along the watersheds of the distance transform; `"contraction"`,
+        where boundaries resist the contraction of a pyramid. The pieces are then merged in the
+        same way, where their union is nearly convex and hardly walled.
+    least_area_m2
+        Smaller pieces go to a neighbour, positive; what has none is no room.
+
+    Returns
+    -------
+    RoomLabels
+        Rooms `room-1`, `room-2`, ..., in reading order of their first cells: highest row first.
+
+    Raises
+    ------
+    InvalidValueError
+        When the method is not known, the area not positive, or there are too many rooms.
+    """
+    if method not in get_args(Segmentation):
+        raise InvalidValueError(
+            f"method must be one of {', '.join(get_args(Segmentation))}, got {method!r:.80}"
+        )
+    if not least_area_m2 > 0:
+        raise InvalidValueError(
+            f"least area must be a positive number of square metres, got {least_area_m2}"
+        )
+    pieces = Pieces(_PIECES[method](grid), grid.resolution_m)
+    pieces.merge_convex(least_solidity=_SOLIDITY, least_open=_OPEN)
+    pieces.merge_small(least_area_m2)
+    labels = _in_reading_order(pieces.label_of, least_area_m2 / grid.resolution_m**2)
+    n_rooms = int(labels.max(initial=NO_ROOM)) + 1
+    if n_rooms > MAX_ROOMS:
+        raise InvalidValueError(
+            f"the map falls into {n_rooms} rooms of {least_area_m2:g} square metres and more, "
+            f"at most {MAX_ROOMS} are kept: raise the least area"
+        )
+    names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
+    return RoomLabels(names, grown(labels, _WALL_REACH_M / grid.resolution_m))
+
+
+def _in_reading_order(label_of: IntArray, least_cells: float) -> IntArray:
+    """Labels of at least some cells, renumbered by their first cells from the top row down."""
+    areas = np.bincount(label_of[label_of >= 0])
+    found, first = np.unique(label_of[::-1], return_index=True)
+    kept = found >= 0
+    found, first = found[kept], first[kept]
+    large = areas[found] >= least_cells
+    order = found[large][np.argsort(first[large], kind="stable")]
+    new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
+    new[order] = np.arange(len(order))
+    renumbered: IntArray = new[label_of]
+    return renumbered
