@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 _LOOK_M = 1.5
 """How far before and behind a door the headings are taken that make a turn."""
 _TURN_RAD = math.radians(40.0)
+_SLIVER_M = 0.5
+_AT_ONCE_M = 0.1
 NOWHERE = "unnamed space"
 """What people are told of cells that lie in no room."""
 
@@ -129,17 +131,30 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
         Legs in the order walked, at least one.
     """
     lines = [f"start in {legs[0].room or NOWHERE}"]
+    carried_m = 0.0
     for leg, following in zip(legs, [*legs[1:], None], strict=True):
-        metres = f"{leg.length_m:.1f} m"
-        if leg.stop is not None:
+        length_m, carried_m = carried_m + leg.length_m, 0.0
+        metres = f"{length_m:.1f} m"
+        if leg.stop is not None and leg.stop == leg.room and length_m < _AT_ONCE_M:
+            lines[-1] += ", and you are there"
+        elif leg.stop is not None:
             place = f" in {leg.room}" if leg.room not in {None, leg.stop} else ""
             lines.append(f"{metres} to {leg.stop}{place}")
-        elif following is not None:
+        elif following is None:
+            lines.append(f"{metres} to the goal in {leg.room or NOWHERE}")
+        elif _is_sliver(following):
+            carried_m = length_m  # who passes a threshold without a name need not hear of it
+        else:
             into = f"into {following.room or NOWHERE}"
             if leg.door is not None:
                 into = f"to door {leg.door.number} ({leg.door.width_m:.1f} m wide), {into}"
-            turn = f", then {leg.turn}" if leg.turn else ""
+                if length_m < _AT_ONCE_M:
+                    metres, into = "at", into.removeprefix("to ")
+            turn = f", then {leg.turn}" if leg.turn and following.length_m >= _AT_ONCE_M else ""
             lines.append(f"{metres} {into}{turn}")
-        else:
-            lines.append(f"{metres} to the goal in {leg.room or NOWHERE}")
     return lines
+
+
+def _is_sliver(leg: Leg) -> bool:
+    """Whether a leg is too short to speak of: across a gap between two outlines."""
+    return leg.room is None and leg.stop is None and leg.length_m < _SLIVER_M
