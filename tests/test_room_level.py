@@ -175,7 +175,7 @@ def test_labels_that_cannot_be_are_refused(names, label, says):
 def test_labels_of_another_shape_are_refused():
     with pytest.raises(hn.InvalidValueError, match=r"\(3, 3\)"):
         hn.DualGraphPyramid.build(
-            occupancy_grid(TWO_ROOMS), rooms=RoomLabels(("a",), np.zeros((3, 3)))
+            occupancy_grid(TWO_ROOMS), rooms=RoomLabels(("a",), np.zeros((3, 3), dtype=np.int32))
         )
 
 
@@ -188,6 +188,6 @@ def test_labels_of_another_shape_are_refused():
     ],
 )
 def test_a_misspelt_name_suggests_the_nearest(given_name, says):
-    labels = RoomLabels(("kitchen", "lab"), np.zeros((2, 2)))
+    labels = RoomLabels(("kitchen", "lab"), np.zeros((2, 2), dtype=np.int32))
     with pytest.raises(hn.InvalidValueError, match=says):
         labels.index(given_name)

@@ -217,8 +217,7 @@ def _cells_in(shape: BaseGeometry, size: tuple[int, int]) -> tuple[tuple[slice, 
         np.arange(cols.start, cols.stop) + 0.5, np.arange(rows.start, rows.stop) + 0.5
     )
     shapely.prepare(shape)
-    inside: BoolArray = shapely.contains_xy(shape, x, y)
-    return (rows, cols), inside
+    return (rows, cols), np.asarray(shapely.contains_xy(shape, x, y), dtype=np.bool_)
 
 
 def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
@@ -232,8 +231,7 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     wanted = []
     for room, point in read.seeds.items():
         row, col = grid.frame.cell_of(*point)
-        inside = 0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]
-        if not inside:
+        if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
             raise RoomsError(
                 f"{read.of(room)}: the seed lies outside the map, which spans {_extent(grid)}"
             )

@@ -87,7 +87,8 @@ def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
     n_kinds = _N_CLASSES * (int(rooms.max()) + 2) + 1
     dtype = np.uint8 if n_kinds <= np.iinfo(np.uint8).max else np.uint16
     kinds = _N_CLASSES * (rooms + 1) + classes
-    return np.where(classes == 0, 0, kinds).astype(dtype)
+    found: KindArray = np.where(classes == 0, 0, kinds).astype(dtype)
+    return found
 
 
 @dataclass

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._typing import BoolArray, IntArray, LongArray
     from hybridnav.topology import Rooms
 
 
@@ -95,7 +95,7 @@ class RoomSearch:
         return found[np.lexsort((-rooms.level.areas[found], ~rooms.is_free[found]))]
 
 
-def _parts(arcs: LongArray, n_vertices: int) -> LongArray:
+def _parts(arcs: IntArray, n_vertices: int) -> LongArray:
     """The connected component of each vertex."""
     ones = np.ones(len(arcs), dtype=np.int8)
     graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))

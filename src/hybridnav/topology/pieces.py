@@ -146,8 +146,8 @@ def wall_line_pieces(grid: OccupancyGrid) -> IntArray:
     if abs(tilt_rad) < _LEAST_TILT_RAD:
         cut = _gaps(occupied, free, grid.resolution_m)
     else:
-        upright = [_turned(mask, tilt_rad) for mask in (occupied, free)]
-        cut = _turned_back(_gaps(*upright, grid.resolution_m), tilt_rad, free.shape)
+        upright = _turned(occupied, tilt_rad), _turned(free, tilt_rad)
+        cut = _turned_back(_gaps(*upright, grid.resolution_m), tilt_rad, grid.shape)
     labels, _ = ndimage.label(free & ~cut)
     areas_m2 = np.bincount(labels.ravel()) * grid.resolution_m**2
     kept = areas_m2 >= _LEAST_PIECE_M2
@@ -234,5 +234,5 @@ def _turned_back(mask: BoolArray, tilt_rad: float, shape: tuple[int, int]) -> Bo
         mask.astype(np.uint8), turn, offset, shape, order=0
     ).astype(np.bool_)
     # Turned lines of one cell have holes at their steps.
-    closed: BoolArray = ndimage.binary_dilation(found, np.ones((2, 2)))
+    closed: BoolArray = ndimage.binary_dilation(found, np.ones((2, 2), dtype=np.bool_))
     return closed

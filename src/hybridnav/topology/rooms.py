@@ -100,7 +100,7 @@ class Rooms:
         cells = np.bincount(
             self.label_of_vertex[named], self.level.areas[named], minlength=len(self.names)
         )
-        areas: FloatArray = cells * self.grid.resolution_m**2
+        areas: FloatArray = cells * np.float64(self.grid.resolution_m**2)
         return areas
 
     @cached_property

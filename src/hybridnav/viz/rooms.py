@@ -147,16 +147,21 @@ def _colours(label_of: IntArray, n_rooms: int) -> ByteArray:
 def _draw_doors(canvas: Canvas, rooms: Rooms) -> Line2D:
     """Draw doors as dots; gives one for the legend."""
     at = [door.position for door in rooms.doors if door.width_m >= _LEAST_DOOR_M]
-    look = {
-        "color": style.PATH,
-        "marker": "o",
-        "markersize": 2.4 * canvas.sizes.line,
-        "linestyle": "none",
-    }
-    dots = Line2D([x for x, _ in at], [y for _, y in at], zorder=6, **look)
+    dots, sample = (
+        Line2D(
+            [x for x, _ in points],
+            [y for _, y in points],
+            color=style.PATH,
+            marker="o",
+            markersize=2.4 * canvas.sizes.line,
+            linestyle="none",
+            zorder=6,
+        )
+        for points in (at, [])
+    )
     dots.set_gid("doors")
     canvas.ax.add_line(dots)
-    return Line2D([], [], **look)
+    return sample
 
 
 def _write_names(canvas: Canvas, labels: RoomLabels, grid: OccupancyGrid) -> None:
