@@ -70,8 +70,8 @@ class Floor:
     def components(self) -> IntArray:
         """Connected parts of the free cells, 0 elsewhere: what legal moves join, for a diagonal
         needs both cells beside it."""
-        labels: IntArray = ndimage.label(self.grid.classes == hn.CellClass.FREE)[0]
-        return labels
+        labels, _ = ndimage.label(self.grid.classes == hn.CellClass.FREE)
+        return labels.astype(np.int32)
 
     @cached_property
     def reachable(self) -> BoolArray:

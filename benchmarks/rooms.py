@@ -24,7 +24,12 @@ from benchmarks._rooms_truth import FLOORS, RADIUS_M, Floor, TrueDoor
 from hybridnav.metrics import compare_rooms
 from hybridnav.route import MaxDistanceSearch, RoomSearch
 from hybridnav.topology.merging import Pieces
-from hybridnav.topology.pieces import contracted_pieces, wall_line_pieces, watershed_pieces
+from hybridnav.topology.pieces import (
+    contracted_pieces,
+    wall_line_pieces,
+    walled_pieces,
+    watershed_pieces,
+)
 from hybridnav.topology.segmentation import Segmentation
 from hybridnav.viz import plot_rooms
 
@@ -35,7 +40,8 @@ if TYPE_CHECKING:
 
 METHODS: tuple[Segmentation, ...] = get_args(Segmentation)
 PIECES = {
-    "walls": wall_line_pieces,
+    "wall lines alone": wall_line_pieces,
+    "walls": walled_pieces,
     "watershed": watershed_pieces,
     "contraction": contracted_pieces,
 }
@@ -80,27 +86,28 @@ def segmentation_table(floors: list[Floor]) -> dict[tuple[str, str], hn.RoomLabe
     )
     print("| floor | way | MCC | rooms found / true | precision | recall | doors | offset, m | s |")
     print("|---|---|---|---|---|---|---|---|---|")
-    found = {}
-    for floor, method in itertools.product(floors, METHODS):
-        began = time.perf_counter()
-        rooms = found[floor.name, method] = hn.find_rooms(floor.grid, method=method)
-        seconds = time.perf_counter() - began
-        for way, labels, took in (
-            (f"{method}, pieces only", only_pieces(floor, method), ""),
-            (method, rooms, f"{seconds:.1f}"),
-        ):
-            score = agreement(floor, labels)
-            offsets = doors_met(floor, floor.topology(labels))
-            total = len(floor.reachable_doors)
-            print(
-                f"| {floor.name} | {way} | {score.mcc:.3f} "
-                f"| {score.n_found} / {len(score.true_labels)} "
-                f"| {score.precision.mean():.2f} | {score.recall.mean():.2f} "
-                f"| {len(offsets)} / {total}, {len(offsets) / total:.0%} "
-                f"| {np.mean(offsets) if offsets else np.nan:.2f} | {took} |",
-                flush=True,
-            )
+    found: dict[tuple[str, str], hn.RoomLabels] = {}
+    for floor in floors:
+        for way in PIECES:
+            _print_row(floor, f"{way}, not merged", only_pieces(floor, way), "")
+        for method in METHODS:
+            began = time.perf_counter()
+            rooms = found[floor.name, method] = hn.find_rooms(floor.grid, method=method)
+            _print_row(floor, method, rooms, f"{time.perf_counter() - began:.1f}")
     return found
+
+
+def _print_row(floor: Floor, way: str, found: hn.RoomLabels, seconds: str) -> None:
+    score = agreement(floor, found)
+    offsets = doors_met(floor, floor.topology(found))
+    total = len(floor.reachable_doors)
+    print(
+        f"| {floor.name} | {way} | {score.mcc:.3f} | {score.n_found} / {len(score.true_labels)} "
+        f"| {score.precision.mean():.2f} | {score.recall.mean():.2f} "
+        f"| {len(offsets)} / {total}, {len(offsets) / total:.0%} "
+        f"| {np.mean(offsets) if offsets else np.nan:.2f} | {seconds} |",
+        flush=True,
+    )
 
 
 def room_tables(floors: list[Floor], found: dict[tuple[str, str], hn.RoomLabels]) -> None:

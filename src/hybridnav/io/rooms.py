@@ -182,6 +182,8 @@ def _shape(rings: list[FloatArray], at: str) -> BaseGeometry:
 def _painted(read: _Read, grid: OccupancyGrid) -> IntArray:
     """The label of each cell by the outline that holds its centre."""
     label_of = np.full(grid.shape, NO_ROOM, dtype=np.int32)
+    if not read.outlines:
+        return label_of
     rooms = list(read.outlines)
     shapes = [read.outlines[room] for room in rooms]
     for room, shape in zip(rooms, shapes, strict=True):

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 _MOST_CORNERS = 2500
 """Corners in a file at most, which keeps it inside the limits of reading."""
-_FIRST_TOLERANCE_CELLS = 3.0
+_TOLERANCE_M = 0.15
 _DECIMALS = 3
 
 
 def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     """Write rooms as a file that `load_rooms` reads and a person can edit.
 
-    Outlines are simplified together, so that neighbours keep their common border: by three
-    cells, more where the file would else have more than 2500 corners.
+    Outlines are simplified together, so that neighbours keep their common border: by 15
+    cm, more where the file would else have more than 2500 corners.
 
     Parameters
     ----------
@@ -52,7 +52,9 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
         "# Rename rooms, move corners, or give a room `seed: [x, y]` in place of an outline.",
         "rooms:" if shapes else "rooms: []",
     ]
-    for name, shape in zip(rooms.names, _simplified(shapes), strict=True):
+    for name, shape in zip(
+        rooms.names, _simplified(shapes, _TOLERANCE_M / grid.resolution_m), strict=True
+    ):
         lines.append(f"- {yaml.safe_dump({'name': name}, allow_unicode=True, width=999).strip()}")
         rings = [_ring(ring, grid) for ring in _rings(shape)]
         if len(rings) == 1:
@@ -81,9 +83,8 @@ def _outline(mask: BoolArray) -> BaseGeometry:
     return shapely.union_all(shapely.box(starts, rows, ends, rows + 1))
 
 
-def _simplified(shapes: list[BaseGeometry]) -> list[BaseGeometry]:
-    """Outlines with few corners, common borders kept."""
-    tolerance = _FIRST_TOLERANCE_CELLS
+def _simplified(shapes: list[BaseGeometry], tolerance: float) -> list[BaseGeometry]:
+    """Outlines with few corners, common borders kept; the tolerance is in cells."""
     while True:
         simple = list(shapely.coverage_simplify(shapes, tolerance))
         # What is so small that it vanishes keeps its corners.

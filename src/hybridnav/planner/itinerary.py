@@ -135,7 +135,7 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
     for leg, following in zip(legs, [*legs[1:], None], strict=True):
         length_m, carried_m = carried_m + leg.length_m, 0.0
         metres = f"{length_m:.1f} m"
-        if leg.stop is not None and leg.stop == leg.room and length_m < _AT_ONCE_M:
+        if leg.stop is not None and leg.stop == leg.room and length_m < _SLIVER_M:
             lines[-1] += ", and you are there"
         elif leg.stop is not None:
             place = f" in {leg.room}" if leg.room not in {None, leg.stop} else ""
@@ -150,7 +150,7 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
                 into = f"to door {leg.door.number} ({leg.door.width_m:.1f} m wide), {into}"
                 if length_m < _AT_ONCE_M:
                     metres, into = "at", into.removeprefix("to ")
-            turn = f", then {leg.turn}" if leg.turn and following.length_m >= _AT_ONCE_M else ""
+            turn = f", then {leg.turn}" if leg.turn and following.length_m >= _SLIVER_M else ""
             lines.append(f"{metres} {into}{turn}")
     return lines
 

@@ -79,16 +79,16 @@ def decimate(
 
 _N_CLASSES = 2
 """Classes that vertices have: free and unexplored."""
+_MOST_KINDS = 256
+"""Kinds that one byte tells apart."""
 
 
 def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
     """Kind of each cell, one number for its class and its room: 0 occupied, `CellClass` outside
     rooms, and so on, two for each room."""
     n_kinds = _N_CLASSES * (int(rooms.max()) + 2) + 1
-    dtype = np.uint8 if n_kinds <= np.iinfo(np.uint8).max else np.uint16
-    kinds = _N_CLASSES * (rooms + 1) + classes
-    found: KindArray = np.where(classes == 0, 0, kinds).astype(dtype)
-    return found
+    kinds = np.where(classes == 0, 0, _N_CLASSES * (rooms + 1) + classes)
+    return kinds.astype(np.uint8) if n_kinds <= _MOST_KINDS else kinds.astype(np.uint16)
 
 
 @dataclass

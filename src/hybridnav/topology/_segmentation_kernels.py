@@ -16,11 +16,12 @@ def find(root, i):
 
 
 @njit(cache=True)
-def flood_basins(clearance, order, cols, ratio):
+def flood_basins(clearance, order, cols, ratio, broad):
     """Basin of each flat cell, -1 outside `order`, by a flood from the clearest cells down.
 
     `order` holds flat cells by falling clearance, none on the rim of the grid. Where two basins
-    meet they merge, unless the clearance there is below `ratio` times that of the lower peak.
+    meet they merge, unless the clearance there is below `ratio` times that of the lower peak and
+    below `broad`.
     """
     basin = np.full(clearance.size, np.int32(-1), np.int32)
     root = np.empty(order.size, np.int64)
@@ -37,7 +38,7 @@ def flood_basins(clearance, order, cols, ratio):
             other = find(root, np.int64(basin[cell + step]))
             if mine < 0:
                 mine = other
-            elif other != mine and here >= ratio * min(peak[mine], peak[other]):
+            elif other != mine and here >= min(broad, ratio * min(peak[mine], peak[other])):
                 if peak[other] > peak[mine]:
                     mine, other = other, mine
                 root[other] = mine

@@ -22,6 +22,11 @@ _PERSISTENCE = 0.8
 _FINE_M = 1.0
 """U_d of the places that the steered contraction begins with."""
 
+_PINCH = 0.4
+_PINCH_M = 0.65
+"""Besides wall lines only a passage with less clearance than this, and than this share of that on
+both sides, parts two pieces: a door in a wall that is no line."""
+
 _GAP_M = 6.0
 _DOOR_M = 1.5
 _WINDOW_M = 5.0
@@ -53,6 +58,12 @@ def watershed_pieces(grid: OccupancyGrid) -> IntArray:
     IntArray
         int32 (rows, cols), a piece for each free cell, -1 elsewhere.
     """
+    return _basins(grid, ratio=_PERSISTENCE, broad_m=math.inf)
+
+
+def _basins(grid: OccupancyGrid, *, ratio: float, broad_m: float) -> IntArray:
+    """Basins of the clearance; they merge where it is not below `ratio` of that of the lower peak,
+    or not below `broad_m`."""
     free = grid.measured == CellClass.FREE
     clearance = np.pad(clearance_cells(grid.measured == CellClass.OCCUPIED), 1)
     # Without an occupied cell all is one basin.
@@ -60,7 +71,8 @@ def watershed_pieces(grid: OccupancyGrid) -> IntArray:
     inside = np.flatnonzero(np.pad(free, 1))
     flat = clearance.ravel()
     order = inside[np.argsort(-flat[inside], kind="stable")]
-    basins = _segmentation_kernels.flood_basins(flat, order, clearance.shape[1], _PERSISTENCE)
+    broad = broad_m / grid.resolution_m
+    basins = _segmentation_kernels.flood_basins(flat, order, clearance.shape[1], ratio, broad)
     pieces: IntArray = basins.reshape(clearance.shape)[1:-1, 1:-1].copy()
     return pieces
 
@@ -118,6 +130,28 @@ def contracted_pieces(grid: OccupancyGrid, *, seed: int = 0) -> IntArray:
     final[~is_free] = -1
     pieces: IntArray = np.append(final, -1)[level.field_of].astype(np.int32)
     return pieces
+
+
+def walled_pieces(grid: OccupancyGrid) -> IntArray:
+    """Cut free space along wall lines, and at pinched passages between them.
+
+    Parameters
+    ----------
+    grid
+        The map; cells count as they were measured, whatever the robot's radius.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+    """
+    lines = wall_line_pieces(grid).astype(np.int64)
+    basins = _basins(grid, ratio=_PINCH, broad_m=_PINCH_M)
+    both = np.where((lines >= 0) & (basins >= 0), lines * (int(basins.max()) + 1) + basins, -1)
+    found, dense = np.unique(both, return_inverse=True)
+    none = int(np.searchsorted(found, 0))
+    pieces: IntArray = (dense.reshape(both.shape) - none).astype(np.int32)
+    return np.maximum(pieces, -1)
 
 
 def wall_line_pieces(grid: OccupancyGrid) -> IntArray:

@@ -10,7 +10,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, RoomLabels
 from hybridnav.grid.rooms import MAX_ROOMS
 from hybridnav.topology.merging import Pieces, grown
-from hybridnav.topology.pieces import contracted_pieces, wall_line_pieces, watershed_pieces
+from hybridnav.topology.pieces import contracted_pieces, walled_pieces, watershed_pieces
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray
@@ -19,12 +19,14 @@ if TYPE_CHECKING:
 Segmentation = Literal["walls", "watershed", "contraction"]
 
 _PIECES = {
-    "walls": wall_line_pieces,
+    "walls": walled_pieces,
     "watershed": watershed_pieces,
     "contraction": contracted_pieces,
 }
+_SPLINTER_M2 = 1.0
+"""Smaller pieces are merged first: they would be convex with anything."""
 _SOLIDITY = 0.8
-_OPEN = 0.6
+_OPEN = 0.65
 _WALL_REACH_M = 0.25
 """How far rooms reach into walls: so far robots of any radius see them change at doors."""
 
@@ -40,9 +42,9 @@ def find_rooms(
         The map. Its cells count as they were measured: the robot's radius changes no room.
     method
         Where free space is cut: `"walls"`, along the lines of walls that continue behind an
-        opening; `"watershed"`, along the watersheds of the distance transform; `"contraction"`,
-        where boundaries resist the contraction of a pyramid. The pieces are then merged in the
-        same way, where their union is nearly convex and hardly walled.
+        opening, and at pinched passages; `"watershed"`, along the watersheds of the distance
+        transform; `"contraction"`, where boundaries resist the contraction of a pyramid. The pieces
+        are then merged in the same way, where their union is nearly convex and hardly walled.
     least_area_m2
         Smaller pieces go to a neighbour, positive; what has none is no room.
 
@@ -65,6 +67,7 @@ def find_rooms(
             f"least area must be a positive number of square metres, got {least_area_m2}"
         )
     pieces = Pieces(_PIECES[method](grid), grid.resolution_m)
+    pieces.merge_small(min(least_area_m2, _SPLINTER_M2))
     pieces.merge_convex(least_solidity=_SOLIDITY, least_open=_OPEN)
     pieces.merge_small(least_area_m2)
     labels = _in_reading_order(pieces.label_of, least_area_m2 / grid.resolution_m**2)
