@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 
 import hybridnav as hn
 from benchmarks._rooms_truth import FLOORS, RADIUS_M, Floor, TrueDoor
+from hybridnav.grid.rooms import Segmentation
 from hybridnav.metrics import compare_rooms
 from hybridnav.route import MaxDistanceSearch, RoomSearch
 from hybridnav.topology.merging import Pieces
@@ -30,7 +31,6 @@ from hybridnav.topology.pieces import (
     walled_pieces,
     watershed_pieces,
 )
-from hybridnav.topology.segmentation import Segmentation
 from hybridnav.viz import plot_rooms
 
 if TYPE_CHECKING:

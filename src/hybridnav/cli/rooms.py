@@ -12,7 +12,7 @@ from hybridnav.cli.common import answer, check_picture, read_settings, stage, ti
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import MapArgument, PlotOption, PresetOption, RadiusOption, RoomsOption
 from hybridnav.config.yaml_file import printable
-from hybridnav.topology.segmentation import Segmentation
+from hybridnav.grid.rooms import Segmentation
 
 OutOption = Annotated[
     Path | None,

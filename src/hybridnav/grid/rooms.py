@@ -6,7 +6,7 @@ import difflib
 import math
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -24,6 +24,9 @@ MAX_NAME = 80
 
 NO_ROOM = -1
 """Label of cells without a room."""
+
+Segmentation = Literal["walls", "watershed", "contraction"]
+"""How rooms may be found; see `hybridnav.topology.find_rooms`."""
 
 Point = tuple[float, float]
 

@@ -8,22 +8,21 @@ from hybridnav.topology.map import Component, Obstacle, TopologicalMap
 from hybridnav.topology.rooms import Door, Rooms
 
 if TYPE_CHECKING:
-    from hybridnav.topology.segmentation import Segmentation, find_rooms
+    from hybridnav.topology.segmentation import find_rooms
 
 __all__ = [
     "Component",
     "Door",
     "Obstacle",
     "Rooms",
-    "Segmentation",
     "TopologicalMap",
     "find_rooms",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in {"Segmentation", "find_rooms"}:
+    if name != "find_rooms":
         raise AttributeError(f"module 'hybridnav.topology' has no attribute {name!r}")
-    from hybridnav.topology import segmentation  # noqa: PLC0415 - loads scipy
+    from hybridnav.topology.segmentation import find_rooms  # noqa: PLC0415 - loads scipy
 
-    return getattr(segmentation, name)
+    return find_rooms

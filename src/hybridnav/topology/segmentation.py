@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, RoomLabels
-from hybridnav.grid.rooms import MAX_ROOMS
+from hybridnav.grid.rooms import MAX_ROOMS, Segmentation
 from hybridnav.topology.merging import Pieces, grown
 from hybridnav.topology.pieces import contracted_pieces, walled_pieces, watershed_pieces
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray
     from hybridnav.grid import OccupancyGrid
-
-Segmentation = Literal["walls", "watershed", "contraction"]
 
 _PIECES = {
     "walls": walled_pieces,
