@@ -1,6 +1,8 @@
 """Words of arcs: every ordinary face reads the identity, every hole one generator, and a route
 that is pushed about without crossing a hole keeps its word."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -23,7 +25,7 @@ def test_words_are_a_free_group(a, b, c):
     assert product(product(a, b), c) == product(a, product(b, c)) == product(a, b, c)
     assert product(a, inverse(a)) == ()
     assert inverse(product(a, b)) == product(inverse(b), inverse(a))
-    assert all(x != -y for x, y in zip(a, a[1:], strict=False))
+    assert all(x != -y for x, y in itertools.pairwise(a))
 
 
 def cyclically_reduced(word):
@@ -112,7 +114,7 @@ def test_two_sides_of_a_hole_are_two_classes_unless_it_is_too_small(least, class
 
     start, goal = topology.place_at((1, 1)), topology.place_at((6, 8))
     for edges in nx.all_simple_edge_paths(graph, start, goal):
-        arcs = [key for _, _, key in edges]
+        arcs = [edge[-1] for edge in edges]
         words.add(homotopy.word_of_route(start, arcs, topology.arcs))
     assert len(words) == classes
 

@@ -25,7 +25,14 @@ if TYPE_CHECKING:
     )
     from hybridnav.grid import CellClass, Frame, OccupancyGrid, RoomLabels
     from hybridnav.io import load_map, load_rooms, save_rooms
-    from hybridnav.planner import Blocked, HybridPlanner, Tour, plan_tour
+    from hybridnav.planner import (
+        Alternative,
+        Blocked,
+        HybridPlanner,
+        Tour,
+        plan_alternatives,
+        plan_tour,
+    )
     from hybridnav.pyramid import DualGraphPyramid, Level
     from hybridnav.result import Path, PlanBatch, PlanResult, PlanStatus, Route
     from hybridnav.topology import Door, Rooms, TopologicalMap, find_rooms
@@ -33,6 +40,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME_OF = {
+    "Alternative": "planner",
     "Blocked": "planner",
     "CellClass": "grid",
     "Door": "topology",
@@ -65,12 +73,14 @@ _HOME_OF = {
     "load_map": "io",
     "load_preset": "config",
     "load_rooms": "io",
+    "plan_alternatives": "planner",
     "plan_tour": "planner",
     "preset_names": "config",
     "save_rooms": "io",
 }
 
 __all__ = [
+    "Alternative",
     "Blocked",
     "CellClass",
     "Door",
@@ -103,6 +113,7 @@ __all__ = [
     "load_map",
     "load_preset",
     "load_rooms",
+    "plan_alternatives",
     "plan_tour",
     "preset_names",
     "save_rooms",

@@ -75,6 +75,25 @@ AtOption = Annotated[
         "--at", metavar="WHERE", help="Where in a room: anywhere (the nearest cell), or its point."
     ),
 ]
+AlternativesOption = Annotated[
+    int,
+    typer.Option(
+        "--alternatives",
+        metavar="N",
+        min=1,
+        max=20,
+        help="Up to N routes by other doors or on other sides of obstacles.",
+    ),
+]
+LeastHoleOption = Annotated[
+    float,
+    typer.Option(
+        "--least-hole",
+        metavar="A",
+        min=0,
+        help="Square metres of an obstacle whose two sides make two routes.",
+    ),
+]
 CompareOption = Annotated[
     bool, typer.Option("--compare", help="Also plan on the whole grid, and tell the loss.")
 ]
@@ -89,6 +108,8 @@ def plan(
     via: ViaOption = None,
     at: AtOption = "anywhere",
     rooms_file: RoomsOption = None,
+    alternatives: AlternativesOption = 1,
+    least_hole_m2: LeastHoleOption = 1.0,
     preset: PresetOption = "balanced",
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
@@ -104,11 +125,28 @@ def plan(
     check_picture(plot)
     settings = read_settings(preset, overrides, robot_radius_m, seed)
     ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
-    if via or rooms_file is not None or any(isinstance(end, str) for end in ends):
+    if via and alternatives > 1:
+        raise UsageError("--alternatives does not go with --via")
+    if (
+        via
+        or alternatives > 1
+        or rooms_file is not None
+        or any(isinstance(end, str) for end in ends)
+    ):
         if compare:
             raise UsageError("--compare goes with --start and --goal alone")
         stops = [ends[0], *map(parsed_stop, via or ()), ends[1]]
-        errand = Errand(map_file, rooms_file, stops, _checked_at(at), settings, plot, as_json)
+        errand = Errand(
+            map_file,
+            rooms_file,
+            stops,
+            _checked_at(at),
+            settings,
+            plot,
+            as_json,
+            alternatives,
+            least_hole_m2,
+        )
         if not run_errand(errand):
             raise typer.Exit(EXIT_NOT_SOLVED)
         return

@@ -13,6 +13,7 @@ import hybridnav as hn
 from hybridnav.cli.common import answer, complain, grow_topology, stage, timings
 from hybridnav.cli.errors import UsageError
 from hybridnav.config.yaml_file import printable
+from hybridnav.planner.itinerary import NOWHERE, Guide
 
 if TYPE_CHECKING:
     from hybridnav.planner.named import At
@@ -31,6 +32,8 @@ class Errand:
     settings: hn.Preset
     plot: Path | None
     as_json: bool
+    alternatives: int = 1
+    least_hole_m2: float = 1.0
 
 
 def run_errand(errand: Errand) -> bool:
@@ -47,7 +50,11 @@ def run_errand(errand: Errand) -> bool:
         planner = hn.HybridPlanner(topology, preset=errand.settings)
     with stage("planning", seconds, "plan"):
         tour = hn.plan_tour(planner, errand.stops, at=errand.at)
-    figures = _figures(errand, tour) | {"seconds": seconds}
+    figures = _figures(errand, tour)
+    if errand.alternatives > 1:
+        with stage("finding alternatives", seconds, "alternatives"):
+            figures["alternatives"] = _alternatives(errand, planner)
+    figures["seconds"] = seconds
     if errand.as_json:
         answer(json.dumps(figures, allow_nan=False) + "\n")
     else:
@@ -101,6 +108,35 @@ def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
     }
 
 
+def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> list[dict[str, Any]]:
+    """Routes of different classes between the two stops, with the rooms and doors they pass."""
+    guide = Guide(planner.topology.rooms)
+    found = hn.plan_alternatives(
+        planner,
+        errand.stops[0],
+        errand.stops[-1],
+        errand.alternatives,
+        least_hole_m2=errand.least_hole_m2,
+        at=errand.at,
+    )
+    routes = []
+    for alternative in found:
+        legs = guide.legs(alternative.path)
+        passed = [
+            f"{leg.room or NOWHERE}" + (f" (door {leg.door.number})" if leg.door else "")
+            for leg in legs
+        ]
+        routes.append(
+            {
+                "length_m": alternative.path.length_m,
+                "word": list(alternative.word),
+                "rooms": passed,
+                "points_m": np.round(alternative.path.points, 6).tolist(),
+            }
+        )
+    return routes
+
+
 def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
     radius = f"robot radius {grid.robot_radius_m:g} m"
     lines = [
@@ -111,5 +147,9 @@ def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
         lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
     for number, line in enumerate(figures["words"]):
         lines.append(f"{'' if number else 'way':<10} {line}")
+    for number, other in enumerate(figures.get("alternatives", ()), start=1):
+        word = " ".join(f"{letter:+d}" for letter in other["word"]) or "-"
+        rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
+        lines.append(f"route {number:<4} {other['length_m']:.2f} m, class {word}{rooms}")
     lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"

@@ -92,7 +92,7 @@ class HomotopyClasses:
         self.enterable: BoolArray = level.classes == CellClass.FREE
         if allow_unexplored:
             self.enterable = np.ones_like(self.enterable)
-        kept = self.enterable[level.arcs].all(axis=1)
+        kept: BoolArray = np.asarray(self.enterable[level.arcs].all(axis=1))
         self.phi = _phi_without(level.sigma, kept)
         self.face_of = _orbits(self.phi)
         """int64 (2 n_arcs,), the face on the right of each dart that is left, -1 for others."""
