@@ -61,9 +61,10 @@ class Floor:
                 )
             )
         neighbours: set[frozenset[str]] = set()
-        if (folder / "connectivity.yaml").is_file():
-            listed = yaml.safe_load((folder / "connectivity.yaml").read_text(encoding="utf-8"))
-            neighbours = {frozenset((a, b)) for a, others in listed.items() for b in others}
+        for place in (folder, folder.with_name(f"sim_{folder.name}")):  # one of them has it
+            if (place / "connectivity.yaml").is_file():
+                listed = yaml.safe_load((place / "connectivity.yaml").read_text(encoding="utf-8"))
+                neighbours |= {frozenset((a, b)) for a, others in listed.items() for b in others}
         return cls(folder.name, grid, rooms, doors, neighbours)
 
     @cached_property
