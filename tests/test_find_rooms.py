@@ -107,7 +107,7 @@ def test_pieces_of_one_rectangle_merge_and_an_l_stays_apart():
     labels = np.full((20, 30), -1, dtype=np.int32)
     labels[0:10, 0:10], labels[0:10, 10:20], labels[10:20, 10:14] = 0, 1, 2
     pieces = Pieces(labels, 1.0)
-    pieces.merge_convex(least_solidity=0.9, least_open=0.5)
+    pieces.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
     merged = pieces.label_of
     assert merged[5, 5] == merged[5, 15] != merged[15, 12]
     pieces.merge_small(50.0)
@@ -119,7 +119,7 @@ def test_a_wall_between_two_pieces_keeps_them_apart():
     labels[:, :20], labels[:, 21:] = 0, 1
     labels[8:10, 20] = 0
     pieces = Pieces(labels, 0.1)
-    pieces.merge_convex(least_solidity=0.9, least_open=0.5)
+    pieces.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
     assert pieces.label_of.max() == 1
 
 

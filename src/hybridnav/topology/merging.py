@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 _REACH_M = 0.25
 """How far pieces reach into what is not free: walls between two pieces are about half as thick."""
+_RUNS_ON = 0.9
+"""Share of their breadth that the border of two parts of one corridor has at least."""
 
 
 class Pieces:
@@ -35,11 +37,13 @@ class Pieces:
         self._label_of[self._label_of < 0] = -1
         self._n = len(found) - first
         self._cell_m2 = resolution_m**2
-        reaching = grown(self._label_of, _REACH_M / resolution_m)
+        self._reach = _REACH_M / resolution_m
+        reaching = grown(self._label_of, self._reach)
         self._areas = np.bincount(reaching[reaching >= 0], minlength=self._n).astype(np.float64)
         self._parent = list(range(self._n))
         self._version = [0] * self._n
         self._hulls = _hulls(reaching, self._n)
+        self._breadths = [self._breadth(piece) for piece in range(self._n)]
         self._borders: list[dict[int, tuple[int, int]]] = [{} for _ in range(self._n)]
         opened = _common_sides(self._label_of)
         for (u, v), length in _common_sides(reaching).items():
@@ -53,7 +57,9 @@ class Pieces:
         labels: IntArray = (dense.ravel()[self._label_of] - 1).astype(np.int32)
         return labels
 
-    def merge_convex(self, *, least_solidity: float, least_open: float) -> None:
+    def merge_convex(
+        self, *, least_solidity: float, least_open: float, least_straight: float
+    ) -> None:
         """Merge neighbours whose border is mostly open and whose union is nearly convex.
 
         Pairs with the greatest solidity (area by area of the convex hull) first.
@@ -64,16 +70,19 @@ class Pieces:
             In (0, 1].
         least_open
             Share of the common border, walls and all, that must be open, in (0, 1].
+        least_straight
+            Solidity that is enough where the border is about as long as both pieces are broad: two
+            parts of one corridor, whose niches no convex hull forgives.
         """
         heap: list[tuple[float, int, int, int, int]] = []
 
         def offer(u: int, v: int) -> None:
             opened, length = self._borders[u][v]
-            if opened == 0 or opened < least_open * length:
+            if opened < max(1.0, least_open * length):
                 return
-            _, hull_area = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
-            solidity = (self._areas[u] + self._areas[v]) / hull_area
-            if solidity >= least_solidity:
+            runs_on = opened >= _RUNS_ON * max(self._breadths[u], self._breadths[v])
+            solidity = self._solidity(u, v)
+            if solidity >= (least_straight if runs_on else least_solidity):
                 heapq.heappush(heap, (-solidity, u, v, self._version[u], self._version[v]))
 
         for u in range(self._n):
@@ -107,6 +116,11 @@ class Pieces:
             self._merge(opened, piece)
             heapq.heappush(heap, (self._areas[opened], opened))
 
+    def _solidity(self, u: int, v: int) -> float:
+        """Area of two pieces by that of the convex hull of both."""
+        _, hull_area = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
+        return float((self._areas[u] + self._areas[v]) / hull_area)
+
     def _merge(self, u: int, v: int) -> None:
         """Let u take v."""
         self._parent[v] = u
@@ -114,6 +128,7 @@ class Pieces:
         self._version[v] = -1
         self._areas[u] += self._areas[v]
         self._hulls[u], _ = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
+        self._breadths[u] = self._breadth(u)
         del self._borders[u][v]
         for other, (opened, length) in self._borders[v].items():
             if other == u:
@@ -123,6 +138,13 @@ class Pieces:
             border = (with_u[0] + opened, with_u[1] + length)
             self._borders[u][other] = self._borders[other][u] = border
         self._borders[v] = {}
+
+    def _breadth(self, piece: int) -> float:
+        """How broad a piece is on the whole: its area by its length, in cells, without its reach
+        into the walls on both sides."""
+        corners = self._hulls[piece]
+        length = np.hypot(*(corners[:, None] - corners[None]).T).max()
+        return float(self._areas[piece] / length) - 2 * self._reach
 
     def _is_root(self, piece: int) -> bool:
         return self._parent[piece] == piece

@@ -25,6 +25,9 @@ _SPLINTER_M2 = 1.0
 """Smaller pieces are merged first: they would be convex with anything."""
 _SOLIDITY = 0.8
 _OPEN = 0.65
+_STRAIGHT: dict[Segmentation, float] = {"walls": 0.35, "watershed": 0.35, "contraction": _SOLIDITY}
+"""Solidity of two parts of one corridor. Boundaries of places lie beside doors, not in them, and
+look like a corridor's: contraction has no rule of its own for it."""
 _WALL_REACH_M = 0.25
 """How far rooms reach into walls: so far robots of any radius see them change at doors."""
 
@@ -66,7 +69,9 @@ def find_rooms(
         )
     pieces = Pieces(_PIECES[method](grid), grid.resolution_m)
     pieces.merge_small(min(least_area_m2, _SPLINTER_M2))
-    pieces.merge_convex(least_solidity=_SOLIDITY, least_open=_OPEN)
+    pieces.merge_convex(
+        least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
+    )
     pieces.merge_small(least_area_m2)
     labels = _in_reading_order(pieces.label_of, least_area_m2 / grid.resolution_m**2)
     n_rooms = int(labels.max(initial=NO_ROOM)) + 1
