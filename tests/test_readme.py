@@ -20,7 +20,7 @@ from PIL import Image
 import hybridnav as hn
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "docs/harness.md", "docs/portals.md", "docs/pyramid.md")
+PAGES = ("README.md", "docs/harness.md", "docs/portals.md", "docs/pyramid.md", "docs/rooms.md")
 MAX_PICTURE_BYTES = 400_000
 
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
