@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
+from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import NO_ROOM, RoomLabels
+from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.grid.rooms import MAX_ROOMS, Segmentation
 from hybridnav.topology.merging import Pieces, grown
 from hybridnav.topology.pieces import contracted_pieces, walled_pieces, watershed_pieces
@@ -21,6 +23,8 @@ _PIECES = {
     "watershed": watershed_pieces,
     "contraction": contracted_pieces,
 }
+_UNEXPLORED_RIM = 0.8
+"""Share of the cells round free space that must be unexplored for them to count as walls."""
 _SPLINTER_M2 = 1.0
 """Smaller pieces are merged first: they would be convex with anything."""
 _SOLIDITY = 0.8
@@ -67,6 +71,7 @@ def find_rooms(
         raise InvalidValueError(
             f"least area must be a positive number of square metres, got {least_area_m2}"
         )
+    grid = _walled(grid)
     pieces = Pieces(_PIECES[method](grid), grid.resolution_m)
     pieces.merge_small(min(least_area_m2, _SPLINTER_M2))
     pieces.merge_convex(
@@ -82,6 +87,22 @@ def find_rooms(
         )
     names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
     return RoomLabels(names, grown(labels, _WALL_REACH_M / grid.resolution_m))
+
+
+def _walled(grid: OccupancyGrid) -> OccupancyGrid:
+    """The map with walls where most of its free space ends at unexplored cells: the rim of those.
+
+    A scan whose thresholds call most walls unexplored has no other ones. Where obstacles bound free
+    space, unexplored pockets are shadows of furniture, and no walls.
+    """
+    free = grid.measured == CellClass.FREE
+    beside = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
+    rim = beside & (grid.measured == CellClass.UNEXPLORED)
+    if np.count_nonzero(rim) <= _UNEXPLORED_RIM * np.count_nonzero(beside):
+        return grid
+    probability = grid.probability.copy()
+    probability[rim] = 1.0
+    return replace(grid, probability=probability)
 
 
 def _in_reading_order(label_of: IntArray, least_cells: float) -> IntArray:
