@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.viz import plot_level, save_figure
+from hybridnav.viz import plot_level, plot_rooms, save_figure
 
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
@@ -37,6 +37,13 @@ def draw_levels(file: Path) -> None:
     save_figure(figure, file, dpi=110)
 
 
+def draw_rooms(file: Path) -> None:
+    """Draw the rooms that are found in the office, with their doors."""
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    pyramid = hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid))
+    save_figure(plot_rooms(hn.TopologicalMap(pyramid)), file, dpi=150)
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -44,6 +51,10 @@ def shrink(file: Path) -> None:
 
 
 if __name__ == "__main__":
-    for draw, name in ((draw_route, "office-route.png"), (draw_levels, "office-levels.png")):
+    for draw, name in (
+        (draw_route, "office-route.png"),
+        (draw_levels, "office-levels.png"),
+        (draw_rooms, "office-rooms.png"),
+    ):
         draw(IMAGES / name)
         shrink(IMAGES / name)

@@ -20,7 +20,8 @@ from PIL import Image
 import hybridnav as hn
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("README.md", "docs/harness.md", "docs/ompl.md", "docs/portals.md", "docs/pyramid.md")
+_DOCS = ("harness", "ompl", "portals", "pyramid", "rooms")
+PAGES = ("README.md", *(f"docs/{name}.md" for name in _DOCS))
 MAX_PICTURE_BYTES = 400_000
 
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

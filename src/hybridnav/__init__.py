@@ -21,19 +21,30 @@ if TYPE_CHECKING:
         PlanError,
         PresetError,
         PresetNotFoundError,
+        RoomsError,
+        RoomsNotFoundError,
     )
-    from hybridnav.grid import CellClass, Frame, OccupancyGrid
-    from hybridnav.io import load_map
-    from hybridnav.planner import Blocked, HybridPlanner
+    from hybridnav.grid import CellClass, Frame, OccupancyGrid, RoomLabels
+    from hybridnav.io import load_map, load_rooms, save_rooms
+    from hybridnav.planner import (
+        Alternative,
+        Blocked,
+        HybridPlanner,
+        Tour,
+        plan_alternatives,
+        plan_tour,
+    )
     from hybridnav.pyramid import DualGraphPyramid, Level
     from hybridnav.result import Path, PlanBatch, PlanResult, PlanStatus, Route
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology import Door, Rooms, TopologicalMap, find_rooms
 
 __version__ = "0.1.0"
 
 _HOME_OF = {
+    "Alternative": "planner",
     "Blocked": "planner",
     "CellClass": "grid",
+    "Door": "topology",
     "DualGraphPyramid": "pyramid",
     "Frame": "grid",
     "HybridNavError": "errors",
@@ -53,16 +64,28 @@ _HOME_OF = {
     "Preset": "config",
     "PresetError": "errors",
     "PresetNotFoundError": "errors",
+    "RoomLabels": "grid",
+    "Rooms": "topology",
+    "RoomsError": "errors",
+    "RoomsNotFoundError": "errors",
     "Route": "result",
     "TopologicalMap": "topology",
+    "Tour": "planner",
+    "find_rooms": "topology",
     "load_map": "io",
     "load_preset": "config",
+    "load_rooms": "io",
+    "plan_alternatives": "planner",
+    "plan_tour": "planner",
     "preset_names": "config",
+    "save_rooms": "io",
 }
 
 __all__ = [
+    "Alternative",
     "Blocked",
     "CellClass",
+    "Door",
     "DualGraphPyramid",
     "Frame",
     "HybridNavError",
@@ -82,11 +105,21 @@ __all__ = [
     "Preset",
     "PresetError",
     "PresetNotFoundError",
+    "RoomLabels",
+    "Rooms",
+    "RoomsError",
+    "RoomsNotFoundError",
     "Route",
     "TopologicalMap",
+    "Tour",
+    "find_rooms",
     "load_map",
     "load_preset",
+    "load_rooms",
+    "plan_alternatives",
+    "plan_tour",
     "preset_names",
+    "save_rooms",
 ]
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -17,6 +17,14 @@ class MapNotFoundError(MapError, FileNotFoundError):
     """A map file, or the image it names, is not there."""
 
 
+class RoomsError(MapError):
+    """A file of rooms cannot be read, or does not fit its map; the text names the room."""
+
+
+class RoomsNotFoundError(RoomsError, FileNotFoundError):
+    """A file of rooms, or the image that it names, is not there."""
+
+
 class PresetError(HybridNavError, ValueError):
     """A preset, or a setting given beside it, is not valid; the text names the key."""
 

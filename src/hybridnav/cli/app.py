@@ -13,6 +13,7 @@ from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_
 from hybridnav.cli.evaluate import compare, evaluate
 from hybridnav.cli.plan import plan
 from hybridnav.cli.presets import preset_app
+from hybridnav.cli.rooms import rooms
 from hybridnav.cli.show import show
 from hybridnav.errors import HybridNavError
 
@@ -28,6 +29,7 @@ app = typer.Typer(
 )
 app.command()(plan)
 app.command()(show)
+app.command()(rooms)
 app.command()(evaluate)
 app.command()(compare)
 app.add_typer(preset_app, name="preset")

@@ -106,17 +106,33 @@ def check_picture(path: Path | None) -> None:
         raise UsageError(f"--plot must name a file, {str(path)!r} is a folder")
 
 
-def grow_topology(path: Path, preset: Preset, seconds: dict[str, float]) -> hn.TopologicalMap:
-    """Load a map and build its pyramid as a preset says."""
+def grow_topology(
+    path: Path,
+    preset: Preset,
+    seconds: dict[str, float],
+    *,
+    rooms_file: Path | None = None,
+    find_rooms: bool = False,
+) -> hn.TopologicalMap:
+    """Load a map and build its pyramid as a preset says: with the rooms of a file; without one, if
+    asked for, with those that are found."""
     settings = preset.pyramid
     with stage(f"reading {path}", seconds, "load"):
         grid = hn.load_map(path, robot_radius_m=settings.robot_radius_m)
+    rooms = None
+    if rooms_file is not None:
+        with stage(f"reading {rooms_file}", seconds, "rooms"):
+            rooms = hn.load_rooms(rooms_file, grid)
+    elif find_rooms:
+        with stage("finding rooms", seconds, "rooms"):
+            rooms = hn.find_rooms(grid)
     with stage("building the pyramid", seconds, "pyramid"):
         pyramid = hn.DualGraphPyramid.build(
             grid,
             merge_distance_m=settings.merge_distance_m,
             linkage=settings.linkage,
             seed=settings.seed,
+            rooms=rooms,
         )
     return hn.TopologicalMap(pyramid)
 

@@ -28,3 +28,9 @@ PlotOption = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw a picture: .png, .pdf or .svg.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+RoomsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--rooms", metavar="FILE", help="Rooms as YAML; else rooms.yaml beside the map, if there."
+    ),
+]

@@ -18,20 +18,24 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
-from hybridnav.cli.errors import EXIT_NOT_SOLVED
+from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import (
     JsonOption,
     MapArgument,
     PlotOption,
     PresetOption,
     RadiusOption,
+    RoomsOption,
     SeedOption,
     SetOption,
 )
+from hybridnav.cli.tour import Errand, parsed_stop, run_errand
 from hybridnav.config.yaml_file import printable
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from hybridnav.planner.named import At
 
 Point = tuple[float, ...]
 
@@ -59,6 +63,41 @@ GoalOption = Annotated[
     Any,
     typer.Option(metavar="X,Y", parser=_point, help="Goal in metres; ,YAW in radians for OMPL."),
 ]
+FromOption = Annotated[
+    str | None, typer.Option("--from", metavar="ROOM|X,Y", help="Start in a room, or at a point.")
+]
+ToOption = Annotated[
+    str | None, typer.Option("--to", metavar="ROOM|X,Y", help="Go to a room, or to a point.")
+]
+ViaOption = Annotated[
+    list[str] | None,
+    typer.Option("--via", metavar="ROOM|X,Y", help="Stop there on the way; may be repeated."),
+]
+AtOption = Annotated[
+    str,
+    typer.Option(
+        "--at", metavar="WHERE", help="Where in a room: anywhere (the nearest cell), or its point."
+    ),
+]
+AlternativesOption = Annotated[
+    int,
+    typer.Option(
+        "--alternatives",
+        metavar="N",
+        min=1,
+        max=20,
+        help="Up to N routes by other doors or on other sides of obstacles.",
+    ),
+]
+LeastHoleOption = Annotated[
+    float,
+    typer.Option(
+        "--least-hole",
+        metavar="A",
+        min=0,
+        help="Square metres of an obstacle whose two sides make two routes.",
+    ),
+]
 CompareOption = Annotated[
     bool, typer.Option("--compare", help="Also plan on the whole grid, and tell the loss.")
 ]
@@ -66,8 +105,15 @@ CompareOption = Annotated[
 
 def plan(
     map_file: MapArgument,
-    start: StartOption,
-    goal: GoalOption,
+    start: StartOption = None,
+    goal: GoalOption = None,
+    origin: FromOption = None,
+    to: ToOption = None,
+    via: ViaOption = None,
+    at: AtOption = "anywhere",
+    rooms_file: RoomsOption = None,
+    alternatives: AlternativesOption = 1,
+    least_hole_m2: LeastHoleOption = 1.0,
     preset: PresetOption = "balanced",
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
@@ -76,12 +122,39 @@ def plan(
     plot: PlotOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a route on MAP from START to GOAL.
+    """Plan a route on MAP, from a point or room to another.
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     check_picture(plot)
     settings = read_settings(preset, overrides, robot_radius_m, seed)
+    ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
+    if via and alternatives > 1:
+        raise UsageError("--alternatives does not go with --via")
+    if (
+        via
+        or alternatives > 1
+        or rooms_file is not None
+        or any(isinstance(end, str) for end in ends)
+    ):
+        if compare:
+            raise UsageError("--compare goes with --start and --goal alone")
+        stops = [ends[0], *map(parsed_stop, via or ()), ends[1]]
+        errand = Errand(
+            map_file,
+            rooms_file,
+            stops,
+            _checked_at(at),
+            settings,
+            plot,
+            as_json,
+            alternatives,
+            least_hole_m2,
+        )
+        if not run_errand(errand):
+            raise typer.Exit(EXIT_NOT_SOLVED)
+        return
+    start, goal = ends
     seconds: dict[str, float] = {}
     topology = grow_topology(map_file, settings, seconds)
     with stage("preparing the planner", seconds, "prepare"):
@@ -99,6 +172,22 @@ def plan(
         _draw(topology, result, (start, goal), figures.get("optimum_m"), plot)
     if not result.solved:
         raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _one_of(option: str, point: Any, other: str, text: str | None) -> Any:
+    """An end of the way, from one of the two options that may give it."""
+    if (point is None) == (text is None):
+        what = "missing option" if point is None else "only one is taken, of"
+        raise UsageError(f"{what} '--{option}' or '--{other}'; see hybridnav plan --help")
+    return parsed_stop(text) if text is not None else point
+
+
+def _checked_at(at: str) -> At:
+    if at == "anywhere":
+        return "anywhere"
+    if at == "point":
+        return "point"
+    raise UsageError(f"--at must be anywhere or point, got {at!r:.80}")
 
 
 def _compare(

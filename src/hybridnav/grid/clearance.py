@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray
+    from hybridnav._typing import BoolArray, FloatArray
 
 _ROUNDING = 1e-9
 """Relative slack on a squared radius, so that 0.25 m is 5 cells of 0.05 m and not 4.999..."""
@@ -45,3 +45,25 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
         squared += (nearest[axis] - offset) ** 2
     within: BoolArray = squared <= math.floor(radius_cells**2 * (1 + _ROUNDING))
     return within
+
+
+def clearance_cells(occupied: BoolArray) -> FloatArray:
+    """Distance from the centre of each cell to the centre of the nearest occupied one, in cells.
+
+    Parameters
+    ----------
+    occupied
+        Shape `(rows, cols)`.
+
+    Returns
+    -------
+    FloatArray
+        float64, same shape; 0 in occupied cells, infinite where none is occupied. Exact, by the
+        Euclidean distance transform. What lies beyond the grid is not occupied.
+    """
+    if not occupied.any():
+        return np.full(occupied.shape, np.inf)
+    from scipy import ndimage  # noqa: PLC0415 - on demand, as above
+
+    distances: FloatArray = ndimage.distance_transform_edt(~occupied)
+    return distances

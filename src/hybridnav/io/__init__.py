@@ -1,7 +1,17 @@
-"""Map files in: ROS maps and MovingAI benchmarks."""
+"""Map files in: ROS maps, MovingAI benchmarks, rooms; and rooms out."""
 
 from hybridnav.io.maps import load_map
 from hybridnav.io.movingai import Scenario, load_movingai_map, read_scenarios
+from hybridnav.io.rooms import load_rooms
+from hybridnav.io.rooms_out import save_rooms
 from hybridnav.io.ros import load_ros_map
 
-__all__ = ["Scenario", "load_map", "load_movingai_map", "load_ros_map", "read_scenarios"]
+__all__ = [
+    "Scenario",
+    "load_map",
+    "load_movingai_map",
+    "load_rooms",
+    "load_ros_map",
+    "read_scenarios",
+    "save_rooms",
+]

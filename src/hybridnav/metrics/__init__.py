@@ -9,6 +9,7 @@ from hybridnav.metrics.anyangle import (
 )
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
 from hybridnav.metrics.optimum import ScipyOptimum, scipy_optimum
+from hybridnav.metrics.segmentation import RoomAgreement, compare_rooms
 from hybridnav.metrics.statistics import (
     Buckets,
     PairedDifference,
@@ -24,11 +25,13 @@ __all__ = [
     "AnyAnglePath",
     "Buckets",
     "PairedDifference",
+    "RoomAgreement",
     "ScipyOptimum",
     "Summary",
     "Verdict",
     "VisibilityGraph",
     "anyangle_optimum",
+    "compare_rooms",
     "distance_buckets",
     "judge_path",
     "paired_difference",

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.planner.planner import HybridPlanner
+from hybridnav.planner.tour import Tour, plan_tour
 
 if TYPE_CHECKING:
+    from hybridnav.planner.alternatives import Alternative, plan_alternatives
     from hybridnav.planner.blocked import Blocked
 
-__all__ = ["Blocked", "HybridPlanner"]
+__all__ = [
+    "Alternative",
+    "Blocked",
+    "HybridPlanner",
+    "Tour",
+    "plan_alternatives",
+    "plan_tour",
+]
 
 
 def __getattr__(name: str) -> Any:
-    if name != "Blocked":
+    homes = {
+        "Alternative": "alternatives",
+        "Blocked": "blocked",
+        "plan_alternatives": "alternatives",
+    }
+    if name not in homes:
         raise AttributeError(f"module 'hybridnav.planner' has no attribute {name!r}")
-    from hybridnav.planner.blocked import Blocked  # noqa: PLC0415 - loads shapely
-
-    return Blocked
+    # They load shapely.
+    return getattr(importlib.import_module(f"hybridnav.planner.{homes[name]}"), name)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray, PathLike
     from hybridnav.planner.blocked import Blocked
     from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import PlanBatch
     from hybridnav.topology import TopologicalMap
@@ -80,19 +81,21 @@ class HybridPlanner:
 
     def plan(
         self,
-        start: ArrayLike,
-        goal: ArrayLike,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
         *,
         smooth: Smooth | None = None,
         blocked: Blocked | BaseGeometry | Mapping[str, Any] | None = None,
+        at: At = "anywhere",
     ) -> PlanResult:
-        """Plan a path between two points.
+        """Plan a path between two points, or rooms.
 
         Parameters
         ----------
         start, goal
             `(x, y)` in metres, map frame. The path runs between the centres of the cells that hold
-            them, an any-angle one between the points; nothing is snapped to free space. With OMPL
+            them, an any-angle one between the points; nothing is snapped to free space. On a map
+            with rooms also the name of a room or of a named point. With OMPL
             in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis;
             elsewhere a heading may be given and means nothing.
         smooth
@@ -100,6 +103,9 @@ class HybridPlanner:
         blocked
             What is closed for this query: a `Blocked`, a shapely geometry in metres, or a mapping
             with keys of `Blocked`. Where it lies in the way the whole map is searched.
+        at
+            Where in a named room: `"anywhere"`, the cells that make the way shortest, or at its
+            `"point"`.
 
         Returns
         -------
@@ -109,12 +115,17 @@ class HybridPlanner:
         Raises
         ------
         InvalidValueError
-            When a point is not two finite numbers, or what is blocked is not on the map.
+            When a point is not two finite numbers, a name is not known, or what is blocked is not
+            on the map.
         """
+        if isinstance(start, str) or isinstance(goal, str):
+            from hybridnav.planner.named import stop_points  # noqa: PLC0415 - most queries are points
+
+            start, goal = stop_points(self, [start, goal], at=at, blocked=blocked)
         poses = self._pose("start", start), self._pose("goal", goal)
         ends = poses[0][:2], poses[1][:2]
         finish = self._finish_asked_for(smooth)
-        closed = None if blocked is None else self._closed(blocked)
+        closed = None if blocked is None else self.closed_cells(blocked)
         first, last = self._cell_of(ends[0]), self._cell_of(ends[1])
         if first is None:
             return self._answer(PlanStatus.START_OUTSIDE)
@@ -331,7 +342,8 @@ class HybridPlanner:
         ids = self.topology.place_ids, self.topology.arc_ids
         return Route(tuple(ids[0][places].tolist()), tuple(ids[1][arcs].tolist()))
 
-    def _closed(self, blocked: Blocked | BaseGeometry | Mapping[str, Any]) -> LongArray:
+    def closed_cells(self, blocked: Blocked | BaseGeometry | Mapping[str, Any]) -> LongArray:
+        """Flat cells that may not be entered when this is closed, int64, sorted."""
         # Loads shapely, which most queries can do without.
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 

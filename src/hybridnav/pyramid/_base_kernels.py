@@ -15,7 +15,7 @@ _SURVIVES = 255
 def uniform_squares(classes):
     """Class of every aligned square of 2x2 entries that are equal, else 0."""
     rows, cols = classes.shape[0] // 2, classes.shape[1] // 2
-    squares = np.empty((rows, cols), np.uint8)
+    squares = np.empty((rows, cols), classes.dtype)
     for row in range(rows):
         for col in range(cols):
             one = classes[2 * row, 2 * col]
@@ -119,7 +119,7 @@ def block_vertices(classes, power, vertex_end, n_vertices):
     cols = classes.shape[1]
     cells = np.empty((n_vertices, 2), np.int32)
     boxes = np.empty((n_vertices, 4), np.int32)
-    of_class = np.empty(n_vertices, np.uint8)
+    of_class = np.empty(n_vertices, classes.dtype)
     whole_at = np.empty(n_vertices, np.uint8)
     v = 0
     for cell in range(vertex_end.size):

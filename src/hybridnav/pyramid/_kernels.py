@@ -35,7 +35,7 @@ class Vertices(NamedTuple):
     boxes: np.ndarray
     """int32 (n, 4), the field's least row and column and greatest row and column."""
     classes: np.ndarray
-    """uint8 (n,), `CellClass`."""
+    """uint8 or uint16 (n,), the kind of each vertex: only equal ones merge (see `decimation`)."""
     whole_at: np.ndarray
     """uint8 (n,), the level from which the vertex is there: until then its block is in pieces."""
 

@@ -21,7 +21,11 @@ from hybridnav.pyramid.blocks import TEMPLATES, max_power
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Record
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from hybridnav._typing import BoolArray, ByteArray, IntArray, KeyArray
+
+    KindArray = NDArray[np.uint8] | NDArray[np.uint16]
 
 Linkage = Literal["survivor", "radius", "diameter"]
 
@@ -41,9 +45,12 @@ def squared_limit(merge_distance_m: float, resolution_m: float) -> int:
 
 
 def decimate(
-    classes: ByteArray, *, linkage: Linkage, limit: int, seed: int
+    classes: ByteArray, *, linkage: Linkage, limit: int, seed: int, rooms: IntArray | None = None
 ) -> tuple[Record, BuildStats]:
     """Contract stars level by level until no edge may be contracted.
+
+    With rooms that happens three times: below the limit and inside rooms, which gives the places;
+    inside rooms without a limit, which gives the rooms; and without rooms.
 
     Parameters
     ----------
@@ -55,12 +62,33 @@ def decimate(
         See `squared_limit`.
     seed
         Breaks ties between edges of equal attribute.
+    rooms
+        int32, label of each cell's room, -1 for none; same shape.
     """
-    run = _Decimation(classes, _LINKAGES[linkage], limit, seed)
-    while run.step():
-        pass
+    kinds = classes if rooms is None else kinds_of(classes, rooms)
+    run = _Decimation(kinds, _LINKAGES[linkage], limit, seed)
+    run.exhaust()
+    if rooms is not None:
+        run.lift_limit()
+        run.exhaust()
+        run.forget_rooms()
+        run.exhaust()
     run.finish()
     return run.record, run.stats
+
+
+_N_CLASSES = 2
+"""Classes that vertices have: free and unexplored."""
+_MOST_KINDS = 256
+"""Kinds that one byte tells apart."""
+
+
+def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
+    """Kind of each cell, one number for its class and its room: 0 occupied, `CellClass` outside
+    rooms, and so on, two for each room."""
+    n_kinds = _N_CLASSES * (int(rooms.max()) + 2) + 1
+    kinds = np.where(classes == 0, 0, _N_CLASSES * (rooms + 1) + classes)
+    return kinds.astype(np.uint8) if n_kinds <= _MOST_KINDS else kinds.astype(np.uint16)
 
 
 @dataclass
@@ -129,32 +157,32 @@ class _Scratch:
 class _Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
-    def __init__(self, classes: ByteArray, linkage: int, limit: int, seed: int) -> None:
+    def __init__(self, kinds: KindArray, linkage: int, limit: int, seed: int) -> None:
         self.stats = BuildStats()
         self._began = time.perf_counter()
-        self._cols = classes.shape[1]
+        self._cols = kinds.shape[1]
         self._linkage = linkage
         self._limit = limit
         self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
         self.record = Record(
-            np.empty(classes.size, np.uint8),
-            np.empty(classes.size, np.int32),
-            np.empty(2 * classes.size, np.uint8),
+            np.empty(kinds.size, np.uint8),
+            np.empty(kinds.size, np.int32),
+            np.empty(2 * kinds.size, np.uint8),
         )
         self._level = 0
         self._loops = [0]
-        self._darts, self._vertices = self._base(classes)
+        self._darts, self._vertices = self._base(kinds)
         self._whole_at = int(self._vertices.whole_at.max(initial=0))
         self._scratch = _Scratch.of_size(len(self._vertices.cells), len(self._darts.base_edge))
         self._lap("base")
 
-    def _base(self, classes: ByteArray) -> tuple[dart_kernels.Darts, _kernels.Vertices]:
+    def _base(self, kinds: KindArray) -> tuple[dart_kernels.Darts, _kernels.Vertices]:
         record = self.record
-        power = _base_kernels.block_powers(classes, max_power(self._limit))
-        new_edge = np.empty(2 * classes.size, np.int32)
+        power = _base_kernels.block_powers(kinds, max_power(self._limit))
+        new_edge = np.empty(2 * kinds.size, np.int32)
         n_vertices, n_edges = _base_kernels.mark_base(
-            classes,
+            kinds,
             power,
             TEMPLATES,
             record.vertex_end,
@@ -162,9 +190,25 @@ class _Decimation:
             record.edge_end,
             new_edge,
         )
-        vertices = _base_kernels.block_vertices(classes, power, record.vertex_end, n_vertices)
-        darts = _base_kernels.block_darts(classes, power, vertices, new_edge, n_edges)
+        vertices = _base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices)
+        darts = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
         return darts, vertices
+
+    def exhaust(self) -> None:
+        """Go on until no edge may be contracted, and take down the level that this makes."""
+        while self.step():
+            pass
+        self.stats.tops.append(self._level)
+
+    def lift_limit(self) -> None:
+        """Let vertices merge however far apart they are."""
+        self._limit = squared_limit(math.inf, 1.0)
+        self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
+
+    def forget_rooms(self) -> None:
+        """Leave only the class of each vertex's kind."""
+        kinds = self._vertices.classes
+        kinds[:] = (kinds - 1) % _N_CLASSES + 1
 
     def step(self) -> bool:
         """Go from this level to the next one; False when this one is the apex."""

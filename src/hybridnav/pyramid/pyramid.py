@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Record
 
@@ -39,6 +39,8 @@ class DualGraphPyramid:
     seed: int
     stats: BuildStats = field(repr=False)
     """Size of each level and seconds per stage of the build."""
+    rooms: RoomLabels | None = field(repr=False)
+    """The rooms that it was built with."""
     _record: Record = field(repr=False)
     _levels: dict[int, Level] = field(repr=False, default_factory=dict)
 
@@ -50,8 +52,9 @@ class DualGraphPyramid:
         merge_distance_m: float = 4.0,
         linkage: Linkage = "radius",
         seed: int = 0,
+        rooms: RoomLabels | None = None,
     ) -> DualGraphPyramid:
-        """Contract the cells of a grid to places.
+        """Contract the cells of a grid to places, and with rooms on to rooms and a building.
 
         At each level the stars of a maximal independent edge set are contracted (MIES; Haxhimusa
         and Kropatsch), and edges that have become redundant are removed, so that every arc of a
@@ -71,12 +74,17 @@ class DualGraphPyramid:
             every two cells of a field (complete linkage).
         seed
             Breaks ties; equal input and seed give an equal pyramid.
+        rooms
+            The room of each cell. No two rooms ever merge at the levels of the places. Above them,
+            all places of a class that are connected inside one room merge whatever U_d is (what
+            lies in no room counts as one), which gives `room_level`; above that whatever touches,
+            up to the apex, the building.
 
         Raises
         ------
         InvalidValueError
-            When the merge distance is not positive, the linkage is not known, or the seed is no
-            whole number.
+            When the merge distance is not positive, the linkage is not known, the seed is no
+            whole number, or the rooms are those of a grid of another shape.
         """
         if math.isnan(merge_distance_m) or merge_distance_m <= 0:
             raise InvalidValueError(
@@ -91,8 +99,35 @@ class DualGraphPyramid:
         except TypeError:
             raise InvalidValueError(f"seed must be a whole number, got {seed!r:.80}") from None
         limit = squared_limit(merge_distance_m, grid.resolution_m)
-        record, stats = decimate(grid.classes, linkage=linkage, limit=limit, seed=seed)
-        return cls(grid, float(merge_distance_m), linkage, seed, stats, record)
+        labels = None
+        if rooms is not None:
+            labels = rooms.label_of
+            if labels.shape != grid.shape:
+                raise InvalidValueError(
+                    f"rooms are labels of {labels.shape} cells, the grid has {grid.shape}"
+                )
+        record, stats = decimate(
+            grid.classes, linkage=linkage, limit=limit, seed=seed, rooms=labels
+        )
+        return cls(grid, float(merge_distance_m), linkage, seed, stats, rooms, record)
+
+    @property
+    def place_level(self) -> int:
+        """Index of the level of the places: the apex, unless rooms lie above it."""
+        return self.stats.tops[0]
+
+    @property
+    def room_level(self) -> int:
+        """Index of the level of the rooms.
+
+        Raises
+        ------
+        InvalidValueError
+            When the pyramid was built without rooms.
+        """
+        if self.rooms is None:
+            raise InvalidValueError("this pyramid has no rooms: build it with rooms=...")
+        return self.stats.tops[1]
 
     def __len__(self) -> int:
         return len(self.stats.sizes)

@@ -45,3 +45,6 @@ class BuildStats:
 
     sizes: list[LevelSize] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
+    tops: list[int] = field(default_factory=list)
+    """Levels at which nothing more could be contracted: the places; and with rooms, the rooms and
+    the apex."""

@@ -3,6 +3,7 @@
 from hybridnav.route.coarse import CoarseRoute, MaxDistanceSearch
 from hybridnav.route.corridor import Corridor, corridor_of
 from hybridnav.route.portal_search import Effort, PortalAnswers, PortalSearch
+from hybridnav.route.rooms import RoomRoute, RoomSearch
 from hybridnav.route.walk import Walks
 
 __all__ = [
@@ -12,6 +13,8 @@ __all__ = [
     "MaxDistanceSearch",
     "PortalAnswers",
     "PortalSearch",
+    "RoomRoute",
+    "RoomSearch",
     "Walks",
     "corridor_of",
 ]

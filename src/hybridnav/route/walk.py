@@ -9,7 +9,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology import Rooms, TopologicalMap
 
 
 class Walks:
@@ -18,10 +18,10 @@ class Walks:
     Parameters
     ----------
     topology
-        The map; where its arcs cross is computed here, once.
+        The map, or its rooms; where its arcs cross is computed here, once.
     """
 
-    def __init__(self, topology: TopologicalMap) -> None:
+    def __init__(self, topology: TopologicalMap | Rooms) -> None:
         self._cols = topology.grid.shape[1]
         self._place_of = topology.level.field_of.ravel()
         edges, arcs = topology.level.boundary_table
@@ -38,6 +38,13 @@ class Walks:
             int64 (n, 2), legal moves without corner cutting. A diagonal between two places passes
             one of its side cells: one that lies in either place if there is one.
         """
+        places, arcs, _ = self.crossings(cells)
+        return places, arcs
+
+    def crossings(self, cells: LongArray) -> tuple[list[int], list[int], list[int]]:
+        """Places and arcs of a path, as `of` gives them, and the step that crosses each arc: from
+        `cells[step]` to the next."""
+        steps: list[int] = []
         flat = cells[:, 0] * self._cols + cells[:, 1]
         place = self._place_of[flat]
         places, arcs = [int(place[0])], []
@@ -50,7 +57,8 @@ class Walks:
                     edge = 2 * min(tail, head) + (abs(head - tail) != 1)
                     arcs.append(int(self._arcs[np.searchsorted(self._edges, edge)]))
                     places.append(int(self._place_of[head]))
-        return places, arcs
+                    steps.append(step)
+        return places, arcs, steps
 
     def _side(self, tail: list[int], head: list[int]) -> int:
         ends = {int(self._place_of[cell[0] * self._cols + cell[1]]) for cell in (tail, head)}

@@ -64,7 +64,8 @@ class Inclusion:
         )
         self._obstacle_component[RIM] = -1
         self._loop_above, self._block_of_face = _loop_tree(level)
-        self._face_of_obstacle = self._find_obstacle_faces()
+        self.face_of_obstacle = self._find_obstacle_faces()
+        """int64 (n_obstacles,), face that holds each obstacle, -1 for the rim."""
 
     def _find_obstacle_faces(self) -> LongArray:
         """Face that holds each obstacle, -1 for the rim."""
@@ -112,7 +113,7 @@ class Inclusion:
     @cached_property
     def place_round_component(self) -> LongArray:
         """int64 (n_components,), the place inside whose self-loop each component lies, -1: none."""
-        face = self._face_of_obstacle[self._islands.surrounding_obstacle]
+        face = self.face_of_obstacle[self._islands.surrounding_obstacle]
         own = _value_at(self._place_round_block, _value_at(self._block_of_face, face))
         at = self._component_above
         while (further := (own < 0) & (at >= 0)).any():
@@ -123,7 +124,7 @@ class Inclusion:
     @cached_property
     def place_round_obstacle(self) -> LongArray:
         """int64 (n_obstacles,), the place inside whose self-loop each obstacle lies, -1: none."""
-        face = self._face_of_obstacle
+        face = self.face_of_obstacle
         own = _value_at(self._place_round_block, _value_at(self._block_of_face, face))
         outer = _value_at(self.place_round_component, self._obstacle_component)
         return np.where((own < 0) & (face >= 0), outer, own)
@@ -220,7 +221,7 @@ class Inclusion:
 
     def ring_round_obstacle(self, obstacle: int) -> LongArray:
         """The cycle of places round an obstacle, counter-clockwise; empty for the rim."""
-        face = self._face_of_obstacle[obstacle]
+        face = self.face_of_obstacle[obstacle]
         if face < 0:
             return np.empty(0, dtype=np.int64)
         start = np.flatnonzero(self._level.dual.face_of == face)[0]

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
     from hybridnav.topology.inclusion import Enclosed, Inclusion
+    from hybridnav.topology.rooms import Rooms
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Component:
 
 
 class TopologicalMap:
-    """The apex of a pyramid, seen as places and arcs with lasting ids.
+    """The place level of a pyramid, seen as places and arcs with lasting ids.
 
     Arrays are indexed by the dense indices of the level; `place_ids` and `arc_ids` are what
     results, files and arguments name.
@@ -44,12 +45,12 @@ class TopologicalMap:
     Parameters
     ----------
     pyramid
-        The pyramid whose apex holds the places.
+        The pyramid that holds the places: at its apex, or below its rooms.
     """
 
     def __init__(self, pyramid: DualGraphPyramid) -> None:
         self.pyramid = pyramid
-        self.level: Level = pyramid[-1]
+        self.level: Level = pyramid[pyramid.place_level]
         self.place_ids: LongArray = np.arange(self.level.n_vertices, dtype=np.int64)
         self.arc_ids: LongArray = np.arange(self.level.n_arcs, dtype=np.int64)
         self.place_ids.flags.writeable = False
@@ -62,6 +63,19 @@ class TopologicalMap:
     def grid(self) -> OccupancyGrid:
         """The map it was grown from."""
         return self.pyramid.grid
+
+    @cached_property
+    def rooms(self) -> Rooms:
+        """The rooms above the places.
+
+        Raises
+        ------
+        InvalidValueError
+            When the pyramid was built without rooms.
+        """
+        from hybridnav.topology.rooms import Rooms  # noqa: PLC0415 - most maps have none
+
+        return Rooms(self.pyramid)
 
     @property
     def n_places(self) -> int:

@@ -4,6 +4,7 @@ from hybridnav.viz.dual import plot_dual
 from hybridnav.viz.maps import plot_level, plot_map, plot_places
 from hybridnav.viz.paper import plot_figure1
 from hybridnav.viz.plan import plot_plan
+from hybridnav.viz.rooms import plot_rooms, plot_tour
 from hybridnav.viz.save import save_figure
 from hybridnav.viz.topology import plot_topology
 
@@ -14,6 +15,8 @@ __all__ = [
     "plot_map",
     "plot_places",
     "plot_plan",
+    "plot_rooms",
     "plot_topology",
+    "plot_tour",
     "save_figure",
 ]

@@ -1,0 +1,96 @@
+"""`hybridnav rooms`: find the rooms of a map and write them down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, get_args
+
+import typer
+
+import hybridnav as hn
+from hybridnav.cli.common import answer, check_picture, read_settings, stage, timings
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import MapArgument, PlotOption, PresetOption, RadiusOption, RoomsOption
+from hybridnav.config.yaml_file import printable
+from hybridnav.grid.rooms import Segmentation
+
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="FILE", help="Write the rooms as YAML, to be edited."),
+]
+MethodOption = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        metavar="NAME",
+        help=f"How rooms are found: {', '.join(get_args(Segmentation))}.",
+    ),
+]
+LeastAreaOption = Annotated[
+    float,
+    typer.Option("--least-area", metavar="A", help="Square metres that a room has at least."),
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
+
+
+def rooms(
+    map_file: MapArgument,
+    out: OutOption = None,
+    method: MethodOption = "walls",
+    least_area_m2: LeastAreaOption = 2.0,
+    rooms_file: RoomsOption = None,
+    preset: PresetOption = "balanced",
+    robot_radius_m: RadiusOption = None,
+    force: ForceOption = False,
+    plot: PlotOption = None,
+) -> None:
+    """Find the rooms of MAP, or read them from a file, and list them with their doors."""
+    check_picture(plot)
+    if out is not None and out.exists() and not force:
+        raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
+    checked = next((known for known in get_args(Segmentation) if known == method), None)
+    if checked is None:
+        known = ", ".join(get_args(Segmentation))
+        raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
+    settings = read_settings(preset, None, robot_radius_m, None)
+    seconds: dict[str, float] = {}
+    with stage(f"reading {map_file}", seconds, "load"):
+        grid = hn.load_map(map_file, robot_radius_m=settings.pyramid.robot_radius_m)
+    with stage("finding rooms", seconds, "rooms"):
+        labels = (
+            hn.find_rooms(grid, method=checked, least_area_m2=least_area_m2)
+            if rooms_file is None
+            else hn.load_rooms(rooms_file, grid)
+        )
+    with stage("building the pyramid", seconds, "pyramid"):
+        built = settings.pyramid
+        pyramid = hn.DualGraphPyramid.build(
+            grid,
+            merge_distance_m=built.merge_distance_m,
+            linkage=built.linkage,
+            seed=built.seed,
+            rooms=labels,
+        )
+    topology = hn.TopologicalMap(pyramid)
+    if out is not None:
+        hn.save_rooms(out, labels, grid)
+    answer(_listing(topology) + f"\nseconds    {timings(seconds)}\n")
+    if plot is not None:
+        from hybridnav.viz import plot_rooms, save_figure  # noqa: PLC0415 - matplotlib on demand
+
+        save_figure(plot_rooms(topology), plot)
+
+
+def _listing(topology: hn.TopologicalMap) -> str:
+    """One line a room: its free area and the doors to its neighbours."""
+    view = topology.rooms
+    doors: dict[str, list[str]] = {name: [] for name in view.names}
+    for door in view.doors:
+        for name, other in (door.rooms, door.rooms[::-1]):
+            if name is not None:
+                doors[name].append(f"{other or '-'} ({door.number}: {door.width_m:.2f} m)")
+    width = max((len(name) for name in view.names), default=0)
+    lines = [f"rooms      {len(view.names)}, {len(view.doors)} doors; free area, doors to"]
+    for name, area_m2 in zip(view.names, view.areas_m2.tolist(), strict=True):
+        lines.append(f"{name:<{width}} {area_m2:>9.2f} m²  {', '.join(doors[name])}".rstrip())
+    return "\n".join(lines)

@@ -1,0 +1,155 @@
+"""`hybridnav plan` between named rooms: the way in words."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import hybridnav as hn
+from hybridnav.cli.common import answer, complain, grow_topology, stage, timings
+from hybridnav.cli.errors import UsageError
+from hybridnav.config.yaml_file import printable
+from hybridnav.planner.itinerary import NOWHERE, Guide
+
+if TYPE_CHECKING:
+    from hybridnav.planner.named import At
+
+Stop = str | tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Errand:
+    """What a command line asks for."""
+
+    map_file: Path
+    rooms_file: Path | None
+    stops: list[Stop]
+    at: At
+    settings: hn.Preset
+    plot: Path | None
+    as_json: bool
+    alternatives: int = 1
+    least_hole_m2: float = 1.0
+
+
+def run_errand(errand: Errand) -> bool:
+    """Plan a way between rooms and points, and tell it; gives whether there is one."""
+    seconds: dict[str, float] = {}
+    topology = grow_topology(
+        errand.map_file,
+        errand.settings,
+        seconds,
+        rooms_file=errand.rooms_file or beside(errand.map_file),
+        find_rooms=True,
+    )
+    with stage("preparing the planner", seconds, "prepare"):
+        planner = hn.HybridPlanner(topology, preset=errand.settings)
+    with stage("planning", seconds, "plan"):
+        tour = hn.plan_tour(planner, errand.stops, at=errand.at)
+    figures = _figures(errand, tour)
+    if errand.alternatives > 1:
+        with stage("finding alternatives", seconds, "alternatives"):
+            figures["alternatives"] = _alternatives(errand, planner)
+    figures["seconds"] = seconds
+    if errand.as_json:
+        answer(json.dumps(figures, allow_nan=False) + "\n")
+    else:
+        answer(_summary(topology.grid, figures))
+    if errand.plot is not None:
+        from hybridnav.viz import plot_tour, save_figure  # noqa: PLC0415 - matplotlib on demand
+
+        save_figure(plot_tour(topology, tour), errand.plot)
+    return tour.solved
+
+
+def beside(map_file: Path) -> Path | None:
+    """The file of rooms in the map's folder, None where there is none."""
+    path = map_file.parent / "rooms.yaml"
+    if path.is_file():
+        return path
+    complain("no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help")
+    return None
+
+
+def parsed_stop(text: str) -> Stop:
+    """A point where the text is two numbers, else a name."""
+    parts = text.split(",")
+    try:
+        x, y = (float(part) for part in parts)
+    except ValueError:
+        return text
+    if not np.isfinite([x, y]).all():
+        raise UsageError(f"expected a name or two finite numbers of metres, got {text!r:.90}")
+    return x, y
+
+
+def _told(stop: Stop) -> str:
+    return stop if isinstance(stop, str) else f"({stop[0]:.10g}, {stop[1]:.10g})"
+
+
+def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
+    paths = [result.path for result in tour.results if result.path is not None]
+    points = [np.round(path.points, 6).tolist() for path in paths]
+    return {
+        "map": str(errand.map_file),
+        "stops": [stop if isinstance(stop, str) else list(stop) for stop in errand.stops],
+        "query": " via ".join(map(_told, errand.stops[:-1])) + " to " + _told(errand.stops[-1]),
+        "status": str(tour.status),
+        "metric": tour.results[0].metric,
+        "length_m": tour.length_m if tour.solved else None,
+        "lower_bound_m": sum(r.lower_bound for r in tour.results) if tour.solved else None,
+        "legs": [leg.to_dict() for leg in tour.legs],
+        "words": tour.in_words(),
+        "points_m": points if tour.solved else None,
+    }
+
+
+def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> list[dict[str, Any]]:
+    """Routes of different classes between the two stops, with the rooms and doors they pass."""
+    guide = Guide(planner.topology.rooms)
+    found = hn.plan_alternatives(
+        planner,
+        errand.stops[0],
+        errand.stops[-1],
+        errand.alternatives,
+        least_hole_m2=errand.least_hole_m2,
+        at=errand.at,
+    )
+    routes = []
+    for alternative in found:
+        legs = guide.legs(alternative.path)
+        passed = [
+            f"{leg.room or NOWHERE}" + (f" (door {leg.door.number})" if leg.door else "")
+            for leg in legs
+        ]
+        routes.append(
+            {
+                "length_m": alternative.path.length_m,
+                "word": list(alternative.word),
+                "rooms": passed,
+                "points_m": np.round(alternative.path.points, 6).tolist(),
+            }
+        )
+    return routes
+
+
+def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
+    radius = f"robot radius {grid.robot_radius_m:g} m"
+    lines = [
+        f"query      {printable(grid.name)}, {figures['query']}, {radius}",
+        f"status     {figures['status']}",
+    ]
+    if figures["length_m"] is not None:
+        lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
+    for number, line in enumerate(figures["words"]):
+        lines.append(f"{'' if number else 'way':<10} {line}")
+    for number, other in enumerate(figures.get("alternatives", ()), start=1):
+        word = " ".join(f"{letter:+d}" for letter in other["word"]) or "-"
+        rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
+        lines.append(f"route {number:<4} {other['length_m']:.2f} m, class {word}{rooms}")
+    lines.append(f"seconds    {timings(figures['seconds'])}")
+    return "\n".join(lines) + "\n"

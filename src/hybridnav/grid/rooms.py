@@ -1,0 +1,130 @@
+"""Rooms on a grid: a name for every cell that has one."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from hybridnav._typing import IntArray
+
+MAX_ROOMS = 10_000
+"""Rooms a map may have at most."""
+MAX_NAME = 80
+"""Characters of a name at most."""
+
+NO_ROOM = -1
+"""Label of cells without a room."""
+
+Segmentation = Literal["walls", "watershed", "contraction"]
+"""How rooms may be found; see `hybridnav.topology.find_rooms`."""
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class RoomLabels:
+    """Which room each cell belongs to, and points that have names of their own.
+
+    Parameters
+    ----------
+    names
+        Name of each room, all different, one printable line each.
+    label_of
+        int32 (rows, cols), the room of each cell as an index into `names`, -1 for none; copied.
+    points
+        Named points, `(x, y)` in metres, map frame. One with the name of a room is the point that
+        stands for the room.
+
+    Raises
+    ------
+    InvalidValueError
+        When a name is given twice, empty, too long or not one printable line, a label has no name,
+        or a point is not finite.
+    """
+
+    names: tuple[str, ...]
+    label_of: IntArray = field(repr=False)
+    points: Mapping[str, Point] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        names = tuple(self.names)
+        if len(names) > MAX_ROOMS:
+            raise InvalidValueError(f"a map has at most {MAX_ROOMS} rooms, got {len(names)}")
+        check_names(names)
+        label_of = np.array(self.label_of, dtype=np.int32, order="C")
+        if label_of.ndim != 2 or label_of.size == 0:  # noqa: PLR2004
+            raise InvalidValueError(f"room labels need rows and columns, got {label_of.shape}")
+        if label_of.min() < NO_ROOM or label_of.max() >= len(names):
+            raise InvalidValueError(
+                f"room labels must be from -1 to {len(names) - 1}, "
+                f"got {label_of.min()} to {label_of.max()}"
+            )
+        label_of.flags.writeable = False
+        points = {name: _point(name, at) for name, at in self.points.items()}
+        for name, value in (
+            ("names", names),
+            ("label_of", label_of),
+            ("points", MappingProxyType(points)),
+        ):
+            object.__setattr__(self, name, value)
+
+    def index(self, name: str) -> int:
+        """Label of a room.
+
+        Raises
+        ------
+        InvalidValueError
+            When no room has this name; suggests the nearest ones.
+        """
+        if name in self.names:
+            return self.names.index(name)
+        raise InvalidValueError(f"no room is called {name!r:.90}{did_you_mean(name, self.names)}")
+
+
+def check_names(names: tuple[str, ...]) -> None:
+    """Refuse names that are empty, too long, not one printable line, or given twice."""
+    seen: set[str] = set()
+    for name in names:
+        if not isinstance(name, str) or not name.strip() or not name.isprintable():
+            raise InvalidValueError(f"a room needs a name of one printable line, got {name!r:.90}")
+        if len(name) > MAX_NAME:
+            raise InvalidValueError(f"a name has at most {MAX_NAME} characters, got {name!r:.90}")
+        if name in seen:
+            raise InvalidValueError(f"room {name!r}: the name is given twice")
+        seen.add(name)
+
+
+def did_you_mean(name: str, known: tuple[str, ...]) -> str:
+    """A clause that names what may have been meant: the nearest names, else some of all."""
+    if not known:
+        return ": the map has no names"
+    folded: dict[str, str] = {}
+    for each in known:
+        folded.setdefault(each.casefold(), each)
+    near = difflib.get_close_matches(name[:MAX_NAME].casefold(), folded, n=3, cutoff=0.5)
+    if near:
+        return f": did you mean {' or '.join(folded[each] for each in near)}?"
+    shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")  # noqa: PLR2004
+    return f": there are {shown}"
+
+
+def _point(name: str, at: Point) -> Point:
+    try:
+        x, y = float(at[0]), float(at[1])
+    except (TypeError, ValueError, IndexError, OverflowError):
+        x = y = math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InvalidValueError(
+            f"point {name!r:.90}: expected two finite coordinates (x, y) in metres, got {at!r:.80}"
+        )
+    return x, y

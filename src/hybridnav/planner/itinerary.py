@@ -1,0 +1,160 @@
+"""The way in words: rooms and doors passed, metres per leg."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.route import Walks
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav.result import Path
+    from hybridnav.topology import Door, Rooms
+
+_LOOK_M = 1.5
+"""How far before and behind a door the headings are taken that make a turn."""
+_TURN_RAD = math.radians(40.0)
+_SLIVER_M = 0.5
+_AT_ONCE_M = 0.1
+NOWHERE = "unnamed space"
+"""What people are told of cells that lie in no room."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The part of a way inside one room."""
+
+    room: str | None
+    """The room's name, None for what lies in no room."""
+    length_m: float
+    door: Door | None = None
+    """The door by which it leaves; None on the last leg, and where it leaves by a boundary that is
+    no door (to or from unexplored cells)."""
+    turn: str = ""
+    """`"left"` or `"right"` behind the door, empty for straight on."""
+    stop: str | None = None
+    """What is reached at its end: the name or the coordinates of a stop."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "room": self.room,
+            "length_m": self.length_m,
+            "door": None if self.door is None else self.door.number,
+            "door_width_m": None if self.door is None else self.door.width_m,
+            "door_m": None if self.door is None else list(self.door.position),
+            "turn": self.turn,
+            "stop": self.stop,
+        }
+
+
+class Guide:
+    """Tells ways on a map with rooms.
+
+    Parameters
+    ----------
+    rooms
+        The rooms; where their doors cross is computed here, once.
+    """
+
+    def __init__(self, rooms: Rooms) -> None:
+        self._rooms = rooms
+        self._walks = Walks(rooms)
+
+    def legs(self, path: Path, *, stop: str | None = None) -> list[Leg]:
+        """Divide a path into its legs.
+
+        Parameters
+        ----------
+        path
+            A cell path, or an any-angle one: its legs share its length in the proportion of those
+            of the cell path that was shortened.
+        stop
+            What is reached at its end.
+
+        Returns
+        -------
+        list of Leg
+            At least one; their lengths add up to the path's.
+        """
+        rooms, cells = self._rooms, path.cells
+        vertices, arcs, steps = self._walks.crossings(cells)
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
+        scale = path.length_m / along[-1] if along[-1] > 0 else 0.0
+        labels = rooms.label_of_vertex[vertices].tolist()
+        legs: list[Leg] = []
+        begun = 0.0
+        for number, (arc, step) in enumerate(zip(arcs, steps, strict=True)):
+            if labels[number] == labels[number + 1]:
+                continue
+            # A diagonal past the corner of a third room crosses twice, both times at its middle.
+            ended = (along[step] + along[step + 1]) / 2
+            legs.append(
+                Leg(
+                    rooms.name_of(labels[number]),
+                    float((ended - begun) * scale),
+                    rooms.door_of_arc.get(arc),
+                    self._turn(cells, along, step),
+                )
+            )
+            begun = ended
+        last = float((along[-1] - begun) * scale)
+        return [*legs, Leg(rooms.name_of(labels[-1]), last, stop=stop)]
+
+    def _turn(self, cells: LongArray, along: FloatArray, step: int) -> str:
+        """Which way a path bends at a step, seen over a few metres."""
+        reach = _LOOK_M / self._rooms.grid.resolution_m
+        before = int(np.searchsorted(along, along[step] - reach))
+        behind = int(np.searchsorted(along, along[step + 1] + reach))
+        behind = min(behind, len(cells) - 1)
+        arriving = cells[step + 1] - cells[max(before, 0)]
+        leaving = cells[behind] - cells[step]
+        cross = float(arriving[1] * leaving[0] - arriving[0] * leaving[1])
+        angle = math.atan2(cross, float(arriving @ leaving))
+        if abs(angle) < _TURN_RAD:
+            return ""
+        return "left" if angle > 0 else "right"
+
+
+def in_words(legs: Sequence[Leg]) -> list[str]:
+    """Tell a way to a person, one line a leg.
+
+    Parameters
+    ----------
+    legs
+        Legs in the order walked, at least one.
+    """
+    lines = [f"start in {legs[0].room or NOWHERE}"]
+    carried_m = 0.0
+    for leg, following in zip(legs, [*legs[1:], None], strict=True):
+        length_m, carried_m = carried_m + leg.length_m, 0.0
+        metres = f"{length_m:.1f} m"
+        if leg.stop is not None and leg.stop == leg.room and length_m < _SLIVER_M:
+            lines[-1] += ", and you are there"
+        elif leg.stop is not None:
+            place = f" in {leg.room}" if leg.room not in {None, leg.stop} else ""
+            lines.append(f"{metres} to {leg.stop}{place}")
+        elif following is None:
+            lines.append(f"{metres} to the goal in {leg.room or NOWHERE}")
+        elif _is_sliver(following):
+            carried_m = length_m  # who passes a threshold without a name need not hear of it
+        else:
+            into = f"into {following.room or NOWHERE}"
+            if leg.door is not None:
+                into = f"to door {leg.door.number} ({leg.door.width_m:.1f} m wide), {into}"
+                if length_m < _AT_ONCE_M:
+                    metres, into = "at", into.removeprefix("to ")
+            turn = f", then {leg.turn}" if leg.turn and following.length_m >= _SLIVER_M else ""
+            lines.append(f"{metres} {into}{turn}")
+    return lines
+
+
+def _is_sliver(leg: Leg) -> bool:
+    """Whether a leg is too short to speak of: across a gap between two outlines."""
+    return leg.room is None and leg.stop is None and leg.length_m < _SLIVER_M

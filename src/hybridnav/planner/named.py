@@ -1,0 +1,123 @@
+"""Stops with names: which cells they mean, and where a way through rooms stops best."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid.rooms import did_you_mean
+from hybridnav.search.stops import cheapest_stops
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+    from shapely.geometry.base import BaseGeometry
+
+    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav.planner.blocked import Blocked
+    from hybridnav.planner.planner import HybridPlanner
+    from hybridnav.topology import TopologicalMap
+
+At = Literal["anywhere", "point"]
+"""Where in a named room a way starts or ends."""
+
+
+def stop_points(
+    planner: HybridPlanner,
+    stops: Sequence[ArrayLike | str],
+    *,
+    at: At = "anywhere",
+    blocked: Blocked | BaseGeometry | Mapping[str, Any] | None = None,
+) -> list[ArrayLike]:
+    """Find a point for each stop of a way, so that the way through all of them is shortest.
+
+    Parameters
+    ----------
+    planner
+        Says what may be entered.
+    stops
+        Two or more points `(x, y)` in metres, names of rooms or of named points.
+    at
+        Where in a room: anywhere, or at the room's point.
+    blocked
+        What is closed for this query.
+
+    Returns
+    -------
+    list
+        Points `(x, y)` in metres, map frame; those given stay as they are. Where no way visits all
+        stops, or a point cannot be entered, rooms are represented by their points.
+
+    Raises
+    ------
+    InvalidValueError
+        When a name is not known, a room has no cell that may be entered, or `at` is another word.
+    """
+    if at not in get_args(At):
+        raise InvalidValueError(f"at must be 'anywhere' or 'point', got {at!r:.80}")
+    topology = planner.topology
+    grid = topology.grid
+    enterable = grid.enterable(allow_unexplored=planner.preset.planner.allow_unexplored)
+    if blocked is not None:
+        enterable = enterable.copy()
+        enterable.ravel()[planner.closed_cells(blocked)] = False
+    fixed: list[Any] = [_point_of(topology, stop, at) for stop in stops]
+    if all(point is not None for point in fixed):
+        return fixed
+    sets = [
+        _cells_in_room(topology, enterable, str(stop))
+        if point is None
+        else _cell_at(topology, enterable, point)
+        for stop, point in zip(stops, fixed, strict=True)
+    ]
+    found = None
+    if all(map(len, sets)):
+        found = cheapest_stops(enterable, sets, corner_cutting=grid.corner_cutting)
+    if found is None:
+        return [
+            topology.rooms.point_of(str(stop)) if point is None else point
+            for stop, point in zip(stops, fixed, strict=True)
+        ]
+    centres = grid.frame.points_of(np.stack(np.divmod(found, grid.shape[1]), axis=1))
+    return [
+        centre if point is None else point for point, centre in zip(fixed, centres, strict=True)
+    ]
+
+
+def _point_of(topology: TopologicalMap, stop: ArrayLike | str, at: At) -> ArrayLike | None:
+    """The point that a stop means by itself; None for anywhere in a room."""
+    if not isinstance(stop, str):
+        return stop
+    rooms = topology.rooms
+    labels = rooms.labels
+    if stop not in labels.names:
+        if stop in labels.points:
+            return labels.points[stop]
+        known = (*labels.names, *labels.points)
+        raise InvalidValueError(
+            f"no room or point is called {stop!r:.90}{did_you_mean(stop, known)}"
+        )
+    if len(rooms.vertices_of(stop)) == 0:
+        raise InvalidValueError(f"room {stop!r} has no free cell for this robot radius")
+    return rooms.point_of(stop) if at == "point" else None
+
+
+def _cells_in_room(topology: TopologicalMap, enterable: BoolArray, name: str) -> LongArray:
+    labels = topology.rooms.labels
+    return np.flatnonzero(enterable & (labels.label_of == labels.index(name)))
+
+
+def _cell_at(topology: TopologicalMap, enterable: BoolArray, point: ArrayLike) -> LongArray:
+    """The cell that holds a point, none where it cannot be entered: what then is wrong, planning
+    from it says."""
+    try:
+        row, col = topology.grid.frame.cells_of(point).tolist()
+    except (InvalidValueError, TypeError, ValueError):
+        return np.empty(0, dtype=np.int64)
+    rows, cols = enterable.shape
+    if not (0 <= row < rows and 0 <= col < cols and enterable[row, col]):
+        return np.empty(0, dtype=np.int64)
+    return np.array([row * cols + col], dtype=np.int64)

@@ -1,0 +1,103 @@
+"""Routes on the room level: from room to room through doors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from hybridnav.search.arc_search import ArcSearch
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav.topology import Rooms
+
+
+@dataclass(frozen=True)
+class RoomRoute:
+    """A route on the room level."""
+
+    rooms: tuple[str | None, ...]
+    """Names of the rooms passed, None for what lies in no room."""
+    arcs: tuple[int, ...]
+    """Arcs of the room level between them, one fewer than rooms."""
+
+
+class RoomSearch:
+    """Searches the room level for the routes that are shortest through the middles of rooms.
+
+    An arc costs `through_m`, the way from the surviving cell of one room across its boundary to
+    that of the next. That is no bound on a path from elsewhere, but there is a route wherever there
+    is a path, for rooms are connected.
+
+    Parameters
+    ----------
+    rooms
+        The room level.
+    allow_unexplored
+        Whether unexplored parts may be passed.
+    """
+
+    def __init__(self, rooms: Rooms, *, allow_unexplored: bool = False) -> None:
+        level = rooms.level
+        self._rooms = rooms
+        self._allowed: BoolArray = rooms.is_free
+        if allow_unexplored:
+            self._allowed = np.ones_like(rooms.is_free)
+        kept = np.flatnonzero(~level.is_self_loop & self._allowed[level.arcs].all(axis=1))
+        self._part = _parts(level.arcs[kept], level.n_vertices)
+        self._search = ArcSearch(
+            self._allowed,
+            level.arcs,
+            level.through_m,
+            np.zeros(level.n_arcs),
+            kept=kept,
+        )
+
+    def search(self, start: str, goal: str) -> RoomRoute | None:
+        """Find a route between two rooms.
+
+        Parameters
+        ----------
+        start, goal
+            Names of rooms. Of rooms in several parts the largest ones that a route joins are taken.
+
+        Returns
+        -------
+        RoomRoute | None
+            None where no route joins them.
+
+        Raises
+        ------
+        InvalidValueError
+            When no room has such a name.
+        """
+        first, last = self._vertices_of(start), self._vertices_of(goal)
+        joined = self._part[first][:, None] == self._part[last][None, :]
+        if not joined.any():
+            return None
+        # Both are sorted by area: the first pair has the largest parts.
+        at_first, at_last = np.argwhere(joined)[0].tolist()
+        walk = self._search.search(int(first[at_first]), int(last[at_last]))
+        assert walk.vertices is not None  # noqa: S101 - both lie in one component
+        labels = self._rooms.label_of_vertex[walk.vertices].tolist()
+        names = tuple(self._rooms.name_of(label) for label in labels)
+        return RoomRoute(names, tuple(walk.arcs.tolist()))
+
+    def _vertices_of(self, name: str) -> LongArray:
+        """Parts of a room that may be entered, free ones first, then by area."""
+        rooms = self._rooms
+        is_named = rooms.label_of_vertex == rooms.labels.index(name)
+        found = np.flatnonzero(is_named & self._allowed)
+        return found[np.lexsort((-rooms.level.areas[found], ~rooms.is_free[found]))]
+
+
+def _parts(arcs: IntArray, n_vertices: int) -> LongArray:
+    """The connected component of each vertex."""
+    ones = np.ones(len(arcs), dtype=np.int8)
+    graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))
+    label: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)
+    return label

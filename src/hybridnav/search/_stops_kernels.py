@@ -1,0 +1,53 @@
+"""Kernel of the search from sets of cells to sets of cells."""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+from numba import njit
+
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
+
+
+@njit(cache=True)
+def spread(moves, cols, sources, costs, is_target, all_targets):
+    """Dijkstra's algorithm from cells with costs of their own.
+
+    Returns the cost of each cell, -1 where it was not settled, and the source it came from (an
+    index into `sources`). Ends at the first settled target, or at the last one with `all_targets`.
+    """
+    cost = np.full(moves.size, np.int64(-1), np.int64)
+    came = np.full(moves.size, np.int32(-1), np.int32)
+    best = np.full(moves.size, np.int64(1) << 62, np.int64)
+    heap = [(np.int64(0), np.int64(0)) for _ in range(0)]
+    left = 0
+    for cell in range(moves.size):
+        left += is_target[cell]
+    for i in range(sources.size):
+        if costs[i] < best[sources[i]]:
+            best[sources[i]] = costs[i]
+            came[sources[i]] = i
+    for i in range(sources.size):
+        if came[sources[i]] == i:
+            heapq.heappush(heap, (np.int64(costs[i]), np.int64(sources[i])))
+    while len(heap) > 0:
+        at, cell = heapq.heappop(heap)
+        if cost[cell] >= 0:
+            continue
+        cost[cell] = at
+        if is_target[cell]:
+            left -= 1
+            if left == 0 or not all_targets:
+                break
+        for k in range(8):
+            if moves[cell] >> k & 1 == 0:
+                continue
+            to = cell + _ROW_STEP[k] * cols + _COL_STEP[k]
+            further = at + (DIAGONAL if k & 1 else STRAIGHT)
+            if cost[to] < 0 and further < best[to]:
+                best[to] = further
+                came[to] = came[cell]
+                heapq.heappush(heap, (further, to))
+    return cost, came

@@ -1,0 +1,57 @@
+"""The cheapest cells to stop at, one from each of some sets that are visited in order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.search import _kernels, _stops_kernels
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import BoolArray, LongArray
+
+
+def cheapest_stops(
+    enterable: BoolArray, sets: Sequence[LongArray], *, corner_cutting: bool = False
+) -> list[int] | None:
+    """Choose a cell from each set so that the way through them, in order, is shortest.
+
+    Dijkstra's algorithm from set to set: what a cell of one set costs is what the search for the
+    next begins with there.
+
+    Parameters
+    ----------
+    enterable
+        bool (rows, cols), cells that the way may use. Moves go to the 8 neighbours; a diagonal
+        needs both side cells, unless corners may be cut.
+    sets
+        Two or more of int64 (n,), flat enterable cells.
+    corner_cutting
+        Whether a diagonal needs no side cell.
+
+    Returns
+    -------
+    list of int | None
+        A flat cell of each set; None where one of them cannot be reached.
+    """
+    moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+    sources, costs = sets[0], np.zeros(len(sets[0]), dtype=np.int64)
+    origins: list[LongArray] = []
+    for number, goals in enumerate(sets[1:], start=2):
+        is_target = np.zeros(moves.size, dtype=np.bool_)
+        is_target[goals] = True
+        cost, came = _stops_kernels.spread(
+            moves, enterable.shape[1], sources, costs, is_target, number < len(sets)
+        )
+        reached = goals[cost[goals] >= 0]
+        if len(reached) == 0:
+            return None
+        origins.append(np.stack([reached, sources[came[reached]]], axis=1))
+        sources, costs = reached, cost[reached]
+    stops = [int(sources[np.argmin(costs)])]
+    for pairs in reversed(origins):
+        stops.append(int(pairs[np.argmax(pairs[:, 0] == stops[-1]), 1]))
+    return stops[::-1]

@@ -1,0 +1,272 @@
+"""Pieces of free space, cut at its narrow places: where the segmentation into rooms begins."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+
+from hybridnav.grid import CellClass
+from hybridnav.grid.clearance import clearance_cells
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.topology import _segmentation_kernels
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, FloatArray, IntArray
+    from hybridnav.grid import OccupancyGrid
+
+_PERSISTENCE = 0.8
+"""A passage parts two pieces when its clearance is below this share of that of either piece."""
+_FINE_M = 1.0
+"""U_d of the places that the steered contraction begins with."""
+
+_PINCH = 0.4
+_PINCH_M = 0.65
+"""Besides wall lines only a passage with less clearance than this, and than this share of that on
+both sides, parts two pieces: a door in a wall that is no line."""
+
+_GAP_M = 6.0
+_DOOR_M = 1.5
+_WINDOW_M = 5.0
+_SIDE_M = 1.5
+_BOTH_M = 4.0
+_FREE_SHARE = 0.7
+_WALL_SLACK_M = 0.15
+"""A wall bends by so much at most where it continues another, on either side."""
+_LEAST_TILT_RAD = 0.02
+_LEAST_PIECE_M2 = 1.0
+
+
+def watershed_pieces(grid: OccupancyGrid) -> IntArray:
+    """Cut free space along the watersheds of the clearance, where passages are narrow.
+
+    The distance transform is flooded from its peaks; two basins merge where they meet unless the
+    saddle is low against the lower peak (a relative persistence, in place of h-maxima, so that
+    broad rooms may have broad doors). S. Beucher, C. Lantuejoul: Use of watersheds in contour
+    detection, 1979; for rooms R. Bormann, F. Jordan, W. Li, J. Hampp, M. Haegele: Room
+    segmentation: survey, implementation, and analysis, ICRA 2016.
+
+    Parameters
+    ----------
+    grid
+        The map; cells count as they were measured, whatever the robot's radius.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+    """
+    return _basins(grid, ratio=_PERSISTENCE, broad_m=math.inf)
+
+
+def _basins(grid: OccupancyGrid, *, ratio: float, broad_m: float) -> IntArray:
+    """Basins of the clearance; they merge where it is not below `ratio` of that of the lower peak,
+    or not below `broad_m`."""
+    free = grid.measured == CellClass.FREE
+    clearance = np.pad(clearance_cells(grid.measured == CellClass.OCCUPIED), 1)
+    # Without an occupied cell all is one basin.
+    clearance[~np.isfinite(clearance)] = 1.0
+    inside = np.flatnonzero(np.pad(free, 1))
+    flat = clearance.ravel()
+    order = inside[np.argsort(-flat[inside], kind="stable")]
+    broad = broad_m / grid.resolution_m
+    basins = _segmentation_kernels.flood_basins(flat, order, clearance.shape[1], ratio, broad)
+    pieces: IntArray = basins.reshape(clearance.shape)[1:-1, 1:-1].copy()
+    return pieces
+
+
+def contracted_pieces(grid: OccupancyGrid, *, seed: int = 0) -> IntArray:
+    """Go on contracting the places of a pyramid, but let narrow boundaries resist.
+
+    Fine places are grown on the map as it was measured. Then arcs are taken by falling clearance of
+    their boundaries, and both ends merge unless it is below a share of the greatest clearance in
+    either: the rule of the watershed, on the arcs of a level, so that two doors between the same
+    rooms are judged one by one.
+
+    Parameters
+    ----------
+    grid
+        The map; cells count as they were measured, whatever the robot's radius.
+    seed
+        Seed of the pyramid.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+    """
+    from hybridnav.grid import OccupancyGrid as Grid  # noqa: PLC0415 - only a type above
+
+    plain = Grid(
+        grid.probability,
+        frame=grid.frame,
+        free_threshold=grid.free_threshold,
+        occupied_threshold=grid.occupied_threshold,
+    )
+    level = DualGraphPyramid.build(
+        plain, merge_distance_m=max(_FINE_M, 2 * grid.resolution_m), seed=seed
+    )[-1]
+    clearance = clearance_cells(grid.measured == CellClass.OCCUPIED).ravel()
+    clearance[~np.isfinite(clearance)] = 1.0
+    field_of = level.field_of.ravel()
+    peak = np.zeros(level.n_vertices)
+    np.maximum.at(peak, field_of[field_of >= 0], clearance[field_of >= 0])
+    edges, arc = level.boundary_table
+    ends = edges >> 1, (edges >> 1) + np.where(edges & 1, grid.shape[1], 1)
+    widest = np.zeros(level.n_arcs)
+    np.maximum.at(widest, arc, np.minimum(clearance[ends[0]], clearance[ends[1]]))
+    is_free = level.classes == CellClass.FREE
+    root = np.arange(level.n_vertices)
+    for at in np.argsort(-widest, kind="stable").tolist():
+        u, v = (int(_segmentation_kernels.find(root, end)) for end in level.arcs[at])
+        if u == v or not (is_free[u] and is_free[v]):
+            continue
+        if widest[at] >= _PERSISTENCE * min(peak[u], peak[v]):
+            low, high = sorted((u, v), key=lambda vertex: peak[vertex])
+            root[low] = high
+    final = np.array([_segmentation_kernels.find(root, v) for v in range(level.n_vertices)])
+    final[~is_free] = -1
+    pieces: IntArray = np.append(final, -1)[level.field_of].astype(np.int32)
+    return pieces
+
+
+def walled_pieces(grid: OccupancyGrid) -> IntArray:
+    """Cut free space along wall lines, and at pinched passages between them.
+
+    Parameters
+    ----------
+    grid
+        The map; cells count as they were measured, whatever the robot's radius.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+    """
+    lines = wall_line_pieces(grid).astype(np.int64)
+    basins = _basins(grid, ratio=_PINCH, broad_m=_PINCH_M)
+    both = np.where((lines >= 0) & (basins >= 0), lines * (int(basins.max()) + 1) + basins, -1)
+    found, dense = np.unique(both, return_inverse=True)
+    none = int(np.searchsorted(found, 0))
+    pieces: IntArray = (dense.reshape(both.shape) - none).astype(np.int32)
+    return np.maximum(pieces, -1)
+
+
+def wall_line_pieces(grid: OccupancyGrid) -> IntArray:
+    """Cut free space along the lines of its walls, where they continue behind an opening.
+
+    In the two main directions of the building, a gap between wall and wall on one line is taken for
+    an opening: up to 6 m where both sides hold enough wall, doors up to 1.5 m where one does. What
+    the cuts leave connected is a piece; those below a square metre go to their neighbours. Kin to
+    the wall lines of M. Luperto, F. Amigoni: Extracting structure of buildings using layout
+    reconstruction, 2019.
+
+    Parameters
+    ----------
+    grid
+        The map; cells count as they were measured, whatever the robot's radius.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+    """
+    free = grid.measured == CellClass.FREE
+    occupied = grid.measured == CellClass.OCCUPIED
+    tilt_rad = main_direction(occupied)
+    cut = np.zeros_like(free)
+    if abs(tilt_rad) < _LEAST_TILT_RAD:
+        cut = _gaps(occupied, free, grid.resolution_m)
+    else:
+        upright = _turned(occupied, tilt_rad), _turned(free, tilt_rad)
+        cut = _turned_back(_gaps(*upright, grid.resolution_m), tilt_rad, grid.shape)
+    labels, _ = ndimage.label(free & ~cut)
+    areas_m2 = np.bincount(labels.ravel()) * grid.resolution_m**2
+    kept = areas_m2 >= _LEAST_PIECE_M2
+    kept[0] = False
+    pieces: IntArray = np.where(kept[labels], labels - 1, -1).astype(np.int32)
+    _segmentation_kernels.grow_labels(pieces, free)
+    return pieces
+
+
+def main_direction(occupied: BoolArray) -> float:
+    """Angle that turns the rows of a grid into the direction of most walls, in radians.
+
+    Parameters
+    ----------
+    occupied
+        bool (rows, cols).
+
+    Returns
+    -------
+    float
+        From -pi/4 to pi/4, counter-clockwise with row 0 at the bottom; 0 without walls.
+    """
+    smooth = ndimage.gaussian_filter(occupied.astype(np.float64), 2.0)
+    if min(occupied.shape) < 2:  # noqa: PLR2004 - no gradient
+        return 0.0
+    by_row, by_col = np.gradient(smooth)
+    # Four times the angle makes walls and their normals, whichever way they face, one direction.
+    turned = np.exp(4j * np.arctan2(by_row, by_col)) * np.hypot(by_row, by_col)
+    return float(np.angle(turned.sum()) / 4)
+
+
+def _gaps(occupied: BoolArray, free: BoolArray, resolution_m: float) -> BoolArray:
+    """Cells between walls that continue each other along rows or columns."""
+    slack = max(1, round(_WALL_SLACK_M / resolution_m))
+    longest, short, window, side, both = (
+        max(1, round(length_m / resolution_m))
+        for length_m in (_GAP_M, _DOOR_M, _WINDOW_M, _SIDE_M, _BOTH_M)
+    )
+    gaps = np.zeros_like(free)
+    for axis in (0, 1):
+        wall = ndimage.binary_dilation(occupied if axis == 0 else occupied.T, _upright(slack))
+        other = free if axis == 0 else free.T
+        found = _segmentation_kernels.gaps_in_rows(
+            np.ascontiguousarray(wall),
+            np.ascontiguousarray(other),
+            longest,
+            short,
+            window,
+            side,
+            both,
+            _FREE_SHARE,
+        )
+        gaps |= found if axis == 0 else found.T
+    return gaps & free
+
+
+def _upright(slack: int) -> BoolArray:
+    return np.ones((2 * slack + 1, 1), dtype=np.bool_)
+
+
+def _rotation(tilt_rad: float) -> FloatArray:
+    """Turns offsets (row, col) of an upright image into those of the grid."""
+    cosine, sine = math.cos(tilt_rad), math.sin(tilt_rad)
+    return np.array([[cosine, sine], [-sine, cosine]])
+
+
+def _turned(mask: BoolArray, tilt_rad: float) -> BoolArray:
+    """A mask on an image that is turned so that walls run along its rows, large enough for all."""
+    side = math.ceil(math.hypot(*mask.shape)) + 2
+    turn = _rotation(tilt_rad)
+    middle = (np.array(mask.shape) - 1) / 2
+    offset = middle - turn @ np.full(2, (side - 1) / 2)
+    found: BoolArray = ndimage.affine_transform(
+        mask.astype(np.uint8), turn, offset, (side, side), order=0
+    ).astype(np.bool_)
+    return found
+
+
+def _turned_back(mask: BoolArray, tilt_rad: float, shape: tuple[int, int]) -> BoolArray:
+    turn = _rotation(tilt_rad).T
+    middle = (np.array(mask.shape) - 1) / 2
+    offset = middle - turn @ ((np.array(shape) - 1) / 2)
+    found: BoolArray = ndimage.affine_transform(
+        mask.astype(np.uint8), turn, offset, shape, order=0
+    ).astype(np.bool_)
+    # Turned lines of one cell have holes at their steps.
+    closed: BoolArray = ndimage.binary_dilation(found, np.ones((2, 2), dtype=np.bool_))
+    return closed

@@ -1,0 +1,119 @@
+"""Rooms that the map itself shows: segmentation of free space at its narrow passages."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+from scipy import ndimage
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
+from hybridnav.grid.rooms import MAX_ROOMS, Segmentation
+from hybridnav.topology.merging import Pieces, grown
+from hybridnav.topology.pieces import contracted_pieces, walled_pieces, watershed_pieces
+
+if TYPE_CHECKING:
+    from hybridnav._typing import IntArray
+    from hybridnav.grid import OccupancyGrid
+
+_PIECES = {
+    "walls": walled_pieces,
+    "watershed": watershed_pieces,
+    "contraction": contracted_pieces,
+}
+_UNEXPLORED_RIM = 0.8
+"""Share of the cells round free space that must be unexplored for them to count as walls."""
+_SPLINTER_M2 = 1.0
+"""Smaller pieces are merged first: they would be convex with anything."""
+_SOLIDITY = 0.8
+_OPEN = 0.65
+_STRAIGHT: dict[Segmentation, float] = {"walls": 0.35, "watershed": 0.35, "contraction": _SOLIDITY}
+"""Solidity of two parts of one corridor. Boundaries of places lie beside doors, not in them, and
+look like a corridor's: contraction has no rule of its own for it."""
+_WALL_REACH_M = 0.25
+"""How far rooms reach into walls: so far robots of any radius see them change at doors."""
+
+
+def find_rooms(
+    grid: OccupancyGrid, *, method: Segmentation = "walls", least_area_m2: float = 2.0
+) -> RoomLabels:
+    """Find the rooms of a map.
+
+    Parameters
+    ----------
+    grid
+        The map. Its cells count as they were measured: the robot's radius changes no room.
+    method
+        Where free space is cut: `"walls"`, along the lines of walls that continue behind an
+        opening, and at pinched passages; `"watershed"`, along the watersheds of the distance
+        transform; `"contraction"`, where boundaries resist the contraction of a pyramid. The pieces
+        are then merged in the same way, where their union is nearly convex and hardly walled.
+    least_area_m2
+        Smaller pieces go to a neighbour, positive; what has none is no room.
+
+    Returns
+    -------
+    RoomLabels
+        Rooms `room-1`, `room-2`, ..., in reading order of their first cells: highest row first.
+
+    Raises
+    ------
+    InvalidValueError
+        When the method is not known, the area not positive, or there are too many rooms.
+    """
+    if method not in get_args(Segmentation):
+        raise InvalidValueError(
+            f"method must be one of {', '.join(get_args(Segmentation))}, got {method!r:.80}"
+        )
+    if not least_area_m2 > 0:
+        raise InvalidValueError(
+            f"least area must be a positive number of square metres, got {least_area_m2}"
+        )
+    grid = _walled(grid)
+    pieces = Pieces(_PIECES[method](grid), grid.resolution_m)
+    pieces.merge_small(min(least_area_m2, _SPLINTER_M2))
+    pieces.merge_convex(
+        least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
+    )
+    pieces.merge_small(least_area_m2)
+    labels = _in_reading_order(pieces.label_of, least_area_m2 / grid.resolution_m**2)
+    n_rooms = int(labels.max(initial=NO_ROOM)) + 1
+    if n_rooms > MAX_ROOMS:
+        raise InvalidValueError(
+            f"the map falls into {n_rooms} rooms of {least_area_m2:g} square metres and more, "
+            f"at most {MAX_ROOMS} are kept: raise the least area"
+        )
+    names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
+    return RoomLabels(names, grown(labels, _WALL_REACH_M / grid.resolution_m))
+
+
+def _walled(grid: OccupancyGrid) -> OccupancyGrid:
+    """The map with walls where most of its free space ends at unexplored cells: the rim of those.
+
+    A scan whose thresholds call most walls unexplored has no other ones. Where obstacles bound free
+    space, unexplored pockets are shadows of furniture, and no walls.
+    """
+    free = grid.measured == CellClass.FREE
+    beside = ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
+    rim = beside & (grid.measured == CellClass.UNEXPLORED)
+    if np.count_nonzero(rim) <= _UNEXPLORED_RIM * np.count_nonzero(beside):
+        return grid
+    probability = grid.probability.copy()
+    probability[rim] = 1.0
+    return replace(grid, probability=probability)
+
+
+def _in_reading_order(label_of: IntArray, least_cells: float) -> IntArray:
+    """Labels of at least some cells, renumbered by their first cells from the top row down."""
+    areas = np.bincount(label_of[label_of >= 0])
+    found, first = np.unique(label_of[::-1], return_index=True)
+    kept = found >= 0
+    found, first = found[kept], first[kept]
+    large = areas[found] >= least_cells
+    order = found[large][np.argsort(first[large], kind="stable")]
+    new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
+    new[order] = np.arange(len(order))
+    renumbered: IntArray = new[label_of]
+    return renumbered

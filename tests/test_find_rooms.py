@@ -1,0 +1,165 @@
+"""Segmentation into rooms: what every method must find, and how agreement is counted."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.grid import CellClass
+from hybridnav.metrics import compare_rooms
+from hybridnav.topology.merging import Pieces
+from hybridnav.topology.pieces import main_direction
+from tests.strategies import class_grids, occupancy_grid
+
+METHODS = ["walls", "watershed", "contraction"]
+RESOLUTION_M = 0.1
+
+
+def floor(turned_rad=0.0):
+    """Three rooms of 4 m x 4 m side by side over a corridor of 2 m, doors of 1 m; and the rooms."""
+    rows, cols = 65, 125
+    free = np.zeros((rows, cols), dtype=bool)
+    true = np.full((rows, cols), -1)
+    free[2:22, 2:123], true[2:22, 2:123] = True, 3
+    for number in range(3):
+        left = 2 + 41 * number
+        free[23:63, left : left + 39], true[23:63, left : left + 39] = True, number
+        free[22, left + 15 : left + 25] = True
+    if turned_rad:
+        side = 150
+        row, col = np.indices((side, side)) - (side - 1) / 2
+        cosine, sine = math.cos(turned_rad), math.sin(turned_rad)
+        from_row = np.rint(cosine * row - sine * col + (rows - 1) / 2).astype(int)
+        from_col = np.rint(sine * row + cosine * col + (cols - 1) / 2).astype(int)
+        inside = (from_row >= 0) & (from_row < rows) & (from_col >= 0) & (from_col < cols)
+        at = from_row.clip(0, rows - 1), from_col.clip(0, cols - 1)
+        free, true = inside & free[at], np.where(inside, true[at], -1)
+    return occupancy_grid(free.astype(np.uint8), resolution_m=RESOLUTION_M), true
+
+
+@pytest.mark.parametrize("turned_rad", [0.0, 0.5])
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_parts_rooms_from_a_corridor(method, turned_rad):
+    grid, true = floor(turned_rad)
+    rooms = hn.find_rooms(grid, method=method)
+    known = (true >= 0) & (grid.classes == CellClass.FREE)
+    agreed = compare_rooms(true[known], rooms.label_of[known])
+    assert agreed.n_found == 4
+    assert agreed.mcc > 0.9
+    assert (agreed.recall > 0.9).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_names_count_up_from_the_top_whatever_the_radius_of_the_robot(method):
+    grid, true = floor()
+    rooms = hn.find_rooms(grid, method=method)
+    assert rooms.names == ("room-1", "room-2", "room-3", "room-4")
+    middles = [rooms.label_of[40, 20], rooms.label_of[40, 60], rooms.label_of[40, 100]]
+    assert middles == [0, 1, 2]
+    assert rooms.label_of[10, 60] == 3
+    wide = hn.OccupancyGrid(grid.probability, grid.frame, robot_radius_m=0.3)
+    assert (hn.find_rooms(wide, method=method).label_of == rooms.label_of).all()
+    assert true.max() == 3
+
+
+@given(classes=class_grids(), method=st.sampled_from(METHODS))
+def test_rooms_of_any_map_hold_free_cells_of_one_connected_part(classes, method):
+    grid = occupancy_grid(classes, resolution_m=0.25)
+    rooms = hn.find_rooms(grid, method=method, least_area_m2=0.2)
+    free = grid.measured == CellClass.FREE
+    counts = np.bincount(rooms.label_of[free & (rooms.label_of >= 0)], minlength=len(rooms.names))
+    assert (counts >= 4).all()
+    again = hn.find_rooms(grid, method=method, least_area_m2=0.2)
+    assert (again.label_of == rooms.label_of).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_walls_that_a_scan_left_unexplored_part_rooms_too(method):
+    grid, true = floor()
+    probability = np.where(grid.probability > 0, 0.5, 0.0).astype(np.float32)
+    rooms = hn.find_rooms(hn.OccupancyGrid(probability, grid.frame), method=method)
+    known = (true >= 0) & (grid.classes == CellClass.FREE)
+    assert compare_rooms(true[known], rooms.label_of[known]).mcc > 0.9
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_open_ground_without_a_wall_is_one_room(method):
+    grid = hn.OccupancyGrid(np.zeros((40, 60), np.float32), hn.Frame(0.1))
+    assert hn.find_rooms(grid, method=method).names == ("room-1",)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_map_without_free_cells_has_no_rooms(method):
+    grid = hn.OccupancyGrid(np.ones((5, 5), np.float32), hn.Frame(0.1))
+    assert hn.find_rooms(grid, method=method).names == ()
+
+
+def test_unknown_methods_and_areas_are_refused():
+    grid = hn.OccupancyGrid(np.zeros((5, 5), np.float32))
+    with pytest.raises(hn.InvalidValueError, match="walls, watershed, contraction"):
+        hn.find_rooms(grid, method="magic")  # type: ignore[arg-type]
+    with pytest.raises(hn.InvalidValueError, match="positive"):
+        hn.find_rooms(grid, least_area_m2=0.0)
+
+
+def test_the_main_direction_is_that_of_the_walls():
+    for angle_rad in (-0.6, -0.2, 0.0, 0.3, 0.7):
+        grid, _ = floor(angle_rad)
+        found = main_direction(grid.measured == CellClass.OCCUPIED)
+        assert abs(found - angle_rad) < 0.03
+
+
+def test_pieces_of_one_rectangle_merge_and_an_l_stays_apart():
+    labels = np.full((20, 30), -1, dtype=np.int32)
+    labels[0:10, 0:10], labels[0:10, 10:20], labels[10:20, 10:14] = 0, 1, 2
+    pieces = Pieces(labels, 1.0)
+    pieces.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
+    merged = pieces.label_of
+    assert merged[5, 5] == merged[5, 15] != merged[15, 12]
+    pieces.merge_small(50.0)
+    assert (pieces.label_of[labels >= 0] == 0).all()
+
+
+def test_a_wall_between_two_pieces_keeps_them_apart():
+    labels = np.full((20, 41), -1, dtype=np.int32)
+    labels[:, :20], labels[:, 21:] = 0, 1
+    labels[8:10, 20] = 0
+    pieces = Pieces(labels, 0.1)
+    pieces.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
+    assert pieces.label_of.max() == 1
+
+
+@given(
+    true=st.lists(st.integers(0, 3), min_size=1, max_size=60),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_agreement_is_full_for_equal_rooms_under_any_names(true, seed):
+    labels = np.array(true)
+    names = np.random.default_rng(seed).permutation(4) + 10
+    agreed = compare_rooms(labels, names[labels])
+    assert agreed.precision.tolist() == agreed.recall.tolist() == [1.0] * len(set(true))
+    if len(set(true)) > 1:
+        assert agreed.mcc == pytest.approx(1.0)
+    else:
+        assert math.isnan(agreed.mcc)
+
+
+def test_agreement_of_two_rooms_is_the_binary_coefficient():
+    true = np.array([0] * 50 + [1] * 30)
+    found = np.array([5] * 40 + [7] * 10 + [7] * 25 + [5] * 5)
+    tp, fn, tn, fp = 40, 10, 25, 5
+    expected = (tp * tn - fp * fn) / math.sqrt((tp + fp) * (tp + fn) * (tn + fp) * (tn + fn))
+    agreed = compare_rooms(true, found)
+    assert agreed.mcc == pytest.approx(expected)
+    assert agreed.precision.tolist() == pytest.approx([40 / 45, 25 / 35])
+    assert agreed.recall.tolist() == pytest.approx([0.8, 25 / 30])
+
+
+def test_no_room_is_nobodys_partner():
+    agreed = compare_rooms(np.array([0, 0, 1, 1]), np.array([-1, -1, 4, 4]))
+    assert agreed.partners.tolist() == [-1, 4]
+    assert agreed.recall.tolist() == [0.0, 1.0]
+    assert agreed.n_found == 1

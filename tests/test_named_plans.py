@@ -1,0 +1,221 @@
+"""Plans between rooms with names, tours with stops, the way in words, and their command lines."""
+
+import itertools
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import hybridnav as hn
+from hybridnav.grid import RoomLabels
+from hybridnav.route import RoomSearch
+from tests.strategies import drawn, occupancy_grid
+from tests.test_cli import cli  # noqa: F401 - the fixture
+
+# Kitchen and lab over a hall, a store that cannot be reached; cells of half a metre.
+CLASSES = drawn(
+    "###################",
+    "#.....#.....#.....#",
+    "#.....#.....#.....#",
+    "#.....#.....#.....#",
+    "#.....#.....#.....#",
+    "###.#####.#########",
+    "#.................#",
+    "#.................#",
+    "#.................#",
+    "###################",
+)
+SIDE = 0.5
+NAMES = ("kitchen", "lab", "store", "hall")
+
+
+def labels():
+    label_of = np.full(CLASSES.shape, -1, dtype=np.int32)
+    label_of[5:9, 1:6], label_of[5:9, 7:12], label_of[5:9, 13:18] = 0, 1, 2
+    label_of[1:4, 1:18] = 3
+    label_of[4, 3], label_of[4, 9] = 0, 1
+    return RoomLabels(NAMES, label_of, {"sink": (0.75, 4.25), "lab": (5.75, 4.25)})
+
+
+@pytest.fixture(scope="module", params=["balanced", "fast", "grid-astar"])
+def planner(request):
+    grid = occupancy_grid(CLASSES, resolution_m=SIDE)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=labels())
+    return hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=request.param)
+
+
+def test_anywhere_in_a_room_means_its_nearest_cells(planner):
+    result = planner.plan("kitchen", "lab")
+    # From the kitchen's doorway down into the hall, six columns on, and up into the lab's.
+    assert result.solved
+    assert [tuple(c) for c in result.path.cells[[0, -1]].tolist()] == [(4, 3), (4, 9)]
+    assert result.cost == pytest.approx(SIDE * 8)
+
+
+def test_the_point_of_a_room_is_used_when_asked_for(planner):
+    result = planner.plan("kitchen", "lab", at="point")
+    assert tuple(result.path.cells[-1].tolist()) == (8, 11)
+    to_point = planner.plan("kitchen", (5.75, 4.25))
+    assert to_point.cost <= result.cost
+    assert planner.plan("sink", "kitchen").cost == 0.0
+
+
+def test_a_room_that_cannot_be_reached_is_an_outcome(planner):
+    assert planner.plan("kitchen", "store").status is hn.PlanStatus.NO_PATH
+    assert hn.plan_tour(planner, ["kitchen", "store", "lab"]).status is hn.PlanStatus.NO_PATH
+
+
+def test_bad_points_beside_names_keep_their_status(planner):
+    assert planner.plan("kitchen", (99.0, 0.0)).status is hn.PlanStatus.GOAL_OUTSIDE
+    assert planner.plan((0.1, 0.1), "lab").status is hn.PlanStatus.START_OCCUPIED
+    with pytest.raises(hn.InvalidValueError, match="two finite coordinates"):
+        planner.plan("kitchen", (1.0, float("nan")))
+
+
+def test_names_and_words_that_are_wrong_are_explained(planner):
+    with pytest.raises(hn.InvalidValueError, match="'kichen': did you mean kitchen"):
+        planner.plan("kichen", "lab")
+    with pytest.raises(hn.InvalidValueError, match="did you mean sink"):
+        planner.plan("lab", "sinc")
+    with pytest.raises(hn.InvalidValueError, match="anywhere"):
+        planner.plan("lab", "sink", at="once")
+    with pytest.raises(hn.InvalidValueError, match="at least two"):
+        hn.plan_tour(planner, ["lab"])
+
+
+def test_what_is_blocked_is_not_chosen_for_a_stop(planner):
+    free = planner.plan("kitchen", "lab")
+    closed = planner.plan("kitchen", "lab", blocked={"cells": [(4, 3)]})
+    assert free.solved
+    assert not closed.solved
+
+
+def test_a_map_without_rooms_says_so():
+    plain = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(CLASSES)))
+    with pytest.raises(hn.InvalidValueError, match="no rooms"):
+        hn.HybridPlanner(plain).plan("kitchen", "lab")
+
+
+def test_a_tour_is_told_by_rooms_and_doors(planner):
+    tour = hn.plan_tour(planner, ["sink", "lab", "hall"])
+    assert tour.solved
+    assert [leg.room for leg in tour.legs] == ["kitchen", "hall", "lab", "lab", "hall"]
+    assert tour.length_m == pytest.approx(sum(leg.length_m for leg in tour.legs))
+    doors = [leg.door for leg in tour.legs if leg.door is not None]
+    assert [door.rooms for door in doors] == [("hall", "kitchen"), ("hall", "lab"), ("hall", "lab")]
+    words = tour.in_words()
+    assert words[0] == "start in kitchen"
+    assert "to door 1 (0.5 m wide), into hall" in words[1]
+    assert words[1].endswith("then left")
+    assert words[2] == "3.5 m to door 2 (0.5 m wide), into lab, and you are there"
+    assert words[-1].endswith("into hall, and you are there")
+
+
+def test_legs_of_an_any_angle_path_share_its_length(planner):
+    tour = hn.plan_tour(planner, ["sink", "lab"], at="point", smooth="line-of-sight")
+    assert tour.results[0].metric == "any-angle"
+    assert sum(leg.length_m for leg in tour.legs) == pytest.approx(tour.length_m)
+
+
+def test_all_levels_agree_on_which_rooms_a_route_joins(planner):
+    search = RoomSearch(planner.topology.rooms)
+    for a, b in itertools.permutations(NAMES, 2):
+        route = search.search(a, b)
+        assert (route is not None) == planner.plan(a, b).solved == ("store" not in {a, b})
+        if route is not None:
+            assert (route.rooms[0], route.rooms[-1]) == (a, b)
+
+
+@pytest.fixture
+def map_file(tmp_path):
+    """The map as a ROS map with its rooms beside it."""
+    pixels = np.where(CLASSES[::-1] == 0, 0, 254).astype(np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "house.pgm")
+    path = tmp_path / "house.yaml"
+    path.write_text(
+        f"image: house.pgm\nresolution: {SIDE}\norigin: [0, 0, 0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    hn.save_rooms(tmp_path / "rooms.yaml", labels(), hn.load_map(path))
+    return path
+
+
+def test_plan_takes_names_from_the_file_beside_the_map(cli, map_file):  # noqa: F811
+    done = cli("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
+    assert done.code == 0
+    assert "house, kitchen to lab" in done.out
+    assert "way        start in kitchen" in done.out
+    assert "and you are there" in done.out
+    assert done.err == ""
+
+
+def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):  # noqa: F811
+    done = cli(
+        *("plan", map_file, "--from", "sink", "--via", "lab", "--to", "1.25,1.25", "--json"),
+        *("--at", "point", "--robot-radius", "0", "--plot", tmp_path / "tour.svg"),
+    )
+    assert done.answer["status"] == "solved"
+    assert done.answer["stops"] == ["sink", "lab", [1.25, 1.25]]
+    assert len(done.answer["points_m"]) == 2
+    assert done.answer["words"][-1].endswith("to (1.25, 1.25) in hall")
+    assert sum(leg["length_m"] for leg in done.answer["legs"]) == pytest.approx(
+        done.answer["length_m"]
+    )
+    assert (tmp_path / "tour.svg").read_text().count('id="path"') == 2
+
+
+def test_plan_to_a_room_out_of_reach_exits_with_1(cli, map_file):  # noqa: F811
+    done = cli("plan", map_file, "--from", "kitchen", "--to", "store", "--robot-radius", "0")
+    assert done.code == 1
+    assert "status     no path" in done.out
+
+
+def test_plan_without_a_file_finds_rooms_and_says_so(cli, map_file):  # noqa: F811
+    (map_file.parent / "rooms.yaml").unlink()
+    query = ("plan", map_file, "--from", "room-1", "--to", "room-1", "--robot-radius", "0")
+    done = cli(*query, "--set", "pyramid.merge_distance_m=2")
+    assert done.code == 0
+    assert "no rooms.yaml" in done.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--from", "kitchn", "--to", "lab"], ["'kitchn'", "did you mean kitchen"]),
+        (["--from", "kitchen"], ["missing option '--goal' or '--to'"]),
+        (["--from", "kitchen", "--start", "1,1", "--to", "lab"], ["only one", "'--from'"]),
+        (["--from", "kitchen", "--to", "lab", "--at", "noon"], ["--at", "'noon'"]),
+        (["--from", "kitchen", "--to", "lab", "--compare"], ["--compare"]),
+        (["--from", "kitchen", "--to", "nan,1"], ["finite"]),
+    ],
+)
+def test_wrong_names_and_options_end_in_one_line(cli, map_file, arguments, words):  # noqa: F811
+    assert cli("plan", map_file, "--robot-radius", "0", *arguments).refuses(2, *words)
+
+
+def test_a_bad_file_of_rooms_is_unreadable_input(cli, map_file):  # noqa: F811
+    (map_file.parent / "rooms.yaml").write_text("rooms: 7\n")
+    query = ("plan", map_file, "--from", "kitchen", "--to", "lab")
+    assert cli(*query).refuses(3, "rooms.yaml", "expected a list")
+
+
+def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):  # noqa: F811
+    out, picture = tmp_path / "found.yaml", tmp_path / "found.svg"
+    query = ("rooms", map_file, "-o", out, "--robot-radius", "0", "--plot", picture)
+    done = cli(*query)
+    assert done.code == 0
+    assert "room-1" in done.out
+    assert hn.load_rooms(out, hn.load_map(map_file)).names[0] == "room-1"
+    assert "room-1" in picture.read_text() or 'id="room-0"' in picture.read_text()
+    assert cli(*query).refuses(2, "found.yaml exists", "--force")
+    assert cli(*query, "--force").code == 0
+
+
+def test_rooms_lists_those_of_a_file(cli, map_file):  # noqa: F811
+    done = cli("rooms", map_file, "--rooms", map_file.parent / "rooms.yaml", "--robot-radius", "0")
+    assert "kitchen" in done.out
+    assert "hall (1: 0.50 m)" in done.out
+
+
+def test_rooms_refuses_an_unknown_method(cli, map_file):  # noqa: F811
+    assert cli("rooms", map_file, "--method", "magic").refuses(2, "walls, watershed", "'magic'")

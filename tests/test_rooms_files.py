@@ -1,0 +1,193 @@
+"""Files of rooms: both forms in, outlines out, and one line for what is wrong."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import hybridnav as hn
+from hybridnav.grid import Frame, RoomLabels
+from tests.strategies import drawn, occupancy_grid
+
+FLAT = drawn(
+    "############",
+    "#....#.....#",
+    "#....#.....#",
+    "#..........#",
+    "#....#.....#",
+    "############",
+)
+KITCHEN = "[[1, 1], [5, 1], [5, 5], [1, 5]]"
+LAB = "[[6, 1], [11, 1], [11, 5], [6, 5]]"
+
+
+@pytest.fixture
+def grid():
+    return occupancy_grid(FLAT)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text):
+        path = tmp_path / "rooms.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def two(first=f"polygon: {KITCHEN}", second=f"polygon: {LAB}", more=""):
+    return f"rooms:\n- name: kitchen\n  {first}\n- name: lab\n  {second}\n{more}"
+
+
+def test_polygons_hold_the_cells_whose_centres_lie_inside(grid, write):
+    rooms = hn.load_rooms(write(two(more="points:\n- name: sink\n  point: [2, 3]\n")), grid)
+    assert rooms.names == ("kitchen", "lab")
+    assert (rooms.label_of[1:5, 1:5] == 0).all()
+    assert (rooms.label_of[1:5, 6:11] == 1).all()
+    assert (rooms.label_of >= 0).sum() == 16 + 20
+    assert dict(rooms.points) == {"sink": (2.0, 3.0)}
+
+
+def test_several_rings_leave_holes_open(grid, write):
+    hole = "[[2, 2], [3, 2], [3, 3], [2, 3]]"
+    rooms = hn.load_rooms(write(two(first=f"polygons: [{KITCHEN}, {hole}]")), grid)
+    assert rooms.label_of[2, 2] == -1
+    assert (rooms.label_of == 0).sum() == 15
+
+
+def test_seeds_name_what_segmentation_finds_there(grid, write):
+    # On cells of a metre the doorway of one cell parts the two rooms.
+    rooms = hn.load_rooms(write(two(first="seed: [2.5, 2.5]", second="seed: [8.5, 2.5]")), grid)
+    assert rooms.label_of[1, 1] == rooms.label_of[4, 4] == 0
+    assert rooms.label_of[1, 10] == rooms.label_of[4, 7] == 1
+
+
+def test_seeds_in_one_room_share_it_by_the_way_to_walk(write):
+    hall = occupancy_grid(drawn("#######", "#.....#", "#.....#", "#######"))
+    rooms = hn.load_rooms(write(two(first="seed: [1.5, 1.5]", second="seed: [5.5, 1.5]")), hall)
+    assert rooms.label_of[2, 1:6].tolist() in ([0, 0, 0, 1, 1], [0, 0, 1, 1, 1])
+
+
+def test_a_polygon_is_where_the_frame_puts_it(write):
+    frame = Frame(0.5, (10.0, -3.0), 0.7)
+    grid = hn.OccupancyGrid(np.zeros((20, 30), np.float32), frame)
+    corners = frame.points_of_grid([[2, 3], [2, 9], [8, 9], [8, 3]])
+    ring = ", ".join(f"[{x:.6f}, {y:.6f}]" for x, y in corners.tolist())
+    rooms = hn.load_rooms(write(f"rooms:\n- name: a\n  polygon: [{ring}]\n"), grid)
+    expected = np.full((20, 30), -1)
+    expected[2:8, 3:9] = 0
+    assert (rooms.label_of == expected).all()
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.1])
+def test_rooms_that_are_written_are_read_again(tmp_path, yaw_rad):
+    frame = Frame(0.05, (500_000.0, -3.0), yaw_rad)
+    grid = hn.OccupancyGrid(np.zeros((60, 80), np.float32), frame, name="a\nb")
+    labels = np.full((60, 80), -1, dtype=np.int32)
+    labels[5:40, 3:41], labels[5:40, 41:77] = 0, 1
+    labels[15:25, 10:30] = 2  # inside the first
+    rooms = RoomLabels(("yes", "Küche: 1", "- c"), labels, {"yes": (1.5, 2.25), "dock": (0, 0)})
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
+    again = hn.load_rooms(tmp_path / "rooms.yaml", grid)
+    assert again.names == rooms.names
+    assert dict(again.points) == dict(rooms.points)
+    assert (again.label_of == labels).all()
+
+
+def locations(tmp_path, image, text="data: l.pgm\nlocations: [kitchen, lab]\n"):
+    Image.fromarray(image).save(tmp_path / "l.pgm")
+    (tmp_path / "locations.yaml").write_text(text, encoding="utf-8")
+    return tmp_path / "locations.yaml"
+
+
+def test_pixels_of_a_label_image_index_the_names(grid, tmp_path):
+    image = np.full(FLAT.shape, 255, dtype=np.uint8)
+    image[1:3, 1:5], image[1:3, 6:11] = 0, 1
+    rooms = hn.load_rooms(locations(tmp_path, image), grid)
+    expected = np.full(FLAT.shape, -1)
+    expected[3:5, 1:5], expected[3:5, 6:11] = 0, 1  # the image's top is the map's last row
+    assert (rooms.label_of == expected).all()
+
+
+def test_flat_polygons_in_pixels_win_over_the_image(grid, tmp_path):
+    text = (
+        "data: l.pgm\nlocations: [kitchen, lab]\n"
+        "polygons: [[1, 1, 5, 1, 5, 3, 1, 3], [6, 1, 11, 1, 11, 5, 6, 5]]\n"
+    )
+    rooms = hn.load_rooms(locations(tmp_path, np.zeros(FLAT.shape, np.uint8), text), grid)
+    assert (rooms.label_of[3:5, 1:5] == 0).all()
+    assert (rooms.label_of == 0).sum() == 8
+    assert (rooms.label_of == 1).sum() == 20
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (two(second=f"polygon: {KITCHEN}"), ["'kitchen'", "'lab'", "overlap in 16.00 square"]),
+        (two(second="polygon: [[6, 1], [99, 1], [9, 5]]"), ["'lab'", "leaves the map"]),
+        (two(second="polygon: [[0, 0], [1, 0], [1, 1], [0, 1]]"), ["'lab'", "no free cell"]),
+        (two(second="polygon: [[6, 1], [9, 1]]"), ["'lab'", "three corners"]),
+        (two(second="polygon: [[6, 1], [9, 1], [7, 1]]"), ["'lab'", "no area"]),
+        (two(second="polygon: [[6, 1], [9, .nan], [7, 1]]"), ["'lab'", "number"]),
+        (two(second="polygon: [[6, 1], [9, 1e300], [7, 1]]"), ["'lab'", "number"]),
+        (two(second="polygon: [6, 1, 9, 1]"), ["'lab'", "[x, y]"]),
+        (two(second="polygon: 7"), ["'lab'", "list"]),
+        (two(second="sead: [1, 2]"), ["'lab'", "unknown key 'sead'", "seed"]),
+        (two(second="point: [1, 2]"), ["'lab'", "one of polygon, polygons and seed"]),
+        (two(second="seed: [99, 2]"), ["'lab'", "outside the map"]),
+        (two(second="seed: [0.5, 0.5]"), ["'lab'", "no free cell"]),
+        (two(second="seed: [2.5, 2.5]"), ["'lab'", "lies in room 'kitchen'"]),
+        (
+            f"rooms:\n- name: a\n  polygon: {KITCHEN}\n- name: a\n  polygon: {LAB}\n",
+            ["'a'", "twice"],
+        ),
+        (two(more="points:\n- name: lab\n  point: [1, 1]\n"), ["'lab'", "twice"]),
+        (two(more="points:\n- name: dock\n  point: here\n"), ["'dock'", "[x, y]"]),
+        ("rooms:\n- polygon: []\n", ["room 1", "name"]),
+        ("rooms: 7\n", ["expected a list"]),
+        ("roms: []\n", ["lacks rooms"]),
+        ("", ["mapping"]),
+        ("locations: [a]\n", ["data"]),
+        ("locations: [a]\ndata: gone.pgm\n", ["gone.pgm", "no such file"]),
+        ("locations: [a]\npolygons: []\n", ["1 locations but 0 polygons"]),
+        ("locations: [a]\npolygons: [[1, 2, 3]]\n", ["'a'", "3 numbers"]),
+        ("locations: [[]]\n", ["expected names"]),
+    ],
+)
+def test_a_file_that_is_wrong_says_so_in_one_line(grid, write, text, words):
+    with pytest.raises(hn.RoomsError) as error:
+        hn.load_rooms(write(text), grid)
+    message = str(error.value)
+    assert message.isprintable()
+    for word in (*words, "rooms.yaml"):
+        assert word in message
+
+
+def test_a_room_that_the_radius_fills_is_named(write):
+    fat = hn.OccupancyGrid((FLAT == 0).astype(np.float32), robot_radius_m=2.0)
+    with pytest.raises(hn.RoomsError, match=r"'kitchen'.*radius of 2 m"):
+        hn.load_rooms(write(two()), fat)
+
+
+def test_an_image_of_another_size_and_a_missing_file_are_refused(grid, tmp_path):
+    with pytest.raises(hn.RoomsError, match="5 x 4 pixels"):
+        hn.load_rooms(locations(tmp_path, np.zeros((4, 5), np.uint8)), grid)
+    with pytest.raises(hn.RoomsNotFoundError, match="no such file"):
+        hn.load_rooms(tmp_path / "gone.yaml", grid)
+
+
+def test_rooms_without_cells_or_a_folder_are_not_written(grid, tmp_path):
+    empty = RoomLabels(("a",), np.full(FLAT.shape, -1, dtype=np.int32))
+    with pytest.raises(hn.RoomsError, match="'a'"):
+        hn.save_rooms(tmp_path / "rooms.yaml", empty, grid)
+    full = RoomLabels(("a",), np.zeros(FLAT.shape, dtype=np.int32))
+    with pytest.raises(hn.RoomsError, match="cannot write"):
+        hn.save_rooms(tmp_path / "gone" / "rooms.yaml", full, grid)
+
+
+@pytest.mark.parametrize("floor", ["2", "3", "3ne"])
+def test_the_labels_of_a_real_floor_load(data, floor):
+    folder = data / "bwi_gdc" / floor
+    grid = hn.load_map(folder / f"{floor}.yaml", robot_radius_m=0.25)
+    rooms = hn.load_rooms(folder / "locations.yaml", grid)
+    assert (np.bincount(rooms.label_of[rooms.label_of >= 0]) > 1000).all()
