@@ -126,6 +126,10 @@ of their scenarios), up to {pairs} pairs a map. `python -m benchmarks.study --da
 makes it anew: records, a report with the worst cases drawn, and this page. What the columns mean is
 said in [harness.md](harness.md).
 
+[study-first.md](study-first.md) has the tables of the first study, 500 pairs a map, before there
+were routes over portals. Times are of single queries with cold caches; [portals.md](portals.md) has
+them interleaved, pair by pair.
+
 ## Consistency
 
 {study.checks:,} answers checked: {len(study.faults)} counter-examples, {study.failures} queries
