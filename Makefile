@@ -23,8 +23,9 @@ lint: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# On all cores, a file of tests to each in turn.
 unit: setup
-	$(BIN)/python -m pytest -m "not full"
+	$(BIN)/python -m pytest -m "not full" -n auto --dist loadfile
 
 # The kernels as plain Python, on maps of at most 12 x 12 cells: a second reading of the same code.
 nojit: setup
