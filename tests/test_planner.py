@@ -150,7 +150,6 @@ def test_maps_of_one_class_and_one_cell_have_answers(preset: str, drawing: str) 
         (1.0, 2.0, 3.0),
         [[1.0, 2.0]],
         3.0,
-        "kitchen",
         None,
         (10**400, 0),
     ],

@@ -13,7 +13,6 @@ import hybridnav as hn
 from hybridnav.cli.common import answer, complain, grow_topology, stage, timings
 from hybridnav.cli.errors import UsageError
 from hybridnav.config.yaml_file import printable
-from hybridnav.planner.itinerary import NOWHERE, Guide
 
 if TYPE_CHECKING:
     from hybridnav.planner.named import At
@@ -110,6 +109,9 @@ def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
 
 def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> list[dict[str, Any]]:
     """Routes of different classes between the two stops, with the rooms and doors they pass."""
+    # Loads numba, which help and wrong usage can do without.
+    from hybridnav.planner.itinerary import NOWHERE, Guide  # noqa: PLC0415
+
     guide = Guide(planner.topology.rooms)
     found = hn.plan_alternatives(
         planner,
