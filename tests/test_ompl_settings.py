@@ -69,6 +69,7 @@ def test_the_parameters_are_those_that_ompl_declares(planner: str) -> None:
         ("budget_s: 0", ["budget_s"]),
         ("seed: 0", ["seed"]),
         ("objective: clearance, planner: PRMstar", ["clearance"]),
+        ("space: dubins, turning_radius_m: 1, planner: PRMstar", ["dubins", "one way", "PRM"]),
         ("speed: 3", ["speed", "unknown key", "budget_s"]),
     ],
 )

@@ -55,6 +55,13 @@ def test_several_rings_leave_holes_open(grid, write):
     assert (rooms.label_of == 0).sum() == 15
 
 
+def test_a_polygon_of_many_corners_that_crosses_itself_is_refused(grid, write):
+    ring = np.random.default_rng(0).uniform(1, 5, size=(1000, 2)).round(3).tolist()
+    with pytest.raises(hn.RoomsError, match=r"kitchen.*1000 corners crosses itself") as refused:
+        hn.load_rooms(write(two(first=f"polygon: {ring}")), grid)
+    assert "\n" not in str(refused.value)
+
+
 def test_seeds_name_what_segmentation_finds_there(grid, write):
     # On cells of a metre the doorway of one cell parts the two rooms.
     rooms = hn.load_rooms(write(two(first="seed: [2.5, 2.5]", second="seed: [8.5, 2.5]")), grid)

@@ -201,6 +201,11 @@ class OmplSettings(BaseModel):
                 "objective",
                 "objective: clearance goes with space: r2 or se2, and not with PRM or PRMstar",
             )
+        if self.space == "dubins" and self.planner in {"PRM", "PRMstar"}:
+            # Their roadmap is undirected: a motion checked one way would be driven the other.
+            raise PydanticCustomError(
+                "roadmap", "space: dubins, whose curves run one way, goes not with PRM or PRMstar"
+            )
         if self.footprint is not None and self.space == "r2":
             raise PydanticCustomError(
                 "footprint", "a footprint needs a space with headings: se2, dubins or reeds-shepp"

@@ -28,6 +28,8 @@ _LEAST_OVERLAP = 0.01
 """Share of the smaller room that two outlines may have in common: lines drawn by hand."""
 _OUTSIDE_CELLS = 1.0
 """How far an outline may reach over the rim of the map."""
+_MOST_CROSSED = 64
+"""Polygons with more corners may not cross themselves: to sort that out takes very long."""
 _FEWEST_CORNERS = 3
 
 
@@ -173,7 +175,10 @@ def _shape(rings: list[FloatArray], at: str) -> BaseGeometry:
     for ring in rings:
         if len(ring) < _FEWEST_CORNERS:
             raise RoomsError(f"{at}: a polygon needs at least three corners, got {len(ring)}")
-        shape = shapely.symmetric_difference(shape, shapely.make_valid(shapely.Polygon(ring)))
+        polygon = shapely.Polygon(ring)
+        if len(ring) > _MOST_CROSSED and not polygon.is_valid:
+            raise RoomsError(f"{at}: a polygon of {len(ring)} corners crosses itself")
+        shape = shapely.symmetric_difference(shape, shapely.make_valid(polygon))
     if shape.area <= 0:
         raise RoomsError(f"{at}: the polygon has no area")
     return shape

@@ -97,7 +97,7 @@ class HybridPlanner:
             them, an any-angle one between the points; nothing is snapped to free space. On a map
             with rooms also the name of a room or of a named point. With OMPL
             in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis;
-            elsewhere a heading may be given and means nothing.
+            in its other spaces the third number means nothing.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one; None as the preset says.
         blocked
@@ -292,7 +292,7 @@ class HybridPlanner:
         if source is None and self.preset.planner.coarse == "portals":
             source = partial(self._walked, plan.cells)
         bound = max(found.lower_bound, self._any_angle_bound(plan.cells, ends))
-        if found.path is not None:
+        if found.path is not None and found.status is PlanStatus.SOLVED:
             bound = min(bound, found.weighted_cost or found.path.length_m)
         return self._answer(
             found.status,

@@ -84,8 +84,9 @@ class Answering:
         return self._reply(is_last=True)
 
     def better(self, points: FloatArray, cost: float) -> None:
-        """Note a path, and send it, where it is better than the best so far."""
-        if cost < self._cost:
+        """Note a path, and send it, where it is better than the best so far, and free of contact:
+        not all planners check the states that they put between others."""
+        if cost < self._cost and self._whole.is_valid(points):
             self._best, self._cost = points, cost
             self._trace.append((self.budget.seconds(), cost))
             self._send(self._reply(is_last=False))
