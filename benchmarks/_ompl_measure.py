@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import hybridnav as hn
+from benchmarks._queries_measure import MOVINGAI_MERGE_DISTANCE_M, ROS_MERGE_DISTANCE_M, read
 from hybridnav.config import load_preset
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import environment, map_digest
@@ -93,12 +93,11 @@ class Bench:
 
     def __init__(self, path: Path, *, pairs: int, seed: int) -> None:
         is_movingai = path.suffix == ".map"
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", hn.MapWarning)
-            self.grid = hn.load_map(path, robot_radius_m=0.0 if is_movingai else 0.25)
+        self.grid = read(path)
         self.sha = map_digest(self.grid)
         pyramid = hn.DualGraphPyramid.build(
-            self.grid, merge_distance_m=40.0 if is_movingai else 4.0
+            self.grid,
+            merge_distance_m=MOVINGAI_MERGE_DISTANCE_M if is_movingai else ROS_MERGE_DISTANCE_M,
         )
         topology = hn.TopologicalMap(pyramid)
         self._coarse = hn.HybridPlanner(topology, preset="fast")

@@ -73,13 +73,13 @@ class PlannerSettings(_Section):
     corridor: Literal["route", "neighbours"] = "route"
     """Fields the refiner may stand on: those of the route, or also their neighbours'."""
     refine: Literal["grid-astar", "gates", "stored-paths", "ompl"] = "grid-astar"
-    """How a path is found inside the corridor: cell by cell, or, over portals, by a search on the
-    border cells of the fields or by the stored paths alone, or by a sampling-based planner."""
+    """How a path is found: cell by cell in the corridor; over portals, with exact costs between all
+    border cells of the fields or by some stored paths alone; or by a sampling-based planner."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, section of its own; null elsewhere."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
-    """With `gates`: the corridor widens until no path can be shorter by more than this part; 0 for
-    the optimum. Null keeps to the corridor."""
+    """With `gates`: what is looked at ends once no path can be shorter by more than this part; null
+    or 0 for the optimum."""
     smooth: Literal["none", "line-of-sight"] = "none"
     """Whether the path is shortened to an any-angle one."""
     allow_unexplored: bool = False

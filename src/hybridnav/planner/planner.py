@@ -22,7 +22,7 @@ from hybridnav.route import Walks
 from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
@@ -208,18 +208,9 @@ class HybridPlanner:
         finish: Smooth,
         closed: LongArray | None,
     ) -> PlanResult:
-        stats = PlanStats(
-            expanded=plan.expanded,
-            expanded_places=plan.expanded_places,
-            expanded_gates=plan.expanded_gates,
-            corridor_cells=plan.corridor_cells,
-            seconds=plan.seconds,
-        )
+        stats = _stats_of(plan)
         if plan.cells is None:
             return self._answer(PlanStatus.NO_PATH, stats=stats)
-        source = plan.route_source
-        if source is None and self.preset.planner.coarse == "portals":
-            source = partial(self._walked, plan.cells)
         if finish == "line-of-sight":
             began = time.perf_counter()
             points = self._sight(closed).shorten(plan.cells, *ends)
@@ -238,7 +229,7 @@ class HybridPlanner:
             PlanStatus.SOLVED,
             metric=metric,
             path=path,
-            route_source=source,
+            route_source=self._route_source(plan),
             lower_bound=min(bound, length_m),
             stats=stats,
         )
@@ -288,9 +279,6 @@ class HybridPlanner:
         began = time.perf_counter()
         found = planner.plan(plan.cells, poses, closed, spent_s=sum(plan.seconds.values()))
         seconds = {**plan.seconds, "ompl": time.perf_counter() - began}
-        source = plan.route_source
-        if source is None and self.preset.planner.coarse == "portals":
-            source = partial(self._walked, plan.cells)
         bound = max(found.lower_bound, self._any_angle_bound(plan.cells, ends))
         if found.path is not None and found.status is PlanStatus.SOLVED:
             bound = min(bound, found.weighted_cost or found.path.length_m)
@@ -298,17 +286,11 @@ class HybridPlanner:
             found.status,
             metric=found.metric,
             path=found.path,
-            route_source=source,
+            route_source=self._route_source(plan),
             lower_bound=bound,
             weighted_cost=found.weighted_cost,
             refinement=found.refinement,
-            stats=PlanStats(
-                expanded=plan.expanded,
-                expanded_places=plan.expanded_places,
-                expanded_gates=plan.expanded_gates,
-                corridor_cells=plan.corridor_cells,
-                seconds=seconds,
-            ),
+            stats=_stats_of(replace(plan, seconds=seconds)),
         )
 
     def _sight(self, closed: LongArray | None) -> LineOfSight:
@@ -335,6 +317,13 @@ class HybridPlanner:
     @cached_property
     def _walks(self) -> Walks:
         return Walks(self.topology)
+
+    def _route_source(self, plan: CellPlan) -> Callable[[], Route] | None:
+        """What finds the route of a plan with a path; None where the whole map was searched."""
+        if plan.route_source is None and self.preset.planner.coarse == "portals":
+            assert plan.cells is not None  # noqa: S101 - the caller has looked
+            return partial(self._walked, plan.cells)
+        return plan.route_source
 
     def _walked(self, cells: LongArray) -> Route:
         """The places and arcs that a path passes."""
@@ -388,6 +377,16 @@ class HybridPlanner:
                 "robot_radius_m": pyramid.grid.robot_radius_m,
             },
         }
+
+
+def _stats_of(plan: CellPlan) -> PlanStats:
+    return PlanStats(
+        expanded=plan.expanded,
+        expanded_places=plan.expanded_places,
+        expanded_gates=plan.expanded_gates,
+        corridor_cells=plan.corridor_cells,
+        seconds=plan.seconds,
+    )
 
 
 def _is_in(sorted_cells: LongArray, cell: int) -> bool:

@@ -48,14 +48,14 @@ def build_tables(portals: Portals) -> tuple[Portals, Tables]:
         _fill(portals, portals.source_gate, shift, route)
     source_at = np.full(portals.n_gates, -1, dtype=np.int32)
     source_at[portals.source_gate] = np.arange(len(portals.source_gate))
-    return portals, Tables(route, between, shift, _field_of_gate(portals), source_at)
+    return portals, Tables(route, between, shift, portals.gate_field, source_at)
 
 
 def _tables(
     portals: Portals, shift: int
 ) -> tuple[NDArray[np.uint32] | None, NDArray[np.uint32], int]:
     """The table of all gates, None if some of them will go, that between sides, the longest way."""
-    field_of = _field_of_gate(portals)
+    field_of = portals.gate_field
     tail = np.repeat(np.arange(portals.n_gates), np.diff(portals.exit_start))
     sources = np.unique(tail[field_of[tail] < field_of[portals.exit_gate]]).astype(np.int32)
     keeps_all = bool((np.diff(portals.row_start) > 0).all())
@@ -101,17 +101,12 @@ def _between(
     return between
 
 
-def _field_of_gate(portals: Portals) -> IntArray:
-    sizes = np.diff(portals.gate_start)
-    return np.repeat(np.arange(portals.n_fields, dtype=np.int32), sizes)
-
-
 def _fill(portals: Portals, sources: IntArray, shift: int, table: NDArray[np.uint32]) -> int:
     """Fill the table of some sources; gives the greatest cost in it."""
     return int(
         kernels.costs_to_gates(
             sources.astype(np.int64),
-            _field_of_gate(portals),
+            portals.gate_field,
             portals.gate_start,
             portals.clique_start,
             portals.clique,

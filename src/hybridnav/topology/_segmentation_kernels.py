@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-
-@njit(cache=True)
-def find(root, i):
-    """Representative of i in a union-find forest, halving the path."""
-    while root[i] != i:
-        root[i] = root[root[i]]
-        i = root[i]
-    return i
+from hybridnav.pyramid._field_kernels import find
 
 
 @njit(cache=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy import ndimage
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid._field_kernels import find
 from hybridnav.topology import _segmentation_kernels
 
 if TYPE_CHECKING:
@@ -65,9 +67,7 @@ def _basins(grid: OccupancyGrid, *, ratio: float, broad_m: float) -> IntArray:
     """Basins of the clearance; they merge where it is not below `ratio` of that of the lower peak,
     or not below `broad_m`."""
     free = grid.measured == CellClass.FREE
-    clearance = np.pad(clearance_cells(grid.measured == CellClass.OCCUPIED), 1)
-    # Without an occupied cell all is one basin.
-    clearance[~np.isfinite(clearance)] = 1.0
+    clearance = np.pad(_clearance(grid), 1)
     inside = np.flatnonzero(np.pad(free, 1))
     flat = clearance.ravel()
     order = inside[np.argsort(-flat[inside], kind="stable")]
@@ -77,7 +77,15 @@ def _basins(grid: OccupancyGrid, *, ratio: float, broad_m: float) -> IntArray:
     return pieces
 
 
-def contracted_pieces(grid: OccupancyGrid, *, seed: int = 0) -> IntArray:
+def _clearance(grid: OccupancyGrid) -> FloatArray:
+    """Clearance in cells of the map as it was measured; 1 everywhere without an occupied cell, so
+    that all is one piece."""
+    clearance = clearance_cells(grid.measured == CellClass.OCCUPIED)
+    clearance[~np.isfinite(clearance)] = 1.0
+    return clearance
+
+
+def contracted_pieces(grid: OccupancyGrid) -> IntArray:
     """Go on contracting the places of a pyramid, but let narrow boundaries resist.
 
     Fine places are grown on the map as it was measured. Then arcs are taken by falling clearance of
@@ -89,27 +97,16 @@ def contracted_pieces(grid: OccupancyGrid, *, seed: int = 0) -> IntArray:
     ----------
     grid
         The map; cells count as they were measured, whatever the robot's radius.
-    seed
-        Seed of the pyramid.
 
     Returns
     -------
     IntArray
         int32 (rows, cols), a piece for each free cell, -1 elsewhere.
     """
-    from hybridnav.grid import OccupancyGrid as Grid  # noqa: PLC0415 - only a type above
-
-    plain = Grid(
-        grid.probability,
-        frame=grid.frame,
-        free_threshold=grid.free_threshold,
-        occupied_threshold=grid.occupied_threshold,
-    )
     level = DualGraphPyramid.build(
-        plain, merge_distance_m=max(_FINE_M, 2 * grid.resolution_m), seed=seed
+        replace(grid, robot_radius_m=0.0), merge_distance_m=max(_FINE_M, 2 * grid.resolution_m)
     )[-1]
-    clearance = clearance_cells(grid.measured == CellClass.OCCUPIED).ravel()
-    clearance[~np.isfinite(clearance)] = 1.0
+    clearance = _clearance(grid).ravel()
     field_of = level.field_of.ravel()
     peak = np.zeros(level.n_vertices)
     np.maximum.at(peak, field_of[field_of >= 0], clearance[field_of >= 0])
@@ -120,13 +117,13 @@ def contracted_pieces(grid: OccupancyGrid, *, seed: int = 0) -> IntArray:
     is_free = level.classes == CellClass.FREE
     root = np.arange(level.n_vertices)
     for at in np.argsort(-widest, kind="stable").tolist():
-        u, v = (int(_segmentation_kernels.find(root, end)) for end in level.arcs[at])
+        u, v = (int(find(root, end)) for end in level.arcs[at])
         if u == v or not (is_free[u] and is_free[v]):
             continue
         if widest[at] >= _PERSISTENCE * min(peak[u], peak[v]):
             low, high = sorted((u, v), key=lambda vertex: peak[vertex])
             root[low] = high
-    final = np.array([_segmentation_kernels.find(root, v) for v in range(level.n_vertices)])
+    final = np.array([find(root, v) for v in range(level.n_vertices)])
     final[~is_free] = -1
     pieces: IntArray = np.append(final, -1)[level.field_of].astype(np.int32)
     return pieces

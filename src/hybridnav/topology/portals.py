@@ -93,6 +93,11 @@ class Portals(NamedTuple):
         return len(self.field_start) - 1
 
     @property
+    def gate_field(self) -> IntArray:
+        """int32 (G,), the field of each gate."""
+        return np.repeat(np.arange(self.n_fields, dtype=np.int32), np.diff(self.gate_start))
+
+    @property
     def n_gates(self) -> int:
         """G."""
         return len(self.gate_cell)
