@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav._typing import FloatArray, LongArray
+    from hybridnav.config import PlannerSettings
     from hybridnav.harness.pairs import Pair
 
 Record = dict[str, Any]
@@ -56,6 +59,18 @@ class Method:
     def name(self) -> str:
         """What tables call it."""
         return f"{self.planner}, {self.scope}, {self.budget_s:g} s"
+
+    @property
+    def settings(self) -> PlannerSettings:
+        """Section `planner` of its preset."""
+        confine = "mask" if self.scope == "whole map" else self.scope
+        ompl = f"planner: {self.planner}, confine: {confine}, budget_s: {self.budget_s}"
+        return load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={{{ompl}}}"]).planner
+
+    @cached_property
+    def digest(self) -> str:
+        """The same for equal settings."""
+        return hashlib.sha256(self.settings.model_dump_json().encode()).hexdigest()[:12]
 
 
 def methods(*, confinements: bool = False) -> list[Method]:
@@ -115,19 +130,9 @@ class Bench:
 
     def planner(self, method: Method) -> OmplPlanner:
         """The planner of a method; its process runs until it is dropped."""
-        whole = method.scope == "whole map"
-        confine = "mask" if whole else method.scope
-        overrides = {
-            "planner": method.planner,
-            "confine": confine,
-            "budget_s": method.budget_s,
-        }
-        preset = load_preset(
-            "ompl-rrtconnect",
-            overrides=[f"planner.ompl={{{', '.join(f'{k}: {v}' for k, v in overrides.items())}}}"],
-        )
         cells: Any = self._coarse._cells  # noqa: SLF001 - the planner's own fields, built once
-        return OmplPlanner(self.grid, preset.planner, None if whole else cells.search.field_of)
+        whole = method.scope == "whole map"
+        return OmplPlanner(self.grid, method.settings, None if whole else cells.search.field_of)
 
     def records(self, method: Method, there: set[str]) -> Iterator[Record]:
         """Records of a method that are not there yet."""
@@ -141,7 +146,7 @@ class Bench:
 
     def record_id(self, method: Method, problem: Problem) -> str:
         """The same for equal map, method and pair."""
-        return f"{self.sha[:12]}/{method.name}/{problem.pair.key}"
+        return f"{self.sha[:12]}/{method.name}-{method.digest}/{problem.pair.key}"
 
     def _record(self, method: Method, problem: Problem, planner: OmplPlanner) -> Record:
         began = time.perf_counter()
@@ -157,7 +162,7 @@ class Bench:
             "map": self.grid.name,
             "map_sha": self.sha,
             "method": method.name,
-            "method_sha": "",
+            "method_sha": method.digest,
             "planner": method.planner,
             "scope": method.scope,
             "budget_s": method.budget_s,

@@ -7,7 +7,8 @@ keeping a search in the corridor, on three maps), `footprint` (500 plans of a lo
 doors, checked by shapely), `soak` (2,000 plans in one process), `pictures` (the search of a
 corridor beside that of the whole map, on the project's own office). All by default. DIR gets
 `records.jsonl`, to which a run that was stopped adds what is missing, `ompl.md`, which is printed
-too, and the pictures. The exit code is 1 where a path touches a wall or memory grows.
+too, and the pictures. The exit code is 1 where a path touches a wall, too few are found, or memory
+grows.
 """
 
 from __future__ import annotations
@@ -67,6 +68,11 @@ def page_of(arguments: argparse.Namespace) -> tuple[str, list[str]]:
         lines = [f"* {space}: {figures}" for space, figures in counts.items()]
         sections.append("## footprint\n\n" + "\n".join(lines) + "\n")
         wrong += [f"{space}: violations" for space, c in counts.items() if c["violations"]]
+        wrong += [
+            f"{space}: {c['solved']} of {c['runs']} solved"
+            for space, c in counts.items()
+            if c["solved"] < checks.LEAST_SOLVED[space] * c["runs"]
+        ]
     if "soak" in parts:
         figures = checks.soak(arguments.plans)
         sections.append(f"## soak\n\n{figures}\n")

@@ -63,6 +63,8 @@ PARAMETERS: dict[str, dict[str, str]] = {
 """The planners, and of each the parameters by OMPL's names with the methods that set them; the
 bindings have no parameter sets."""
 
+ROADMAPS = frozenset({"PRM", "PRMstar"})
+"""Planners that grow a roadmap, in both directions of travel."""
 WHOLE = {
     "max_nearest_neighbors",
     "number_sampling_attempts",
@@ -159,7 +161,9 @@ class OmplSettings(BaseModel):
     problem whose states and motions are refused outside (`mask`); or by drawing the states of PRM
     and PRMstar from the corridor's cells (`prm`)."""
     simplify: bool = True
-    """Whether paths are shortened and smoothed by OMPL's PathSimplifier."""
+    """Whether paths are shortened by OMPL's PathSimplifier."""
+    smooth: bool = False
+    """Whether it rounds their bends by B-splines at the end, where there is room; not on curves."""
 
     @model_validator(mode="after")
     def _planner_is_known(self) -> Self:
@@ -185,7 +189,7 @@ class OmplSettings(BaseModel):
                     },
                 )
             _check_parameter(name, value)
-        if self.confine == "prm" and self.planner not in {"PRM", "PRMstar"}:
+        if self.confine == "prm" and self.planner not in ROADMAPS:
             raise PydanticCustomError("prm", "confine: prm goes with planner PRM or PRMstar")
         return self
 
@@ -196,16 +200,18 @@ class OmplSettings(BaseModel):
             raise PydanticCustomError(
                 "turning_radius", "turning_radius_m goes with space: dubins or reeds-shepp"
             )
-        if self.objective == "clearance" and (curved or self.planner in {"PRM", "PRMstar"}):
+        if self.objective == "clearance" and (curved or self.planner in ROADMAPS):
             raise PydanticCustomError(
                 "objective",
                 "objective: clearance goes with space: r2 or se2, and not with PRM or PRMstar",
             )
-        if self.space == "dubins" and self.planner in {"PRM", "PRMstar"}:
+        if self.space == "dubins" and self.planner in ROADMAPS:
             # Their roadmap is undirected: a motion checked one way would be driven the other.
             raise PydanticCustomError(
                 "roadmap", "space: dubins, whose curves run one way, goes not with PRM or PRMstar"
             )
+        if self.smooth and curved:
+            raise PydanticCustomError("smooth", "smooth: true goes with space: r2 or se2")
         if self.footprint is not None and self.space == "r2":
             raise PydanticCustomError(
                 "footprint", "a footprint needs a space with headings: se2, dubins or reeds-shepp"

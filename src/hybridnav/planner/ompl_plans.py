@@ -109,7 +109,6 @@ class OmplPlanner:
         if refused is not None:
             nothing = Refinement((), by_grid=False, trace=(), iterations=0)
             return OmplPlan(refused, self._metric, None, None, math.inf, nothing)
-        self._worker.ensure()
         query = Query(
             start=ends[0],
             goal=ends[1],
@@ -121,15 +120,14 @@ class OmplPlanner:
         )
         self._worker.send(query)
         # Made while the worker is at it, so that there is a path when its time is over.
-        by_line = None
-        if self._worker.is_late():
-            by_line = self._by_line_of_sight(cells, ends, closed)
+        is_late = self._worker.is_late()
+        by_line = self._by_line_of_sight(cells, ends, closed) if is_late else None
         reply = self._worker.reply()
         steps, by_grid = list(reply.steps), False
         path = self._path(cells, reply) if len(reply.points) else None
         status = _STATUS[reply.outcome]
         if status is not PlanStatus.SOLVED:
-            if by_line is None:
+            if not is_late:
                 by_line = self._by_line_of_sight(cells, ends, closed)
             steps.append(f"grid path by line of sight: {'no' if by_line is None else 'solved'}")
             if by_line is not None:

@@ -57,7 +57,7 @@ class MotionCheck:
     ------
     InvalidValueError
         When `inside` does not have the shape of the map, a closed cell lies outside it, or the
-        footprint is refused or reaches more than 5000 cells.
+        footprint is refused, reaches more than 5000 cells, or is narrower than the map is inflated.
     """
 
     def __init__(
@@ -269,6 +269,12 @@ def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ..
         raise InvalidValueError(
             f"a footprint may reach {_FARTHEST_CELLS} cells, this one reaches "
             f"{footprint.circumscribed_radius_m:g} m on cells of {grid.resolution_m:g} m"
+        )
+    if grid.robot_radius_m > footprint.inscribed_radius_m * (1 + 1e-9):
+        raise InvalidValueError(
+            f"the map is inflated by {grid.robot_radius_m:g} m, but the largest circle about the "
+            f"base inside the footprint has a radius of {footprint.inscribed_radius_m:g} m: load "
+            "the map with that robot_radius_m, or ways that the robot can take are closed"
         )
     parts = footprint.convex_parts()
     offsets = np.cumsum([0, *map(len, parts)])

@@ -15,7 +15,7 @@ from hybridnav.refine.ompl.messages import Reply, Search
 from hybridnav.refine.ompl.objectives import Objective
 from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
 from hybridnav.refine.ompl.sampler import draw_from
-from hybridnav.refine.ompl.simplify import simplify
+from hybridnav.refine.ompl.simplify import Simplifier, simplify
 from hybridnav.refine.ompl.spaces import StateSpace
 
 if TYPE_CHECKING:
@@ -81,6 +81,10 @@ class Answering:
             self._steps.append(f"{name}: {outcome}")
             if outcome == "solved" or self.budget.left() <= 0:
                 break
+        if self.settings.smooth and len(self._best) > 2 and self.budget.left() > 0:  # noqa: PLR2004
+            points = Simplifier(self._whole, self.objective).smoother(self._best)
+            self._steps.append(f"smoothed: {'no' if points is self._best else 'yes'}")
+            self.better(points, self.objective.cost(points))
         return self._reply(is_last=True)
 
     def better(self, points: FloatArray, cost: float) -> None:
@@ -92,8 +96,10 @@ class Answering:
             self._send(self._reply(is_last=False))
 
     def partial(self, points: FloatArray) -> None:
-        """Note a path that ends elsewhere, where it ends nearer to the goal than others."""
-        if len(points) and self._miss(points) < self._miss(self._near):
+        """Note a path that ends elsewhere, where it ends nearer to the goal than others, and than
+        the start."""
+        least = min(self._miss(self._near), self._miss(self.query.start[None]))
+        if self._miss(points) < least and self._whole.is_valid(points):
             self._near = points
 
     def space(self, corridor: Corridor, low: FloatArray, high: FloatArray) -> StateSpace:
@@ -104,7 +110,7 @@ class Answering:
     def _attempt(self, corridor: Corridor, *, part: float) -> None:
         whole = self._whole = self.space(corridor, *corridor.bounds)
         self.bound_m = whole.length(np.stack([self.query.start, self.query.goal]))
-        self.objective = Objective(whole, self._base.clearance)
+        self.objective = Objective(whole, self.settings, self._base.clearance)
         if np.array_equal(self.query.start, self.query.goal):
             self.better(self.query.start[None], 0.0)
             return
@@ -135,7 +141,7 @@ class Answering:
             problem,
             self.settings,
             self.budget.stopper(share),
-            on_cost=self._note_cost,
+            on_path=lambda points: self.better(points, self.objective.cost(points)),
             search=self.search,
         )
         if found.is_exact:
@@ -149,11 +155,6 @@ class Answering:
         if not self.settings.simplify:
             return points
         return simplify(whole, points, self.budget, self.objective, self.better)
-
-    def _note_cost(self, cost: float) -> None:
-        # In SE2 OMPL adds the turns to the length, so its cost is not ours.
-        if cost < self._cost and math.isfinite(cost) and self.settings.space != "se2":
-            self._trace.append((self.budget.seconds(), cost))
 
     def _note(self, x: float, y: float) -> None:
         assert self.search is not None  # noqa: S101 - only called where it is

@@ -11,12 +11,11 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ompl import geometric
 
 from hybridnav.refine.ompl.corridor import bounds_of
 from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
 from hybridnav.refine.ompl.poses import Poses
-from hybridnav.refine.ompl.simplify import simplified
+from hybridnav.refine.ompl.simplify import Simplifier
 from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
@@ -146,8 +145,7 @@ def _leg(
     )
     if not found.is_exact or not flat:
         return found.points if found.is_exact else None
-    simplifier = geometric.PathSimplifier(space.information, None, objective)
-    points = simplified(space, simplifier, found.points)
+    points = Simplifier(space, answering.objective).shorter(found.points)
     if answering.settings.objective != "length":
         return points
     limit_m = _LONGER * path_length_in_cells(cells) * corridor.grid.resolution_m

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from hybridnav._typing import BoolArray, FloatArray, LongArray
@@ -83,6 +84,17 @@ class Reply:
     iterations: int = 0
     """Iterations of planners and simplification."""
     is_last: bool = True
-    error: str | None = None
-    """What went wrong in the worker, if something did."""
     search: Search | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """What ended a search that found no end of its own; what it sent before counts."""
+
+    reason: str
+    """One line."""
+
+
+def without_answer(reason: str) -> Reply:
+    """The reply of a worker from which none came."""
+    return Reply("timeout", np.empty((0, 3)), np.inf, steps=(reason,))

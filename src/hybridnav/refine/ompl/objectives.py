@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from ompl import base
 
+from hybridnav.config.ompl import ROADMAPS
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._typing import FloatArray
+    from hybridnav.config import OmplSettings
     from hybridnav.refine.ompl.clearance import Clearance
     from hybridnav.refine.ompl.spaces import StateSpace
 
@@ -20,19 +25,27 @@ class Objective:
     ----------
     whole
         State space of the whole corridor.
+    settings
+        State space and planner.
     clearance
         What weights the length; None for the length itself.
     """
 
-    def __init__(self, whole: StateSpace, clearance: Clearance | None) -> None:
+    def __init__(
+        self, whole: StateSpace, settings: OmplSettings, clearance: Clearance | None
+    ) -> None:
         self._whole = whole
         self._clearance = clearance
+        # PRM waits for ever for objectives in Python: it finds the least of length and turns.
+        self._is_own = settings.space == "se2" and settings.planner not in ROADMAPS
 
     def of(self, space: StateSpace) -> Any:
         """The objective in OMPL's terms, for one state space of the query."""
-        if self._clearance is None:
-            return base.PathLengthOptimizationObjective(space.information)
-        return _Weighted(space, self._clearance)
+        if self._clearance is not None:
+            return _Line(space, self._clearance.cost)
+        if self._is_own:
+            return _Line(space, _length)
+        return base.PathLengthOptimizationObjective(space.information)
 
     def cost(self, points: FloatArray) -> float:
         """What a path of states costs."""
@@ -41,12 +54,21 @@ class Objective:
         return self._clearance.cost_of(points)
 
 
-class _Weighted(base.OptimizationObjective):  # type: ignore[misc]  # the bindings have no types
-    """The clearance objective as OMPL asks for it; distances bound it from below."""
+def _length(x0: float, y0: float, x1: float, y1: float) -> float:
+    return math.hypot(x1 - x0, y1 - y0)
 
-    def __init__(self, space: StateSpace, clearance: Clearance) -> None:
+
+class _Line(base.OptimizationObjective):  # type: ignore[misc]  # the bindings have no types
+    """What the base's straight lines cost, whatever the turns; distances bound it from below.
+
+    OMPL's own path length counts half a metre for each radian of an SE2 path.
+    """
+
+    def __init__(
+        self, space: StateSpace, cost: Callable[[float, float, float, float], float]
+    ) -> None:
         super().__init__(space.information)
-        self._cost = clearance.cost
+        self._cost = cost
         self._flat = space.dimension == 2  # noqa: PLR2004
 
     def _ends(self, first: Any, second: Any) -> tuple[float, float, float, float]:
@@ -58,8 +80,7 @@ class _Weighted(base.OptimizationObjective):  # type: ignore[misc]  # the bindin
         return base.Cost(self._cost(*self._ends(first, second)))
 
     def motionCostHeuristic(self, first: Any, second: Any) -> Any:  # noqa: N802
-        x0, y0, x1, y1 = self._ends(first, second)
-        return base.Cost(math.hypot(x1 - x0, y1 - y0))
+        return base.Cost(_length(*self._ends(first, second)))
 
     def stateCost(self, state: Any) -> Any:  # noqa: ARG002, N802
         return base.Cost(0.0)

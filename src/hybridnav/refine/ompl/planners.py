@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ompl import base, geometric
 
-from hybridnav.config.ompl import PARAMETERS, REAL
+from hybridnav.config.ompl import PARAMETERS, REAL, ROADMAPS
+from hybridnav.errors import OmplError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Search
     from hybridnav.refine.ompl.spaces import StateSpace
 
-ROADMAPS = frozenset({"PRM", "PRMstar"})
 IMPROVING = frozenset({"RRTstar", "InformedRRTstar", "BITstar", "PRMstar"})
 """Planners that go on after the first solution."""
 NEAR = 1e-6
@@ -56,7 +56,7 @@ def solve(
     settings: OmplSettings,
     is_spent: Callable[[], bool],
     *,
-    on_cost: Callable[[float], None] | None = None,
+    on_path: Callable[[FloatArray], None] | None = None,
     search: Search | None = None,
 ) -> Found:
     """Give a problem to the planner of the settings.
@@ -69,8 +69,8 @@ def solve(
         Planner and parameters.
     is_spent
         Asked once an iteration; ends the search.
-    on_cost
-        Called with the cost of each better path, where the planner tells it.
+    on_path
+        Called with each better path that a planner which goes on has found, float64 (n, 3).
     search
         Where the motions of tree or roadmap are noted.
     """
@@ -83,44 +83,73 @@ def solve(
     planner.setProblemDefinition(definition)
     planner.setup()
     if settings.planner in ROADMAPS:
-        _grow(planner, definition, problem, is_spent, on_cost)
+        _grow(planner, definition, problem, is_spent, on_path)
+    elif settings.planner in IMPROVING and on_path is not None:
+        _improve(planner, definition, problem, is_spent, on_path)
     else:
-        condition = base.PlannerTerminationCondition(_watched(planner, is_spent, on_cost))
-        planner.solve(condition)
+        planner.solve(base.PlannerTerminationCondition(is_spent))
     if search is not None:
         _note_edges(space, planner, search)
     return _found(problem, definition)
 
 
 def make(settings: OmplSettings, information: Any) -> Any:
-    """A planner with its parameters."""
+    """A planner with its parameters.
+
+    Raises
+    ------
+    OmplError
+        When OMPL does not take one of them together with the others.
+    """
     planner = getattr(geometric, settings.planner)(information)
+    setters = PARAMETERS[settings.planner]
     # Just-in-time sampling is refused while BIT* takes k nearest neighbours.
     ordered = sorted(settings.parameters.items(), key=lambda item: item[0] != "use_k_nearest")
     for name, value in ordered:
-        set_value = getattr(planner, PARAMETERS[settings.planner][name])
-        set_value(float(value) if name in REAL else value)
+        getattr(planner, setters[name])(float(value) if name in REAL else value)
+    for name, value in ordered:
+        taken = getattr(planner, f"get{setters[name].removeprefix('set')}")()
+        if taken != value:
+            raise OmplError(
+                f"planner.ompl.parameters: {settings.planner} does not take {name}: {value} "
+                f"together with the others; it keeps {taken}"
+            )
     return planner
 
 
-def _watched(
-    planner: Any, is_spent: Callable[[], bool], on_cost: Callable[[float], None] | None
-) -> Callable[[], bool]:
-    """A stopper that tells of better paths."""
-    if on_cost is None or not hasattr(planner, "bestCost"):
-        return is_spent
+_FIRST_SLICE, _MOST_SLICE = 64, 1 << 20
+"""Iterations after which a planner that goes on is asked for its path; twice as many each time."""
+_WORTH = 0.01
+"""A path that is shorter by this part is asked for at once."""
+
+
+def _improve(
+    planner: Any,
+    definition: Any,
+    problem: Problem,
+    is_spent: Callable[[], bool],
+    on_path: Callable[[FloatArray], None],
+) -> None:
+    """Let a planner go on slice by slice, so that one which must be killed has told its paths."""
+    best, size, over = math.inf, _FIRST_SLICE, False
     best_cost = planner.bestCost
-    best = math.inf
+    while not over:
+        left, worth = size, best * (1 - _WORTH)
 
-    def watched() -> bool:
-        nonlocal best
-        cost = best_cost().value()
-        if cost < best:
-            best = cost
-            on_cost(cost)
-        return is_spent()
+        def ended(worth: float = worth) -> bool:
+            nonlocal left, over
+            left -= 1
+            over = is_spent()
+            return over or left < 0 or best_cost().value() < worth
 
-    return watched
+        planner.solve(base.PlannerTerminationCondition(ended))
+        found = _found(problem, definition)
+        if found.is_exact:
+            best = best_cost().value()
+            on_path(found.points)
+        # One that ends without being asked has nothing left to do.
+        over = over or best <= problem.enough or left == size
+        size = min(2 * size, _MOST_SLICE)
 
 
 _FIRST_GROWTH, _MOST_GROWTH = 25, 5000
@@ -133,7 +162,7 @@ def _grow(
     definition: Any,
     problem: Problem,
     is_spent: Callable[[], bool],
-    on_cost: Callable[[float], None] | None,
+    on_path: Callable[[FloatArray], None] | None,
 ) -> None:
     """Grow a roadmap and ask it for paths, in turn.
 
@@ -153,10 +182,11 @@ def _grow(
 
         planner.growRoadmapPtc(base.PlannerTerminationCondition(grown))
         planner.solve(base.timedPlannerTerminationCondition(_ASK_S))
-        if _found(problem, definition).is_exact:
+        found = _found(problem, definition)
+        if found.is_exact:
             cost = definition.getSolutionPath().cost(problem.objective).value()
-            if cost < best and on_cost is not None:
-                on_cost(cost)
+            if cost < best and on_path is not None:
+                on_path(found.points)
             best = min(cost, best)
             over = over or cost <= problem.enough
         growth = min(2 * growth, _MOST_GROWTH)

@@ -7,26 +7,29 @@ numbers start from the seed in each fork.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import signal
 import sys
 import time
-import traceback
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.errors import HybridNavError
 from hybridnav.refine.ompl.corridor import Base
-from hybridnav.refine.ompl.messages import SEARCH_S, Reply
+from hybridnav.refine.ompl.messages import SEARCH_S, Failure, without_answer
 
 if TYPE_CHECKING:
-    from hybridnav.refine.ompl.messages import Query, Setup
+    from hybridnav.refine.ompl.messages import Query, Reply, Setup
 
 GRACE = 0.03
 """Part of the budget after its end at which a fork is killed."""
+_ALONE_S = 0.5
+"""Seconds after that at which a fork that nobody killed ends by itself."""
 
 
 def serve(connection: Connection) -> None:
@@ -35,21 +38,24 @@ def serve(connection: Connection) -> None:
     from ompl import util  # noqa: PLC0415 - after the map, which the other side is waiting to send
 
     util.setLogLevel(util.LOG_NONE)
-    base = Base(setup)
-    _warm_up(base)
+    try:
+        base = Base(setup)
+        _warm_up(base)
+    except HybridNavError as error:
+        connection.send(Failure(str(error)))
+        return
     gc.freeze()
     connection.send(None)
     while True:
-        try:
-            number, query = connection.recv()
-        except EOFError:
-            return
-        connection.send((number, _answer(base, query)))
+        number, query = connection.recv()
+        connection.send((number, _answer(base, query, connection)))
 
 
 def _warm_up(base: Base) -> None:
-    """Load modules and kernels, so that forks need not."""
+    """Load modules and kernels, so that forks need not; OMPL's word on the parameters."""
     import hybridnav.refine.ompl.answer  # noqa: F401, PLC0415
+    from hybridnav.refine.ompl.planners import make  # noqa: PLC0415
+    from hybridnav.refine.ompl.spaces import StateSpace  # noqa: PLC0415
 
     inside = np.ones(base.setup.grid.shape, dtype=np.bool_)
     check = base.check.confined(inside=inside, closed=np.empty(0, dtype=np.int64))
@@ -59,6 +65,10 @@ def _warm_up(base: Base) -> None:
     check.path_valid(np.array([[x, y]]))
     if base.clearance is not None:
         base.clearance.cost(x, y, x, y)
+    make(
+        base.setup.settings,
+        StateSpace(base.setup.settings, check, np.zeros(2), np.ones(2)).information,
+    )
     radius_m = base.setup.settings.turning_radius_m
     if base.setup.settings.has_heading:
         check.turn_valid(x, y, 0.0, x, y, 1.0)
@@ -66,7 +76,7 @@ def _warm_up(base: Base) -> None:
         check.dubins_valid(x, y, 0.0, x, y, 1.0, radius_m)
 
 
-def _answer(base: Base, query: Query) -> Reply:
+def _answer(base: Base, query: Query, connection: Connection) -> Reply:
     """Fork, wait, kill where it takes too long; the best reply that came."""
     left_s = query.deadline_s - time.monotonic()
     kill_s = query.deadline_s + GRACE * max(left_s, 0.0)
@@ -75,29 +85,36 @@ def _answer(base: Base, query: Query) -> Reply:
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
+        # Ends it even where this process is gone and OMPL never comes back to Python.
+        signal.setitimer(signal.ITIMER_REAL, max(kill_s - time.monotonic(), 0.0) + _ALONE_S)
+        connection.close()
         os.close(reading)
         _run(base, query, Connection(writing, readable=False))
     os.close(writing)
-    with Connection(reading, writable=False) as replies:
-        best = _last_reply(replies, kill_s)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return best
+    try:
+        with Connection(reading, writable=False) as replies:
+            return _last_reply(replies, kill_s)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
 
 
 def _last_reply(replies: Connection, kill_s: float) -> Reply:
-    best = Reply("timeout", np.empty((0, 3)), np.inf)
-    error = "killed when the time was over"
+    best = None
+    reason = "killed when the time was over"
     while replies.poll(max(kill_s - time.monotonic(), 0.0)):
         try:
-            reply: Reply = replies.recv()
-        except EOFError:
-            error = "the planner crashed"
+            reply: Reply | Failure = replies.recv()
+        except (EOFError, OSError):
+            reason = "the planner crashed"
+            break
+        if isinstance(reply, Failure):
+            reason = reply.reason
             break
         if reply.is_last:
             return reply
         best = reply
-    return replace(best, steps=(*best.steps, error), error=error)
+    return without_answer(reason) if best is None else replace(best, steps=(*best.steps, reason))
 
 
 def _run(base: Base, query: Query, replies: Connection) -> None:
@@ -109,16 +126,17 @@ def _run(base: Base, query: Query, replies: Connection) -> None:
 
         util.RNG.setSeed(base.setup.settings.seed)
         replies.send(Answering(base, query, replies.send).run())
-    except BaseException:  # noqa: BLE001 - whatever it is, it ends here
-        text = traceback.format_exc().strip().splitlines()
-        replies.send(
-            Reply("timeout", np.empty((0, 3)), np.inf, steps=(text[-1],), error="; ".join(text))
-        )
+    except BaseException as error:  # noqa: BLE001 - whatever it is, it ends here
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        with contextlib.suppress(OSError):
+            replies.send(Failure(f"the search failed, {text[:200]}"))
     finally:
         os._exit(0)
 
 
 if __name__ == "__main__":
-    serve(Connection(int(sys.argv[1])))
+    # The planner's process closes the connection when it is done, or is gone.
+    with contextlib.suppress(EOFError, OSError):
+        serve(Connection(int(sys.argv[1])))
     # The bindings complain at an orderly exit about instances that are left.
     os._exit(0)

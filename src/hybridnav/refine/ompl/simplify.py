@@ -26,6 +26,9 @@ _SNAP = 1e-3
 _LEAST_GAIN = 5e-4
 """Rounds that gain less than this part are fruitless."""
 _FRUITLESS = 3
+_SPLINES, _LEAST_MOVE = 3, 1e-4
+"""Rounds of subdivision, each of which doubles the states, and the least part of the length by
+which a state must move."""
 
 
 def simplify(
@@ -50,48 +53,76 @@ def simplify(
     on_better
         Called with each better path and its cost.
     """
-    simplifier = geometric.PathSimplifier(space.information, None, objective.of(space))
-    best, best_cost = points, objective.cost(points)
-    fruitless, shift = 0, 0
-    while len(best) > 2 and fruitless < _FRUITLESS and budget.left() > 0:  # noqa: PLR2004
-        found = _round(space, simplifier, best, budget, shift)
-        cost = objective.cost(found)
-        fruitless = 0 if cost < best_cost * (1 - _LEAST_GAIN) else fruitless + 1
+    simplifier = Simplifier(space, objective)
+    cost, fruitless, shift = objective.cost(points), 0, 0
+    while len(points) > 2 and fruitless < _FRUITLESS and budget.left() > 0:  # noqa: PLR2004
+        before = cost
+        points = _round(simplifier, points, budget, shift)
+        cost = objective.cost(points)
+        fruitless = 0 if cost < before * (1 - _LEAST_GAIN) else fruitless + 1
         shift = 0 if shift else _PIECE // 2
-        if cost < best_cost:
-            best, best_cost = found, cost
-            on_better(best, best_cost)
-    return best
+        on_better(points, cost)
+    return points
 
 
-def _round(
-    space: StateSpace, simplifier: Any, points: FloatArray, budget: Budget, shift: int
-) -> FloatArray:
+def _round(simplifier: Simplifier, points: FloatArray, budget: Budget, shift: int) -> FloatArray:
     """Simplify piece by piece; the pieces begin at other states in every other round."""
     cuts = [0, *range(shift or _PIECE, len(points) - 1, _PIECE), len(points) - 1]
     done = [points[:1]]
     for first, last in itertools.pairwise(cuts):
         piece = points[first : last + 1]
         if len(piece) > 2 and budget.left() > 0:  # noqa: PLR2004
-            piece = simplified(space, simplifier, piece)
+            piece = simplifier.shorter(piece)
             budget.spend(_STEPS * (last - first))
         done.append(piece[1:])
     return np.concatenate(done)
 
 
-def simplified(space: StateSpace, simplifier: Any, points: FloatArray) -> FloatArray:
-    """Drop states, and join points anywhere between them.
+class Simplifier:
+    """PathSimplifier, with its results checked.
 
     OMPL takes parts of valid motions for valid, but a point between two others can be rounded to
-    the wrong side of a corner that their line grazes: so what comes out is checked again.
+    the wrong side of a corner that their line grazes.
+
+    Parameters
+    ----------
+    space
+        With the checks.
+    objective
+        What a path costs.
     """
-    path = geometric.PathGeometric(space.information)
-    state = space.information.allocState()
-    for point in points:
-        space.fill(state, point)
-        path.append(state)
-    steps = _STEPS * len(points)
-    simplifier.reduceVertices(path, steps, steps, 1.0)
-    simplifier.partialShortcutPath(path, steps, steps, 0.33, _SNAP)
-    found = space.points(path.getStates())
-    return found if space.is_valid(found) else points
+
+    def __init__(self, space: StateSpace, objective: Objective) -> None:
+        self._space = space
+        self._objective = objective
+        self._own = objective.of(space)
+        self._simplifier = geometric.PathSimplifier(space.information, None, self._own)
+
+    def shorter(self, points: FloatArray) -> FloatArray:
+        """Drop states, and join points anywhere between them; the path itself if in vain."""
+        path = self._path_of(points)
+        steps = _STEPS * len(points)
+        self._simplifier.reduceVertices(path, steps, steps, 1.0)
+        self._simplifier.partialShortcutPath(path, steps, steps, 0.33, _SNAP)
+        return self._checked(path, points)
+
+    def smoother(self, points: FloatArray) -> FloatArray:
+        """Round the bends of a path of straight motions by B-splines, where there is room; the
+        path itself if that is in vain. States at the corner of an obstacle stay where they are."""
+        path = self._path_of(points)
+        least_m = _LEAST_MOVE * self._space.length(points)
+        self._simplifier.smoothBSpline(path, _SPLINES, least_m)
+        return self._checked(path, points)
+
+    def _path_of(self, points: FloatArray) -> Any:
+        path = geometric.PathGeometric(self._space.information)
+        state = self._space.information.allocState()
+        for point in points:
+            self._space.fill(state, point)
+            path.append(state)
+        return path
+
+    def _checked(self, path: Any, points: FloatArray) -> FloatArray:
+        found = self._space.points(path.getStates())
+        cost_of = self._objective.cost
+        return found if cost_of(found) < cost_of(points) and self._space.is_valid(found) else points

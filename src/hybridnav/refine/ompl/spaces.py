@@ -11,7 +11,7 @@ import numpy as np
 from ompl import base
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from hybridnav._typing import FloatArray
     from hybridnav.config import OmplSettings
@@ -27,6 +27,7 @@ class StateSpace:
     """One state space inside some bounds, with the checks of a map.
 
     Keeps what it hands to OMPL alive: the bindings hold no references to Python objects.
+    `state_valid` decides on a state of OMPL.
 
     Parameters
     ----------
@@ -54,15 +55,15 @@ class StateSpace:
             bounds.setLow(axis, float(low[axis]))
             bounds.setHigh(axis, float(max(high[axis], low[axis] + 1e-9)))
         self._check = check
-        self._is_straight = settings.space in {"r2", "se2"}
+        self.is_straight = settings.space in {"r2", "se2"}
         self.dimension = _STATES[settings.space]
         self.space = _space_of(settings)
         self.space.setBounds(bounds)
         self.information = base.SpaceInformation(self.space)
         is_flat = self.dimension == 2  # noqa: PLR2004
-        self._is_valid = _flat_check(check, note) if is_flat else _heading_check(check, note)
+        self.state_valid = _flat_check(check, note) if is_flat else _heading_check(check, note)
         self._motions = _motions_of(settings, check, self.information)
-        self.information.setStateValidityChecker(self._is_valid)
+        self.information.setStateValidityChecker(self.state_valid)
         self.information.setMotionValidator(self._motions)
         self.information.setStateValidityCheckingResolution(FINE)
         self.information.setup()
@@ -78,7 +79,7 @@ class StateSpace:
         self.fill(state, values)
         return state
 
-    def fill(self, state: Any, values: FloatArray) -> None:
+    def fill(self, state: Any, values: Sequence[float] | FloatArray) -> None:
         """Give a state of OMPL its values."""
         if self.dimension == 2:  # noqa: PLR2004
             state[0], state[1] = float(values[0]), float(values[1])
@@ -105,7 +106,7 @@ class StateSpace:
 
     def length(self, points: FloatArray) -> float:
         """Metres along a path of states: what the robot's base covers."""
-        if not self._is_straight:
+        if not self.is_straight:
             states = [self.state(point) for point in points]
             return math.fsum(self.space.distance(*pair) for pair in itertools.pairwise(states))
         steps = np.diff(points[:, :2], axis=0)

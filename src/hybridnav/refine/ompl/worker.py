@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -15,13 +16,11 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hybridnav.errors import OmplError
-from hybridnav.refine.ompl.messages import SEARCH_S, Reply
+from hybridnav.refine.ompl.messages import SEARCH_S, without_answer
 
 if TYPE_CHECKING:
-    from hybridnav.refine.ompl.messages import Query, Setup
+    from hybridnav.refine.ompl.messages import Query, Reply, Setup
 
 _GRACE = 0.08
 """Part of a query's time after its end at which the worker is no longer waited for. It has killed
@@ -31,6 +30,7 @@ _PATIENCE_S = 5.0
 _LATE = 0.3
 """Part of a query's time before its end at which its reply is late."""
 _START_S = 120.0
+_END_S = 1.0
 _PACKAGES = Path(__file__).parents[3]
 
 
@@ -60,7 +60,7 @@ class Worker:
     Raises
     ------
     OmplError
-        When OMPL is not installed, or the process does not start.
+        When OMPL is not installed or refuses the settings, or the process does not start.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -69,18 +69,37 @@ class Worker:
         self._until = self._late = 0.0
         self._number = self._answered = 0
         self._reply: Reply | None = None
+        self._starting: threading.Thread | None = None
+        self._problem: str | None = None
         self._start()
+        self._raise_problem()
 
     def send(self, query: Query) -> None:
-        """Give the process a query; `reply` waits for what comes of it."""
+        """Give the process a query; `reply` waits for what comes of it.
+
+        Where the process died, or owes an answer for long, a new one is started, and the query
+        waits for it no longer than for a reply.
+
+        Raises
+        ------
+        OmplError
+            When the new process does not start.
+        """
         left_s = query.deadline_s - time.monotonic()
+        given_up = self._owes() and time.monotonic() > self._until + _PATIENCE_S
         self._until = query.deadline_s + _GRACE * max(left_s, 0.0)
         if query.tells_search:
             self._until += SEARCH_S
         self._late = query.deadline_s - _LATE * max(left_s, 0.0)
+        if self._starting is None and (given_up or self._is_dead()):
+            self.close()
+            self._answered, self._reply = self._number, None
+            self._starting = threading.Thread(target=self._start, daemon=True)
+            self._starting.start()
         self._number += 1
-        with contextlib.suppress(OSError):
-            self._connection.send((self._number, query))
+        if self._is_up():
+            with contextlib.suppress(OSError):
+                self._connection.send((self._number, query))
 
     def is_late(self) -> bool:
         """Wait for the reply until most of the time is over; whether it still has not come."""
@@ -90,16 +109,18 @@ class Worker:
         """The reply to the query that was sent, at most a tenth of its time too late; where none
         comes, one that says so."""
         reply = self._received(self._until)
-        if reply is not None:
-            return reply
-        problem = "the worker did not answer in time"
-        return Reply("timeout", np.empty((0, 3)), np.inf, steps=(problem,), error=problem)
+        return without_answer("the worker did not answer in time") if reply is None else reply
+
+    def close(self) -> None:
+        """End the process and what it forked."""
+        self._finalizer()
 
     def _received(self, until_s: float) -> Reply | None:
         """The reply to the last query; those to earlier ones, which came too late, are dropped."""
         try:
             while self._answered < self._number:
-                if not self._connection.poll(max(until_s - time.monotonic(), 0.0)):
+                left_s = max(until_s - time.monotonic(), 0.0)
+                if self._starting is not None or not self._connection.poll(left_s):
                     return None
                 self._answered, self._reply = self._connection.recv()
         except (EOFError, OSError):
@@ -107,44 +128,44 @@ class Worker:
             return None
         return self._reply
 
-    def ensure(self) -> None:
-        """Have a process that answers: a new one where it died, or owes an answer for long.
-
-        Raises
-        ------
-        OmplError
-            When it does not start.
-        """
-        dead = not self._finalizer.alive or self._process.poll() is not None
+    def _owes(self) -> bool:
         self._received(0.0)
-        owes = self._answered < self._number
-        if dead or (owes and time.monotonic() > self._until + _PATIENCE_S):
-            self.close()
-            self._start()
+        return self._answered < self._number
 
-    def close(self) -> None:
-        """End the process."""
-        self._finalizer()
+    def _is_dead(self) -> bool:
+        return not self._finalizer.alive or self._process.poll() is not None
+
+    def _is_up(self) -> bool:
+        """Wait for a process that is being started until a reply would be late."""
+        if self._starting is not None:
+            self._starting.join(max(self._late - time.monotonic(), 0.0))
+            if self._starting.is_alive():
+                return False
+            self._starting = None
+            self._raise_problem()
+        return True
 
     def _start(self) -> None:
+        """Start a process and wait until it is ready; `_problem` says why it is not."""
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = _launch(theirs.fileno())
         self._connection = Connection(ours.detach())
-        self._answered, self._reply = self._number, None
         self._finalizer = weakref.finalize(self, _end, self._process, self._connection)
-        try:
-            self._connection.send(self._setup)
-            if self._connection.poll(_START_S):
-                self._connection.recv()
-                return
-        except (EOFError, OSError):
-            pass
-        self.close()
-        raise OmplError(
+        self._problem = (
             "the process that runs OMPL does not start; "
             "`python -c 'import ompl.geometric'` may say why"
         )
+        with contextlib.suppress(EOFError, OSError):
+            self._connection.send(self._setup)
+            if self._connection.poll(_START_S):
+                refusal = self._connection.recv()
+                self._problem = None if refusal is None else refusal.reason
+
+    def _raise_problem(self) -> None:
+        if self._problem is not None:
+            self.close()
+            raise OmplError(self._problem)
 
 
 def _launch(descriptor: int) -> subprocess.Popen[bytes]:
@@ -155,6 +176,7 @@ def _launch(descriptor: int) -> subprocess.Popen[bytes]:
         pass_fds=[descriptor],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
+        start_new_session=True,  # an interrupt from the keyboard is the planner's alone
         env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
     )
 
@@ -162,5 +184,7 @@ def _launch(descriptor: int) -> subprocess.Popen[bytes]:
 def _end(process: subprocess.Popen[bytes], connection: Connection) -> None:
     with contextlib.suppress(OSError):
         connection.close()
-    process.kill()
-    threading.Thread(target=process.wait, daemon=True).start()
+    with contextlib.suppress(OSError):
+        os.killpg(process.pid, signal.SIGKILL)  # its session, so what it forked too
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(_END_S)
