@@ -115,6 +115,8 @@ class PlanBatch:
     """int64 (n + 1,), query i has the points `path_start[i]` to `path_start[i + 1]`."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame, of all paths."""
+    headings_rad: FloatArray | None = None
+    """float64 (m,), the heading at each point; None in spaces without headings."""
 
     @property
     def gap(self) -> FloatArray:

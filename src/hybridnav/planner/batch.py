@@ -23,7 +23,8 @@ def plan_many(
     goals: FloatArray,
     smooth: Smooth,
 ) -> PlanBatch:
-    """What `planner.plan` answers to each pair of points, float64 (n, 2) each, in arrays.
+    """What `planner.plan` answers to each pair of points, float64 (n, 2) each, or poses (n, 3), in
+    arrays.
 
     `cell_planner` answers what it can alone; None leaves all to `planner`.
     """
@@ -31,6 +32,7 @@ def plan_many(
     status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)
     paths: list[FloatArray] = [np.empty((0, 2))] * n
+    headings = [np.empty(0)] * n
     left = np.ones(n, dtype=np.bool_)
     if n and smooth == "none" and isinstance(cell_planner, OverPortals):
         grid = planner.topology.grid
@@ -50,12 +52,15 @@ def plan_many(
         status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
         if result.path is not None:
             paths[i] = result.path.points
+            if result.path.headings_rad is not None:
+                headings[i] = result.path.headings_rad
     return PlanBatch(
         status=status,
         cost=cost,
         lower_bound=bound,
         path_start=np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64),
         points=np.concatenate([np.empty((0, 2)), *paths]),
+        headings_rad=np.concatenate([np.empty(0), *headings]) if starts.shape[1] > 2 else None,  # noqa: PLR2004
     )
 
 

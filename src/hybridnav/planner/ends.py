@@ -46,13 +46,14 @@ def read_pose(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray
     return pose
 
 
-def read_points(name: str, points: ArrayLike) -> FloatArray:
-    """Positions, float64 (n, 2); n may be 0."""
-    xy = _numbers(points)
-    if xy.shape in {(0,), (0, 2)}:
-        return np.empty((0, 2))
-    if xy.ndim != 2 or xy.shape[1] != 2 or not np.isfinite(xy).all():  # noqa: PLR2004
+def read_points(name: str, points: ArrayLike, *, needs_heading: bool = False) -> FloatArray:
+    """Positions, float64 (n, 2), or with headings (n, 3); n may be 0."""
+    rows, width = _numbers(points), 3 if needs_heading else 2
+    if rows.shape in {(0,), (0, width)}:
+        return np.empty((0, width))
+    if rows.ndim != 2 or rows.shape[1] != width or not np.isfinite(rows).all():  # noqa: PLR2004
+        what = "poses (x, y, yaw) in metres and radians" if needs_heading else "(x, y) in metres"
         raise InvalidValueError(
-            f"{name} must be finite coordinates (x, y) in metres, shape (n, 2), got {points!r:.80}"
+            f"{name} must be finite coordinates {what}, shape (n, {width}), got {points!r:.80}"
         )
-    return xy
+    return rows

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.planner.cell_plans import MaxDistance, OverPortals
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.ompl import Clearance, Query, Setup, Worker
@@ -22,8 +23,10 @@ if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.cell_plans import CellPlanner
     from hybridnav.refine.ompl import Reply, Search
     from hybridnav.result import Metric
+    from hybridnav.topology import TopologicalMap
 
 _STATUS = {
     "solved": PlanStatus.SOLVED,
@@ -45,6 +48,28 @@ class OmplPlan:
     search: Search | None = None
 
 
+def ompl_planner(
+    topology: TopologicalMap, cells: CellPlanner, settings: PlannerSettings
+) -> OmplPlanner:
+    """OMPL in the fields that a planner of cell paths goes by; on the whole map where it has none.
+
+    Raises
+    ------
+    OmplError
+        When OMPL is not installed, refuses the settings, or its process does not start.
+    """
+    field_of = None
+    if isinstance(cells, OverPortals):
+        field_of = cells.search.field_of
+    elif isinstance(cells, MaxDistance):
+        field_of = topology.level.field_of
+    free = np.argwhere(topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
+    if len(free):  # kernels that load at the first query would eat up its budget
+        row, col = free[0].tolist()
+        cells.plan((row, col), (row, col))
+    return OmplPlanner(topology.grid, settings, field_of)
+
+
 class OmplPlanner:
     """OMPL inside the fields that a coarse path passes, and nowhere else.
 
@@ -64,7 +89,7 @@ class OmplPlanner:
     Raises
     ------
     OmplError
-        When OMPL is not installed or its process does not start.
+        When OMPL is not installed, refuses the settings, or its process does not start.
     """
 
     def __init__(

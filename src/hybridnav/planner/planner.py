@@ -77,7 +77,12 @@ class HybridPlanner:
             self._cells = OverPortals(topology, self._refiner, settings)
         else:
             self._cells = WholeMap(self._refiner)
-        self._ompl = self._with_ompl() if settings.refine == "ompl" else None
+        self._ompl: OmplPlanner | None = None
+        if settings.refine == "ompl":
+            # Loads what only these presets need, and says what to install where it is missing.
+            from hybridnav.planner.ompl_plans import ompl_planner  # noqa: PLC0415
+
+            self._ompl = ompl_planner(topology, self._cells, settings)
 
     def plan(
         self,
@@ -157,7 +162,8 @@ class HybridPlanner:
         Parameters
         ----------
         starts, goals
-            `(x, y)` in metres, map frame, shape (n, 2) each.
+            `(x, y)` in metres, map frame, shape (n, 2) each; with OMPL in a space with headings
+            `(x, y, yaw)`, shape (n, 3).
         smooth
             As in `plan`.
 
@@ -166,7 +172,9 @@ class HybridPlanner:
         InvalidValueError
             When the shapes differ or a coordinate is not finite.
         """
-        first, last = read_points("starts", starts), read_points("goals", goals)
+        with_heading = self._ompl is not None and self._ompl.ompl.has_heading
+        first = read_points("starts", starts, needs_heading=with_heading)
+        last = read_points("goals", goals, needs_heading=with_heading)
         if len(first) != len(last):
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
         finish = self._finish_asked_for(smooth)
@@ -249,22 +257,6 @@ class HybridPlanner:
         if self._ompl is None:
             return read_point(name, given)
         return read_pose(name, given, needs_heading=self._ompl.ompl.has_heading)
-
-    def _with_ompl(self) -> OmplPlanner:
-        # Loads what only these presets need, and says what to install where it is missing.
-        from hybridnav.planner.ompl_plans import OmplPlanner  # noqa: PLC0415
-
-        field_of = None
-        if isinstance(self._cells, OverPortals):
-            field_of = self._cells.search.field_of
-        elif isinstance(self._cells, MaxDistance):
-            field_of = self.topology.level.field_of
-        settings = self.preset.planner
-        free = np.argwhere(self.topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
-        if len(free):  # kernels that load at the first query would eat up its budget
-            row, col = free[0].tolist()
-            self._cells.plan((row, col), (row, col))
-        return OmplPlanner(self.topology.grid, settings, field_of)
 
     def _by_ompl(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -95,6 +95,11 @@ class Failure:
     """One line."""
 
 
-def without_answer(reason: str) -> Reply:
+def without_answer() -> Reply:
     """The reply of a worker from which none came."""
-    return Reply("timeout", np.empty((0, 3)), np.inf, steps=(reason,))
+    return Reply("timeout", np.empty((0, 3)), np.inf)
+
+
+def ended(best: Reply, reason: str) -> Reply:
+    """The best reply of a search that something else ended."""
+    return replace(best, steps=(*best.steps, reason), is_last=True)

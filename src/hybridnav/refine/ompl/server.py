@@ -13,7 +13,6 @@ import os
 import signal
 import sys
 import time
-from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
@@ -21,9 +20,11 @@ import numpy as np
 
 from hybridnav.errors import HybridNavError
 from hybridnav.refine.ompl.corridor import Base
-from hybridnav.refine.ompl.messages import SEARCH_S, Failure, without_answer
+from hybridnav.refine.ompl.messages import SEARCH_S, Failure, ended, without_answer
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav.refine.ompl.messages import Query, Reply, Setup
 
 GRACE = 0.03
@@ -48,7 +49,11 @@ def serve(connection: Connection) -> None:
     connection.send(None)
     while True:
         number, query = connection.recv()
-        connection.send((number, _answer(base, query, connection)))
+
+        def tell(reply: Reply, number: int = number) -> None:
+            connection.send((number, reply))
+
+        tell(_answer(base, query, connection, tell))
 
 
 def _warm_up(base: Base) -> None:
@@ -76,8 +81,10 @@ def _warm_up(base: Base) -> None:
         check.dubins_valid(x, y, 0.0, x, y, 1.0, radius_m)
 
 
-def _answer(base: Base, query: Query, connection: Connection) -> Reply:
-    """Fork, wait, kill where it takes too long; the best reply that came."""
+def _answer(
+    base: Base, query: Query, connection: Connection, tell: Callable[[Reply], None]
+) -> Reply:
+    """Fork, hand on what it finds, kill it where it takes too long; the last reply."""
     left_s = query.deadline_s - time.monotonic()
     kill_s = query.deadline_s + GRACE * max(left_s, 0.0)
     if query.tells_search:
@@ -93,14 +100,14 @@ def _answer(base: Base, query: Query, connection: Connection) -> Reply:
     os.close(writing)
     try:
         with Connection(reading, writable=False) as replies:
-            return _last_reply(replies, kill_s)
+            return _last_reply(replies, kill_s, tell)
     finally:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
 
 
-def _last_reply(replies: Connection, kill_s: float) -> Reply:
-    best = None
+def _last_reply(replies: Connection, kill_s: float, tell: Callable[[Reply], None]) -> Reply:
+    best = without_answer()
     reason = "killed when the time was over"
     while replies.poll(max(kill_s - time.monotonic(), 0.0)):
         try:
@@ -114,7 +121,8 @@ def _last_reply(replies: Connection, kill_s: float) -> Reply:
         if reply.is_last:
             return reply
         best = reply
-    return without_answer(reason) if best is None else replace(best, steps=(*best.steps, reason))
+        tell(reply)
+    return ended(best, reason)
 
 
 def _run(base: Base, query: Query, replies: Connection) -> None:

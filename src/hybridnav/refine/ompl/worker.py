@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import OmplError
-from hybridnav.refine.ompl.messages import SEARCH_S, without_answer
+from hybridnav.refine.ompl.messages import SEARCH_S, ended, without_answer
 
 if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query, Reply, Setup
@@ -68,7 +68,7 @@ class Worker:
         self._setup = setup
         self._until = self._late = 0.0
         self._number = self._answered = 0
-        self._reply: Reply | None = None
+        self._best = without_answer()
         self._starting: threading.Thread | None = None
         self._problem: str | None = None
         self._start()
@@ -86,51 +86,54 @@ class Worker:
             When the new process does not start.
         """
         left_s = query.deadline_s - time.monotonic()
-        given_up = self._owes() and time.monotonic() > self._until + _PATIENCE_S
+        owes = not self._has_ended(0.0)
+        given_up = owes and time.monotonic() > self._until + _PATIENCE_S
         self._until = query.deadline_s + _GRACE * max(left_s, 0.0)
         if query.tells_search:
             self._until += SEARCH_S
         self._late = query.deadline_s - _LATE * max(left_s, 0.0)
         if self._starting is None and (given_up or self._is_dead()):
             self.close()
-            self._answered, self._reply = self._number, None
+            self._answered = self._number
             self._starting = threading.Thread(target=self._start, daemon=True)
             self._starting.start()
         self._number += 1
+        self._best = without_answer()
         if self._is_up():
             with contextlib.suppress(OSError):
                 self._connection.send((self._number, query))
 
     def is_late(self) -> bool:
         """Wait for the reply until most of the time is over; whether it still has not come."""
-        return self._received(self._late) is None
+        return not self._has_ended(self._late)
 
     def reply(self) -> Reply:
-        """The reply to the query that was sent, at most a tenth of its time too late; where none
-        comes, one that says so."""
-        reply = self._received(self._until)
-        return without_answer("the worker did not answer in time") if reply is None else reply
+        """The last reply to the query that was sent, or at most a tenth of its time too late the
+        best so far, which says that no other came."""
+        if self._has_ended(self._until):
+            return self._best
+        return ended(self._best, "the worker did not answer in time")
 
     def close(self) -> None:
         """End the process and what it forked."""
         self._finalizer()
 
-    def _received(self, until_s: float) -> Reply | None:
-        """The reply to the last query; those to earlier ones, which came too late, are dropped."""
+    def _has_ended(self, until_s: float) -> bool:
+        """Wait for the last reply to the last query; what comes of earlier ones is dropped."""
         try:
             while self._answered < self._number:
                 left_s = max(until_s - time.monotonic(), 0.0)
                 if self._starting is not None or not self._connection.poll(left_s):
-                    return None
-                self._answered, self._reply = self._connection.recv()
+                    return False
+                number, reply = self._connection.recv()
+                if number == self._number:
+                    self._best = reply
+                if reply.is_last:
+                    self._answered = number
         except (EOFError, OSError):
             self.close()
-            return None
-        return self._reply
-
-    def _owes(self) -> bool:
-        self._received(0.0)
-        return self._answered < self._number
+            return False
+        return True
 
     def _is_dead(self) -> bool:
         return not self._finalizer.alive or self._process.poll() is not None

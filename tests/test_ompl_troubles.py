@@ -1,0 +1,212 @@
+"""What a query with OMPL costs when the search hangs, crashes or fails: its time, no more."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+import hybridnav as hn
+from hybridnav.config import load_preset
+from hybridnav.grid.worlds import office_world
+from hybridnav.metrics import segment_faults
+from tests.troubled_query import TroubledQuery
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+pytest.importorskip("ompl")
+
+ROOT = Path(__file__).parents[1]
+ENDS = (1.0, 13.2), (40.6, 19.4)
+BUDGET_S = 1.0
+LATE = "the worker did not answer in time"
+"""What a busy machine can make of the first of these."""
+REASONS = {
+    "hang": "killed when the time was over",
+    "crash": "the planner crashed",
+    "failure": "the search failed, ZeroDivisionError: failure on purpose",
+}
+
+
+@pytest.fixture(scope="module")
+def planner() -> Iterator[hn.HybridPlanner]:
+    """Its worker finds the troubled query in the tests."""
+    topology = hn.TopologicalMap(
+        hn.DualGraphPyramid.build(office_world().grid(robot_radius_m=0.25))
+    )
+    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl.budget_s={BUDGET_S}"])
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PYTHONPATH", str(ROOT))
+        yield hn.HybridPlanner(topology, preset=preset)
+
+
+def worker_of(planner: hn.HybridPlanner) -> Any:
+    assert planner._ompl is not None
+    return planner._ompl._worker
+
+
+@pytest.fixture
+def troubled(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Make queries troubled from now on; without a kind no more."""
+
+    def arm(trouble: str | None, *, after_path: bool = False) -> None:
+        made = hn.refine.ompl.Query if trouble is None else partial(
+            TroubledQuery, trouble=trouble, after_path=after_path
+        )  # fmt: skip
+        monkeypatch.setattr("hybridnav.planner.ompl_plans.Query", made)
+
+    return arm
+
+
+def children_of(pid: int) -> list[int]:
+    return [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def gone(pid: int, *, within_s: float) -> bool:
+    """Whether a process ends in time; one that nobody has waited for yet has ended too."""
+    until = time.monotonic() + within_s
+    while time.monotonic() < until:
+        try:
+            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+                return True
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+        time.sleep(0.02)
+    return False
+
+
+@pytest.mark.parametrize("trouble", list(REASONS))
+def test_trouble_before_a_path_costs_the_time_at_most_and_the_grid_takes_over(
+    planner: hn.HybridPlanner, troubled: Callable[..., None], trouble: str
+) -> None:
+    troubled(trouble)
+    spent = []
+    for _ in range(3):
+        began = time.perf_counter()
+        result = planner.plan(*ENDS)
+        spent.append(time.perf_counter() - began)
+        assert result.status is hn.PlanStatus.SOLVED
+        assert result.refinement is not None
+        assert result.refinement.by_grid
+        reasons = {REASONS[trouble], LATE} if trouble == "hang" else {REASONS[trouble]}
+        assert result.refinement.steps[0] in reasons
+        assert children_of(worker_of(planner)._process.pid) == []
+    # The promise; a busy machine adds to some of the three what it takes to wake a process up.
+    assert min(spent) <= 1.1 * BUDGET_S
+    troubled(None)
+    assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("trouble", list(REASONS))
+def test_what_was_found_before_the_trouble_counts(
+    planner: hn.HybridPlanner, troubled: Callable[..., None], trouble: str
+) -> None:
+    troubled(trouble, after_path=True)
+    result = planner.plan(*ENDS)
+    assert result.status is hn.PlanStatus.SOLVED
+    assert result.refinement is not None
+    assert result.refinement.by_grid is False
+    assert result.refinement.steps[-1] in {REASONS[trouble], LATE}
+    assert result.path is not None
+    assert segment_faults(planner.topology.grid, result.path.points) == ()
+    assert result.lower_bound <= result.cost
+
+
+@pytest.mark.parametrize(
+    ("planner_name", "confine"),
+    [
+        ("RRTstar", "mask"),
+        ("InformedRRTstar", "mask"),
+        ("BITstar", "mask"),
+        ("BITstar", "chain"),
+        ("PRMstar", "prm"),
+    ],
+)
+def test_planners_that_go_on_keep_to_their_time(
+    planner: hn.HybridPlanner, planner_name: str, confine: str
+) -> None:
+    settings = f"{{planner: {planner_name}, confine: {confine}, budget_s: {BUDGET_S}}}"
+    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
+    made = hn.HybridPlanner(planner.topology, preset=preset)
+    spent = []
+    for _ in range(2):
+        began = time.perf_counter()
+        assert made.plan(*ENDS).solved
+        spent.append(time.perf_counter() - began)
+    assert min(spent) <= 1.1 * BUDGET_S
+
+
+def test_a_worker_that_dies_costs_one_query_at_most(planner: hn.HybridPlanner) -> None:
+    worker = worker_of(planner)
+    first = worker._process
+    os.kill(first.pid, signal.SIGKILL)
+    began = time.perf_counter()
+    assert planner.plan(*ENDS).solved
+    assert time.perf_counter() - began < 2 * BUDGET_S
+    for _ in range(60):
+        result = planner.plan(*ENDS)
+        assert result.solved
+        if result.refinement is not None and not result.refinement.by_grid:
+            break
+    assert result.refinement is not None
+    assert result.refinement.by_grid is False
+    assert worker._process.pid != first.pid
+
+
+def test_a_fork_does_not_outlive_its_worker(
+    planner: hn.HybridPlanner, troubled: Callable[..., None]
+) -> None:
+    troubled("hang")
+    worker = worker_of(planner)
+    results: list[hn.PlanResult] = []
+    query = threading.Thread(target=lambda: results.append(planner.plan(*ENDS)))
+    query.start()
+    until = time.monotonic() + BUDGET_S
+    while not (forks := children_of(worker._process.pid)) and time.monotonic() < until:
+        time.sleep(0.01)
+    worker._process.send_signal(signal.SIGKILL)
+    query.join(10 * BUDGET_S)
+    assert results[0].refinement is not None
+    assert results[0].refinement.by_grid
+    assert forks
+    assert all(gone(fork, within_s=BUDGET_S) for fork in forks)
+
+
+def test_nothing_outlives_a_planner_that_is_killed(tmp_path: Path) -> None:
+    code = f"""
+import hybridnav as hn
+from functools import partial
+from hybridnav.grid.worlds import office_world
+from hybridnav.planner import ompl_plans
+from tests.troubled_query import TroubledQuery
+grid = office_world().grid(robot_radius_m=0.25)
+planner = hn.HybridPlanner(
+    hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl-rrtconnect"
+)
+print(planner._ompl._worker._process.pid, flush=True)
+ompl_plans.Query = TroubledQuery
+planner.plan(*{ENDS})
+"""
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    started = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=env, cwd=tmp_path
+    )
+    assert started.stdout is not None
+    server = int(started.stdout.readline())
+    until = time.monotonic() + 10
+    while not (forks := children_of(server)) and time.monotonic() < until:
+        time.sleep(0.01)
+    started.kill()
+    started.wait()
+    started.stdout.close()
+    assert forks
+    assert all(gone(pid, within_s=10 * BUDGET_S) for pid in [*forks, server])
