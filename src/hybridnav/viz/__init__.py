@@ -1,21 +1,27 @@
 """Pictures: maps, places, graphs, plans. Drawn on matplotlib figures without pyplot or display."""
 
 from hybridnav.viz.dual import plot_dual
+from hybridnav.viz.kernels import plot_kernels
+from hybridnav.viz.levels import plot_levels
 from hybridnav.viz.maps import plot_level, plot_map, plot_places
 from hybridnav.viz.paper import plot_figure1
 from hybridnav.viz.plan import plot_plan
 from hybridnav.viz.rooms import plot_rooms, plot_tour
 from hybridnav.viz.save import save_figure
+from hybridnav.viz.search import plot_search
 from hybridnav.viz.topology import plot_topology
 
 __all__ = [
     "plot_dual",
     "plot_figure1",
+    "plot_kernels",
     "plot_level",
+    "plot_levels",
     "plot_map",
     "plot_places",
     "plot_plan",
     "plot_rooms",
+    "plot_search",
     "plot_topology",
     "plot_tour",
     "save_figure",

@@ -1,0 +1,144 @@
+"""Pictures of one step of a pyramid: which arcs are contracted, which are removed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+
+from hybridnav.grid import CellClass
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, known_view
+from hybridnav.viz.places import Places
+from hybridnav.viz.topology import Graph, draw_ground, drawable, finish
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav.pyramid import DualGraphPyramid
+    from hybridnav.viz.layout import Entry
+
+_CLEARANCE = 2.4  # points on a picture of full width
+_CONTRACTED, _REMOVED, _KEPT = "contraction kernel", "removal kernel", "arc of the next level"
+_STROKES = {
+    _KEPT: (style.RIM_ARC, 0.8, "solid"),
+    _REMOVED: (style.HOLE, 1.3, (0, (2.2, 1.4))),
+    _CONTRACTED: (style.INK, 2.4, "solid"),
+}
+_DOTS = {"surviving": (5.6, style.INK), "not surviving": (4.4, style.FREE)}
+
+
+def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
+    pyramid: DualGraphPyramid,
+    level: int,
+    *,
+    ax: Axes | None = None,
+    removed: bool = True,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw how a level becomes the next one: the paper's Fig. 2 for any map.
+
+    Thick lines are contracted: each is a spoke of a star, whose centre, a black dot, survives.
+    Dashed ones are redundant after that, and removed; thin ones are the arcs of the next level. A
+    colour is the field of one vertex of the next level, a reduction window.
+
+    Parameters
+    ----------
+    pyramid
+        The pyramid.
+    level
+        Index of the lower of the two levels; negative ones count from the apex.
+    ax
+        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+    removed
+        Draw the arcs that are removed.
+    title
+        Replaces the title that counts; an empty one leaves it out.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    IndexError
+        When there is no such level, or none above it.
+    InvalidValueError
+        When the level has more than 20,000 vertices.
+    """
+    lower = drawable(pyramid[level])
+    upper = pyramid[lower.index + 1]
+    canvas = Canvas.opened(ax, width_in, known_view(lower.grid))
+    draw_ground(canvas, lower.grid, upper.field_of, Places(upper).colours(), style.PALE * 2)
+    graph = Graph(lower, 0.0)
+    kinds = _kinds(pyramid, lower.index, lower.n_arcs)
+    if not removed:
+        kinds[_REMOVED][:] = False
+    curves = graph.curves(_CLEARANCE * canvas.sizes.line / canvas.sizes.points_per_metre)
+    for label, (colour, width, dashes) in _STROKES.items():
+        arcs = np.flatnonzero(kinds[label]).tolist()
+        lines = LineCollection(
+            [curves[arc] for arc in arcs if arc in curves],
+            colors=colour,
+            linewidths=width * canvas.sizes.line,
+            linestyles=[dashes],
+            zorder=3,
+        )
+        lines.set_gid(label.replace(" ", "-"))
+        canvas.ax.add_collection(lines, autolim=False)
+    cols = lower.grid.shape[1]
+    survives = np.isin(lower.cells @ [cols, 1], upper.cells @ [cols, 1])
+    _draw_dots(canvas, graph.positions, survives, lower.classes == CellClass.FREE)
+    n_gone, n_removed = (int(kinds[label].sum()) for label in (_CONTRACTED, _REMOVED))
+    words = [
+        f"level {lower.index} to {upper.index}: {lower.n_vertices} to {upper.n_vertices} vertices",
+        f"{n_gone} arcs contracted",
+        *([f"{n_removed} removed"] if removed else []),
+    ]
+    finish(canvas, _entries(canvas, kinds, survives), words if title is None else [title])
+    return canvas.ax
+
+
+def _kinds(pyramid: DualGraphPyramid, level: int, n_arcs: int) -> dict[str, BoolArray]:
+    """Masks of the arcs of a level: contracted, removed, kept."""
+    masks = {label: np.zeros(n_arcs, dtype=np.bool_) for label in _STROKES}
+    masks[_CONTRACTED][pyramid.contraction_kernel(level)] = True
+    masks[_REMOVED][pyramid.removal_kernel(level)] = True
+    masks[_KEPT] = ~masks[_CONTRACTED] & ~masks[_REMOVED]
+    return masks
+
+
+def _draw_dots(canvas: Canvas, at: FloatArray, survives: BoolArray, free: BoolArray) -> None:
+    for (label, (size, face)), mask in zip(_DOTS.items(), (survives, ~survives), strict=True):
+        edges = [style.INK if is_free else style.UNEXPLORED_NODE for is_free in free[mask]]
+        fill = edges if label == "surviving" else face
+        dots = canvas.ax.scatter(
+            at[mask, 0],
+            at[mask, 1],
+            s=(size * canvas.sizes.line) ** 2,
+            c=fill,
+            edgecolors=edges,
+            linewidths=0.9 * canvas.sizes.line,
+            zorder=4,
+        )
+        dots.set_gid(label.replace(" ", "-"))
+
+
+def _entries(canvas: Canvas, kinds: dict[str, BoolArray], survives: BoolArray) -> list[Entry]:
+    line = canvas.sizes.line
+    entries: list[Entry] = []
+    for (label, (size, face)), mask in zip(_DOTS.items(), (survives, ~survives), strict=True):
+        if mask.any():
+            dot = Line2D([], [], ls="", marker="o", ms=size * line, mfc=face, mec=style.INK)
+            entries.append((dot, f"{label} vertex"))
+    for label, (colour, width, dashes) in reversed(_STROKES.items()):
+        if kinds[label].any():
+            entries.append((Line2D([], [], color=colour, lw=width * line, ls=dashes), label))
+    return entries

@@ -1,0 +1,91 @@
+"""Levels of a pyramid side by side: fields that grow, and the graph over them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.viz import style
+from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
+from hybridnav.viz.places import Places
+from hybridnav.viz.topology import Graph, draw_graph, draw_ground, frame_axes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav.pyramid import DualGraphPyramid
+
+GRAPH_UP_TO = 150
+"""Vertices up to which a panel shows the graph too: more would cover their own fields."""
+_GAP_IN = 0.1
+_STRENGTH = 0.75
+
+
+def plot_levels(
+    pyramid: DualGraphPyramid,
+    levels: Sequence[int] | None = None,
+    *,
+    columns: int = 3,
+    graph_up_to: int = GRAPH_UP_TO,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Figure:
+    """Draw levels of a pyramid side by side, each with its fields and, high up, its graph.
+
+    Neighbouring fields never have the same colour; unexplored ones are grey. Arcs are drawn as
+    `plot_topology` does: parallel ones in blue, self-loops in red.
+
+    Parameters
+    ----------
+    pyramid
+        The pyramid.
+    levels
+        Indices of levels, in the order of the panels; negative ones count from the apex. By default
+        all.
+    columns
+        Panels in a row, >= 1.
+    graph_up_to
+        Levels of more vertices are drawn as fields alone.
+    width_in
+        Width of the figure in inches; its height follows.
+
+    Returns
+    -------
+    Figure
+        A figure with one axes for each level.
+
+    Raises
+    ------
+    IndexError
+        When there is no such level.
+    InvalidValueError
+        When there are no levels or no columns.
+    """
+    chosen = [pyramid[index] for index in (range(len(pyramid)) if levels is None else levels)]
+    if not chosen or columns < 1:
+        raise InvalidValueError(
+            f"expected at least one level and one column, got {len(chosen)} and {columns}"
+        )
+    view = known_view(pyramid.grid)
+    rows = math.ceil(len(chosen) / columns)
+    panel_in = (width_in - (columns - 1) * _GAP_IN - 2 * PAD_IN) / columns
+    tall_in = panel_in * float(view.size[1] / view.size[0])
+    font = style.Sizes.fitting(panel_in, 1.0).font
+    row_in = tall_in + 2.0 * font / 72
+    height_in = rows * row_in + (rows - 1) * _GAP_IN + 2 * PAD_IN
+    figure = Figure(figsize=(width_in, height_in))
+    for number, level in enumerate(chosen):
+        row, col = divmod(number, columns)
+        left_in = PAD_IN + col * (panel_in + _GAP_IN)
+        bottom_in = height_in - PAD_IN - (row + 1) * row_in - row * _GAP_IN
+        box = left_in / width_in, bottom_in / height_in, panel_in / width_in, tall_in / height_in
+        canvas = Canvas.opened(figure.add_axes(box), width_in, view)
+        draw_ground(canvas, level.grid, level.field_of, Places(level).colours(), _STRENGTH)
+        if level.n_vertices <= graph_up_to:
+            draw_graph(canvas, Graph(level, 0.0), simple=False)
+        frame_axes(canvas)
+        title = f"level {level.index}: {level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
+        canvas.ax.set_title(title, fontsize=font, pad=0.4 * font, color=style.INK)
+    return figure

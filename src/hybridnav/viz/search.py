@@ -1,0 +1,126 @@
+"""Pictures of a sampling-based search: what it drew, what it joined, and what came of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.maps import ground_entries
+from hybridnav.viz.topology import frame_axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import BoolArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.refine.ompl import Search
+    from hybridnav.result import Path
+    from hybridnav.viz.layout import Entry
+
+_CORRIDOR = style.PLACES[1]
+_STRENGTH = 0.55
+_STATE, _EDGE = style.HOLE, style.PARALLEL
+
+
+def plot_search(  # noqa: PLR0913 - all but the first two have defaults
+    grid: OccupancyGrid,
+    search: Search | None,
+    *,
+    corridor: BoolArray | None = None,
+    path: Path | None = None,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw the states and motions of an OMPL search, the corridor that it kept to, and its path.
+
+    Parameters
+    ----------
+    grid
+        The map. The picture is cropped to its known part.
+    search
+        States that were drawn and found valid (dots), and motions of trees or roadmaps (lines);
+        None for a search that looked at nothing, as where a straight line will do.
+    corridor
+        bool (rows, cols), the cells that the search might stand on; None for all.
+    path
+        The path found.
+    ax
+        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+    title
+        Replaces the title that counts states and motions; an empty one leaves it out.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    InvalidValueError
+        When the corridor has another shape than the grid.
+    """
+    if corridor is not None and corridor.shape != grid.shape:
+        raise InvalidValueError(
+            f"the corridor has {corridor.shape} cells, the grid has {grid.shape}"
+        )
+    canvas = Canvas.opened(ax, width_in, known_view(grid))
+    _draw_ground(canvas, grid, corridor)
+    n_states = 0 if search is None else len(search.states)
+    n_edges = 0 if search is None else len(search.edges)
+    line = canvas.sizes.line
+    entries: list[Entry] = []
+    if search is not None and n_edges:
+        lines = np.array(search.edges, dtype=np.float64).reshape(-1, 2, 2)
+        drawn = LineCollection(list(lines), colors=_EDGE, linewidths=0.5 * line, zorder=3)
+        drawn.set_gid("motions")
+        canvas.ax.add_collection(drawn, autolim=False)
+        entries.append((Line2D([], [], color=_EDGE, lw=1.2 * line), "motions of the trees"))
+    if search is not None and n_states:
+        at = np.array(search.states, dtype=np.float64).reshape(-1, 2)
+        dots = canvas.ax.scatter(
+            at[:, 0], at[:, 1], s=(1.3 * line) ** 2, c=_STATE, linewidths=0, zorder=4
+        )
+        dots.set_gid("states")
+        dot = Line2D([], [], ls="", marker="o", ms=3 * line, mfc=_STATE, mec="none")
+        entries.append((dot, "states drawn"))
+    if path is not None:
+        way = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5)
+        way.set_gid("path")
+        canvas.ax.add_line(way)
+        entries.append((Line2D([], [], color=style.PATH, lw=1.8 * line), "path"))
+    if corridor is not None:
+        (colour,) = style.rgb(_CORRIDOR, strength=_STRENGTH) / 255
+        entries.append((Patch(fc=colour), "corridor"))
+    frame_axes(canvas)
+    words = [grid.name, f"{n_states:,} states", f"{n_edges:,} motions"]
+    add_title(canvas, words if title is None else [title])
+    bar = add_scale_bar(canvas)
+    below = 0.35 * canvas.sizes.font
+    legend = add_legend(canvas, entries + ground_entries(grid), bar=bar, below=below)
+    fit_height(canvas, legend)
+    return canvas.ax
+
+
+def _draw_ground(canvas: Canvas, grid: OccupancyGrid, corridor: BoolArray | None) -> None:
+    """The cells by class, those of the corridor tinted."""
+    index = grid.classes.astype(np.int64)
+    if corridor is not None:
+        index[corridor] = 3
+    colours = np.concatenate(
+        [
+            style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED),
+            style.rgb(_CORRIDOR, strength=_STRENGTH),
+        ]
+    )
+    draw_cells(canvas, grid, index, colours)
