@@ -5,64 +5,59 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 import hybridnav as hn
 from hybridnav.config import load_preset
 from hybridnav.grid.worlds import office_world
 from hybridnav.planner.ompl_plans import OmplPlanner
+from hybridnav.viz import plot_search
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 ENDS = (1.0, 13.2), (40.6, 19.4)
 PLANNERS = ("RRTConnect", "BITstar")
+SCOPES = (
+    ("whole map", "mask"),
+    ("corridor, as one problem", "mask"),
+    ("corridor, leg by leg", "chain"),
+)
 
 
 def draw(out: Path) -> list[Path]:
-    """A picture for each planner: the corridor's run on the left, the whole map's on the right."""
+    """A picture for each planner: the whole map's run, and the corridor's in both ways."""
     grid = office_world().grid(robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     coarse = hn.HybridPlanner(topology, preset="fast")
     cells: Any = coarse._cells  # noqa: SLF001 - the planner's own fields, built once
+    field_of = cells.search.field_of
     path = coarse.plan(*ENDS).raise_for_status().path
     assert path is not None  # noqa: S101 - solved
+    passed = np.unique(field_of[path.cells[:, 0], path.cells[:, 1]])
+    corridor = np.isin(field_of, passed)
     poses = np.column_stack([ENDS, np.zeros(2)])
     files = []
     for planner in PLANNERS:
-        figure = Figure(figsize=(15, 6), layout="constrained")
-        for ax, (scope, confine) in zip(
-            figure.subplots(1, 2), (("corridor", "mask"), ("whole map", "mask")), strict=True
-        ):
+        figure = Figure(figsize=(9, 17), layout="constrained")
+        for ax, (scope, confine) in zip(figure.subplots(3, 1), SCOPES, strict=True):
             settings = f"planner.ompl={{planner: {planner}, confine: {confine}}}"
             preset = load_preset("ompl-rrtconnect", overrides=[settings])
-            field_of = cells.search.field_of if scope == "corridor" else None
-            plan = OmplPlanner(grid, preset.planner, field_of).plan(
+            is_whole = scope == "whole map"
+            plan = OmplPlanner(grid, preset.planner, None if is_whole else field_of).plan(
                 path.cells, (poses[0], poses[1]), None, tells_search=True
             )
-            _draw(ax, grid, plan)
-            steps = "; ".join(plan.refinement.steps)
-            ax.set_title(f"{planner}, {scope}: {steps}", fontsize=9)
+            assert plan.path is not None  # noqa: S101 - the office is easy
+            plot_search(
+                grid,
+                plan.search,
+                corridor=None if is_whole else corridor,
+                path=plan.path,
+                ax=ax,
+                title=f"{planner}, {scope}: {plan.path.length_m:.2f} m, first path after "
+                f"{1e3 * plan.refinement.trace[0][0]:.0f} ms",
+            )
         file = out / f"ompl-{planner.lower()}.png"
-        figure.savefig(file, dpi=110)
+        figure.savefig(file, dpi=100)
         files.append(file)
     return files
-
-
-def _draw(ax: Any, grid: hn.OccupancyGrid, plan: Any) -> None:
-    rows, cols = grid.shape
-    extent = (0.0, cols * grid.resolution_m, 0.0, rows * grid.resolution_m)
-    blocked = grid.classes == hn.CellClass.OCCUPIED
-    ax.imshow(~blocked, origin="lower", extent=extent, cmap="gray", vmin=-1.0, vmax=1.0)
-    search = plan.search
-    if search is not None:
-        lines = np.array(search.edges, dtype=np.float64).reshape(-1, 2, 2)
-        ax.add_collection(LineCollection(list(lines), colors="tab:blue", linewidths=0.4))
-        states = np.array(search.states, dtype=np.float64).reshape(-1, 2)
-        ax.plot(*states.T, ".", color="tab:orange", markersize=1.2)
-    if plan.path is not None:
-        ax.plot(*plan.path.points.T, color="tab:red", linewidth=1.5)
-    ax.set_aspect("equal")
-    ax.set_xlabel("x in metres")
-    ax.set_ylabel("y in metres")
