@@ -8,6 +8,7 @@ from hybridnav.metrics.anyangle import (
     shorten,
 )
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
+from hybridnav.metrics.judge_line import judge_line, line_cells
 from hybridnav.metrics.optimum import ScipyOptimum, scipy_optimum
 from hybridnav.metrics.segmentation import RoomAgreement, compare_rooms
 from hybridnav.metrics.statistics import (
@@ -33,7 +34,9 @@ __all__ = [
     "anyangle_optimum",
     "compare_rooms",
     "distance_buckets",
+    "judge_line",
     "judge_path",
+    "line_cells",
     "paired_difference",
     "scipy_optimum",
     "segment_faults",

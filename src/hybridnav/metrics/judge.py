@@ -148,12 +148,8 @@ def segment_faults(
     InvalidValueError
         When the points are no finite array of shape (n, 2) or there is none.
     """
-    xy = np.asarray(points, dtype=np.float64)
-    if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy):  # noqa: PLR2004
-        raise InvalidValueError(f"points must have the shape (n, 2), n >= 1, got {xy.shape}")
-    if not np.isfinite(xy).all():
-        raise InvalidValueError("points need finite coordinates in metres")
-    positions = _grid_positions(grid.frame, xy)
+    xy = checked_points(points)
+    positions = grid_positions(grid.frame, xy)
     free_of = free_classes(allow_unexplored=allow_unexplored)
     codes = kernels.segment_codes(grid.classes, free_of, positions)
     crossed = kernels.crossed_joints(grid.classes, free_of, positions)
@@ -166,6 +162,22 @@ def segment_faults(
     bends = np.flatnonzero(crossed).tolist()
     faults.extend((i, 0, f"the bend at {_at(xy[i])} m {_BETWEEN}") for i in bends)
     return tuple(text for _, _, text in sorted(faults))
+
+
+def checked_points(points: ArrayLike) -> FloatArray:
+    """Points as float64 (n, 2).
+
+    Raises
+    ------
+    InvalidValueError
+        When they are no finite array of shape (n, 2) or there is none.
+    """
+    xy = np.asarray(points, dtype=np.float64)
+    if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy):  # noqa: PLR2004
+        raise InvalidValueError(f"points must have the shape (n, 2), n >= 1, got {xy.shape}")
+    if not np.isfinite(xy).all():
+        raise InvalidValueError("points need finite coordinates in metres")
+    return xy
 
 
 def free_classes(*, allow_unexplored: bool) -> BoolArray:
@@ -196,7 +208,7 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
     return path.astype(np.int64)
 
 
-def _grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
+def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
     """Positions (row, col) of points, rounded to 2^-24 of a cell and held near the map."""
     # The frame at the origin gives the two axes without the rounding of a far origin.
     axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
@@ -217,7 +229,7 @@ def _about_cells(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
     where = np.flatnonzero(wrong)
     if not len(where):
         return []
-    return [f"cell {_cell(path[where[0]])} is {what}{_more(len(where))}"]
+    return [f"cell {_cell(path[where[0]])} is {what}{more(len(where))}"]
 
 
 def _about_steps(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
@@ -225,7 +237,7 @@ def _about_steps(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
     if not len(where):
         return []
     tail, head = path[where[0]], path[where[0] + 1]
-    return [f"the step from {_cell(tail)} to {_cell(head)} {what}{_more(len(where))}"]
+    return [f"the step from {_cell(tail)} to {_cell(head)} {what}{more(len(where))}"]
 
 
 def _cut_corners(
@@ -257,5 +269,6 @@ def _at(point: FloatArray) -> str:
     return f"({point[0]:.3f}, {point[1]:.3f})"
 
 
-def _more(count: int) -> str:
+def more(count: int) -> str:
+    """How many others there are beside the first of some faults, in brackets."""
     return "" if count == 1 else f" (and {count - 1} more)"

@@ -1,0 +1,147 @@
+"""Any-angle paths judged: ends, exact geometry, length, and the cells that they pass."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.metrics.judge import (
+    Verdict,
+    checked_points,
+    free_classes,
+    grid_positions,
+    more,
+    segment_faults,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+Cell = tuple[int, int]
+
+_NEAR_CELLS = 2.0**-20
+"""How far from the centre of its cell an end may be."""
+_SLIVER_CELLS = 1e-9
+"""Pieces of a line below this are rounding: the line passes the corner of a cell."""
+
+
+def judge_line(
+    grid: OccupancyGrid,
+    points: ArrayLike,
+    *,
+    start: Cell,
+    goal: Cell,
+    allow_unexplored: bool = False,
+) -> Verdict:
+    """Judge an any-angle path between the centres of two cells.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    points
+        `(x, y)` in metres, map frame, shape (n, 2), n >= 1, finite.
+    start, goal
+        The cells between whose centres it should run.
+    allow_unexplored
+        Whether unexplored cells count as free.
+
+    Returns
+    -------
+    Verdict
+        Faults: the first or last point is not the centre of its cell; what `segment_faults` finds.
+
+    Raises
+    ------
+    InvalidValueError
+        When the points are no finite array of shape (n, 2) or there is none.
+    """
+    xy = checked_points(points)
+    steps = np.diff(xy, axis=0)
+    crossed = segment_faults(grid, xy, allow_unexplored=allow_unexplored)
+    faults = _wrong_ends(grid, xy, start, goal)
+    faults += [f"{crossed[0]}{more(len(crossed))}"] if crossed else []
+    return Verdict(tuple(faults), math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist()))
+
+
+def line_cells(
+    grid: OccupancyGrid, points: ArrayLike, *, allow_unexplored: bool = False
+) -> LongArray:
+    """Cells that a legal any-angle path passes.
+
+    Of a piece along the side between two cells only one cell is named, a free one.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    points
+        A path in which `segment_faults` finds nothing.
+    allow_unexplored
+        Whether unexplored cells count as free.
+
+    Returns
+    -------
+    LongArray
+        int64 (n, 2), (row, col), each a neighbour of the one before, diagonally where the line
+        passes a corner.
+
+    Raises
+    ------
+    InvalidValueError
+        When the points are no finite array of shape (n, 2) or there is none.
+    """
+    positions = grid_positions(grid.frame, checked_points(points))
+    free = np.pad(free_classes(allow_unexplored=allow_unexplored)[grid.classes], 1)
+    pieces = [_middles(*ends) for ends in itertools.pairwise(positions)]
+    cells = _free_cells_at(free, np.concatenate([positions[:1], *pieces, positions[-1:]]))
+    moved = np.ones(len(cells), dtype=np.bool_)
+    moved[1:] = (cells[1:] != cells[:-1]).any(axis=1)
+    passed: LongArray = cells[moved]
+    return passed
+
+
+def _middles(start: FloatArray, end: FloatArray) -> FloatArray:
+    """The middle of each piece of a segment between two lines of the lattice."""
+    way = end - start
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    cuts = [np.array([0.0, 1.0])]
+    for axis in np.flatnonzero(way):
+        lines = np.arange(math.ceil(low[axis]), math.floor(high[axis]) + 1)
+        cuts.append((lines - start[axis]) / way[axis])
+    along = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
+    whole = np.diff(along) * np.hypot(*way) > _SLIVER_CELLS
+    at = ((along[:-1] + along[1:]) / 2)[whole]
+    middles: FloatArray = start + at[:, None] * way
+    return middles
+
+
+def _free_cells_at(free: BoolArray, positions: FloatArray) -> LongArray:
+    """A free cell at each position, of the map whose padded free cells are given."""
+    above = np.floor(positions).astype(np.int64)
+    below = np.ceil(positions).astype(np.int64) - 1
+    cells = above.copy()
+    # Where a position lies on lines of the lattice the cells beside it are tried in turn.
+    for rows, cols in ((above, below), (below, above), (below, below)):
+        walled = ~free[tuple((cells + 1).T)]
+        cells[walled] = np.column_stack([rows[walled, 0], cols[walled, 1]])
+    return cells
+
+
+def _wrong_ends(grid: OccupancyGrid, xy: FloatArray, start: Cell, goal: Cell) -> list[str]:
+    ends = grid_positions(grid.frame, xy[[0, -1]])
+    off = np.abs(ends - (np.array([start, goal]) + 0.5)).max(axis=1) > _NEAR_CELLS
+    return [
+        f"the {which} point ({point[0]:.3f}, {point[1]:.3f}) m is not the centre of cell "
+        f"({int(cell[0])}, {int(cell[1])})"
+        for which, point, cell, wrong in zip(
+            ("first", "last"), xy[[0, -1]], (start, goal), off, strict=True
+        )
+        if wrong
+    ]
