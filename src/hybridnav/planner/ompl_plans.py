@@ -167,6 +167,10 @@ class OmplPlanner:
             reply.search,
         )
 
+    def close(self) -> None:
+        """End the process; the next query starts another."""
+        self._worker.close()
+
     def _refused(self, ends: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
         """Status of a query at one of whose ends the footprint does not fit."""
         if self.ompl.footprint is None:

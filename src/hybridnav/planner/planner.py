@@ -181,6 +181,11 @@ class HybridPlanner:
         cells = self._cells if self._ompl is None else None
         return plan_many(self, cells, first, last, finish)
 
+    def close(self) -> None:
+        """End the process that a preset with OMPL plans in; the next query starts another."""
+        if self._ompl is not None:
+            self._ompl.close()
+
     def _round(self, closed: LongArray, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
         """The plan itself where nothing closed is in its way, else the best path round it all.
 
