@@ -18,10 +18,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import hybridnav as hn
-from hybridnav.harness.analysis import ANSWERED, nanquantile
+from hybridnav.harness.analysis import nanquantile
+from hybridnav.harness.charts import chart_file, loss_chart, speed_chart
+from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.methods import BASELINES
 from hybridnav.harness.output import write_outputs
-from hybridnav.harness.report_html import chart_file, loss_chart, speed_chart
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.svg import looks
 from hybridnav.harness.tables import (

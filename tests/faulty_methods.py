@@ -11,16 +11,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.baselines import Answer
+from hybridnav.baselines import Answer, Line
 from hybridnav.baselines.grid import GridAstar
 from hybridnav.config import Preset
 from hybridnav.grid import CellClass
 from hybridnav.harness.methods import HybridMethod
+from hybridnav.metrics import shorten
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from hybridnav.grid import OccupancyGrid
 
     Cell = tuple[int, int]
@@ -212,6 +215,125 @@ class HomelessCells(Sound):
         region_of = np.where(self.free, 0, -1).astype(np.int32)
         region_of[tuple(np.argwhere(self.free)[0])] = -1
         self.region_of = region_of
+
+
+# --- any-angle paths ----------------------------------------------------------------------------
+
+
+class SoundLine(Sound):
+    """A method without a fault, for the others to derive from: A* on the grid, pulled taut."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer = super().solve(start, goal)
+        if answer.cells is None:
+            return answer
+        return Answer(None, line=self.line(shorten(self.grid, answer.cells)))
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        """What is said of the path."""
+        return Line(points, length_of(points), lower_bound_m=length_of(points[[0, -1]]))
+
+
+class LineThroughWall(SoundLine):
+    """Straight from start to goal, whatever lies between."""
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        return super().line(points[[0, -1]])
+
+
+class LineSaidShort(SoundLine):
+    """A right path, said to be 1 % shorter than it is."""
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        return replace(super().line(points), length_m=0.99 * length_of(points))
+
+
+class LineBelowItsBound(SoundLine):
+    """A right path, and the claim that none is as short."""
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        return replace(super().line(points), lower_bound_m=1.01 * length_of(points))
+
+
+class LineBesideTheGoal(SoundLine):
+    """The path ends a tenth of a cell beside the goal."""
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        off = points.copy()
+        off[-1] += 0.1 * self.grid.resolution_m
+        return super().line(off)
+
+
+class LineFromElsewhere(SoundLine):
+    """The path starts a tenth of a cell beside the start."""
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        off = points.copy()
+        off[0] += 0.1 * self.grid.resolution_m
+        return super().line(off)
+
+
+class LineSaidOptimal(SoundLine):
+    """Along the centres of the cells of the grid's path, and the claim that none is shorter."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        cells = Sound.solve(self, start, goal).cells
+        if cells is None:
+            return Answer(None)
+        line = self.line(self.grid.frame.points_of(cells))
+        return Answer(None, line=replace(line, lower_bound_m=line.length_m))
+
+
+class LineForAll(SoundLine):
+    """Straight from start to goal where there is no path too."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        return Answer(None, line=self.line(self.grid.frame.points_of([start, goal])))
+
+
+class LineOfNothing(SoundLine):
+    """Points that are no numbers, and a bound that is none."""
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        return Line(np.full_like(points, math.nan), math.nan, lower_bound_m=math.nan)
+
+
+class LineUnsaid(SoundLine):
+    """A right path; of its length and of a bound nothing that can be checked."""
+
+    def line(self, points: NDArray[np.float64]) -> Line:
+        return Line(points, math.nan, lower_bound_m=math.nan)
+
+
+class LineOverHomelessCells(HomelessCells):
+    """Any-angle paths over cells some of which are in no region."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        cells = super().solve(start, goal).cells
+        if cells is None:
+            return Answer(None)
+        points = self.grid.frame.points_of(cells)
+        return Answer(None, line=Line(points, length_of(points)))
+
+
+class OwnGridOrNothing(SoundLine):
+    """A third of the paths are its own, a third the grid's, and for a third it has no time."""
+
+    def solve(self, start: Cell, goal: Cell) -> Answer:
+        answer, turn = super().solve(start, goal), (start[0] + goal[0]) % 3
+        cells = Sound.solve(self, start, goal).cells
+        if answer.line is None or cells is None:
+            return answer
+        if turn == 0:
+            return Answer(None, gave_up="timeout")
+        line = answer.line if turn == 1 else self.line(self.grid.frame.points_of(cells))
+        return Answer(None, line=replace(line, by_grid=turn != 1))
+
+
+def length_of(points: NDArray[np.float64]) -> float:
+    """Metres along some points."""
+    steps = np.diff(points, axis=0)
+    return math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
 
 
 # --- methods that fail --------------------------------------------------------------------------

@@ -15,15 +15,14 @@ from PIL import Image
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.harness.charts import loss_chart, speed_chart
 from hybridnav.harness.map_picture import crop_box, downsampled, draw_case, png_uri
 from hybridnav.harness.report_html import (
     MapSection,
     ReportData,
     Table,
     WorstCase,
-    loss_chart,
     render_report,
-    speed_chart,
 )
 from hybridnav.harness.svg import (
     Rect,
@@ -90,7 +89,7 @@ def lengthy(rng, mean, count=500):
 
 
 def staircase(start, moves):
-    return np.cumsum(np.array([start, *moves], dtype=np.int64), axis=0)
+    return np.cumsum(np.array([start, *moves], dtype=np.float64), axis=0)
 
 
 def rooms(rows, cols, rng):
@@ -111,7 +110,7 @@ def worst_case(classes, rng, title="pair 1: 12 %"):
     drift = rng.integers(-1, 2, n).cumsum()
     path = np.column_stack((np.arange(n) + 10, np.clip(10 + np.arange(n) + drift, 0, n + 9)))
     straight = np.column_stack((np.arange(n) + 10, np.arange(n) + 10))
-    return WorstCase(title, classes, 0.05, path.astype(np.int64), straight.astype(np.int64))
+    return WorstCase(title, classes, 0.05, path.astype(float), straight.astype(float))
 
 
 def a_report(n_maps=2, n_worst=2, size=(120, 160), names=NAMES, map_name="office"):
@@ -216,7 +215,7 @@ def test_equal_data_give_equal_text():
 def test_names_cannot_break_out_of_the_page():
     nasty = '</title></script><script>alert("1")&\'\x00\udcff'
     report = a_report(1, 1, names=[nasty, "b"], map_name=nasty)
-    case = WorstCase(nasty, report.maps[0].worst[0].classes, 0.05, np.zeros((0, 2), np.int64))
+    case = WorstCase(nasty, report.maps[0].worst[0].classes, 0.05, np.zeros((0, 2)))
     report.maps[0].worst.append(case)
     again = bare_report(
         title=nasty,
@@ -404,7 +403,7 @@ def test_row_0_of_a_map_is_at_the_bottom_of_its_picture():
 def test_the_path_lies_on_its_cells():
     classes = np.full((40, 50), CellClass.OCCUPIED, np.uint8)
     path = staircase((5, 5), [(0, 1)] * 20 + [(1, 0)] * 15 + [(0, 1)] * 10)
-    classes[path[:, 0], path[:, 1]] = CellClass.FREE
+    classes[tuple(path.astype(int).T)] = CellClass.FREE
     svg = draw_case(classes, path, path[:5], resolution_m=1.0, title="t")
     shown, drawn = picture(svg), line(svg, RED)
     (width,) = re.findall(r'<image [^>]*width="([\d.]+)"', svg)
@@ -427,7 +426,7 @@ def test_walls_survive_downsampling_and_free_beats_unexplored():
 
 def test_a_large_map_becomes_a_small_picture_of_the_part_round_the_paths():
     classes = np.full((3000, 4000), CellClass.FREE, np.uint8)
-    long = np.column_stack((np.arange(2500), np.arange(2500))).astype(np.int64)
+    long = np.column_stack((np.arange(2500), np.arange(2500))).astype(float)
     assert max(picture(draw_case(classes, long, None, resolution_m=0.05, title="t")).shape) <= 500
     short = staircase((100, 200), [(1, 1)] * 20)
     svg = draw_case(classes, short, None, resolution_m=0.05, title="t")
@@ -459,7 +458,7 @@ def test_the_scale_bar_is_as_long_as_it_says(resolution, told):
 @pytest.mark.parametrize("n_cells", [0, 1, 2])
 def test_short_paths_are_drawn(n_cells):
     classes = np.full((3, 4), CellClass.FREE, np.uint8)
-    path = np.array([[1, 1], [1, 2]], dtype=np.int64)[:n_cells]
+    path = np.array([[1, 1], [1, 2]], dtype=np.float64)[:n_cells]
     page = Page(draw_case(classes, path, path, resolution_m=0.05, title="t"))
     assert len(page.all("image")) == 1
     assert len(page.all("circle")) == min(n_cells, 1)

@@ -10,20 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.harness.contradictions import ANSWERED, SLACK, against, is_line
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.paths import path_steps
 from hybridnav.harness.records import read_records
 from hybridnav.metrics import thrun_count
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.harness.records import Record
-
-SLACK = 1e-9
-"""Relative difference of lengths that is rounding."""
-
-ANSWERED = ("solved", "no path")
-"""Statuses of records that hold an answer."""
 
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
 
@@ -49,6 +44,8 @@ class Outcome:
     """Of the pairs, all kinds."""
     optimum: dict[QueryKey, Record] = field(repr=False)
     """The reference's records on this map."""
+    lines: dict[QueryKey, float] = field(default_factory=dict, repr=False)
+    """Lengths of the best any-angle paths known on this map, metres."""
 
     @cached_property
     def _matched(self) -> list[Record | None]:
@@ -71,42 +68,77 @@ class Outcome:
         return np.array([math.nan if value is None else value for value in values], dtype=float)
 
     @cached_property
+    def metric(self) -> str:
+        """That of its paths, and of what their losses refer to: "octile" or "any-angle"."""
+        return "any-angle" if any(map(is_line, (self.preparation, *self.records))) else "octile"
+
+    @cached_property
     def optima_m(self) -> FloatArray:
-        """Lengths of the optimum."""
+        """Lengths of the optimum on the grid."""
         return np.array([record["length_m"] for record in self.references], dtype=float)
 
     @cached_property
+    def best_lines_m(self) -> FloatArray:
+        """Lengths of the any-angle optimum, or of the best any-angle path known."""
+        known = [self.lines.get(query_key(record), math.nan) for record in self.references]
+        return np.array(known, dtype=float)
+
+    @cached_property
+    def best_m(self) -> FloatArray:
+        """Lengths that losses refer to: the best in the metric of each path."""
+        lines = [bool(record and is_line(record)) for record in self._matched]
+        return np.where(lines, self.best_lines_m, self.optima_m)
+
+    @cached_property
     def losses(self) -> FloatArray:
-        """Length over the optimum's, minus one."""
-        return self._loss(self.lengths_m, self.optima_m)
+        """Length over that of the best path in its metric, minus one."""
+        return loss_of(self.lengths_m, self.best_m)
 
     @cached_property
     def lengths_m(self) -> FloatArray:
-        """Lengths of the paths in which no fault was found."""
+        """Lengths of the method's own paths in which no fault was found."""
+        return np.where(self._by_grid, math.nan, self._sound_m)
+
+    @cached_property
+    def fallback_losses(self) -> FloatArray:
+        """Loss of the grid's paths that stand in for the method's own."""
+        return loss_of(np.where(self._by_grid, self._sound_m, math.nan), self.best_m)
+
+    @cached_property
+    def by_grid(self) -> float:
+        """How many paths are the grid's, because the method found none; NaN where a method has no
+        such way out."""
+        counted = [(record or {}).get("by_grid") for record in self._matched]
+        return math.nan if all(one is None for one in counted) else float(self._by_grid.sum())
+
+    @cached_property
+    def _by_grid(self) -> BoolArray:
+        return np.nan_to_num(self.figure("by_grid")) > 0
+
+    @cached_property
+    def _sound_m(self) -> FloatArray:
         faulty = [bool(record and record.get("faults")) for record in self._matched]
         return np.where(faulty, math.nan, self.figure("length_m"))
 
     @cached_property
     def plan_losses(self) -> FloatArray:
-        """Thrun's loss of the plan: the best path inside its regions, over the optimum."""
-        return self._loss(self.figure("plan_optimum_m"), self.optima_m)
+        """Thrun's loss of the plan: the best grid path inside its regions, over the optimum."""
+        return loss_of(self.figure("plan_optimum_m"), self.optima_m)
 
     @cached_property
     def any_angle_losses(self) -> FloatArray:
         """Length over the any-angle optimum or the best any-angle path known, minus one."""
-        known = [record.get("any_angle_m") or math.nan for record in self.references]
-        return self._loss(self.lengths_m, np.array(known, dtype=float))
-
-    @staticmethod
-    def _loss(lengths: FloatArray, optima: FloatArray) -> FloatArray:
-        loss = lengths / optima - 1
-        rounded: FloatArray = np.where(np.abs(loss) <= SLACK, 0.0, loss)
-        return rounded
+        return loss_of(self.lengths_m, self.best_lines_m)
 
     @cached_property
     def seconds(self) -> FloatArray:
         """Wall-clock seconds of each query that it solved without a fault."""
         return np.where(np.isfinite(self.losses), self.figure("seconds"), math.nan)
+
+    @cached_property
+    def first_seconds(self) -> FloatArray:
+        """Of these, seconds until there was a first path, of planners that improve theirs."""
+        return np.where(np.isfinite(self.losses), self._stage("first path"), math.nan)
 
     @cached_property
     def reference_seconds(self) -> FloatArray:
@@ -116,8 +148,11 @@ class Outcome:
     @cached_property
     def refine_seconds(self) -> FloatArray:
         """Of these, seconds in the metric layer."""
+        return self._stage("refine")
+
+    def _stage(self, name: str) -> FloatArray:
         stages = ((record or {}).get("stages") or {} for record in self._matched)
-        return np.array([stage.get("refine", math.nan) for stage in stages], dtype=float)
+        return np.array([stage.get(name, math.nan) for stage in stages], dtype=float)
 
     @property
     def preparation_seconds(self) -> float:
@@ -149,8 +184,9 @@ class Outcome:
         found = [(self.preparation, fault) for fault in self.preparation.get("faults", ())]
         for record in self.records:
             found += [(record, fault) for fault in record.get("faults", ())]
-            reference = self.optimum.get(query_key(record))
-            wrong = None if reference is None else _against(record, reference)
+            key = query_key(record)
+            reference = self.optimum.get(key)
+            wrong = None if reference is None else against(record, reference, self.lines.get(key))
             if wrong:
                 found.append((record, wrong))
         return found
@@ -166,6 +202,13 @@ class Outcome:
         return sum(record["status"] not in ANSWERED for record in self.records)
 
 
+def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:
+    """Lengths over the best ones, minus one, without what is rounding."""
+    loss = lengths / best - 1
+    rounded: FloatArray = np.where(np.abs(loss) <= SLACK, 0.0, loss)
+    return rounded
+
+
 def nanmean(values: FloatArray) -> float:
     """Mean of the finite values, NaN where there is none."""
     finite = values[np.isfinite(values)]
@@ -176,22 +219,6 @@ def nanquantile(values: FloatArray, share: float) -> float:
     """Quantile of the finite values, NaN where there is none."""
     finite = values[np.isfinite(values)]
     return float(np.quantile(finite, share)) if finite.size else math.nan
-
-
-def _against(record: Record, reference: Record) -> str | None:
-    """What the optimum says against an answer."""
-    statuses = {record["status"], reference["status"]}
-    if statuses == set(ANSWERED):
-        return f"solvability: {record['status']}, the whole grid says {reference['status']}"
-    length, optimum = record.get("length_m"), reference.get("length_m")
-    if length is None or optimum is None:
-        return None
-    if length < optimum * (1 - SLACK):
-        return f"length {length:.6f} m is below the optimum {optimum:.6f} m"
-    bound = record.get("bound")
-    if bound is not None and length > optimum * bound * (1 + SLACK) + SLACK:
-        return f"length {length:.6f} m breaks its bound, {bound:.6f} x optimum {optimum:.6f} m"
-    return None
 
 
 @dataclass
@@ -272,23 +299,41 @@ def load_study(folder: Path, *, root: Path | None = None) -> Study:
         for (sha, method), record in preparations.items()
         if record["method"] == REFERENCE
     }
+    lines = {sha: _best_lines(known, pairs, sha) for sha, known in optima.items()}
     outcomes = []
     for (sha, method), record in preparations.items():
         name = names[sha]
         several = len(digests[f"{record['method']}@{name}"]) > 1
         label = f"{record['method']} {method[:4]}" if several else record["method"]
-        known = optima.get(sha, {})
-        outcomes.append(Outcome(name, label, record, pairs.get((sha, method), []), known))
+        known = optima.get(sha, {}), lines.get(sha, {})
+        outcomes.append(Outcome(name, label, record, pairs.get((sha, method), []), *known))
     order = {name: at for at, name in enumerate(dict.fromkeys(names.values()))}
     place = {name: at for at, name in enumerate(BASELINES)}
     outcomes.sort(
         key=lambda outcome: (
             order[outcome.map_name],
+            outcome.metric != "octile",
             place.get(outcome.preparation["method"], len(place)),
             outcome.label,
         )
     )
     return Study(outcomes)
+
+
+def _best_lines(
+    optima: dict[QueryKey, Record], pairs: dict[tuple[str, str], list[Record]], sha: str
+) -> dict[QueryKey, float]:
+    """The shortest any-angle path that is known for each pair of a map: the reference's own, and
+    those in which no fault was found."""
+    best = {key: record["any_angle_m"] for key, record in optima.items() if "any_angle_m" in record}
+    for (map_sha, _), records in pairs.items():
+        if map_sha != sha:
+            continue
+        for record in records:
+            key = query_key(record)
+            if key in best and is_line(record) and not record["faults"]:
+                best[key] = min(best[key], record["length_m"])
+    return best
 
 
 def _map_labels(preparations: dict[tuple[str, str], Record], root: Path | None) -> dict[str, str]:

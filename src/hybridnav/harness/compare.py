@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.analysis import load_study, nanmean, query_key
+from hybridnav.harness.analysis import load_study, loss_of, nanmean, query_key
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.metrics import paired_difference
 
@@ -85,7 +85,10 @@ def _paired(first: Outcome, second: Outcome) -> _Sample:
     ]
     shared = [key for key in places[0] if key in places[1]]
     one, other = (np.array([place[key] for key in shared], dtype=np.int64) for place in places)
-    return first.losses[one], second.losses[other], first.seconds[one], second.seconds[other]
+    # Of any-angle paths each run knows a best one of its own, and of other metrics the shorter.
+    best = np.fmin(first.best_m[one], second.best_m[other])
+    losses = loss_of(first.lengths_m[one], best), loss_of(second.lengths_m[other], best)
+    return *losses, first.seconds[one], second.seconds[other]
 
 
 def _row(labels: tuple[str, str], map_name: str, sample: _Sample) -> Row:

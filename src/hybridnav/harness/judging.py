@@ -12,13 +12,20 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.methods import HybridMethod, Prepared
-from hybridnav.metrics import ScipyOptimum, VisibilityGraph, judge_path, shorten
+from hybridnav.metrics import (
+    ScipyOptimum,
+    VisibilityGraph,
+    judge_line,
+    judge_path,
+    line_cells,
+    shorten,
+)
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
-    from hybridnav.baselines import Answer
+    from hybridnav.baselines import Answer, Line
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
@@ -71,12 +78,7 @@ class Judge:
 
     def faults(self, pair: Pair, answer: Answer) -> tuple[float | None, list[str]]:
         """Length of the path, counted anew, and all that is wrong with the answer."""
-        faults: list[str] = []
-        length_m = None
-        if answer.cells is not None:
-            verdict = judge_path(self._grid, answer.cells, start=pair.start, goal=pair.goal)
-            length_m = verdict.length_m
-            faults += verdict.faults
+        length_m, faults = self._judged_path(pair, answer)
         checks = self._consistency
         if checks is None:
             return length_m, faults
@@ -84,13 +86,29 @@ class Judge:
             arcs = answer.arcs if self._has_arcs else None  # of what other map is not known here
             wrong = checks.check_plan(pair.start, pair.goal, answer.nodes, arcs)
             faults += [wrong] if wrong else []
-        if (answer.cells is not None) != checks.joined(pair.start, pair.goal):
-            found = "a path" if answer.cells is not None else "no path"
+        if not answer.gave_up and answer.is_path != checks.joined(pair.start, pair.goal):
+            found = "a path" if answer.is_path else "no path"
             faults.append(f"solvability: {found} was found, moves on the grid say otherwise")
-        if answer.cells is not None and not faults:
-            wrong = checks.check_walk(answer.cells)
+        if answer.is_path and not faults:
+            wrong = checks.check_walk(self._cells_of(answer))
             faults += [wrong] if wrong else []
         return length_m, faults
+
+    def _judged_path(self, pair: Pair, answer: Answer) -> tuple[float | None, list[str]]:
+        if answer.line is not None:
+            line = answer.line
+            verdict = judge_line(self._grid, line.points, start=pair.start, goal=pair.goal)
+            return verdict.length_m, [*verdict.faults, *_false_claims(line, verdict.length_m)]
+        if answer.cells is None:
+            return None, []
+        verdict = judge_path(self._grid, answer.cells, start=pair.start, goal=pair.goal)
+        return verdict.length_m, [*verdict.faults]
+
+    def _cells_of(self, answer: Answer) -> LongArray:
+        if answer.line is not None:
+            return line_cells(self._grid, answer.line.points)
+        assert answer.cells is not None  # noqa: S101 - the caller has looked
+        return answer.cells
 
     def oracles(
         self, answer: Answer, pair: Pair, length_m: float | None
@@ -112,6 +130,18 @@ class Judge:
         if found.cells is None:
             return None
         return path_length_in_cells(found.cells) * self._grid.resolution_m
+
+
+def _false_claims(line: Line, length_m: float) -> list[str]:
+    """What a method says of a path and is not so; asked so that what is no number fails too."""
+    wrong = []
+    if not abs(line.length_m - length_m) <= SLACK * length_m:
+        wrong.append(f"the length is {length_m:.6f} m, not {line.length_m:.6f} m as reported")
+    if not line.lower_bound_m <= length_m * (1 + SLACK):
+        wrong.append(
+            f"the lower bound {line.lower_bound_m:.6f} m is above the length {length_m:.6f} m"
+        )
+    return wrong
 
 
 class Oracles:

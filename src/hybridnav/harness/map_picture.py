@@ -15,7 +15,7 @@ from hybridnav.grid import CellClass
 from hybridnav.harness.svg import coordinate, drawing, element, round_step, text
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, FloatArray, LongArray
+    from hybridnav._typing import ByteArray, FloatArray
 
 PICTURE_PX = 480
 """Pixels of the longer side of a map's PNG, at most."""
@@ -53,8 +53,8 @@ PICTURE_CSS = (
 
 def draw_case(
     classes: ByteArray,
-    path: LongArray,
-    optimum: LongArray | None,
+    path: FloatArray,
+    optimum: FloatArray | None,
     *,
     resolution_m: float,
     title: str,
@@ -66,7 +66,8 @@ def draw_case(
     classes
         uint8 (rows, cols) `CellClass`, row 0 at the lowest y.
     path, optimum
-        int64 (n, 2) cells (row, col), from start to goal; they may be empty.
+        float64 (n, 2), (row, col) from start to goal, centres of cells at whole numbers; they may
+        be empty.
     resolution_m
         Side of a cell in metres.
     title
@@ -108,13 +109,14 @@ def draw_case(
     )
 
 
-def crop_box(shape: tuple[int, ...], lines: list[LongArray]) -> Box:
+def crop_box(shape: tuple[int, ...], lines: list[FloatArray]) -> Box:
     """The part of a map to show: a box round all lines with a margin, not too narrow."""
     rows, cols = shape
     if not lines:
         return 0, rows, 0, cols
     cells = np.concatenate(lines)
-    (low, left), (high, right) = cells.min(axis=0).tolist(), (cells.max(axis=0) + 1).tolist()
+    low, left = np.floor(cells.min(axis=0)).astype(int).tolist()
+    high, right = (np.ceil(cells.max(axis=0)).astype(int) + 1).tolist()
     longer = max(high - low, right - left)
     margin = max(_LEAST_MARGIN_CELLS, round(_MARGIN * longer))
     least = math.ceil(_LEAST_ASPECT * (longer + 2 * margin))
@@ -150,7 +152,7 @@ def _stretched(low: int, high: int, least: int, size: int) -> tuple[int, int]:
     return max(0, low - more // 2), min(size, high + more - more // 2)
 
 
-def _placed(line: LongArray, top: int, left: int, unit: float) -> FloatArray:
+def _placed(line: FloatArray, top: int, left: int, unit: float) -> FloatArray:
     """Centres of cells in drawing units, y down."""
     centres = np.column_stack((line[:, 1] + 0.5 - left, top - line[:, 0] - 0.5))
     return centres.astype(np.float64) * unit

@@ -12,23 +12,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines import Answer
+from hybridnav.baselines import Answer, Line
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.planner import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.result import PlanStatus
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray
     from hybridnav.baselines import Method
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.result import Metric, PlanResult
 
 Cell = tuple[int, int]
 
 REFERENCE = "grid-astar"
 """The baseline whose lengths are the optimum; part of every run."""
+
+LINE_OF_SIGHT = "line-of-sight"
+"""Value of `planner.smooth`; added to the names of presets that have it: `fast+line-of-sight`."""
 
 BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
     "grid-astar": ("hybridnav.baselines.grid:GridAstar", {}),
@@ -59,6 +64,13 @@ class MethodSpec:
     pyramid: dict[str, Any] = field(default_factory=dict)
     """merge_distance_m, linkage, seed: of the places that it plans on."""
 
+    @property
+    def metric(self) -> Metric:
+        """Of its paths. A baseline whose answers have a `line` is not known as any-angle here."""
+        planner = (self.preset or {}).get("planner", {})
+        is_line = planner.get("refine") == "ompl" or planner.get("smooth") == LINE_OF_SIGHT
+        return "any-angle" if is_line else "octile"
+
     @cached_property
     def digest(self) -> str:
         """Short hash of all settings, part of every record's id."""
@@ -69,14 +81,43 @@ class MethodSpec:
 def preset_spec(
     source: str | Preset, *, merge_distance_m: float | None = None, seed: int | None = None
 ) -> MethodSpec:
-    """Method of a preset, its merge distance and seed overridden where given."""
+    """Method of a preset, its merge distance and seed overridden where given.
+
+    Raises
+    ------
+    InvalidValueError
+        When the preset plans in a metric in which the harness has nothing to compare with.
+    OmplError
+        When it needs OMPL, which is not installed.
+    """
     preset = load_preset(source)
+    _check_metric(preset)
     pyramid = preset.pyramid.model_dump(exclude={"robot_radius_m"})
+    smoothed = preset.planner.smooth == LINE_OF_SIGHT
     return MethodSpec(
-        preset.name,
+        f"{preset.name}+{LINE_OF_SIGHT}" if smoothed else preset.name,
         preset.model_dump(exclude={"description"}),
         pyramid | _given(merge_distance_m, seed),
     )
+
+
+def _check_metric(preset: Preset) -> None:
+    ompl = preset.planner.ompl
+    if ompl is None:
+        return
+    if ompl.has_heading:
+        raise InvalidValueError(
+            f"preset {preset.name}: space {ompl.space} needs headings at start and goal, and the "
+            "harness asks for paths between cells: it evaluates space r2"
+        )
+    if ompl.objective != "length":
+        raise InvalidValueError(
+            f"preset {preset.name}: the harness measures lengths, objective {ompl.objective} makes "
+            "something else small: it evaluates objective length"
+        )
+    from hybridnav.refine.ompl import require_ompl  # noqa: PLC0415 - workers need it not
+
+    require_ompl()
 
 
 def baseline_spec(
@@ -133,15 +174,49 @@ class HybridMethod:
         ends = self._frame.points_of(np.array([start, goal]))
         result = self._planner.plan(ends[0], ends[1])
         route, stats = result.route, result.stats
+        path = result.path if result.solved else None
+        line = _line(result)
         return Answer(
-            None if result.path is None else result.path.cells,
+            None if path is None or line is not None else path.cells,
+            line=line,
+            gave_up=str(result.status) if result.status in _GAVE_UP else "",
             nodes=None if route is None else _dense(self.topology.place_ids, route.places),
             arcs=None if route is None else _dense(self.topology.arc_ids, route.arcs),
-            bound=1 + result.gap if result.solved else np.inf,
+            bound=1 + result.gap if result.solved and line is None else np.inf,
             expanded=stats.expanded,
             expanded_nodes=stats.expanded_places,
-            seconds=dict(stats.seconds),
+            seconds=_stages(result),
         )
+
+    def close(self) -> None:
+        """End the process that a planner with OMPL has."""
+        self._planner.close()
+
+
+_GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
+
+
+def _line(result: PlanResult) -> Line | None:
+    """The path of a solved query where it is at any angle."""
+    if result.metric != "any-angle" or result.path is None or not result.solved:
+        return None
+    how = result.refinement
+    return Line(
+        result.path.points,
+        result.path.length_m,
+        lower_bound_m=result.lower_bound,
+        by_grid=None if how is None else how.by_grid,
+    )
+
+
+def _stages(result: PlanResult) -> dict[str, float]:
+    """Seconds by stage, called as every method calls them."""
+    seconds = dict(result.stats.seconds)
+    if "ompl" in seconds:
+        seconds["refine"] = seconds.pop("ompl")
+    if result.refinement is not None and result.refinement.trace:
+        seconds["first path"] = result.refinement.trace[0][0]
+    return seconds
 
 
 def _dense(ids: Any, named: tuple[int, ...]) -> tuple[int, ...]:
@@ -179,6 +254,11 @@ class Prepared:
     """The places that it plans on, None for methods that need none."""
     pyramid_seconds: float
     method_seconds: float
+
+    def close(self) -> None:
+        """End the processes that it has; it answers no more."""
+        if isinstance(self.method, HybridMethod):
+            self.method.close()
 
 
 def prepare(spec: MethodSpec, grid: OccupancyGrid) -> Prepared:

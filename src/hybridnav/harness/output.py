@@ -29,11 +29,15 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from hybridnav._typing import LongArray
+    from hybridnav._typing import FloatArray
+    from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.records import Record
 
 MAX_FAULTS_SHOWN = 50
 WORST_CASES = 2
+
+_WORDS = ("method", "map", "metric")
+"""Columns that hold no numbers."""
 
 
 def write_outputs(
@@ -88,6 +92,7 @@ def _report(
     hidden = len(faults) - MAX_FAULTS_SHOWN
     if hidden > 0:
         faults = [*faults[:MAX_FAULTS_SHOWN], f"and {hidden} more, see records.jsonl"]
+    drawn = dict.fromkeys(outcome.label for outcome in _drawn(study.outcomes))
     facts = [
         *_machines(study).items(),
         ("maps", str(len(study.maps))),
@@ -103,10 +108,11 @@ def _report(
             overall, ("method", "maps", *LOSS_COLUMNS, *EFFICIENCY_COLUMNS), "All maps together"
         ),
         maps=[_section(study, name, by_map[name]) for name in study.maps],
-        overall_losses={label: study.pooled(label, "losses") for label in study.labels},
+        overall_losses={label: study.pooled(label, "losses") for label in drawn},
         overall_times_ms={
-            label: 1e3 * nanquantile(study.pooled(label, "seconds"), 0.5) for label in study.labels
+            label: 1e3 * nanquantile(study.pooled(label, "seconds"), 0.5) for label in drawn
         },
+        metric_of={outcome.label: outcome.metric for outcome in study.outcomes},
     )
 
 
@@ -127,7 +133,7 @@ def _pair_text(record: Record) -> str:
 
 def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
     kept = [column for column in columns if any(column in row for row in rows)]
-    numeric = frozenset(at for at, column in enumerate(kept) if column not in ("method", "map"))
+    numeric = frozenset(at for at, column in enumerate(kept) if column not in _WORDS)
     return Table(
         columns=kept,
         rows=[[text_of(row.get(column, "")) for column in kept] for row in rows],
@@ -138,6 +144,7 @@ def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
 
 def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
     outcomes = study.of_map(name)
+    drawn = _drawn(outcomes)
     first = outcomes[0].preparation
     shape = first.get("shape", [0, 0])
     distance = rows_by_distance(study, name)
@@ -155,10 +162,18 @@ def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
             _table(rows, ("method", *EFFICIENCY_COLUMNS), "Efficiency"),
             _table(distance, columns, "Mean loss in per cent by length of the optimum (pairs)"),
         ],
-        losses={outcome.label: outcome.losses for outcome in outcomes},
-        times_ms={outcome.label: 1e3 * nanquantile(outcome.seconds, 0.5) for outcome in outcomes},
+        losses={outcome.label: outcome.losses for outcome in drawn},
+        times_ms={outcome.label: 1e3 * nanquantile(outcome.seconds, 0.5) for outcome in drawn},
         worst=[case for outcome in outcomes for case in _worst(outcome)],
     )
+
+
+def _drawn(outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
+    """Those for charts: without the reference where all others are of another metric."""
+    others = [outcome for outcome in outcomes if outcome.label != REFERENCE]
+    if all(outcome.metric == "any-angle" for outcome in others):
+        return others or outcomes
+    return outcomes
 
 
 def _worst(outcome: Outcome) -> list[WorstCase]:
@@ -166,7 +181,7 @@ def _worst(outcome: Outcome) -> list[WorstCase]:
     cases = [_case(outcome, record, fault) for record, fault in outcome.faults[:WORST_CASES]]
     if outcome.label != REFERENCE:
         shown = WORST_CASES if outcome.preparation.get("preset") is not None else 1
-        own = {query_key(record): record for record in outcome.records if record.get("path")}
+        own = {query_key(record): record for record in outcome.records}
         order = np.argsort(-np.nan_to_num(outcome.losses, nan=0.0), kind="stable")[:shown]
         for at in order[outcome.losses[order] > 0]:
             reference = outcome.references[at]
@@ -187,12 +202,12 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
         return None
     optimum = None
     if record["type"] == "pair":
-        path = _path(record) if record.get("path") else np.array([record["start"], record["goal"]])
+        path = _path(record, grid)
         reference = outcome.optimum.get(query_key(record))
         if reference is not None and reference.get("path"):
-            optimum = _path(reference)
+            optimum = _path(reference, grid)
     else:  # a fault of the regions: the two cells that show it
-        path = np.array(record["fault_cells"][record["faults"].index(text)])
+        path = np.array(record["fault_cells"][record["faults"].index(text)], dtype=np.float64)
     return WorstCase(
         title=f"{outcome.label}, {_pair_text(record)}: {text}",
         classes=grid.classes,
@@ -202,6 +217,12 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
     )
 
 
-def _path(record: Record) -> LongArray:
-    start: list[int] = record["start"]
-    return decode_path((start[0], start[1]), record["path"])
+def _path(record: Record, grid: OccupancyGrid) -> FloatArray:
+    """What there is to draw of an answer: its path, or where there is none its ends."""
+    start, goal = record["start"], record["goal"]
+    if record.get("points"):
+        positions = [grid.frame.position_of(x, y) for x, y in record["points"]]
+        return np.array(positions) - 0.5
+    if record.get("path"):
+        return decode_path((start[0], start[1]), record["path"]).astype(np.float64)
+    return np.array([start, goal], dtype=np.float64)

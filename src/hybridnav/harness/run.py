@@ -175,6 +175,12 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
         # The preset of the same name as the reference is that very search: measured once.
         if spec.name != REFERENCE:
             specs.append(spec)
+    lines = [spec.name for spec in specs if spec.metric != "octile"]
+    if lines and settings.corner_cutting:
+        raise InvalidValueError(
+            f"preset {lines[0]}: an any-angle path never passes between two blocked cells that "
+            "meet at a corner, so it goes not with corner cutting"
+        )
     return list({spec.digest: spec for spec in specs}.values())
 
 

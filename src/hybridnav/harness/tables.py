@@ -25,8 +25,10 @@ _DIGITS = 3
 _LEAST = 1e-4
 
 LOSS_COLUMNS = (
+    "metric",
     "pairs",
     "solved",
+    "by the grid",
     "faults",
     "loss mean %",
     "loss 95 % interval",
@@ -77,11 +79,14 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
     finite = losses[np.isfinite(losses)]
     summary = summarise(finite)
     lengths = _pooled([outcome.lengths_m for outcome in outcomes])
-    optima = _pooled([outcome.optima_m for outcome in outcomes])
+    best = _pooled([outcome.best_m for outcome in outcomes])
+    fallbacks = [outcome.by_grid for outcome in outcomes if not math.isnan(outcome.by_grid)]
     low, high = (100 * end for end in summary.mean_interval)
     return {
+        "metric": outcomes[0].metric if outcomes else "",
         "pairs": len(losses),
         "solved": len(finite),
+        "by the grid": int(sum(fallbacks)) if fallbacks else math.nan,
         "faults": sum(len(outcome.faults) for outcome in outcomes),
         "loss mean %": 100 * summary.mean,
         "loss 95 % interval": f"{text_of(low)} to {text_of(high)}" if len(finite) else "",
@@ -93,7 +98,7 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
         "loss of the plan %": 100 * nanmean(_pooled([o.plan_losses for o in outcomes])),
         "any-angle loss %": 100 * nanmean(_pooled([o.any_angle_losses for o in outcomes])),
         "any-angle exact %": 100 * nanmean(_pooled([o.any_angle_exact for o in outcomes])),
-        "loss mean m": nanmean(lengths - optima),
+        "loss mean m": nanmean(lengths - best),
         **_efficiency(outcomes, references),
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -22,7 +23,7 @@ from hybridnav.io import load_map
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav.baselines import Answer
+    from hybridnav.baselines import Answer, Line
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
@@ -94,11 +95,15 @@ def run_task(task: Task) -> Iterator[Record]:
         for name, pair in zip(task.ids[1:], task.pairs, strict=True):
             yield {**_of_pair(name, pair, common), "status": "error", "error": reason, "faults": []}
         return
+    with closing(prepared):
+        yield {**head, "status": "ready", **_about(grid, task), **_of_preparation(prepared, judge)}
+        for name, pair in zip(task.ids[1:], task.pairs, strict=True):
+            yield {**_of_pair(name, pair, common), **_answer(prepared, judge, pair)}
+
+
+def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     method = prepared.method
-    yield {
-        **head,
-        "status": "ready",
-        **_about(grid, task),
+    return {
         "pyramid_seconds": prepared.pyramid_seconds,
         "method_seconds": prepared.method_seconds,
         "n_nodes": int(method.n_nodes),
@@ -107,8 +112,6 @@ def run_task(task: Task) -> Iterator[Record]:
         "faults": [text for text, _ in judge.region_faults],
         "fault_cells": [cells for _, cells in judge.region_faults],
     }
-    for name, pair in zip(task.ids[1:], task.pairs, strict=True):
-        yield {**_of_pair(name, pair, common), **_answer(prepared, judge, pair)}
 
 
 def _ready(grid: OccupancyGrid, task: Task) -> tuple[Prepared, Judge]:
@@ -127,6 +130,7 @@ def _about(grid: OccupancyGrid, task: Task) -> Record:
         "robot_radius_m": grid.robot_radius_m,
         "corner_cutting": grid.corner_cutting,
         "free_cells": int((grid.classes == CellClass.FREE).sum()),
+        "metric": task.method.metric,
         "preset": None if task.method.preset is None else _plain(task.method.preset),
         "pyramid": _plain(task.method.pyramid),
         "environment": environment(),
@@ -194,19 +198,31 @@ def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
     known: Record = {}
     if not faults:
         known, faults = judge.oracles(answer, pair, length_m)
+    unsolved = answer.gave_up or "no path"
     return {
-        "status": "no path" if answer.cells is None else "solved",
+        "status": "solved" if answer.is_path else unsolved,
         "length_m": length_m,
         "bound": float(answer.bound) if math.isfinite(answer.bound) else None,
         "plan_steps": _plan_steps(answer),
         "plan_optimum_m": None if faults else judge.plan_optimum_m(pair, answer),
         "path": None if answer.cells is None else encode_path(answer.cells),
+        **({} if answer.line is None else _of_line(answer.line)),
         "expanded": int(answer.expanded),
         "expanded_nodes": int(answer.expanded_nodes),
         "seconds": seconds,
         "stages": {stage: float(value) for stage, value in answer.seconds.items()},
         **known,
         "faults": faults,
+    }
+
+
+def _of_line(line: Line) -> Record:
+    """What the record of an any-angle path has beside that of a path of cells."""
+    return {
+        "metric": "any-angle",
+        "lower_bound_m": float(line.lower_bound_m) if math.isfinite(line.lower_bound_m) else None,
+        "by_grid": line.by_grid,
+        "points": line.points.tolist(),
     }
 
 
@@ -222,10 +238,10 @@ def _warm_up(spec: MethodSpec) -> None:
     if spec.digest in _WARM:
         return
     grid = figure1_world().grid()
-    prepared = prepare(spec, grid)
-    Judge(grid, prepared, reference=False)
-    for goal in ((2, 2), (grid.shape[0] - 3, 12)):
-        prepared.method.solve((2, 2), goal)
+    with closing(prepare(spec, grid)) as prepared:
+        Judge(grid, prepared, reference=False)
+        for goal in ((2, 2), (grid.shape[0] - 3, 12)):
+            prepared.method.solve((2, 2), goal)
     _WARM.add(spec.digest)
 
 

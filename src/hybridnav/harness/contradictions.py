@@ -1,0 +1,70 @@
+"""What the answers of other methods, and above all the optimum, say against an answer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hybridnav.harness.records import Record
+
+SLACK = 1e-9
+"""Relative difference of lengths that is rounding."""
+
+LINE_SLACK = 1e-6
+"""That of any-angle lengths: the judge of segments rounds points to 2^-24 of a cell, so a path may
+cut each corner by as much."""
+
+ANSWERED = ("solved", "no path")
+"""Statuses of records that hold an answer."""
+
+
+def is_line(record: Record) -> bool:
+    """Whether a record is about any-angle paths: they are set beside such paths only."""
+    return bool(record.get("metric") == "any-angle")
+
+
+def against(record: Record, reference: Record, best_line_m: float | None) -> str | None:
+    """What is known otherwise against an answer.
+
+    Parameters
+    ----------
+    record
+        Of the answer.
+    reference
+        The reference's record of the same pair.
+    best_line_m
+        Length of the best any-angle path known between the two, None for none.
+
+    Returns
+    -------
+    str or None
+        What is wrong.
+    """
+    if {record["status"], reference["status"]} == set(ANSWERED):
+        return f"solvability: {record['status']}, the whole grid says {reference['status']}"
+    if record.get("length_m") is None or reference.get("length_m") is None:
+        return None
+    if is_line(record):
+        return _against_line(record, reference, best_line_m)
+    return _against_cells(record, reference)
+
+
+def _against_cells(record: Record, reference: Record) -> str | None:
+    length, optimum = record["length_m"], reference["length_m"]
+    if length < optimum * (1 - SLACK):
+        return f"length {length:.6f} m is below the optimum {optimum:.6f} m"
+    bound = record.get("bound")
+    if bound is not None and length > optimum * bound * (1 + SLACK) + SLACK:
+        return f"length {length:.6f} m breaks its bound, {bound:.6f} x optimum {optimum:.6f} m"
+    return None
+
+
+def _against_line(record: Record, reference: Record, best_line_m: float | None) -> str | None:
+    length = record["length_m"]
+    optimum = reference["any_angle_m"] if reference.get("any_angle_exact") else 0.0
+    if length < optimum * (1 - LINE_SLACK):
+        return f"length {length:.6f} m is below the any-angle optimum {optimum:.6f} m"
+    bound = record.get("lower_bound_m")
+    if bound is not None and best_line_m is not None and bound > best_line_m * (1 + LINE_SLACK):
+        return f"the lower bound {bound:.6f} m is above {best_line_m:.6f} m, a path that is known"
+    return None

@@ -1,0 +1,308 @@
+"""Any-angle paths in the harness: judged, set beside their like only, and OMPL through it all."""
+
+import csv
+import math
+import time
+import uuid
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from hybridnav.config import load_preset
+from hybridnav.errors import InvalidValueError
+from hybridnav.harness.compare import compare_runs
+from hybridnav.harness.contradictions import against
+from hybridnav.harness.methods import preset_spec
+from hybridnav.harness.output import write_outputs
+from hybridnav.harness.records import read_records
+from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.io import load_map
+from hybridnav.metrics import VisibilityGraph
+from tests import faulty_methods as faulty
+from tests.test_cli import FIGURE, cli  # noqa: F401 - a fixture
+from tests.test_harness_faults import ROOMS, ROOT, name_of, run_here, write_map
+
+FAULTS = {
+    faulty.LineThroughWall: "m enters a blocked cell",
+    faulty.LineSaidShort: "m as reported",
+    faulty.LineBelowItsBound: "is above the length",
+    faulty.LineBesideTheGoal: "the last point",
+    faulty.LineFromElsewhere: "the first point",
+    faulty.LineSaidOptimal: "m, a path that is known",
+    faulty.LineForAll: "solvability: solved, the whole grid says no path",
+    faulty.LineOfNothing: "no answer to judge: points need finite coordinates",
+    faulty.LineUnsaid: "not nan m as reported",
+    faulty.LineOverHomelessCells: "the path leaves the regions",
+}
+SOUND = (faulty.SoundLine, faulty.OwnGridOrNothing)
+PRESETS = ("paper", "balanced")
+N_PAIRS = 40
+MARK = "HYBRIDNAV_TEST_MARK"
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """No processes but OMPL's."""
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lines")
+    smooth = [load_preset(name, overrides=["planner.smooth=line-of-sight"]) for name in PRESETS]
+    settings = RunSettings(
+        maps=(str(write_map(folder, ROOMS)),),
+        presets=("paper", *smooth),
+        baselines=tuple(map(name_of, (*FAULTS, *SOUND))),
+        pairs=N_PAIRS,
+        merge_distance_m=4.0,
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hybridnav.harness.run.run_local", run_here)
+        evaluate(settings, folder / "run")
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def study(folder):
+    return write_outputs(folder)
+
+
+@pytest.fixture(scope="module")
+def rows(folder, study):
+    assert study.outcomes
+    with (folder / "summary.csv").open() as stream:
+        return {row["method"]: row for row in csv.DictReader(stream)}
+
+
+def outcome_of(study, method):
+    name = method if isinstance(method, str) else name_of(method)
+    return next(outcome for outcome in study.outcomes if outcome.label == name)
+
+
+@pytest.mark.parametrize("method", FAULTS)
+def test_a_planted_fault_is_caught(study, method):
+    found = [fault for _, fault in outcome_of(study, method).faults]
+    assert any(FAULTS[method] in fault for fault in found), found[:3]
+    if method in (faulty.LineSaidShort, faulty.LineBelowItsBound, faulty.LineUnsaid):
+        assert len({record["id"] for record, _ in outcome_of(study, method).faults}) == N_PAIRS
+
+
+@pytest.mark.parametrize("method", [*SOUND, *(f"{name}+line-of-sight" for name in PRESETS)])
+def test_a_sound_method_has_no_fault(study, method):
+    outcome = outcome_of(study, method)
+    assert outcome.faults == []
+    assert outcome.checks + outcome.failures == N_PAIRS + 2
+    assert outcome.metric == "any-angle"
+
+
+def test_losses_refer_to_the_shortest_any_angle_path(study):
+    outcome = outcome_of(study, faulty.SoundLine)
+    graph = VisibilityGraph(load_map(outcome.preparation["file"]))
+    lengths = [
+        graph.shortest(tuple(record["start"]), tuple(record["goal"])).length_m
+        for record in outcome.references
+    ]
+    np.testing.assert_allclose(outcome.losses, outcome.lengths_m / lengths - 1, atol=1e-9)
+    assert (outcome.losses < 0.05).all()
+    # Beside the grid's optimum they would be shorter than what is shortest.
+    assert (outcome.lengths_m < outcome.optima_m * (1 - 1e-3)).any()
+
+
+def test_the_best_of_all_methods_counts_where_nothing_is_exact(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("hybridnav.harness.judging.EXACT_CORNERS", 0)
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
+    settings = RunSettings(
+        maps=(str(folder.parent / "rooms.map"),),
+        presets=(load_preset("balanced", overrides=["planner.smooth=line-of-sight"]),),
+        baselines=(name_of(faulty.SoundLine), name_of(faulty.LineThroughWall)),
+        pairs=N_PAIRS,
+        merge_distance_m=4.0,
+    )
+    evaluate(settings, tmp_path)
+    study = write_outputs(tmp_path)
+    lines = [o for o in study.outcomes if o.metric == "any-angle"]
+    assert len(lines) == 3
+    # What goes through walls is no path, so it is not the best one either.
+    best = np.nanmin([outcome.lengths_m for outcome in lines], axis=0)
+    assert (outcome_of(study, faulty.LineThroughWall).losses >= 0).any()
+    for outcome in lines:
+        np.testing.assert_allclose(outcome.best_m, best, rtol=1e-12)
+        assert not (outcome.losses < 0).any()
+        assert (outcome.any_angle_exact == 0).all()
+
+
+def test_a_line_below_the_exact_optimum_is_a_contradiction():
+    reference = {"status": "solved", "length_m": 11.0, "any_angle_m": 10.0, "any_angle_exact": True}
+    line = {"status": "solved", "metric": "any-angle", "length_m": 9.99, "lower_bound_m": 9.0}
+    assert against(line, reference, 9.99) == (
+        "length 9.990000 m is below the any-angle optimum 10.000000 m"
+    )
+    assert against(line, {**reference, "any_angle_exact": False}, 9.99) is None
+    assert against({**line, "length_m": 10.0 - 1e-9}, reference, 10.0) is None
+
+
+def test_each_metric_has_rows_and_charts_of_its_own(folder, study, rows):
+    metrics = [row["metric"] for row in rows.values()]
+    assert metrics == sorted(metrics, reverse=True)
+    assert rows["paper"]["metric"] == rows["grid-astar"]["metric"] == "octile"
+    assert rows["paper"]["by the grid"] == ""
+    for name in ("balanced+line-of-sight", name_of(faulty.SoundLine)):
+        assert rows[name]["metric"] == "any-angle"
+        assert float(rows[name]["loss mean %"]) == float(rows[name]["any-angle loss %"])
+    report = (folder / "report.html").read_text()
+    for title in ("Speed against loss, all maps", f"Loss, {study.maps[0]}"):
+        assert f"{title}, octile paths" in report
+        assert f"{title}, any-angle paths" in report
+
+
+def test_a_path_by_the_grid_is_not_its_method_s(study, rows):
+    outcome = outcome_of(study, faulty.OwnGridOrNothing)
+    turns = [(record["start"][0] + record["goal"][0]) % 3 for record in outcome.references]
+    own, grid = turns.count(1), turns.count(2)
+    assert min(own, grid, turns.count(0)) > 3
+    row = rows[name_of(faulty.OwnGridOrNothing)]
+    assert (row["solved"], row["by the grid"]) == (str(own), str(grid))
+    # Its own are as good as can be, the grid's longer: those do not count.
+    assert np.isfinite(outcome.losses).sum() == own
+    taut = outcome_of(study, faulty.SoundLine)
+    assert float(row["loss max %"]) <= 100 * taut.losses.max()
+    assert np.nanmax(outcome.fallback_losses) > 0.03
+    assert np.isfinite(outcome.seconds).sum() == own
+    late = [record for record in outcome.records if record["status"] == "timeout"]
+    assert len(late) == outcome.failures == turns.count(0)
+
+
+def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_path, monkeypatch):
+    name = name_of(faulty.SoundLine)
+    rows = {row["method"]: row for row in compare_runs(folder, folder)}
+    assert rows[name]["difference, points"] == 0
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
+    settings = RunSettings(
+        maps=(str(folder.parent / "rooms.map"),), pairs=N_PAIRS, merge_distance_m=4.0
+    )
+    smooth = load_preset("balanced", overrides=["planner.smooth=line-of-sight"])
+    evaluate(replace(settings, presets=("balanced",)), tmp_path / "cells")
+    evaluate(replace(settings, presets=(smooth,)), tmp_path / "lines")
+    # What is no loss by definition is no line in a chart of another metric.
+    write_outputs(tmp_path / "lines")
+    report = (tmp_path / "lines" / "report.html").read_text()
+    assert "Loss, rooms, any-angle paths" in report
+    assert "octile paths" not in report
+    (row,) = compare_runs(tmp_path / "cells", tmp_path / "lines")
+    assert row["method"] == "balanced+line-of-sight against balanced"
+    cells, lines = (
+        next(o for o in write_outputs(tmp_path / run).outcomes if o.label != "grid-astar")
+        for run in ("cells", "lines")
+    )
+    shorter = 100 * ((lines.lengths_m - cells.lengths_m) / lines.best_m).mean()
+    assert row["difference, points"] == pytest.approx(shorter)
+    assert shorter < -1
+
+
+# --- presets that there is nothing to compare with ----------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ("space: se2", "space se2 needs headings"),
+        ("{space: dubins, turning_radius_m: 0.5}", "space dubins needs headings"),
+        ("{space: reeds-shepp, turning_radius_m: 0.5}", "space reeds-shepp needs headings"),
+        ("{objective: clearance}", "objective clearance"),
+    ],
+)
+def test_a_preset_in_another_metric_is_refused_in_one_line(cli, tmp_path, settings, words):  # noqa: F811
+    settings = settings if settings.startswith("{") else f"{{{settings}}}"
+    arguments = ["--preset", "ompl-rrtconnect", "--set", f"planner.ompl={settings}"]
+    done = cli("evaluate", FIGURE, *arguments, "-o", tmp_path / "run")
+    assert done.refuses(2, words)
+    assert "preset ompl-rrtconnect" in done.err
+    assert not (tmp_path / "run").exists()
+
+
+def test_lines_go_not_with_corner_cutting():
+    smooth = load_preset("paper", overrides=["planner.smooth=line-of-sight"])
+    settings = RunSettings(maps=("x.yaml",), presets=("paper", smooth), corner_cutting=True)
+    with pytest.raises(InvalidValueError, match=r"preset paper\+line-of-sight.*corner cutting"):
+        methods_of(settings, None)
+    assert methods_of(replace(settings, presets=("paper",)), None)
+
+
+def test_what_a_smoothed_preset_is_called():
+    smooth = load_preset("grid-astar", overrides=["planner.smooth=line-of-sight"])
+    names = [s.name for s in methods_of(RunSettings(maps=(), presets=(smooth,)), None)]
+    assert names == ["grid-astar", "grid-astar+line-of-sight"]
+    assert preset_spec("paper").metric == "octile"
+
+
+# --- OMPL ---------------------------------------------------------------------------------------
+
+
+def ompl_processes_with(mark):
+    """Command lines of OMPL's processes that have the mark in their environment."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+            if "hybridnav.refine.ompl" in command:
+                found += [command] * (mark.encode() in (process / "environ").read_bytes())
+        except OSError:  # it has ended
+            continue
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="needs /proc")
+def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):  # noqa: F811
+    pytest.importorskip("ompl")
+    mark = uuid.uuid4().hex
+    monkeypatch.setenv(MARK, mark)
+    out = tmp_path / "run"
+    arguments = ["evaluate", FIGURE, "--preset", "ompl-rrtconnect", "--preset", "ompl-rrtstar"]
+    arguments += ["--set", "planner.ompl.budget_s=0.3", "--pairs", 5, "--workers", 2, "-o", out]
+    done = cli(*arguments)
+    assert (done.code, done.err) == (0, "")
+    assert "15 answers checked, 0 counter-examples" in done.out
+    deadline = time.monotonic() + 10
+    while ompl_processes_with(mark) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert ompl_processes_with(mark) == []
+    records = [r for r in read_records(out) if r["method"] != "grid-astar" and r["type"] == "pair"]
+    solved = [record for record in records if record["status"] == "solved"]
+    assert len(solved) == 10
+    for record in solved:
+        assert 0 < record["lower_bound_m"] <= record["length_m"] * (1 + 1e-9)
+        assert record["stages"]["first path"] <= record["stages"]["refine"]
+    # Again: nothing to do, the same answer.
+    assert cli(*arguments).out == done.out
+    assert len(read_records(out)) == 3 * 6
+
+
+@pytest.mark.usefixtures("here")
+def test_what_ompl_does_not_find_is_not_its_own(tmp_path):
+    pytest.importorskip("ompl")
+    hopeless = "{confine: mask, iterations: 1, budget_s: 10, simplify: false}"
+    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={hopeless}"])
+    map_file = ROOT / "maps" / "office" / "office.yaml"
+    evaluate(RunSettings(maps=(str(map_file),), presets=(preset,), pairs=8), tmp_path)
+    outcome = outcome_of(write_outputs(tmp_path), "ompl-rrtconnect")
+    by_grid = [r for r in outcome.records if r.get("by_grid")]
+    assert outcome.by_grid == len(by_grid) > 0
+    assert np.isfinite(outcome.losses).sum() == 8 - len(by_grid)
+    assert outcome.faults == []
+    assert not math.isnan(np.nanmean(outcome.fallback_losses))
+
+
+def test_a_planner_that_is_closed_answers_again():
+    pytest.importorskip("ompl")
+    grid = hn.load_map(FIGURE)
+    planner = hn.HybridPlanner(
+        hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl-rrtconnect"
+    )
+    start, goal = grid.frame.points_of([[2, 2], [4, 9]])
+    planner.close()
+    planner.close()
+    assert planner.plan(start, goal).solved
