@@ -1,23 +1,32 @@
 """The study: Thrun's three criteria for every method on 24 public maps.
 
     python -m benchmarks.study --data FOLDER -o DIR [--pairs 500] [--workers 2]
+                               [--part methods|ompl] [--ompl-pairs 10] [--ompl-budget S]
+                               [--map GLOB]
 
 Twelve ROS maps (robot radius 0.25 m, merge distance 4 m, sampled pairs) and twelve MovingAI maps
 (cells of 1 m, a point robot, merge distance 40 m, pairs of their scenario files, whose optima are
 an oracle). DIR gets the records and the whole report; it draws the maps, so it belongs in no
 repository. `docs/study.md` gets the tables and `docs/images/study-*.svg` the charts, which show no
 map. A run that was stopped goes on where it was.
+
+Part `ompl` asks the presets with OMPL on the same maps, with fewer pairs, for each query may take
+its whole budget: about half an hour on one core. Its records go to DIR/ompl, its page is
+`docs/study-ompl.md`. With `--map` only maps whose path fits are asked, and pages and charts stay in
+DIR.
 """
 
 from __future__ import annotations
 
 import argparse
+import fnmatch
 import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import hybridnav as hn
+from benchmarks import _study_ompl
 from hybridnav.harness.analysis import nanquantile
 from hybridnav.harness.charts import chart_file, loss_chart, speed_chart
 from hybridnav.harness.contradictions import ANSWERED
@@ -91,15 +100,22 @@ def movingai_maps(data: Path) -> list[Path]:
     return order[:N_MOVINGAI]
 
 
-def run(data: Path, folder: Path, pairs: int, workers: int) -> None:
+def maps_of(data: Path, globs: list[str]) -> list[tuple[Path, str | None]]:
+    """The files of all maps, or of those that fit, with their scenario files."""
+    maps: list[tuple[Path, str | None]] = [(data / name, None) for name in ROS_MAPS]
+    maps += [(path, f"{path}.scen") for path in movingai_maps(data)]
+    if not globs:
+        return maps
+    names = [path.relative_to(data).as_posix() for path, _ in maps]
+    fits = [any(fnmatch.fnmatch(name, glob) for glob in globs) for name in names]
+    return [one for one, fit in zip(maps, fits, strict=True) if fit]
+
+
+def run(maps: list[tuple[Path, str | None]], folder: Path, pairs: int, workers: int) -> None:
     """All queries of the study."""
-    # OMPL's paths are no cell paths, by which the harness judges: `benchmarks.ompl` measures them.
     presets = tuple(
         name for name in hn.preset_names() if name != "grid-astar" and not name.startswith("ompl-")
     )
-    total = len(ROS_MAPS) + N_MOVINGAI
-    maps: list[tuple[Path, str | None]] = [(data / name, None) for name in ROS_MAPS]
-    maps += [(path, f"{path}.scen") for path in movingai_maps(data)]
     for number, (path, scenarios) in enumerate(maps, start=1):
         settings = RunSettings(
             maps=(str(path),),
@@ -110,7 +126,7 @@ def run(data: Path, folder: Path, pairs: int, workers: int) -> None:
             workers=workers,
         )
         made = evaluate(settings, folder)
-        sys.stderr.write(f"{number} of {total}: {path.name}, {made} records\n")
+        sys.stderr.write(f"{number} of {len(maps)}: {path.name}, {made} records\n")
 
 
 def page(study: Study, pairs: int) -> str:
@@ -129,7 +145,8 @@ said in [harness.md](harness.md).
 
 [study-first.md](study-first.md) has the tables of the first study, 500 pairs a map, before there
 were routes over portals. Times are of single queries with cold caches; [portals.md](portals.md) has
-them interleaved, pair by pair.
+them interleaved, pair by pair. [study-ompl.md](study-ompl.md) has the presets with OMPL, whose
+paths are any-angle.
 
 ## Consistency
 
@@ -169,18 +186,43 @@ def _failures(study: Study) -> str:
 
 
 def main() -> None:
-    """Run the study and write its page."""
+    """Run the study, or a part of it, and write its pages."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, default=os.environ.get("HYBRIDNAV_DATA"))
     parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--part", choices=("methods", "ompl"), help="both unless given")
     parser.add_argument("--pairs", type=int, default=500)
+    parser.add_argument("--ompl-pairs", type=int, default=10)
+    parser.add_argument("--ompl-budget", type=float, help="seconds; else the presets'")
+    parser.add_argument("--map", action="append", default=[], metavar="GLOB")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     arguments = parser.parse_args()
     if arguments.data is None:
         parser.error("the study needs --data or HYBRIDNAV_DATA")
-    run(Path(arguments.data), arguments.out, arguments.pairs, arguments.workers)
-    study = write_outputs(arguments.out, title="hybridnav: the study", root=Path(arguments.data))
-    (DOCS / "study.md").write_text(page(study, arguments.pairs), encoding="utf-8")
+    data = Path(arguments.data)
+    maps = maps_of(data, arguments.map)
+    if not maps:
+        parser.error("no map of the study fits --map")
+    docs = arguments.out / "docs" if arguments.map else DOCS
+    (docs / "images").mkdir(parents=True, exist_ok=True)
+    if arguments.part != "ompl":
+        run(maps, arguments.out / "methods", arguments.pairs, arguments.workers)
+        write_methods(arguments, docs)
+    if arguments.part != "methods":
+        folder, budget_s = arguments.out / "ompl", arguments.ompl_budget
+        asked = {"pairs": arguments.ompl_pairs, "budget_s": budget_s}
+        _study_ompl.run(maps, folder, workers=arguments.workers, **asked)
+        found = write_outputs(folder, title="hybridnav: the study, OMPL", root=data)
+        _write(docs / "study-ompl.md", _study_ompl.page(found, **asked))
+        _write(docs / "images" / "study-ompl-loss.svg", _study_ompl.chart(found))
+
+
+def write_methods(arguments: argparse.Namespace, docs: Path) -> None:
+    """The report of the records, the page and its charts."""
+    study = write_outputs(
+        arguments.out / "methods", title="hybridnav: the study", root=Path(arguments.data)
+    )
+    _write(docs / "study.md", page(study, arguments.pairs))
     losses = {label: study.pooled(label, "losses") for label in study.labels}
     times = {
         label: 1e3 * nanquantile(study.pooled(label, "seconds"), 0.5) for label in study.labels
@@ -190,8 +232,12 @@ def main() -> None:
         "study-loss.svg": loss_chart(losses, seen, "Loss of each method, all maps"),
         "study-speed.svg": speed_chart(losses, times, seen, "Speed against loss, all maps"),
     }
-    for name, figure in charts.items():
-        (DOCS / "images" / name).write_text(chart_file(figure), encoding="utf-8")
+    for name, chart in charts.items():
+        _write(docs / "images" / name, chart_file(chart))
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks import _study_ompl
 
 import hybridnav as hn
 from hybridnav.config import load_preset
@@ -174,6 +175,20 @@ def test_a_path_by_the_grid_is_not_its_method_s(study, rows):
     assert np.isfinite(outcome.seconds).sum() == own
     late = [record for record in outcome.records if record["status"] == "timeout"]
     assert len(late) == outcome.failures == turns.count(0)
+
+
+def test_the_page_of_the_study_counts_a_method_s_own_paths_by_themselves(study):
+    text = _study_ompl.page(study, pairs=N_PAIRS, budget_s=None)
+    table = text.partition("## OMPL\n\n")[2].partition("\n\n")[0].splitlines()
+    head, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in table)
+    named = {row[0]: dict(zip(head, row, strict=True)) for row in rows}
+    assert named.keys().isdisjoint({"paper", "grid-astar"})
+    outcome = outcome_of(study, faulty.OwnGridOrNothing)
+    row = named[name_of(faulty.OwnGridOrNothing)]
+    assert int(row["solved by itself"]) == np.isfinite(outcome.losses).sum()
+    assert int(row["by the grid"]) == outcome.by_grid
+    assert int(row["without an answer"]) == outcome.failures
+    assert float(row["loss max %"]) < float(row["loss by the grid %"])
 
 
 def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_path, monkeypatch):
