@@ -87,6 +87,9 @@ class LineOfSight:
             When a point does not lie in its cell.
         """
         metres = np.array([start, goal], dtype=np.float64)
+        # Kernels are compiled for each layout, and anew for arrays that are read only.
+        cells = np.ascontiguousarray(cells).view()
+        cells.flags.writeable = False
         positions = kernels.shorten(
             self._marks, cells, metres, self._origin_m, self._per_metre, self._corner_cutting
         )
