@@ -68,7 +68,8 @@ class Route:
     places: tuple[int, ...]
     """Ids of the places, from the start's to the goal's."""
     arcs: tuple[int, ...]
-    """Ids of the arcs, one fewer than places."""
+    """Ids of the arcs, one fewer than places; -1 for a step between two occupied cells, where
+    corners may be cut."""
 
 
 @dataclass(frozen=True)

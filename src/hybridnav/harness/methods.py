@@ -176,12 +176,13 @@ class HybridMethod:
         route, stats = result.route, result.stats
         path = result.path if result.solved else None
         line = _line(result)
+        arc_ids = self.topology.arc_ids
         return Answer(
             None if path is None or line is not None else path.cells,
             line=line,
             gave_up=str(result.status) if result.status in _GAVE_UP else "",
             nodes=None if route is None else _dense(self.topology.place_ids, route.places),
-            arcs=None if route is None else _dense(self.topology.arc_ids, route.arcs),
+            arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
             bound=1 + result.gap if result.solved and line is None else np.inf,
             expanded=stats.expanded,
             expanded_nodes=stats.expanded_places,

@@ -326,7 +326,8 @@ class HybridPlanner:
         """The places and arcs that a path passes."""
         places, arcs = self._walks.of(cells)
         ids = self.topology.place_ids, self.topology.arc_ids
-        return Route(tuple(ids[0][places].tolist()), tuple(ids[1][arcs].tolist()))
+        passed = [int(ids[1][arc]) if arc >= 0 else -1 for arc in arcs]
+        return Route(tuple(ids[0][places].tolist()), tuple(passed))
 
     def closed_cells(self, blocked: Blocked | BaseGeometry | Mapping[str, Any]) -> LongArray:
         """Flat cells that may not be entered when this is closed, int64, sorted."""

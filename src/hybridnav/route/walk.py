@@ -35,8 +35,9 @@ class Walks:
         Parameters
         ----------
         cells
-            int64 (n, 2), legal moves without corner cutting. A diagonal between two places passes
-            one of its side cells: one that lies in either place if there is one.
+            int64 (n, 2), legal moves. A diagonal between two places passes one of its side cells:
+            one that lies in either place if there is one. Where corners may be cut and both side
+            cells are occupied, it crosses no boundary: its arc is -1.
         """
         places, arcs, _ = self.crossings(cells)
         return places, arcs
@@ -50,17 +51,31 @@ class Walks:
         places, arcs = [int(place[0])], []
         for step in np.flatnonzero(place[1:] != place[:-1]).tolist():
             way = [int(flat[step]), int(flat[step + 1])]
-            if (cells[step] != cells[step + 1]).all():
-                way.insert(1, self._side(cells[step].tolist(), cells[step + 1].tolist()))
+            side = self._side(cells[step].tolist(), cells[step + 1].tolist())
+            if side is not None:
+                way.insert(1, side)
             for tail, head in itertools.pairwise(way):
                 if self._place_of[tail] != self._place_of[head]:
-                    edge = 2 * min(tail, head) + (abs(head - tail) != 1)
-                    arcs.append(int(self._arcs[np.searchsorted(self._edges, edge)]))
+                    arcs.append(self._arc_between(tail, head))
                     places.append(int(self._place_of[head]))
                     steps.append(step)
         return places, arcs, steps
 
-    def _side(self, tail: list[int], head: list[int]) -> int:
+    def _arc_between(self, tail: int, head: int) -> int:
+        """The arc whose boundary lies between two neighbours; -1 where they meet at a corner."""
+        (row, col), (to_row, to_col) = divmod(tail, self._cols), divmod(head, self._cols)
+        if row != to_row and col != to_col:
+            return -1
+        edge = 2 * min(tail, head) + (row != to_row)
+        return int(self._arcs[np.searchsorted(self._edges, edge)])
+
+    def _side(self, tail: list[int], head: list[int]) -> int | None:
+        """The side cell that a diagonal passes; None where both are occupied, and for a step along
+        a side."""
+        if tail[0] == head[0] or tail[1] == head[1]:
+            return None
         ends = {int(self._place_of[cell[0] * self._cols + cell[1]]) for cell in (tail, head)}
         sides = tail[0] * self._cols + head[1], head[0] * self._cols + tail[1]
-        return next((side for side in sides if int(self._place_of[side]) in ends), sides[0])
+        passable = [side for side in sides if self._place_of[side] >= 0]
+        own = (side for side in passable if int(self._place_of[side]) in ends)
+        return next(own, passable[0] if passable else None)
