@@ -58,6 +58,27 @@ class Islands:
             label[rows + 1, cols].astype(np.int64) - 1,
         )
 
+    @property
+    def component_round_obstacle(self) -> LongArray:
+        """int64 (n_obstacles,), the component that surrounds each obstacle, -1 for the rim."""
+        found: LongArray = self.component_of.ravel()[self.obstacle_cell].astype(np.int64)
+        found[RIM] = -1
+        return found
+
+    def filled_cells(self) -> LongArray:
+        """Count the cells of each obstacle and of all that it surrounds, int64 (n_obstacles,)."""
+        count = len(self.obstacle_cell)
+        cells = np.bincount(self.obstacle_of[self.obstacle_of >= 0], minlength=count)
+        inner = np.bincount(self.component_of[self.component_of >= 0])
+        np.add.at(cells, self.surrounding_obstacle, inner)
+        component = self.component_round_obstacle
+        above = np.where(component < 0, -1, np.append(self.surrounding_obstacle, -1)[component])
+        filled, at = cells.copy(), above
+        while (further := at >= 0).any():
+            np.add.at(filled, at[further], cells[further])
+            at = np.where(further, above[at], -1)
+        return filled
+
 
 def _first_cells(labels: IntArray, count: int) -> LongArray:
     """First flat cell of each label from 0, -1 where it has none."""

@@ -183,7 +183,9 @@ class Level:
         """bool (2 n_arcs,), whether the face on the right of each dart is protected."""
         return self.darts.protected
 
-    def face_darts(self, cells: LongArray, direction: int) -> LongArray:
+    def face_darts(
+        self, cells: LongArray, direction: int, *, among: BoolArray | None = None
+    ) -> LongArray:
         """One dart on the face that a direction at each cell points into.
 
         Parameters
@@ -192,21 +194,32 @@ class Level:
             int64 (n,), flat cells that are vertices of the base.
         direction
             0 east, 1 north, 2 west, 3 south; no vertex lies there.
+        among
+            bool (rows, cols), the vertices that count, whole fields of them; None for all. The
+            face is that of the map without the others.
 
         Returns
         -------
         LongArray
             int64 (n,), -1 where the vertex that holds the cell has no arc.
         """
+        edge_end = self._record.edge_end
+        if among is not None:
+            ends = np.zeros((among.size, 2), dtype=np.bool_)
+            ends[:-1, 0] = among.ravel()[:-1] & among.ravel()[1:]
+            ends[: -among.shape[1], 1] = (among[:-1] & among[1:]).ravel()
+            edge_end = np.where(ends.ravel(), edge_end, 0).astype(np.uint8)
         found: LongArray = _field_kernels.darts_at_corners(
-            cells,
-            direction,
-            self.base_edges,
-            self._record.edge_end,
-            self.index,
-            self._grid.shape[1],
+            cells, direction, self.base_edges, edge_end, self.index, self._grid.shape[1]
         )
         return found
+
+    @property
+    def removed_edges(self) -> BoolArray:
+        """bool (2 rows cols,), the base edges that are gone as redundant, not as contracted."""
+        end = self._record.edge_end
+        removed: BoolArray = (end & 1 == 1) & (end < min(2 * self.index + 2, SURVIVES))
+        return removed
 
     @cached_property
     def dual(self) -> DualGraph:

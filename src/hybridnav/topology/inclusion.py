@@ -17,7 +17,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from hybridnav.pyramid.dual import FaceKind
-from hybridnav.pyramid.islands import RIM
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, IntArray, LongArray
@@ -58,11 +57,7 @@ class Inclusion:
         self._origin = level.arcs.ravel().astype(np.int64)
         self._n_obstacles = len(islands.obstacle_cell)
         self._component_of_place = islands.component_of[tuple(level.cells.T)].astype(np.int64)
-        # The component that surrounds each obstacle, none for the rim.
-        self._obstacle_component = islands.component_of.ravel()[islands.obstacle_cell].astype(
-            np.int64
-        )
-        self._obstacle_component[RIM] = -1
+        self._obstacle_component = islands.component_round_obstacle
         self._loop_above, self._block_of_face = _loop_tree(level)
         self.face_of_obstacle = self._find_obstacle_faces()
         """int64 (n_obstacles,), face that holds each obstacle, -1 for the rim."""
@@ -139,18 +134,7 @@ class Inclusion:
     @cached_property
     def obstacle_cells(self) -> LongArray:
         """int64 (n_obstacles,), cells of each obstacle and of all that it surrounds."""
-        islands = self._islands
-        cells = np.bincount(
-            islands.obstacle_of[islands.obstacle_of >= 0], minlength=self._n_obstacles
-        )
-        inner = np.bincount(islands.component_of[islands.component_of >= 0])
-        np.add.at(cells, islands.surrounding_obstacle, inner)
-        above = _value_at(islands.surrounding_obstacle, self._obstacle_component)
-        filled, at = cells.copy(), above
-        while (further := at >= 0).any():
-            np.add.at(filled, at[further], cells[further])
-            at = np.where(further, above[at], -1)
-        return filled
+        return self._islands.filled_cells()
 
     def encloses(self, place: int, *, least_area_cells: float = 0.0) -> Enclosed:
         """Find what lies inside the self-loops of a place.
