@@ -1,59 +1,82 @@
-"""Routes of different homotopy classes, shortest first."""
+"""Shortest paths of different homotopy classes, shortest first."""
 
 from __future__ import annotations
 
-import heapq
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.topology.homotopy import IDENTITY, HomotopyClasses, Word, product
+from hybridnav.errors import InvalidValueError
+from hybridnav.route import _class_kernels
+from hybridnav.search._kernels import field_distances, legal_moves
+from hybridnav.search.octile import length_in_cells
+from hybridnav.topology.homotopy import HomotopyClasses
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import LongArray
     from hybridnav.topology import TopologicalMap
+    from hybridnav.topology.homotopy import Word
 
-_MOST_EXPANDED = 20_000
-"""States expanded per search at most: with many holes there are ever more classes."""
+Cell = tuple[int, int]
+
+MOST_STATES = 1_000_000
+"""Pairs of a cell and a word that a search looks at before it gives up."""
+_LARGEST_GAP_M = 1.0
+"""A path that comes back nearer to itself than this winds, however large holes are that count."""
 
 
-@dataclass(frozen=True)
-class ClassRoute:
-    """A route and its class."""
+@dataclass(frozen=True, eq=False)
+class ClassPath:
+    """A path and its class."""
 
-    places: tuple[int, ...]
-    """Dense indices of places."""
-    arcs: tuple[int, ...]
-    """Dense indices of the arcs between them."""
+    cells: LongArray
+    """int64 (n, 2), legal moves."""
     word: Word
     """Reduced word of its class."""
-    length_m: float
-    """Sum of `through_m` over its arcs, metres."""
+    length_cells: float
+    """Octile length."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClassPaths:
+    """What a search found."""
+
+    paths: tuple[ClassPath, ...]
+    """The shortest first, no class twice."""
+    complete: bool
+    """Whether there are as many as were asked for, or all: False where the search gave up."""
 
 
 class AlternativeSearch:
-    """Searches places together with the words of the ways to them.
+    """Searches cells together with the words of the ways to them.
 
-    A* over pairs of a place and a reduced word, with the exact length of the way that is left as
-    the heuristic, so that classes come out in the order of their shortest routes. Routes that pass
-    a place twice are left out: a turn round a pillar is a class of its own, but no way to go.
+    A* over pairs of a cell and a reduced word, with the exact length of the way that is left as the
+    estimate. A path *winds* when it comes back after it circled a hole: when it stands on, or sees
+    along a row or a column, at most the side of a square hole of the least area off (and one cell
+    at least, 1 m at most, half the shortest path at most), a cell that it has passed, and the loop
+    between the two can not be drawn together. Paths that wind are not pursued: turns round a
+    pillar, and ways through a door, round a table and out again.
+
+    A class whose shortest paths none of them wind is found, with a shortest path, before any class
+    that is longer. A class of which some shortest path winds may be found with a path that does
+    not, or not at all; one whose paths all wind, never.
 
     Parameters
     ----------
     topology
         The map.
     allow_unexplored
-        Whether unexplored places may be passed.
+        Whether unexplored cells may be entered.
     least_hole_m2
         Holes of a smaller area do not count.
 
     Raises
     ------
     InvalidValueError
-        When the area is negative.
+        When the area is negative, or the grid allows corner cutting: a path between two blocked
+        cells that meet at a corner goes through a hole.
     """
 
     def __init__(
@@ -63,76 +86,53 @@ class AlternativeSearch:
         allow_unexplored: bool = False,
         least_hole_m2: float = 1.0,
     ) -> None:
+        grid = topology.grid
+        if grid.corner_cutting:
+            raise InvalidValueError("alternatives need a grid without corner cutting")
         self.classes = HomotopyClasses(
             topology, allow_unexplored=allow_unexplored, least_hole_m2=least_hole_m2
         )
-        level = topology.level
-        self._through_m = level.through_m
-        darts: list[list[tuple[int, int]]] = [[] for _ in range(level.n_vertices)]
-        enterable = self.classes.enterable
-        for arc, (tail, head) in enumerate(level.arcs.tolist()):
-            if tail != head and enterable[tail] and enterable[head]:
-                darts[tail].append((2 * arc, head))
-                darts[head].append((2 * arc + 1, tail))
-        self._darts = darts
+        gap_m = min(math.sqrt(least_hole_m2), _LARGEST_GAP_M)
+        self._apart = max(1, round(gap_m / grid.resolution_m))
+        words = self.classes.cell_words.words
+        self._letters = _class_kernels.Letters(
+            np.cumsum([0, *map(len, words)], dtype=np.int64),
+            np.array([letter for word in words for letter in word], dtype=np.int32),
+        )
+        self._enterable = np.ascontiguousarray(self.classes.enterable_cells)
+        self._moves = legal_moves(self._enterable, False).ravel()  # corners are not cut
 
-    def routes(self, start: int, goal: int) -> Iterator[ClassRoute]:
-        """Yield one route of each class, the shortest first.
+    def paths(self, start: Cell, goal: Cell, count: int) -> ClassPaths:
+        """Find paths of different classes.
 
         Parameters
         ----------
         start, goal
-            Dense indices of places that may be entered.
-
-        Yields
-        ------
-        ClassRoute
-            Until there are no more, or 20,000 states have been expanded.
+            Cells (row, col) that may be entered.
+        count
+            Paths at most.
         """
-        left_m = self._lengths_to(goal)
-        if not np.isfinite(left_m[start]):
-            return
-        heap: list[tuple[float, int, int, Word, tuple[int, ...]]] = []
-        heapq.heappush(heap, (float(left_m[start]), 0, start, IDENTITY, ()))
-        closed: set[tuple[int, Word]] = set()
-        pushed = 0
-        while heap and len(closed) < _MOST_EXPANDED:
-            bound, _, place, word, taken = heapq.heappop(heap)
-            if (place, word) in closed:
-                continue
-            closed.add((place, word))
-            passed = self._places(start, taken)
-            if place == goal:
-                arcs = tuple(dart >> 1 for dart in taken)
-                yield ClassRoute(passed, arcs, word, bound)
-                continue
-            length = bound - float(left_m[place])
-            for dart, head in self._darts[place]:
-                if head in passed:
-                    continue
-                pushed += 1
-                further = product(word, self.classes.word_of_dart(dart))
-                whole = length + float(self._through_m[dart >> 1]) + float(left_m[head])
-                heapq.heappush(heap, (whole, pushed, head, further, (*taken, dart)))
-
-    def _places(self, start: int, darts: tuple[int, ...]) -> tuple[int, ...]:
-        places = [start]
-        for dart in darts:
-            places.append(next(head for other, head in self._darts[places[-1]] if other == dart))
-        return tuple(places)
-
-    def _lengths_to(self, goal: int) -> FloatArray:
-        """Length of the shortest route from each place, infinite where there is none."""
-        lengths = np.full(len(self._darts), np.inf)
-        lengths[goal] = 0.0
-        heap = [(0.0, goal)]
-        while heap:
-            length, place = heapq.heappop(heap)
-            if length > lengths[place]:
-                continue
-            for dart, head in self._darts[place]:
-                further = length + float(self._through_m[dart >> 1])
-                if further < lengths[head]:
-                    lengths[head] = further
-                    heapq.heappush(heap, (further, head))
-        return lengths
+        cols = self._enterable.shape[1]
+        first, last = start[0] * cols + start[1], goal[0] * cols + goal[1]
+        label = np.where(self._enterable, np.int32(0), np.int32(-1)).ravel()
+        left = field_distances(self._enterable.astype(np.uint8), label, np.array([last]))
+        shortest = length_in_cells(left[[first]])[0] if left[first] >= 0 else 0.0
+        states, tree, goals, reason = _class_kernels.find_classes(
+            self._moves,
+            cols,
+            (first, last),
+            left,
+            self.classes.cell_words.of_edge,
+            self._letters,
+            count,
+            max(1, min(self._apart, int(shortest / 2))),
+            MOST_STATES,
+        )
+        found = []
+        for state in goals.tolist():
+            flat = _class_kernels.path_to(states, state)
+            word = tuple(_class_kernels.word_at(tree, states.word[state]).tolist())
+            length = float(length_in_cells(states.cost[[state]])[0])
+            cells = np.stack(np.divmod(flat, cols), axis=1)
+            found.append(ClassPath(cells, word, length))
+        return ClassPaths(tuple(found), reason != _class_kernels.LIMITED)

@@ -2,32 +2,40 @@
 
 Two routes between the same places are of one class when one can be pushed into the other without
 crossing a hole. Every arc gets a word so that round an ordinary face the words cancel and round a
-hole they leave one generator; the class of a route is the reduced product along its arcs. To search
-with such signatures is the idea of S. Bhattacharya, M. Likhachev, V. Kumar: Topological constraints
-in search-based robot path planning, 2012.
+hole they leave one generator; the class of a route is the reduced product along its arcs,
+self-loops included. To search with such signatures is the idea of S. Bhattacharya, M. Likhachev,
+V. Kumar: Topological constraints in search-based robot path planning, 2012.
+
+Cells have words too. A base edge that was contracted reads the identity, one that stands for an arc
+reads its word, and one that was removed as redundant reads what the full 2x2 blocks beside it leave
+it, so that every such block reads the identity: a path of cells has the class of its route, however
+it winds through the fields and round what one field encloses.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.pyramid.dual import FaceKind
+from hybridnav.pyramid.islands import RIM, Islands
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.topology.map import TopologicalMap
 
 Word = tuple[int, ...]
 """Generators 1, 2, ... and their inverses -1, -2, ..., none beside its own inverse."""
 
 IDENTITY: Word = ()
+
+_EAST, _SOUTH = 0, 3
 
 
 def product(*words: Word) -> Word:
@@ -53,14 +61,24 @@ def inverse(word: Word) -> Word:
     return tuple(-letter for letter in reversed(word))
 
 
+class CellWords(NamedTuple):
+    """Words of the steps between cells that may be entered."""
+
+    of_edge: IntArray
+    """int32 (2 rows cols,), number of the word of each base edge (2 * flat cell, plus 1 for a step
+    north), read from the lower cell to the higher one; 0 the identity, a minus the inverse."""
+    words: list[Word]
+    """The word of each number; that of 0 is the identity."""
+
+
 class HomotopyClasses:
-    """Words of the arcs between places that may be entered.
+    """Words of the arcs between places that may be entered, and of the steps between their cells.
 
     Places that may not be entered are taken out of the graph first: the faces round them become one
-    hole. Of the faces that are left, a spanning tree of the dual is rooted at the largest hole, the
-    outside where there is one. Arcs that it does not cross get the empty word; from the leaves to
-    the root, the arc between a face and its parent gets the word that makes the face's boundary,
-    read in rotation order from that arc, the identity, or one new generator for a hole.
+    hole. What is left may fall into connected parts; for each a spanning tree of the dual is rooted
+    at its outer face. Arcs that it does not cross get the empty word; from the leaves to the root,
+    the arc between a face and its parent gets the word that makes the face's boundary, read in
+    rotation order from that arc, the identity, or one new generator for a hole.
 
     Parameters
     ----------
@@ -69,7 +87,8 @@ class HomotopyClasses:
     allow_unexplored
         Whether unexplored places may be entered.
     least_hole_m2
-        Holes of a smaller area do not count: routes on both sides are of one class.
+        Holes of a smaller area do not count: routes on both sides are of one class. The area is
+        that of the hole filled: obstacles, with all that they surround.
 
     Raises
     ------
@@ -89,20 +108,25 @@ class HomotopyClasses:
                 f"least hole must be a number of square metres >= 0, got {least_hole_m2}"
             )
         level = topology.level
+        self._level = level
         self.enterable: BoolArray = level.classes == CellClass.FREE
         if allow_unexplored:
             self.enterable = np.ones_like(self.enterable)
+        self.enterable_cells = topology.grid.enterable(allow_unexplored=allow_unexplored)
+        """bool (rows, cols), the cells of places that may be entered."""
         kept: BoolArray = np.asarray(self.enterable[level.arcs].all(axis=1))
         self.phi = _phi_without(level.sigma, kept)
         self.face_of = _orbits(self.phi)
         """int64 (2 n_arcs,), the face on the right of each dart that is left, -1 for others."""
-        self.areas_m2 = _hole_areas(topology, kept, self.enterable, self.face_of)
-        """float64 (n_faces,), area of the hole in each face, 0 for ordinary ones."""
+        self.roots: list[int] = []
+        """The outer face of each connected part, whose reading the other faces determine."""
+        self.areas_m2: FloatArray = np.zeros(int(self.face_of.max(initial=-1)) + 1)
+        """float64 (n_faces,), area of the hole in each face, 0 for ordinary ones and infinite for
+        outer faces."""
+        self._measure(topology)
         self.is_hole: BoolArray = (self.areas_m2 > 0) & (self.areas_m2 >= least_hole_m2)
         self.words: list[Word] = [IDENTITY] * len(kept)
         """The word of dart 2a of each arc a; that of 2a + 1 is its inverse."""
-        self.roots: list[int] = []
-        """One face of each connected part of the graph, whose reading the others determine."""
         self._assign()
 
     def word_of_dart(self, dart: int) -> Word:
@@ -110,30 +134,69 @@ class HomotopyClasses:
         word = self.words[dart >> 1]
         return inverse(word) if dart & 1 else word
 
-    def word_of_route(self, start: int, arcs: Iterable[int], ends: LongArray) -> Word:
+    def word_of_route(self, darts: Iterable[int]) -> Word:
         """The class of a route.
 
         Parameters
         ----------
-        start
-            Dense index of the first place.
-        arcs
-            Dense indices of the arcs passed, none of them a self-loop.
-        ends
-            int (n_arcs, 2), the places that each arc joins.
+        darts
+            The darts passed: 2a along arc a, 2a + 1 against it, self-loops included.
         """
-        words = []
-        at = start
-        for arc in arcs:
-            first, second = ends[arc].tolist()
-            words.append(self.word_of_dart(2 * arc if first == at else 2 * arc + 1))
-            at = second if first == at else first
-        return product(*words)
+        return product(*(self.word_of_dart(dart) for dart in darts))
+
+    def word_of_path(self, cells: LongArray) -> Word:
+        """The class of a path of cells.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), moves without corner cutting over cells that may be entered.
+        """
+        cols = self.enterable_cells.shape[1]
+        # A diagonal goes by the cell in its own row: full blocks read the identity.
+        corners = np.empty((2 * len(cells) - 1, 2), dtype=np.int64)
+        corners[::2] = cells
+        corners[1::2, 0], corners[1::2, 1] = cells[:-1, 0], cells[1:, 1]
+        flat = corners[:, 0] * cols + corners[:, 1]
+        low, step = np.minimum(flat[:-1], flat[1:]), np.diff(flat)
+        moved = step != 0
+        edges = 2 * low + (corners[:-1, 0] != corners[1:, 0])
+        numbers = (np.sign(step) * self.cell_words.of_edge[np.where(moved, edges, 0)])[moved]
+        words = self.cell_words.words
+        return product(
+            *(words[n] if n > 0 else inverse(words[-n]) for n in numbers[numbers != 0].tolist())
+        )
 
     def reading(self, face: int, *, first: int | None = None) -> Word:
         """The word of a face's boundary, in rotation order from one of its darts."""
         start = int(np.flatnonzero(self.face_of == face)[0]) if first is None else first
-        return product(*(self.word_of_dart(dart) for dart in self._round(start)))
+        return self.word_of_route(self._round(start))
+
+    @cached_property
+    def cell_words(self) -> CellWords:
+        """The words of base edges."""
+        from hybridnav.topology._word_kernels import spread_words  # noqa: PLC0415 - loads numba
+
+        of_edge = np.zeros(2 * self.enterable_cells.size, dtype=np.int32)
+        carrying = np.array([word != IDENTITY for word in self.words], dtype=np.bool_)
+        arcs = np.flatnonzero(carrying)
+        of_edge[self._level.base_edges[arcs]] = 1 + np.arange(len(arcs))
+        products = spread_words(self.enterable_cells, self._level.removed_edges, of_edge)
+        words = [IDENTITY, *(self.words[arc] for arc in arcs.tolist())]
+        for factors in products.tolist():
+            words.append(product(*(words[n] if n > 0 else inverse(words[-n]) for n in factors)))
+        number_of = {IDENTITY: 0}
+        renumbered = np.zeros(len(words), dtype=np.int32)
+        distinct = [IDENTITY]
+        for number, word in enumerate(words):
+            if inverse(word) in number_of:
+                renumbered[number] = -number_of[inverse(word)]
+                continue
+            if word not in number_of:
+                number_of[word] = len(distinct)
+                distinct.append(word)
+            renumbered[number] = number_of[word]
+        return CellWords(np.sign(of_edge) * renumbered[np.abs(of_edge)], distinct)
 
     def _round(self, start: int) -> list[int]:
         darts, dart = [start], int(self.phi[start])
@@ -141,6 +204,20 @@ class HomotopyClasses:
             darts.append(dart)
             dart = int(self.phi[dart])
         return darts
+
+    def _measure(self, topology: TopologicalMap) -> None:
+        """Find the outer faces, and the areas of the holes: what the cells that may be entered
+        surround."""
+        cells = self.enterable_cells
+        masked = np.where(cells, np.uint8(CellClass.FREE), np.uint8(CellClass.OCCUPIED))
+        islands = Islands.of_classes(masked)
+        outer = self._level.face_darts(islands.component_cell, _SOUTH, among=cells)
+        self.roots = self.face_of[outer[outer >= 0]].tolist()
+        inner = self._level.face_darts(islands.obstacle_cell[RIM + 1 :], _EAST, among=cells)
+        found = inner >= 0
+        filled = islands.filled_cells()[RIM + 1 :] * topology.grid.resolution_m**2
+        self.areas_m2[self.face_of[inner[found]]] = filled[found]
+        self.areas_m2[self.roots] = np.inf
 
     def _assign(self) -> None:
         n_faces = len(self.areas_m2)
@@ -150,26 +227,19 @@ class HomotopyClasses:
         # The dart on each face whose arc leads to the parent; order runs from roots to leaves.
         up = np.full(n_faces, -1, dtype=np.int64)
         seen = np.zeros(n_faces, dtype=np.bool_)
-        order: list[int] = []
-        for root in np.argsort(-self.areas_m2, kind="stable").tolist():
-            if seen[root]:
-                continue
-            self.roots.append(root)
-            seen[root] = True
-            queue = deque([root])
-            while queue:
-                face = queue.popleft()
-                order.append(face)
-                for dart in darts_of[face]:
-                    beyond = int(self.face_of[dart ^ 1])
-                    if not seen[beyond]:
-                        seen[beyond] = True
-                        up[beyond] = dart ^ 1
-                        queue.append(beyond)
+        seen[self.roots] = True
+        queue, order = deque(self.roots), []
+        while queue:
+            face = queue.popleft()
+            for dart in darts_of[face]:
+                beyond = int(self.face_of[dart ^ 1])
+                if not seen[beyond]:
+                    seen[beyond] = True
+                    up[beyond] = dart ^ 1
+                    order.append(beyond)
+                    queue.append(beyond)
         generator = 0
         for face in reversed(order):
-            if up[face] < 0:
-                continue
             dart = int(up[face])
             target = IDENTITY
             if self.is_hole[face]:
@@ -205,43 +275,3 @@ def _orbits(phi: LongArray) -> LongArray:
             dart = int(phi[dart])
         count += 1
     return face_of
-
-
-def _hole_areas(
-    topology: TopologicalMap, kept: BoolArray, enterable: BoolArray, face_of: LongArray
-) -> FloatArray:
-    """Area of what cannot be entered in each face of the kept map: obstacles with all that they
-    surround, and places; infinite for the outside."""
-    level, inclusion = topology.level, topology.inclusion
-    dual = level.dual
-    group = np.arange(dual.n_faces)
-    for one, other in dual.edges[~kept].tolist():
-        one, other = _find(group, one), _find(group, other)  # noqa: PLW2901 - their groups
-        group[max(one, other)] = min(one, other)
-    area = np.zeros(dual.n_faces)
-    faces = inclusion.face_of_obstacle[1:]
-    inside = faces >= 0
-    np.add.at(area, faces[inside], inclusion.obstacle_cells[1:][inside])
-    # A protected face counts even where rounding or nesting leaves it no cells of its own.
-    area[(dual.kinds == FaceKind.PROTECTED) & (area <= 0)] = 1.0
-    area[dual.kinds == FaceKind.OUTSIDE] = np.inf
-    total = np.zeros(dual.n_faces)
-    for face in range(dual.n_faces):
-        total[_find(group, face)] += area[face]
-    origin = level.arcs.ravel()
-    for place in np.flatnonzero(~enterable).tolist():
-        darts = np.flatnonzero(origin == place)
-        if len(darts):
-            total[_find(group, int(dual.face_of[darts[0]]))] += level.areas[place]
-    areas = np.zeros(int(face_of.max(initial=-1)) + 1)
-    for dart in np.flatnonzero(face_of >= 0).tolist():
-        areas[face_of[dart]] = total[_find(group, int(dual.face_of[dart]))]
-    m2: FloatArray = areas * np.float64(topology.grid.resolution_m**2)
-    return m2
-
-
-def _find(group: LongArray, face: int) -> int:
-    while group[face] != face:
-        group[face] = group[group[face]]
-        face = int(group[face])
-    return face

@@ -1,0 +1,380 @@
+"""Kernel of the search for shortest paths of different homotopy classes.
+
+A* over pairs of a cell and a reduced word: S. Bhattacharya, M. Likhachev, V. Kumar: Topological
+constraints in search-based robot path planning, 2012. Words are vertices of a tree, the Cayley
+graph of the free group; each step of a path leads from one to another.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
+
+_STATE_BITS = 26
+_STATE_MASK = (1 << _STATE_BITS) - 1
+_OPEN, _EXPANDED, _WINDING = 0, 1, 2
+
+FOUND, EXHAUSTED, LIMITED = 0, 1, 2
+"""Why a search ended: all classes asked for, no more classes, no more room."""
+
+
+class Letters(NamedTuple):
+    """The numbered words, letter by letter: word n is letters[start[n]:start[n + 1]]."""
+
+    start: np.ndarray
+    letters: np.ndarray
+
+
+class Tree(NamedTuple):
+    """The reduced words that were met: vertex 0 is the identity."""
+
+    above: np.ndarray
+    letter: np.ndarray
+    child: np.ndarray
+    sibling: np.ndarray
+    # Products met before: a list at each word of pairs of a numbered word and the product.
+    known: np.ndarray
+    known_next: np.ndarray
+    known_number: np.ndarray
+    known_product: np.ndarray
+    # Words, and products met before.
+    used: np.ndarray
+
+
+class States(NamedTuple):
+    """Pairs of a cell and a word, in the order in which they were met."""
+
+    cell: np.ndarray
+    word: np.ndarray
+    cost: np.ndarray
+    before: np.ndarray
+    # Of states that have been taken: steps from the start, an earlier state to jump back to, and
+    # the first state of those with the same word at the end of the path.
+    depth: np.ndarray
+    jump: np.ndarray
+    run: np.ndarray
+    status: np.ndarray
+    # The next state of the same cell.
+    other: np.ndarray
+
+
+@njit(cache=True)
+def new_tree(room):
+    """A tree of the identity alone."""
+    tree = Tree(
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.zeros(2, np.int64),
+    )
+    tree.above[0] = tree.child[0] = tree.sibling[0] = tree.known[0] = -1
+    tree.letter[0] = 0
+    tree.used[0] = 1
+    return tree
+
+
+@njit(cache=True)
+def new_states(room):
+    """No states yet."""
+    return States(
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int64),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(room, np.uint8),
+        np.empty(room, np.int32),
+    )
+
+
+@njit(cache=True)
+def _times_letter(tree, word, letter):
+    if tree.letter[word] == -letter:
+        return tree.above[word]
+    child = tree.child[word]
+    while child >= 0:
+        if tree.letter[child] == letter:
+            return child
+        child = tree.sibling[child]
+    new = tree.used[0]
+    if new == tree.above.size:
+        return -1
+    tree.used[0] += 1
+    tree.above[new], tree.letter[new] = word, letter
+    tree.child[new] = tree.known[new] = -1
+    tree.sibling[new] = tree.child[word]
+    tree.child[word] = new
+    return new
+
+
+@njit(cache=True)
+def _times(tree, letters, word, number):
+    """The product with a numbered word, or with the inverse of one; -1 when there is no room."""
+    if number == 0 or word < 0:
+        return word
+    at = tree.known[word]
+    while at >= 0:
+        if tree.known_number[at] == number:
+            return np.int64(tree.known_product[at])
+        at = tree.known_next[at]
+    first, end = letters.start[abs(number)], letters.start[abs(number) + 1]
+    result = np.int64(word)
+    for i in range(end - first):
+        letter = letters.letters[first + i] if number > 0 else -letters.letters[end - 1 - i]
+        result = np.int64(_times_letter(tree, result, letter))
+        if result < 0:
+            return np.int64(-1)
+    at = tree.used[1]
+    if at == tree.above.size:
+        return np.int64(-1)
+    tree.used[1] += 1
+    tree.known_number[at], tree.known_product[at] = number, result
+    tree.known_next[at] = tree.known[word]
+    tree.known[word] = at
+    return result
+
+
+@njit(cache=True)
+def _along(of_edge, cell, direction, cols):
+    """Numbered word of a step to a neighbour by a side; directions 0, 2, 4, 6."""
+    if direction == 0:
+        return np.int64(of_edge[2 * cell])
+    if direction == 2:
+        return np.int64(of_edge[2 * cell + 1])
+    if direction == 4:
+        return -np.int64(of_edge[2 * (cell - 1)])
+    return -np.int64(of_edge[2 * (cell - cols) + 1])
+
+
+@njit(cache=True)
+def _after(tree, letters, of_edge, word, cell, direction, cols):
+    """The word after a step; a diagonal goes by the cell in its own row."""
+    if direction & 1 == 0:
+        return _times(tree, letters, word, _along(of_edge, cell, direction, cols))
+    sideways = 0 if _COL_STEP[direction] > 0 else 4
+    upwards = 2 if _ROW_STEP[direction] > 0 else 6
+    word = _times(tree, letters, word, _along(of_edge, cell, sideways, cols))
+    beside = cell + _COL_STEP[direction]
+    return _times(tree, letters, word, _along(of_edge, beside, upwards, cols))
+
+
+@njit(cache=True)
+def _leads_to(states, earlier, later):
+    """Whether the path to one taken state passes another."""
+    depth = states.depth[earlier]
+    if depth > states.depth[later]:
+        return False
+    at = np.int64(later)
+    while states.depth[states.run[at]] > depth:
+        at = np.int64(states.before[states.run[at]])
+    if states.word[at] != states.word[earlier]:
+        return False
+    while states.depth[at] > depth:
+        jump = np.int64(states.jump[at])
+        at = jump if states.depth[jump] >= depth else np.int64(states.before[at])
+    return at == earlier
+
+
+@njit(cache=True)
+def _winds(states, tree, letters, of_edge, moves, head, state, apart, cols):
+    """Whether a path has come back: stands on, or sees along a row or a column, at most `apart`
+    cells off, a cell that it passed before it circled a hole. 1 or 0, -1 when there is no room."""
+    cell, word = np.int64(states.cell[state]), np.int64(states.word[state])
+    other = np.int64(head[cell])
+    while other >= 0:
+        if (
+            states.word[other] != word
+            and states.status[other] == _EXPANDED
+            and _leads_to(states, other, state)
+        ):
+            return 1
+        other = np.int64(states.other[other])
+    for direction in range(0, 8, 2):
+        at, there = cell, word
+        for _ in range(apart):
+            if not moves[at] >> direction & 1:
+                break
+            there = _times(tree, letters, there, _along(of_edge, at, direction, cols))
+            if there < 0:
+                return -1
+            at += _ROW_STEP[direction] * cols + _COL_STEP[direction]
+            other = np.int64(head[at])
+            while other >= 0:
+                if (
+                    states.word[other] != there
+                    and states.status[other] == _EXPANDED
+                    and _leads_to(states, other, state)
+                ):
+                    return 1
+                other = np.int64(states.other[other])
+    return 0
+
+
+@njit(cache=True)
+def _push(heap, n, key):
+    at = n
+    while at > 0:
+        above = (at - 1) >> 2
+        if heap[above] <= key:
+            break
+        heap[at] = heap[above]
+        at = above
+    heap[at] = key
+
+
+@njit(cache=True)
+def _pop(heap, n):
+    """Take the least of n keys out."""
+    least, key = heap[0], heap[n - 1]
+    n -= 1
+    at = 0
+    while True:
+        first = 4 * at + 1
+        if first >= n:
+            break
+        best = first
+        for child in range(first + 1, min(first + 4, n)):
+            if heap[child] < heap[best]:
+                best = child
+        if heap[best] >= key:
+            break
+        heap[at] = heap[best]
+        at = best
+    heap[at] = key
+    return least
+
+
+@njit(cache=True)
+def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, room):
+    """Shortest paths of the first classes that do not wind, and why there are no more.
+
+    `left` is the exact cost of the way from each flat cell to the goal, -1 where there is none: a
+    consistent estimate, so that each state is taken at its least cost among paths that do not wind.
+    Returns the states, the tree, the states at the goal in the order of cost, and the reason.
+    """
+    start, goal = ends
+    stride = apart
+    head = np.full(moves.size, np.int32(-1), np.int32)
+    tree = new_tree(room)
+    states = new_states(room)
+    heap = np.empty(2 * room, np.int64)
+    goals = np.empty(wanted, np.int64)
+    n_goals = n_states = n_heap = 0
+    reason = EXHAUSTED
+    origin = left[start]
+    if origin >= 0:
+        states.cell[0], states.word[0], states.cost[0], states.before[0] = start, 0, 0, -1
+        states.status[0], states.other[0] = _OPEN, -1
+        head[start] = 0
+        heap[0] = _STATE_MASK
+        n_states = n_heap = 1
+    while n_heap > 0:
+        # Of equal costs the newest state comes first.
+        state = _STATE_MASK - (_pop(heap, n_heap) & _STATE_MASK)
+        n_heap -= 1
+        if states.status[state] != _OPEN:
+            continue
+        cell, word = np.int64(states.cell[state]), np.int64(states.word[state])
+        before = np.int64(states.before[state])
+        if before < 0:
+            states.depth[state], states.jump[state], states.run[state] = 0, state, state
+        else:
+            states.depth[state] = states.depth[before] + 1
+            # Skew-binary jumps (E. W. Myers 1983): any earlier state in a logarithm of steps.
+            jump = states.jump[before]
+            further = states.jump[jump]
+            even = (
+                states.depth[before] - states.depth[jump]
+                == states.depth[jump] - states.depth[further]
+            )
+            states.jump[state] = further if even else before
+            states.run[state] = states.run[before] if states.word[before] == word else state
+        # Farther off than the cell itself only now and then, and all along a path that is found.
+        reach = apart if states.depth[state] % stride == 0 else 0
+        winds = _winds(states, tree, letters, of_edge, moves, head, state, reach, cols)
+        if winds == 0 and cell == goal:
+            passed = np.int64(state)
+            while winds == 0 and passed >= 0:
+                winds = _winds(states, tree, letters, of_edge, moves, head, passed, apart, cols)
+                passed = np.int64(states.before[passed])
+        if winds != 0:
+            states.status[state] = _WINDING
+            if winds < 0:
+                reason = LIMITED
+                break
+            continue
+        states.status[state] = _EXPANDED
+        if cell == goal:
+            goals[n_goals] = state
+            n_goals += 1
+            if n_goals == wanted:
+                reason = FOUND
+                break
+            continue
+        if n_states + 8 > room or n_heap + 8 > heap.size:
+            reason = LIMITED
+            break
+        for k in range(8):
+            if not moves[cell] >> k & 1:
+                continue
+            there = _after(tree, letters, of_edge, word, cell, k, cols)
+            if there < 0:
+                reason = LIMITED
+                break
+            to = cell + _ROW_STEP[k] * cols + _COL_STEP[k]
+            cost = states.cost[state] + (DIAGONAL if k & 1 else STRAIGHT)
+            known = np.int64(head[to])
+            while known >= 0 and states.word[known] != there:
+                known = np.int64(states.other[known])
+            if known < 0:
+                known = n_states
+                n_states += 1
+                states.cell[known], states.word[known] = to, there
+                states.status[known], states.other[known] = _OPEN, head[to]
+                head[to] = known
+            elif states.status[known] != _OPEN or states.cost[known] <= cost:
+                continue
+            states.cost[known], states.before[known] = cost, state
+            _push(heap, n_heap, cost + left[to] - origin << _STATE_BITS | _STATE_MASK - known)
+            n_heap += 1
+        if reason == LIMITED:
+            break
+    return states, tree, goals[:n_goals], reason
+
+
+@njit(cache=True)
+def path_to(states, state):
+    """Flat cells of the path to a state, from the start."""
+    cells = np.empty(states.depth[state] + 1, np.int64)
+    for i in range(states.depth[state], -1, -1):
+        cells[i] = states.cell[state]
+        state = states.before[state]
+    return cells
+
+
+@njit(cache=True)
+def word_at(tree, word):
+    """Letters of a word of the tree."""
+    count = 0
+    at = word
+    while at > 0:
+        count += 1
+        at = tree.above[at]
+    letters = np.empty(count, np.int64)
+    at = word
+    for i in range(count - 1, -1, -1):
+        letters[i] = tree.letter[at]
+        at = tree.above[at]
+    return letters
