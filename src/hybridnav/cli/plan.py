@@ -131,6 +131,8 @@ def plan(
     ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
+    if settings.planner.refine == "ompl" and alternatives > 1:
+        raise UsageError(f"--alternatives needs a preset without OMPL, not {settings.name}")
     if (
         via
         or alternatives > 1
