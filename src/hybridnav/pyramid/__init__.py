@@ -4,5 +4,6 @@ from hybridnav.pyramid.decimation import Linkage
 from hybridnav.pyramid.dual import DualGraph, FaceKind
 from hybridnav.pyramid.level import Level
 from hybridnav.pyramid.pyramid import DualGraphPyramid
+from hybridnav.pyramid.resistance import Resistance
 
-__all__ = ["DualGraph", "DualGraphPyramid", "FaceKind", "Level", "Linkage"]
+__all__ = ["DualGraph", "DualGraphPyramid", "FaceKind", "Level", "Linkage", "Resistance"]

@@ -166,6 +166,19 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
 
 
 @njit(cache=True)
+def open_candidates(origin, keys, ways, best):
+    """Let either end of every candidate survive, and give each vertex its least key in `best`."""
+    for v in range(best.size):
+        best[v] = _NO_KEY
+    for key in keys:
+        edge = key & _POSITION
+        dart = edge << np.uint64(1)
+        ways[edge] = EITHER_MAY_SURVIVE
+        for end in (origin[dart], origin[dart + np.uint64(1)]):
+            best[end] = min(best[end], key)
+
+
+@njit(cache=True)
 def match(origin, keys, best, matched, rest):
     """Greedy maximal matching in the order of keys, by rounds of locally best edges (Preis 1999).
 

@@ -19,11 +19,13 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _base_kernels, _field_kernels, _kernels
 from hybridnav.pyramid.blocks import TEMPLATES, max_power
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Record
+from hybridnav.pyramid.resistance import Steering
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._typing import BoolArray, ByteArray, IntArray, KeyArray
+    from hybridnav.pyramid.resistance import Resistance
 
     KindArray = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -44,13 +46,20 @@ def squared_limit(merge_distance_m: float, resolution_m: float) -> int:
     return math.ceil(min(ratio * ratio * (1 - _ROUNDING), 2.0**62))
 
 
-def decimate(
-    classes: ByteArray, *, linkage: Linkage, limit: int, seed: int, rooms: IntArray | None = None
+def decimate(  # noqa: PLR0913 - what may merge, each way of saying it by itself
+    classes: ByteArray,
+    *,
+    linkage: Linkage,
+    limit: int,
+    seed: int,
+    rooms: IntArray | None = None,
+    resistance: Resistance | None = None,
 ) -> tuple[Record, BuildStats]:
     """Contract stars level by level until no edge may be contracted.
 
     With rooms that happens three times: below the limit and inside rooms, which gives the places;
-    inside rooms without a limit, which gives the rooms; and without rooms.
+    inside rooms without a limit, which gives the rooms; and without rooms. With a resistance it
+    happens twice: below the limit, and then without a limit until every arc resists.
 
     Parameters
     ----------
@@ -64,6 +73,8 @@ def decimate(
         Breaks ties between edges of equal attribute.
     rooms
         int32, label of each cell's room, -1 for none; same shape.
+    resistance
+        Which arcs resist above the places.
     """
     kinds = classes if rooms is None else kinds_of(classes, rooms)
     run = _Decimation(kinds, _LINKAGES[linkage], limit, seed)
@@ -72,6 +83,10 @@ def decimate(
         run.lift_limit()
         run.exhaust()
         run.forget_rooms()
+        run.exhaust()
+    if resistance is not None:
+        run.lift_limit()
+        run.steer(resistance)
         run.exhaust()
     run.finish()
     return run.record, run.stats
@@ -165,6 +180,7 @@ class _Decimation:
         self._limit = limit
         self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
+        self._steering: Steering | None = None
         self.record = Record(
             np.empty(kinds.size, np.uint8),
             np.empty(kinds.size, np.int32),
@@ -204,6 +220,10 @@ class _Decimation:
         """Let vertices merge however far apart they are."""
         self._limit = squared_limit(math.inf, 1.0)
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
+
+    def steer(self, resistance: Resistance) -> None:
+        """Let arcs resist from here on."""
+        self._steering = Steering(resistance)
 
     def forget_rooms(self) -> None:
         """Leave only the class of each vertex's kind."""
@@ -269,13 +289,17 @@ class _Decimation:
             self._seed,
             stars,
         )
-        if self._linkage == _kernels.DIAMETER and len(self._hulls.start):
+        if self._steering is not None:
+            self._steering.refuse_leaves(scratch.parent, scratch.kernel_dart)
+        elif self._linkage == _kernels.DIAMETER and len(self._hulls.start):
             _kernels.refuse_leaves(
                 scratch.parent, scratch.kernel_dart, scratch.matched, self._hulls, self._limit
             )
         self._lap("stars")
 
     def _find_candidates(self) -> int:
+        if self._steering is not None:
+            return self._find_yielding(self._steering)
         count = self._try_candidates()
         if count == _kernels.UNDECIDED:
             self._start_hulls()
@@ -299,16 +323,30 @@ class _Decimation:
             )
         )
 
+    def _find_yielding(self, steering: Steering) -> int:
+        """The arcs that do not resist, as `_try_candidates` gives those below the limit."""
+        scratch, darts = self._scratch, self._darts
+        count = steering.candidates(
+            self._field_of(), darts, self._vertices, scratch.keys, self._seed
+        )
+        origin, keys = darts.origin, scratch.keys[:count]
+        _kernels.open_candidates(origin, keys, scratch.state, scratch.best)
+        return count
+
     def _start_hulls(self) -> None:
         """Give every vertex its hull: bounding boxes have stopped deciding every edge."""
-        record = self.record
-        field_of, _ = _field_kernels.label_fields(
-            record.vertex_end, record.vertex_parent, MAX_LEVELS
-        )
         self._hulls = _kernels.Hulls(
-            *_field_kernels.field_hulls(field_of, self._cols, self._vertices.boxes)
+            *_field_kernels.field_hulls(self._field_of(), self._cols, self._vertices.boxes)
         )
         self._lap("hulls")
+
+    def _field_of(self) -> IntArray:
+        """int32 (n_cells,), the vertex of each flat cell now, -1 for none."""
+        record = self.record
+        labels: IntArray = _field_kernels.label_fields(
+            record.vertex_end, record.vertex_parent, MAX_LEVELS
+        )[0]
+        return labels
 
     def _merge_vertices(self, scratch: _Scratch) -> None:
         record = self.record

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Record
+    from hybridnav.pyramid.resistance import Resistance
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ class DualGraphPyramid:
     _levels: dict[int, Level] = field(repr=False, default_factory=dict)
 
     @classmethod
-    def build(
+    def build(  # noqa: PLR0913 - all but the grid have defaults
         cls,
         grid: OccupancyGrid,
         *,
@@ -53,6 +54,7 @@ class DualGraphPyramid:
         linkage: Linkage = "radius",
         seed: int = 0,
         rooms: RoomLabels | None = None,
+        resistance: Resistance | None = None,
     ) -> DualGraphPyramid:
         """Contract the cells of a grid to places, and with rooms on to rooms and a building.
 
@@ -79,12 +81,16 @@ class DualGraphPyramid:
             all places of a class that are connected inside one room merge whatever U_d is (what
             lies in no room counts as one), which gives `room_level`; above that whatever touches,
             up to the apex, the building.
+        resistance
+            Lets contraction go on above the places, whatever U_d is, until every arc of the apex
+            resists: see `Resistance`. Not with rooms, which say themselves what merges.
 
         Raises
         ------
         InvalidValueError
             When the merge distance is not positive, the linkage is not known, the seed is no
-            whole number, or the rooms are those of a grid of another shape.
+            whole number, the rooms or the clearance are those of a grid of another shape, or both
+            are given.
         """
         if math.isnan(merge_distance_m) or merge_distance_m <= 0:
             raise InvalidValueError(
@@ -106,14 +112,25 @@ class DualGraphPyramid:
                 raise InvalidValueError(
                     f"rooms are labels of {labels.shape} cells, the grid has {grid.shape}"
                 )
+        if resistance is not None and (
+            rooms is not None or resistance.clearance.shape != grid.shape
+        ):
+            raise InvalidValueError(
+                f"a resistance goes without rooms and with the clearance of {grid.shape} cells"
+            )
         record, stats = decimate(
-            grid.classes, linkage=linkage, limit=limit, seed=seed, rooms=labels
+            grid.classes,
+            linkage=linkage,
+            limit=limit,
+            seed=seed,
+            rooms=labels,
+            resistance=resistance,
         )
         return cls(grid, float(merge_distance_m), linkage, seed, stats, rooms, record)
 
     @property
     def place_level(self) -> int:
-        """Index of the level of the places: the apex, unless rooms lie above it."""
+        """Index of the level of the places: the apex, unless contraction went on above it."""
         return self.stats.tops[0]
 
     @property

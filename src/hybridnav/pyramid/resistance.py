@@ -1,0 +1,124 @@
+"""Boundaries that resist contraction: the levels above the places, steered by clearance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.pyramid import _field_kernels, _resistance_kernels
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, IntArray, KeyArray
+    from hybridnav.combinatorial._kernels import Darts
+    from hybridnav.pyramid._kernels import Vertices
+
+
+@dataclass(frozen=True, eq=False)
+class Resistance:
+    """Says which arcs resist: those whose boundary is narrow against both of the fields it joins.
+
+    The width of an arc is the greatest clearance along its boundary, the peak of a vertex that in
+    its field. An arc is contracted while its width is at least a share of the lower of its two
+    peaks, the widest arcs first. Peaks only grow, so that a door resists once both rooms have grown
+    to it, at every level from there to the apex. It is the saddle and peak of a watershed, on the
+    arcs of a level: two doors between the same rooms are judged one by one.
+
+    Parameters
+    ----------
+    clearance
+        float64 (rows, cols), finite, >= 0, any unit.
+    share
+        In (0, 1].
+
+    Raises
+    ------
+    InvalidValueError
+        When the clearance is not finite or negative, or the share is not in that range.
+    """
+
+    clearance: FloatArray
+    share: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.share <= 1:
+            raise InvalidValueError(f"share must be above 0 and at most 1, got {self.share}")
+        if not (np.isfinite(self.clearance) & (self.clearance >= 0)).all():
+            raise InvalidValueError("clearance must be finite and >= 0 in every cell")
+
+    def peaks(self, field_of: IntArray, n_vertices: int) -> FloatArray:
+        """float64 (n_vertices,), greatest clearance in each field.
+
+        Parameters
+        ----------
+        field_of
+            int32 (n_cells,), -1 for none.
+        n_vertices
+            How many fields there are.
+        """
+        inside = field_of >= 0
+        peaks = np.zeros(n_vertices)
+        np.maximum.at(peaks, field_of[inside], self.clearance.ravel()[inside])
+        return peaks
+
+    def widths(self, field_of: IntArray, base_edges: IntArray) -> FloatArray:
+        """float64 (n_arcs,), greatest clearance along each arc's boundary: of the two cells of a
+        crack the lower one counts. Self-loops have 0.
+
+        Parameters
+        ----------
+        field_of
+            int32 (n_cells,), -1 for none.
+        base_edges
+            int (n_arcs,), the base edge that represents each arc.
+        """
+        rows, cols = self.clearance.shape
+        cracks, classes = _field_kernels.find_cracks(field_of, rows, cols)
+        clearance = self.clearance.ravel()
+        first = cracks >> 1
+        second = first + np.where(cracks & 1, cols, 1)
+        widest = np.zeros(len(cracks))
+        np.maximum.at(widest, classes, np.minimum(clearance[first], clearance[second]))
+        at = np.searchsorted(cracks, base_edges)
+        plain = np.append(cracks, -1)[at] == base_edges
+        widths = np.zeros(len(base_edges))
+        widths[plain] = widest[classes[at[plain]]]
+        return widths
+
+
+class Steering:
+    """A resistance on the arcs of the level that is being contracted."""
+
+    def __init__(self, resistance: Resistance) -> None:
+        self._resistance = resistance
+        self._widths = self._peaks = np.empty(0)
+
+    def candidates(
+        self, field_of: IntArray, darts: Darts, vertices: Vertices, keys: KeyArray, seed: np.uint64
+    ) -> int:
+        """Fill `keys` with the arcs that do not resist; gives their number."""
+        self._peaks = self._resistance.peaks(field_of, len(vertices.cells))
+        self._widths = self._resistance.widths(field_of, darts.base_edge)
+        return int(
+            _resistance_kernels.yielding(
+                darts.origin,
+                darts.base_edge,
+                vertices.classes,
+                self._widths,
+                self._peaks,
+                self._resistance.share,
+                seed,
+                keys,
+            )
+        )
+
+    def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
+        """Undo the joins of stars that would merge two rooms by way of the threshold between."""
+        leaves = np.flatnonzero(kernel_dart >= 0)
+        widths = self._widths[kernel_dart[leaves] >> 1]
+        leaves = leaves[np.argsort(-widths, kind="stable")]
+        _resistance_kernels.refuse_narrow_leaves(
+            leaves, parent, kernel_dart, self._widths, self._peaks, self._resistance.share
+        )
