@@ -54,7 +54,7 @@ def test_every_method_parts_rooms_from_a_corridor(method, turned_rad):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_names_count_up_from_the_top_whatever_the_radius_of_the_robot(method):
-    grid, true = floor()
+    grid, _ = floor()
     rooms = hn.find_rooms(grid, method=method)
     assert rooms.names == ("room-1", "room-2", "room-3", "room-4")
     middles = [rooms.label_of[40, 20], rooms.label_of[40, 60], rooms.label_of[40, 100]]
@@ -62,7 +62,54 @@ def test_names_count_up_from_the_top_whatever_the_radius_of_the_robot(method):
     assert rooms.label_of[10, 60] == 3
     wide = hn.OccupancyGrid(grid.probability, grid.frame, robot_radius_m=0.3)
     assert (hn.find_rooms(wide, method=method).label_of == rooms.label_of).all()
-    assert true.max() == 3
+
+
+def beside_a_closet(side_cells):
+    """A room of 4 m x 6 m; behind a wall of one cell a closet without a door."""
+    free = np.zeros((64, 70), dtype=np.uint8)
+    free[2:62, 2:42] = 1
+    free[10 : 10 + side_cells, 43 : 43 + side_cells] = 1
+    return free
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_closet_with_a_door_is_a_room_by_its_free_area(method):
+    free = beside_a_closet(12)
+    free[12:20, 42] = 1
+    grid = occupancy_grid(free, resolution_m=RESOLUTION_M)
+    # Contraction parts rooms beside doors, not in them.
+    least_area_m2 = 1.44 if method != "contraction" else 1.2
+    small = hn.find_rooms(grid, method=method, least_area_m2=least_area_m2)
+    assert small.names == ("room-1", "room-2")
+    assert small.label_of[15, 50] != small.label_of[15, 20]
+    # Larger than the closet and its threshold are: it goes to the room it opens onto.
+    whole = hn.find_rooms(grid, method=method, least_area_m2=1.8)
+    assert whole.names == ("room-1",)
+    assert (whole.label_of[free == 1] == 0).all()
+
+
+@pytest.mark.parametrize("beyond", [CellClass.FREE, CellClass.UNEXPLORED])
+@pytest.mark.parametrize("method", METHODS)
+def test_no_room_reaches_through_a_wall_of_one_cell(method, beyond):
+    cells = beside_a_closet(6)
+    closet = np.zeros(cells.shape, dtype=bool)
+    closet[10:16, 43:49] = True
+    cells[closet] = beyond
+    rooms = hn.find_rooms(occupancy_grid(cells, resolution_m=RESOLUTION_M), method=method)
+    assert rooms.names == ("room-1",)
+    assert (rooms.label_of[closet] == -1).all()
+    assert rooms.label_of[12, 42] == 0  # into the wall, not out of it
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rooms_reach_into_what_is_unexplored_on_their_side(method):
+    cells = beside_a_closet(0)
+    cells[30:42, 30:42] = CellClass.UNEXPLORED
+    label_of = hn.find_rooms(
+        occupancy_grid(cells, resolution_m=RESOLUTION_M), method=method
+    ).label_of
+    assert (label_of[32:40, 30] == 0).all()
+    assert label_of[36, 36] == -1
 
 
 @given(classes=class_grids(), method=st.sampled_from(METHODS))

@@ -235,7 +235,6 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
 
     found = find_rooms(grid).label_of
     seeded = np.full(grid.shape, NO_ROOM, dtype=np.int32)
-    wanted = []
     for room, point in read.seeds.items():
         row, col = grid.frame.cell_of(*point)
         if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
@@ -250,12 +249,9 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
         if found[row, col] == NO_ROOM:
             raise RoomsError(f"{read.of(room)}: no room is found round the seed, draw a polygon")
         seeded[row, col] = room
-        wanted.append(int(found[row, col]))
-    for piece in sorted(set(wanted)):
-        inside = (found == piece) & (label_of == NO_ROOM)
-        part = np.where(inside, seeded, np.int32(NO_ROOM))
-        grow_labels(part, inside)
-        seeded = np.where(inside, part, seeded)
+    # All at once: each spreads inside the room that was found round it, and stops at outlines.
+    region = np.where(label_of == NO_ROOM, found, np.int32(NO_ROOM))
+    grow_labels(seeded, region, region.size)
     return np.where(label_of == NO_ROOM, seeded, label_of)
 
 

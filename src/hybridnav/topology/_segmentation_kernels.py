@@ -80,8 +80,12 @@ def gaps_in_rows(wall, free, longest, short, window, side, both, share):
 
 
 @njit(cache=True)
-def grow_labels(label_of, enterable):
-    """Give every enterable cell the label that is nearest by steps along sides; in place."""
+def grow_labels(label_of, region, most_steps):
+    """Spread labels by steps along sides, each cell taking the nearest, in place.
+
+    Steps go only between cells of one region, none into region -1, and at most `most_steps` from
+    where a label begins.
+    """
     rows, cols = label_of.shape
     queue = np.empty(rows * cols, np.int64)
     head = tail = 0
@@ -89,14 +93,18 @@ def grow_labels(label_of, enterable):
         if label_of[cell // cols, cell % cols] >= 0:
             queue[tail] = cell
             tail += 1
-    while head < tail:
-        row, col = queue[head] // cols, queue[head] % cols
-        head += 1
-        for step in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-            to_row, to_col = row + step[0], col + step[1]
-            if not (0 <= to_row < rows and 0 <= to_col < cols):
-                continue
-            if label_of[to_row, to_col] < 0 and enterable[to_row, to_col]:
-                label_of[to_row, to_col] = label_of[row, col]
-                queue[tail] = to_row * cols + to_col
-                tail += 1
+    for _ in range(most_steps):
+        if head == tail:
+            break
+        for at in range(head, tail):  # the cells that the last step labelled
+            row, col = queue[at] // cols, queue[at] % cols
+            for step in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+                to_row, to_col = row + step[0], col + step[1]
+                if not (0 <= to_row < rows and 0 <= to_col < cols):
+                    continue
+                here = region[to_row, to_col]
+                if label_of[to_row, to_col] < 0 and 0 <= here == region[row, col]:
+                    label_of[to_row, to_col] = label_of[row, col]
+                    queue[tail] = to_row * cols + to_col
+                    tail += 1
+            head += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,11 +17,15 @@ _REACH_M = 0.25
 """How far pieces reach into what is not free: walls between two pieces are about half as thick."""
 _RUNS_ON = 0.9
 """Share of their breadth that the border of two parts of one corridor has at least."""
+_ROUNDING = 1e-9
 
 
 class Pieces:
     """Pieces of a label image, with their neighbours: how long each common border is, and how much
     of it is open.
+
+    How large a piece is, is its area of free cells. Shapes alone (solidity, breadth, the length of
+    borders) are those of pieces that reach half-way into the walls between them.
 
     Parameters
     ----------
@@ -39,6 +44,7 @@ class Pieces:
         self._cell_m2 = resolution_m**2
         self._reach = _REACH_M / resolution_m
         reaching = grown(self._label_of, self._reach)
+        self._free = np.bincount(self._label_of[self._label_of >= 0], minlength=self._n)
         self._areas = np.bincount(reaching[reaching >= 0], minlength=self._n).astype(np.float64)
         self._parent = list(range(self._n))
         self._version = [0] * self._n
@@ -98,23 +104,23 @@ class Pieces:
                 offer(min(u, other), max(u, other))
 
     def merge_small(self, least_m2: float) -> None:
-        """Give pieces below an area to the neighbour with the longest open border, smallest first;
-        those without a neighbour stay."""
-        least = least_m2 / self._cell_m2
-        heap = [(self._areas[piece], piece) for piece in range(self._n) if self._is_root(piece)]
+        """Give pieces of a smaller free area to the neighbour with the longest open border,
+        smallest first; those without a neighbour stay."""
+        least = least_cells(least_m2, self._cell_m2)
+        heap = [(int(self._free[piece]), piece) for piece in range(self._n) if self._is_root(piece)]
         heapq.heapify(heap)
         while heap:
-            area, piece = heapq.heappop(heap)
-            if not self._is_root(piece) or area != self._areas[piece]:
+            cells, piece = heapq.heappop(heap)
+            if not self._is_root(piece) or cells != self._free[piece]:
                 continue
-            if area >= least:
+            if cells >= least:
                 break
             borders = self._borders[piece]
             opened = max(borders, key=lambda other: (borders[other][0], -other), default=-1)
             if opened < 0 or borders[opened][0] == 0:
                 continue
             self._merge(opened, piece)
-            heapq.heappush(heap, (self._areas[opened], opened))
+            heapq.heappush(heap, (int(self._free[opened]), opened))
 
     def _solidity(self, u: int, v: int) -> float:
         """Area of two pieces by that of the convex hull of both."""
@@ -127,6 +133,7 @@ class Pieces:
         self._version[u] += 1
         self._version[v] = -1
         self._areas[u] += self._areas[v]
+        self._free[u] += self._free[v]
         self._hulls[u], _ = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
         self._breadths[u] = self._breadth(u)
         del self._borders[u][v]
@@ -155,8 +162,13 @@ class Pieces:
         return piece
 
 
+def least_cells(least_m2: float, cell_m2: float) -> int:
+    """Fewest cells that make an area, so that 2 m2 are 200 cells of a decimetre and not 201."""
+    return math.ceil(least_m2 / cell_m2 * (1 - _ROUNDING))
+
+
 def grown(label_of: IntArray, reach_cells: float) -> IntArray:
-    """Labels spread to the cells of none within reach: each takes the nearest one."""
+    """Labels spread to the cells of none within reach, walls or not: each takes the nearest one."""
     if (label_of < 0).all():
         return label_of.copy()
     distance, nearest = ndimage.distance_transform_edt(label_of < 0, return_indices=True)

@@ -11,8 +11,7 @@ from scipy import ndimage
 
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
-from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid._field_kernels import find
+from hybridnav.pyramid import DualGraphPyramid, Resistance
 from hybridnav.topology import _segmentation_kernels
 
 if TYPE_CHECKING:
@@ -35,10 +34,12 @@ _WINDOW_M = 5.0
 _SIDE_M = 1.5
 _BOTH_M = 4.0
 _FREE_SHARE = 0.7
+_RIM_M = 0.3
 _WALL_SLACK_M = 0.15
 """A wall bends by so much at most where it continues another, on either side."""
 _LEAST_TILT_RAD = 0.02
-_LEAST_PIECE_M2 = 1.0
+LEAST_PIECE_M2 = 1.0
+"""Smaller pieces between wall lines go to neighbours, unless still smaller rooms are wanted."""
 
 
 def watershed_pieces(grid: OccupancyGrid) -> IntArray:
@@ -86,12 +87,12 @@ def _clearance(grid: OccupancyGrid) -> FloatArray:
 
 
 def contracted_pieces(grid: OccupancyGrid) -> IntArray:
-    """Go on contracting the places of a pyramid, but let narrow boundaries resist.
+    """Take the fields of the apex of a pyramid in which narrow boundaries resist.
 
-    Fine places are grown on the map as it was measured. Then arcs are taken by falling clearance of
-    their boundaries, and both ends merge unless it is below a share of the greatest clearance in
-    either: the rule of the watershed, on the arcs of a level, so that two doors between the same
-    rooms are judged one by one.
+    Above fine places of the map as it was measured the pyramid goes on: at each level the stars of
+    a maximal independent edge set are contracted, widest arcs first, but no arc whose boundary has
+    less clearance than a share of the greatest in either field. So doors resist, two doors between
+    the same rooms one by one, and the apex is what they leave apart.
 
     Parameters
     ----------
@@ -103,46 +104,31 @@ def contracted_pieces(grid: OccupancyGrid) -> IntArray:
     IntArray
         int32 (rows, cols), a piece for each free cell, -1 elsewhere.
     """
-    level = DualGraphPyramid.build(
-        replace(grid, robot_radius_m=0.0), merge_distance_m=max(_FINE_M, 2 * grid.resolution_m)
+    apex = DualGraphPyramid.build(
+        replace(grid, robot_radius_m=0.0),
+        merge_distance_m=max(_FINE_M, 2 * grid.resolution_m),
+        resistance=Resistance(_clearance(grid), _PERSISTENCE),
     )[-1]
-    clearance = _clearance(grid).ravel()
-    field_of = level.field_of.ravel()
-    peak = np.zeros(level.n_vertices)
-    np.maximum.at(peak, field_of[field_of >= 0], clearance[field_of >= 0])
-    edges, arc = level.boundary_table
-    ends = edges >> 1, (edges >> 1) + np.where(edges & 1, grid.shape[1], 1)
-    widest = np.zeros(level.n_arcs)
-    np.maximum.at(widest, arc, np.minimum(clearance[ends[0]], clearance[ends[1]]))
-    is_free = level.classes == CellClass.FREE
-    root = np.arange(level.n_vertices)
-    for at in np.argsort(-widest, kind="stable").tolist():
-        u, v = (int(find(root, end)) for end in level.arcs[at])
-        if u == v or not (is_free[u] and is_free[v]):
-            continue
-        if widest[at] >= _PERSISTENCE * min(peak[u], peak[v]):
-            low, high = sorted((u, v), key=lambda vertex: peak[vertex])
-            root[low] = high
-    final = np.array([find(root, v) for v in range(level.n_vertices)])
-    final[~is_free] = -1
-    pieces: IntArray = np.append(final, -1)[level.field_of].astype(np.int32)
-    return pieces
+    pieces: IntArray = np.where(grid.measured == CellClass.FREE, apex.field_of, -1)
+    return pieces.astype(np.int32)
 
 
-def walled_pieces(grid: OccupancyGrid) -> IntArray:
+def walled_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> IntArray:
     """Cut free space along wall lines, and at pinched passages between them.
 
     Parameters
     ----------
     grid
         The map; cells count as they were measured, whatever the robot's radius.
+    least_m2
+        As of `wall_line_pieces`.
 
     Returns
     -------
     IntArray
         int32 (rows, cols), a piece for each free cell, -1 elsewhere.
     """
-    lines = wall_line_pieces(grid).astype(np.int64)
+    lines = wall_line_pieces(grid, least_m2=least_m2).astype(np.int64)
     basins = _basins(grid, ratio=_PINCH, broad_m=_PINCH_M)
     both = np.where((lines >= 0) & (basins >= 0), lines * (int(basins.max()) + 1) + basins, -1)
     found, dense = np.unique(both, return_inverse=True)
@@ -151,19 +137,20 @@ def walled_pieces(grid: OccupancyGrid) -> IntArray:
     return np.maximum(pieces, -1)
 
 
-def wall_line_pieces(grid: OccupancyGrid) -> IntArray:
+def wall_line_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> IntArray:
     """Cut free space along the lines of its walls, where they continue behind an opening.
 
     In the two main directions of the building, a gap between wall and wall on one line is taken for
     an opening: up to 6 m where both sides hold enough wall, doors up to 1.5 m where one does. What
-    the cuts leave connected is a piece; those below a square metre go to their neighbours. Kin to
-    the wall lines of M. Luperto, F. Amigoni: Extracting structure of buildings using layout
-    reconstruction, 2019.
+    the cuts leave connected is a piece; small ones go to their neighbours. Kin to the wall lines
+    of M. Luperto, F. Amigoni: Extracting structure of buildings using layout reconstruction, 2019.
 
     Parameters
     ----------
     grid
         The map; cells count as they were measured, whatever the robot's radius.
+    least_m2
+        Square metres of free cells below which a piece goes to its neighbours.
 
     Returns
     -------
@@ -173,7 +160,9 @@ def wall_line_pieces(grid: OccupancyGrid) -> IntArray:
     free = grid.measured == CellClass.FREE
     occupied = grid.measured == CellClass.OCCUPIED
     tilt_rad = main_direction(occupied)
-    cut = np.zeros_like(free)
+    # Of a solid mass only the rim is a wall: else a space in it would be a gap all over.
+    rim = ndimage.distance_transform_edt(~free) * grid.resolution_m <= _RIM_M
+    occupied = occupied & rim
     if abs(tilt_rad) < _LEAST_TILT_RAD:
         cut = _gaps(occupied, free, grid.resolution_m)
     else:
@@ -181,10 +170,11 @@ def wall_line_pieces(grid: OccupancyGrid) -> IntArray:
         cut = _turned_back(_gaps(*upright, grid.resolution_m), tilt_rad, grid.shape)
     labels, _ = ndimage.label(free & ~cut)
     areas_m2 = np.bincount(labels.ravel()) * grid.resolution_m**2
-    kept = areas_m2 >= _LEAST_PIECE_M2
+    kept = areas_m2 >= least_m2
     kept[0] = False
     pieces: IntArray = np.where(kept[labels], labels - 1, -1).astype(np.int32)
-    _segmentation_kernels.grow_labels(pieces, free)
+    everywhere = np.where(free, np.int32(0), np.int32(-1))
+    _segmentation_kernels.grow_labels(pieces, everywhere, free.size)
     return pieces
 
 

@@ -11,21 +11,22 @@ from scipy import ndimage
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.grid.rooms import MAX_ROOMS, Segmentation
-from hybridnav.topology.merging import Pieces, grown
-from hybridnav.topology.pieces import contracted_pieces, walled_pieces, watershed_pieces
+from hybridnav.topology import _segmentation_kernels
+from hybridnav.topology.merging import Pieces, grown, least_cells
+from hybridnav.topology.pieces import (
+    LEAST_PIECE_M2,
+    contracted_pieces,
+    walled_pieces,
+    watershed_pieces,
+)
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray
     from hybridnav.grid import OccupancyGrid
 
-_PIECES = {
-    "walls": walled_pieces,
-    "watershed": watershed_pieces,
-    "contraction": contracted_pieces,
-}
 _UNEXPLORED_RIM = 0.8
 """Share of the cells round free space that must be unexplored for them to count as walls."""
-_SPLINTER_M2 = 1.0
+_SPLINTER_M2 = 0.5
 """Smaller pieces are merged first: they would be convex with anything."""
 _SOLIDITY = 0.8
 _OPEN = 0.65
@@ -33,11 +34,12 @@ _STRAIGHT: dict[Segmentation, float] = {"walls": 0.35, "watershed": 0.35, "contr
 """Solidity of two parts of one corridor. Boundaries of places lie beside doors, not in them, and
 look like a corridor's: contraction has no rule of its own for it."""
 _WALL_REACH_M = 0.25
-"""How far rooms reach into walls: so far robots of any radius see them change at doors."""
+"""How far rooms reach into walls, and into the unexplored cells of their own side: outlines that
+people edit then run inside walls, not along the free cells' steps."""
 
 
 def find_rooms(
-    grid: OccupancyGrid, *, method: Segmentation = "walls", least_area_m2: float = 2.0
+    grid: OccupancyGrid, *, method: Segmentation = "walls", least_area_m2: float = 1.0
 ) -> RoomLabels:
     """Find the rooms of a map.
 
@@ -51,7 +53,8 @@ def find_rooms(
         transform; `"contraction"`, where boundaries resist the contraction of a pyramid. The pieces
         are then merged in the same way, where their union is nearly convex and hardly walled.
     least_area_m2
-        Smaller pieces go to a neighbour, positive; what has none is no room.
+        In square metres of free cells, positive. Smaller pieces go to the neighbour with the
+        longest open border; what has none is no room.
 
     Returns
     -------
@@ -72,13 +75,14 @@ def find_rooms(
             f"least area must be a positive number of square metres, got {least_area_m2}"
         )
     grid = _walled(grid)
-    pieces = Pieces(_PIECES[method](grid), grid.resolution_m)
+    pieces = Pieces(_pieces(grid, method, least_area_m2), grid.resolution_m)
     pieces.merge_small(min(least_area_m2, _SPLINTER_M2))
     pieces.merge_convex(
         least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
     )
     pieces.merge_small(least_area_m2)
-    labels = _in_reading_order(pieces.label_of, least_area_m2 / grid.resolution_m**2)
+    least = least_cells(least_area_m2, grid.resolution_m**2)
+    labels = _in_reading_order(pieces.label_of, least)
     n_rooms = int(labels.max(initial=NO_ROOM)) + 1
     if n_rooms > MAX_ROOMS:
         raise InvalidValueError(
@@ -86,7 +90,31 @@ def find_rooms(
             f"at most {MAX_ROOMS} are kept: raise the least area"
         )
     names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
-    return RoomLabels(names, grown(labels, _WALL_REACH_M / grid.resolution_m))
+    return RoomLabels(names, _reaching(labels, grid))
+
+
+def _pieces(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
+    """Where free space is cut."""
+    if method == "walls":
+        return walled_pieces(grid, least_m2=min(least_m2, LEAST_PIECE_M2))
+    return watershed_pieces(grid) if method == "watershed" else contracted_pieces(grid)
+
+
+def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
+    """Labels spread into walls, and through unexplored cells, but never out behind a wall.
+
+    A wall of one cell is all that parts two rooms on some maps: what is free and has no room, or is
+    unexplored, takes none through it.
+    """
+    reach = _WALL_REACH_M / grid.resolution_m
+    wall = grid.measured == CellClass.OCCUPIED
+    into_walls = grown(label_of, reach)
+    inside = label_of.copy()
+    entered = (label_of >= 0) | (grid.measured == CellClass.UNEXPLORED)
+    _segmentation_kernels.grow_labels(
+        inside, np.where(entered, np.int32(0), np.int32(-1)), int(reach)
+    )
+    return np.where(wall, into_walls, inside)
 
 
 def _walled(grid: OccupancyGrid) -> OccupancyGrid:
@@ -105,13 +133,13 @@ def _walled(grid: OccupancyGrid) -> OccupancyGrid:
     return replace(grid, probability=probability)
 
 
-def _in_reading_order(label_of: IntArray, least_cells: float) -> IntArray:
+def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
     """Labels of at least some cells, renumbered by their first cells from the top row down."""
     areas = np.bincount(label_of[label_of >= 0])
     found, first = np.unique(label_of[::-1], return_index=True)
     kept = found >= 0
     found, first = found[kept], first[kept]
-    large = areas[found] >= least_cells
+    large = areas[found] >= least
     order = found[large][np.argsort(first[large], kind="stable")]
     new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
     new[order] = np.arange(len(order))
