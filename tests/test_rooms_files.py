@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 from PIL import Image
 
 import hybridnav as hn
 from hybridnav.grid import Frame, RoomLabels
-from tests.strategies import drawn, occupancy_grid
+from hybridnav.io.rooms_paint import cells_inside, painted
+from tests.strategies import class_grids, drawn, occupancy_grid
 
 FLAT = drawn(
     "############",
@@ -55,11 +59,58 @@ def test_several_rings_leave_holes_open(grid, write):
     assert (rooms.label_of == 0).sum() == 15
 
 
-def test_a_polygon_of_many_corners_that_crosses_itself_is_refused(grid, write):
-    ring = np.random.default_rng(0).uniform(1, 5, size=(1000, 2)).round(3).tolist()
-    with pytest.raises(hn.RoomsError, match=r"kitchen.*1000 corners crosses itself") as refused:
-        hn.load_rooms(write(two(first=f"polygon: {ring}")), grid)
-    assert "\n" not in str(refused.value)
+@st.composite
+def crossing_rings(draw):
+    """Rings with corners anywhere, so that sides cross; some corners on centre lines of cells."""
+    step = draw(st.sampled_from([0.5, 0.01]))
+    corner = st.tuples(*[st.integers(-2, round(12 / step)).map(lambda n: n * step)] * 2)
+    ring = st.lists(corner, min_size=3, max_size=12)
+    return [np.array(ring, dtype=float) for ring in draw(st.lists(ring, min_size=1, max_size=3))]
+
+
+@given(rings=crossing_rings())
+def test_cells_inside_rings_are_those_by_the_even_odd_rule(rings):
+    rows, cols = 9, 11
+    found = np.zeros((rows, cols), dtype=bool)
+    found.ravel()[cells_inside(rings, (rows, cols))] = True
+    sides = [pair for ring in rings for pair in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
+    lines = [shapely.LineString(side) for side in sides]
+    for row, col in np.ndindex(rows, cols):
+        centre = shapely.Point(col + 0.5, row + 0.5)
+        if min(line.distance(centre) for line in lines) < 1e-6:
+            continue  # on a side, where either is right
+        # Winding by angles, ring by ring: no scan line in it.
+        odd = 0
+        for ring in rings:
+            offset = (ring - [centre.x, centre.y]) @ [1, 1j]
+            turns = np.angle(np.roll(offset, -1) / offset).sum() / (2 * np.pi)
+            odd += round(turns)
+        assert found[row, col] == odd % 2
+
+
+def test_rings_beside_each_other_share_no_cell_and_leave_none_out():
+    left, right = (np.array([[x, 0.5], [x + 2, 0.5], [x + 2, 4.5], [x, 4.5]]) for x in (0.5, 2.5))
+    one, other = cells_inside([left], (5, 6)), cells_inside([right], (5, 6))
+    assert len(one) == len(other) == 8
+    assert not set(one.tolist()) & set(other.tolist())
+
+
+def test_outlines_of_a_hostile_file_are_refused_before_they_cost_much(grid):
+    x = np.arange(1_000_000)
+    zigzag = np.stack([x % 7, 6.0 * (x % 2)], axis=1)
+    with pytest.raises(hn.RoomsError, match="rows of the map"):
+        painted({0: [zigzag]}, ["a"], "rooms x", grid)
+
+
+def test_many_outlines_over_one_room_are_refused():
+    floor = occupancy_grid(np.ones((120, 120), dtype=np.uint8))
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    strips = {n: [square * [1, 100] + [n, 0]] for n in range(100)}
+    across = {100 + n: [square * [100, 1] + [0, n]] for n in range(100)}
+    names = [f"r{n}" for n in range(200)]
+    # Every pair has one cell of a hundred in common.
+    with pytest.raises(hn.RoomsError, match="'r100': most of it lies in other rooms"):
+        painted(strips | across, names, "rooms x", floor)
 
 
 def test_seeds_name_what_segmentation_finds_there(grid, write):
@@ -86,19 +137,87 @@ def test_a_polygon_is_where_the_frame_puts_it(write):
     assert (rooms.label_of == expected).all()
 
 
+def test_seeds_of_many_rooms_stay_inside_their_own(write):
+    hall = drawn("###############", "#...#...#.....#", "#...#...#.....#", "###############")
+    seeds = [(1, 1), (3, 1), (5, 1), (7, 1), (9, 1), (13, 1)]
+    entries = [f"- name: s{n}\n  seed: [{x}.5, {y}.5]\n" for n, (x, y) in enumerate(seeds)]
+    rooms = hn.load_rooms(write("rooms:\n" + "".join(entries)), occupancy_grid(hall))
+    for row in (1, 2):
+        assert set(rooms.label_of[row, 1:4].tolist()) == {0, 1}
+        assert set(rooms.label_of[row, 5:8].tolist()) == {2, 3}
+        assert set(rooms.label_of[row, 9:14].tolist()) == {4, 5}
+
+
 @pytest.mark.parametrize("yaw_rad", [0.0, 1.1])
 def test_rooms_that_are_written_are_read_again(tmp_path, yaw_rad):
     frame = Frame(0.05, (500_000.0, -3.0), yaw_rad)
+
+    def at(x, y):
+        return tuple(frame.points_of_grid(np.array([y, x]) / 0.05).round(3).tolist())
+
     grid = hn.OccupancyGrid(np.zeros((60, 80), np.float32), frame, name="a\nb")
     labels = np.full((60, 80), -1, dtype=np.int32)
     labels[5:40, 3:41], labels[5:40, 41:77] = 0, 1
     labels[15:25, 10:30] = 2  # inside the first
-    rooms = RoomLabels(("yes", "Küche: 1", "- c"), labels, {"yes": (1.5, 2.25), "dock": (0, 0)})
+    rooms = RoomLabels(("yes", "Küche: 1", "- c"), labels, {"yes": at(1.5, 2.25), "dock": at(1, 1)})
     hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
     again = hn.load_rooms(tmp_path / "rooms.yaml", grid)
     assert again.names == rooms.names
     assert dict(again.points) == dict(rooms.points)
     assert (again.label_of == labels).all()
+
+
+def blocks(side):
+    """A map of rooms of 4 x 4 cells, walls of one cell between; so many along each side."""
+    classes = np.zeros((5 * side + 1, 5 * side + 1), dtype=np.uint8)
+    label_of = np.full(classes.shape, -1, dtype=np.int32)
+    for room in range(side * side):
+        row, col = 5 * (room // side) + 1, 5 * (room % side) + 1
+        classes[row : row + 4, col : col + 4] = 1
+        label_of[row : row + 4, col : col + 4] = room
+    names = tuple(f"room {room}" for room in range(side * side))
+    return occupancy_grid(classes, resolution_m=0.1), RoomLabels(names, label_of)
+
+
+def test_a_thousand_rooms_that_are_written_are_read_again(tmp_path):
+    grid, rooms = blocks(32)
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
+    again = hn.load_rooms(tmp_path / "rooms.yaml", grid)
+    assert again.names == rooms.names
+    assert (again.label_of == rooms.label_of).all()
+
+
+def test_more_rooms_than_can_be_read_are_not_written(tmp_path):
+    grid, rooms = blocks(80)
+    with pytest.raises(hn.RoomsError, match="6400 rooms take"):
+        hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
+    assert not (tmp_path / "rooms.yaml").exists()
+
+
+def test_a_room_thinner_than_its_outline_is_rounded_keeps_its_corners(tmp_path):
+    classes = np.ones((40, 40), dtype=np.uint8)
+    labels = np.zeros((40, 40), dtype=np.int32)
+    labels[10:30, 20] = 1  # a strip of 5 cm in the middle of another room
+    grid = occupancy_grid(classes, resolution_m=0.05)
+    rooms = RoomLabels(("hall", "strip"), labels)
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
+    again = hn.load_rooms(tmp_path / "rooms.yaml", grid)
+    assert (again.label_of[:, 20] == 1).any()
+
+
+@given(labels=class_grids(12))
+def test_whatever_is_written_is_read_again(tmp_path_factory, labels):
+    names = tuple(f"r{n}" for n in range(int(labels.max()) + 1))
+    grid = occupancy_grid(np.ones(labels.shape, dtype=np.uint8), resolution_m=0.1)
+    rooms = RoomLabels(names, labels.astype(np.int32))
+    path = tmp_path_factory.mktemp("any") / "rooms.yaml"
+    try:
+        hn.save_rooms(path, rooms, grid)
+    except hn.RoomsError:
+        # Refused for a room without a cell alone.
+        assert len(np.unique(labels)) < len(names)
+        return
+    assert hn.load_rooms(path, grid).names == names
 
 
 def locations(tmp_path, image, text="data: l.pgm\nlocations: [kitchen, lab]\n"):
@@ -150,6 +269,11 @@ def test_flat_polygons_in_pixels_win_over_the_image(grid, tmp_path):
         ),
         (two(more="points:\n- name: lab\n  point: [1, 1]\n"), ["'lab'", "twice"]),
         (two(more="points:\n- name: dock\n  point: here\n"), ["'dock'", "[x, y]"]),
+        (two(more="points:\n- name: dock\n  point: [.nan, 1]\n"), ["'dock'", "number"]),
+        (two(more="points:\n- name: dock\n  point: [99, 1]\n"), ["'dock'", "outside the map"]),
+        (two(more="points:\n- name: dock\n  point: [0.5, 1]\n"), ["'dock'", "in an obstacle"]),
+        (two(second=f"polygon: {LAB}\n  point: [5.5, 1]"), ["'lab'", "in an obstacle"]),
+        (two(second="polygon: [[6, 1], [9, 1], [9, 1]]"), ["'lab'", "no area"]),
         ("rooms:\n- polygon: []\n", ["room 1", "name"]),
         ("rooms: 7\n", ["expected a list"]),
         ("roms: []\n", ["lacks rooms"]),
@@ -176,11 +300,26 @@ def test_a_room_that_the_radius_fills_is_named(write):
         hn.load_rooms(write(two()), fat)
 
 
+def test_a_point_beside_a_wall_is_kept_for_robots_of_any_radius(write):
+    fat = hn.OccupancyGrid((FLAT == 0).astype(np.float32), robot_radius_m=1.0)
+    rooms = hn.load_rooms(write(two(more="points:\n- name: dock\n  point: [1.5, 1.5]\n")), fat)
+    assert dict(rooms.points) == {"dock": (1.5, 1.5)}
+
+
 def test_an_image_of_another_size_and_a_missing_file_are_refused(grid, tmp_path):
     with pytest.raises(hn.RoomsError, match="5 x 4 pixels"):
         hn.load_rooms(locations(tmp_path, np.zeros((4, 5), np.uint8)), grid)
     with pytest.raises(hn.RoomsNotFoundError, match="no such file"):
         hn.load_rooms(tmp_path / "gone.yaml", grid)
+
+
+def test_rooms_that_could_not_be_read_again_are_not_written(grid, tmp_path):
+    full = RoomLabels(("a",), np.zeros(FLAT.shape, dtype=np.int32), {"b": (0.5, 0.5)})
+    with pytest.raises(hn.RoomsError, match=r"'b'.*in an obstacle"):
+        hn.save_rooms(tmp_path / "rooms.yaml", full, grid)
+    fat = hn.OccupancyGrid((FLAT == 0).astype(np.float32), robot_radius_m=3.0)
+    with pytest.raises(hn.RoomsError, match=r"'a'.*radius of 3 m"):
+        hn.save_rooms(tmp_path / "rooms.yaml", RoomLabels(("a",), full.label_of), fat)
 
 
 def test_rooms_without_cells_or_a_folder_are_not_written(grid, tmp_path):

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, get_args
 
+import numpy as np
 import typer
 
 import hybridnav as hn
-from hybridnav.cli.common import answer, check_picture, read_settings, stage, timings
+from hybridnav.cli.common import answer, check_picture, complain, read_settings, stage, timings
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import MapArgument, PlotOption, PresetOption, RadiusOption, RoomsOption
 from hybridnav.config.yaml_file import printable
-from hybridnav.grid.rooms import Segmentation
+from hybridnav.grid.rooms import NO_ROOM, Segmentation
 
 OutOption = Annotated[
     Path | None,
@@ -28,16 +29,19 @@ MethodOption = Annotated[
 ]
 LeastAreaOption = Annotated[
     float,
-    typer.Option("--least-area", metavar="A", help="Square metres that a room has at least."),
+    typer.Option("--least-area", metavar="A", help="Square metres of free cells that a room has."),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
+
+_TOLD = 5
+"""Names that a warning lists at most."""
 
 
 def rooms(
     map_file: MapArgument,
     out: OutOption = None,
     method: MethodOption = "walls",
-    least_area_m2: LeastAreaOption = 2.0,
+    least_area_m2: LeastAreaOption = 1.0,
     rooms_file: RoomsOption = None,
     preset: PresetOption = "balanced",
     robot_radius_m: RadiusOption = None,
@@ -73,12 +77,29 @@ def rooms(
         )
     topology = hn.TopologicalMap(pyramid)
     if out is not None:
-        hn.save_rooms(out, labels, grid)
+        hn.save_rooms(out, _enterable(labels, topology), grid)
     answer(_listing(topology) + f"\nseconds    {timings(seconds)}\n")
     if plot is not None:
         from hybridnav.viz import plot_rooms, save_figure  # noqa: PLC0415 - matplotlib on demand
 
         save_figure(plot_rooms(topology), plot)
+
+
+def _enterable(labels: hn.RoomLabels, topology: hn.TopologicalMap) -> hn.RoomLabels:
+    """The rooms that the robot can be in: a file with others could not be read for it."""
+    fits = topology.rooms.areas_m2 > 0
+    if fits.all():
+        return labels
+    names = np.array(labels.names, dtype=object)
+    left_out = names[~fits]
+    told = ", ".join(left_out[:_TOLD]) + (", ..." if len(left_out) > _TOLD else "")
+    complain(
+        f"not written, as a robot radius of {topology.grid.robot_radius_m:g} m leaves no free "
+        f"cell: {len(left_out)} rooms, {told}"
+    )
+    renumbered = np.append(np.where(fits, np.cumsum(fits) - 1, NO_ROOM), NO_ROOM)
+    points = {name: at for name, at in labels.points.items() if name not in set(left_out)}
+    return hn.RoomLabels(tuple(names[fits].tolist()), renumbered[labels.label_of], points)
 
 
 def _listing(topology: hn.TopologicalMap) -> str:

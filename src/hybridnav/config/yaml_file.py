@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 import stat
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -17,10 +18,18 @@ if TYPE_CHECKING:
     from hybridnav._typing import PathLike
     from hybridnav.errors import HybridNavError
 
-MAX_BYTES = 2**20
+
+@dataclass(frozen=True)
+class Limits:
+    """How much of a file is read at most."""
+
+    max_bytes: int = 2**20
+    max_values: int = 10_000
+    """PyYAML reads about 30,000 values a second, so that a hostile file costs a third of one."""
+
+
+_SETTINGS = Limits()
 _MAX_DEPTH = 32
-_MAX_VALUES = 10_000
-"""PyYAML reads about 30,000 values a second, so that a hostile file costs a third of one."""
 _MAX_CHARACTERS = 2048
 """Per value. Python refuses to print integers of more than 4300 digits; this stays below."""
 _MAX_PROBLEM = 200
@@ -33,6 +42,7 @@ def read_yaml(
     what: str,
     error: type[HybridNavError],
     missing: type[HybridNavError] | None = None,
+    limits: Limits = _SETTINGS,
 ) -> dict[str, Any]:
     """Read a YAML mapping from a file that may be damaged or hostile.
 
@@ -47,6 +57,8 @@ def read_yaml(
         What to raise when the file cannot be read.
     missing
         What to raise when there is no such file; `error` by default.
+    limits
+        How large the file may be, where it is more than settings.
 
     Returns
     -------
@@ -60,16 +72,16 @@ def read_yaml(
     """
     where = f"{what} {printable(path)}"
     with open_file(path, what=what, error=error, missing=missing or error) as stream:
-        content = stream.read(MAX_BYTES + 1)
-    if len(content) > MAX_BYTES:
-        raise error(f"{where}: YAML of more than {MAX_BYTES} bytes is not read")
+        content = stream.read(limits.max_bytes + 1)
+    if len(content) > limits.max_bytes:
+        raise error(f"{where}: YAML of more than {limits.max_bytes} bytes is not read")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as failure:
         line = content.count(b"\n", 0, failure.start) + 1
         raise error(f"{where}, line {line}: not UTF-8 text") from None
     try:
-        data = _construct(text)
+        data = _construct(text, limits.max_values)
     except yaml.YAMLError as failure:
         raise error(f"{where}{_explain(failure, text)}") from None
     if not isinstance(data, dict):
@@ -150,6 +162,7 @@ class _LimitedLoader(yaml.SafeLoader):
 
     _depth = 0
     _values = 0
+    max_values = _SETTINGS.max_values
 
     def compose_node(self, parent: Node | None, index: int) -> Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
@@ -163,8 +176,8 @@ class _LimitedLoader(yaml.SafeLoader):
             problem = f"a value has more than {_MAX_CHARACTERS} characters"
         elif self._depth >= _MAX_DEPTH:
             problem = f"nested more than {_MAX_DEPTH} deep"
-        elif self._values > _MAX_VALUES:
-            problem = f"more than {_MAX_VALUES} values"
+        elif self._values > self.max_values:
+            problem = f"more than {self.max_values} values"
         if problem is not None:
             raise ComposerError(None, None, problem, event.start_mark)
         self._depth += 1
@@ -191,8 +204,9 @@ class _LimitedLoader(yaml.SafeLoader):
             raise ConstructorError(None, None, str(failure), node.start_mark) from None
 
 
-def _construct(text: str) -> Any:
+def _construct(text: str, max_values: int) -> Any:
     loader = _LimitedLoader(text)
+    loader.max_values = max_values
     try:
         return loader.get_single_data()
     finally:

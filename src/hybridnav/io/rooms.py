@@ -9,37 +9,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import shapely
 
-from hybridnav.config.yaml_file import printable, read_yaml
+from hybridnav.config.yaml_file import Limits, printable, read_yaml
 from hybridnav.errors import InvalidValueError, MapNotFoundError, RoomsError, RoomsNotFoundError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.grid.rooms import check_names
 from hybridnav.io.image import read_raster
+from hybridnav.io.rooms_paint import painted
 
 if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
+    from collections.abc import Mapping, Sequence
 
-    from hybridnav._typing import BoolArray, FloatArray, IntArray, PathLike
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray, PathLike
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid.rooms import Point
 
 _ROOM_KEYS = ("name", "polygon", "polygons", "seed", "point")
-_LEAST_OVERLAP = 0.01
-"""Share of the smaller room that two outlines may have in common: lines drawn by hand."""
 _OUTSIDE_CELLS = 1.0
 """How far an outline may reach over the rim of the map."""
-_MOST_CROSSED = 64
-"""Polygons with more corners may not cross themselves: to sort that out takes very long."""
 _FEWEST_CORNERS = 3
+_LEAST_AREA_CELLS = 1e-6
+
+LIMITS = Limits(max_bytes=2**22, max_values=100_000)
+"""Of a file of rooms; hostile ones cost three seconds."""
 
 
 @dataclass
 class _Read:
-    """What a file says: outlines in cells, x along columns and y along rows."""
+    """What a file says: rings of outlines in cells, x along columns and y along rows."""
 
     where: str
     names: list[str] = field(default_factory=list)
-    outlines: dict[int, BaseGeometry] = field(default_factory=dict)
+    outlines: dict[int, list[FloatArray]] = field(default_factory=dict)
     seeds: dict[int, tuple[float, float]] = field(default_factory=dict)
     points: dict[str, tuple[float, float]] = field(default_factory=dict)
     label_of: IntArray | None = None
@@ -55,12 +56,12 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
     ----------
     path
         A YAML file of one of two forms. `rooms:` is a list of rooms with a `name` and either a
-        `polygon` (a ring of [x, y] in metres, map frame), `polygons` (rings, filled by the even-odd
-        rule: parts and holes) or a `seed` [x, y], which names the room that segmentation finds
-        there; and a `point` [x, y] that stands for the room, if wanted. Beside it `points:` is a
-        list of named points. Or `locations:` is a list of names, with an image `data:` whose pixel
-        values index it, the size of the map's, or flat `polygons:` in pixels of that image; these
-        win where both are given.
+        `polygon` (a ring of [x, y] in metres, map frame), `polygons` (rings: parts and holes) or a
+        `seed` [x, y], which names the room that segmentation finds there; and a `point` [x, y] that
+        stands for the room, if wanted. Rings are filled by the even-odd rule, also where one
+        crosses itself. Beside it `points:` is a list of named points. Or `locations:` is a list of
+        names, with an image `data:` whose pixel values index it, the size of the map's, or flat
+        `polygons:` in pixels of that image; these win where both are given.
     grid
         The map.
 
@@ -75,9 +76,12 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         When the file or the image is not there.
     RoomsError
         When one of them cannot be read, or a room has no name or one that is taken, leaves the map,
-        overlaps another, has no free cell, or none that the robot's radius leaves; one line.
+        overlaps another, has no free cell, or none that the robot's radius leaves, or a named point
+        lies outside the map or in an obstacle; one line.
     """
-    values = read_yaml(path, what="rooms", error=RoomsError, missing=RoomsNotFoundError)
+    values = read_yaml(
+        path, what="rooms", error=RoomsError, missing=RoomsNotFoundError, limits=LIMITS
+    )
     where = f"rooms {printable(path)}"
     if "locations" in values:
         read = _locations(values, Path(path), where, grid)
@@ -87,10 +91,13 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         raise RoomsError(f"{where}: lacks rooms, or locations")
     try:
         check_names(tuple(read.names))
-        label_of = _painted(read, grid) if read.label_of is None else read.label_of
+        label_of = read.label_of
+        if label_of is None:
+            label_of = painted(read.outlines, read.names, where, grid)
         if read.seeds:
             label_of = _seeded(read, label_of, grid)
-        _check_rooms(read, label_of, grid)
+        check_rooms(read.names, label_of, where, grid)
+        check_points(read.points, where, grid)
         return RoomLabels(tuple(read.names), label_of, read.points)
     except InvalidValueError as error:
         raise RoomsError(f"{where}: {error}") from None
@@ -122,12 +129,14 @@ def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
             np.array([_xy(corner, f"{at}: polygon") for corner in _list_of(ring, f"{at}: polygon")])
             for ring in _list_of(rings, f"{at}: polygons")
         ]
-        read.outlines[number] = _shape([_in_cells(ring, grid) for ring in corners], at)
+        read.outlines[number] = _checked([in_cells(ring, grid) for ring in corners], at, grid)
+    taken = {*read.points, *read.names}
     for entry in _list_of(values.get("points", []), f"{where}: points"):
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
             raise RoomsError(f"{where}: points: expected a name and a point, got {entry!r:.80}")
-        if entry["name"] in {*read.points, *read.names}:
+        if entry["name"] in taken:
             raise RoomsError(f"{where}: point {entry['name']!r}: the name is given twice")
+        taken.add(entry["name"])
         read.points[entry["name"]] = _xy(entry.get("point"), f"{where}: point {entry['name']!r}")
     return read
 
@@ -151,7 +160,7 @@ def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGr
             raise RoomsError(f"{read.of(room)}: a polygon of {len(numbers)} numbers, expected x, y")
         pixels = np.array(numbers).reshape(-1, 2)
         corners = np.stack([pixels[:, 0], grid.shape[0] - pixels[:, 1]], axis=1)
-        read.outlines[room] = _shape([corners], read.of(room))
+        read.outlines[room] = _checked([corners], read.of(room), grid)
     return read
 
 
@@ -169,62 +178,25 @@ def _label_image(data: Any, path: Path, where: str, grid: OccupancyGrid, n_rooms
     return np.where(level < n_rooms, level.astype(np.int32), np.int32(NO_ROOM))
 
 
-def _shape(rings: list[FloatArray], at: str) -> BaseGeometry:
-    """The area of rings by the even-odd rule."""
-    shape: BaseGeometry = shapely.Polygon()
+def _checked(rings: list[FloatArray], at: str, grid: OccupancyGrid) -> list[FloatArray]:
+    """Rings that have corners, an area, and a place on the map."""
     for ring in rings:
         if len(ring) < _FEWEST_CORNERS:
             raise RoomsError(f"{at}: a polygon needs at least three corners, got {len(ring)}")
-        polygon = shapely.Polygon(ring)
-        if len(ring) > _MOST_CROSSED and not polygon.is_valid:
-            raise RoomsError(f"{at}: a polygon of {len(ring)} corners crosses itself")
-        shape = shapely.symmetric_difference(shape, shapely.make_valid(polygon))
-    if shape.area <= 0:
+    if all(_is_straight(ring) for ring in rings):
         raise RoomsError(f"{at}: the polygon has no area")
-    return shape
+    corners, rim = np.concatenate(rings), np.array(grid.shape[::-1]) + _OUTSIDE_CELLS
+    if (corners < -_OUTSIDE_CELLS).any() or (corners > rim).any():
+        raise RoomsError(f"{at}: the polygon leaves the map, which spans {_extent(grid)}")
+    return rings
 
 
-def _painted(read: _Read, grid: OccupancyGrid) -> IntArray:
-    """The label of each cell by the outline that holds its centre."""
-    label_of = np.full(grid.shape, NO_ROOM, dtype=np.int32)
-    if not read.outlines:
-        return label_of
-    rooms = list(read.outlines)
-    shapes = [read.outlines[room] for room in rooms]
-    for room, shape in zip(rooms, shapes, strict=True):
-        left, bottom, right, top = shape.bounds
-        rim = _OUTSIDE_CELLS
-        if min(left, bottom) < -rim or right > grid.shape[1] + rim or top > grid.shape[0] + rim:
-            raise RoomsError(
-                f"{read.of(room)}: the polygon leaves the map, which spans {_extent(grid)}"
-            )
-    tree = shapely.STRtree(shapes)
-    for one, other in tree.query(shapes, predicate="intersects").T.tolist():
-        if one >= other:
-            continue
-        common = shapely.intersection(shapes[one], shapes[other]).area
-        if common > _LEAST_OVERLAP * min(shapes[one].area, shapes[other].area):
-            area_m2 = common * grid.resolution_m**2
-            raise RoomsError(
-                f"{read.of(rooms[one])} and room {read.names[rooms[other]]!r} overlap "
-                f"in {area_m2:.2f} square metres"
-            )
-    for room, shape in zip(rooms, shapes, strict=True):
-        window, inside = _cells_in(shape, grid.shape)
-        label_of[window][inside & (label_of[window] == NO_ROOM)] = room
-    return label_of
-
-
-def _cells_in(shape: BaseGeometry, size: tuple[int, int]) -> tuple[tuple[slice, slice], BoolArray]:
-    """The window of a grid that holds a shape, and the cells there whose centres lie inside."""
-    left, bottom, right, top = shape.bounds
-    rows = slice(max(math.floor(bottom), 0), min(math.ceil(top), size[0]))
-    cols = slice(max(math.floor(left), 0), min(math.ceil(right), size[1]))
-    x, y = np.meshgrid(
-        np.arange(cols.start, cols.stop) + 0.5, np.arange(rows.start, rows.stop) + 0.5
-    )
-    shapely.prepare(shape)
-    return (rows, cols), np.asarray(shapely.contains_xy(shape, x, y), dtype=np.bool_)
+def _is_straight(ring: FloatArray) -> bool:
+    """Whether all corners lie on one line."""
+    offset = ring - ring[0]
+    far = offset[np.argmax(np.abs(offset).sum(axis=1))]
+    cross = offset[:, 0] * far[1] - offset[:, 1] * far[0]
+    return bool((np.abs(cross) <= _LEAST_AREA_CELLS).all())
 
 
 def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
@@ -255,26 +227,44 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     return np.where(label_of == NO_ROOM, seeded, label_of)
 
 
-def _check_rooms(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> None:
+def check_rooms(names: Sequence[str], label_of: IntArray, where: str, grid: OccupancyGrid) -> None:
     """Refuse rooms without a free cell."""
-    n_rooms = len(read.names)
 
-    def counted(free: BoolArray) -> Any:
-        return np.bincount(label_of[free & (label_of >= 0)], minlength=n_rooms)
+    def counted(free: BoolArray) -> LongArray:
+        return np.bincount(label_of[free & (label_of >= 0)], minlength=len(names))
 
     measured = counted(grid.measured == CellClass.FREE)
     left = counted(grid.classes == CellClass.FREE)
-    for room in range(n_rooms):
+    for room, name in enumerate(names):
         if measured[room] == 0:
-            raise RoomsError(f"{read.of(room)}: holds no free cell of the map")
+            raise RoomsError(f"{where}: room {name!r}: holds no free cell of the map")
         if left[room] == 0:
             raise RoomsError(
-                f"{read.of(room)}: a robot radius of {grid.robot_radius_m:g} m leaves it "
+                f"{where}: room {name!r}: a robot radius of {grid.robot_radius_m:g} m leaves it "
                 "no free cell"
             )
 
 
-def _in_cells(points: FloatArray, grid: OccupancyGrid) -> FloatArray:
+def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -> None:
+    """Refuse named points that lie outside the map or in an obstacle.
+
+    Near an obstacle they may lie, and in unexplored cells: whether a robot can go there its radius
+    and its preset decide, and the status of a plan says it.
+    """
+    for name, point in points.items():
+        row, col = grid.frame.cell_of(*point)
+        if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+            raise RoomsError(
+                f"{where}: point {name!r}: ({point[0]:.10g}, {point[1]:.10g}) lies outside the "
+                f"map, which spans {_extent(grid)}"
+            )
+        if grid.measured[row, col] == CellClass.OCCUPIED:
+            raise RoomsError(
+                f"{where}: point {name!r}: ({point[0]:.10g}, {point[1]:.10g}) lies in an obstacle"
+            )
+
+
+def in_cells(points: FloatArray, grid: OccupancyGrid) -> FloatArray:
     """Points in metres as x along columns and y along rows, in cells."""
     frame = grid.frame
     offset = (points - np.array(frame.origin_m)) / frame.resolution_m

@@ -8,26 +8,33 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 import yaml
+from scipy import ndimage
 
+from hybridnav.config.yaml_file import printable
 from hybridnav.errors import RoomsError
+from hybridnav.io.rooms import LIMITS, check_points, check_rooms, in_cells
+from hybridnav.io.rooms_paint import painted
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._typing import BoolArray, FloatArray, PathLike
+    from hybridnav._typing import FloatArray, IntArray, PathLike
     from hybridnav.grid import OccupancyGrid, RoomLabels
 
-_MOST_CORNERS = 2500
-"""Corners in a file at most, which keeps it inside the limits of reading."""
+_MOST_CORNERS = 20_000
+"""Corners in a file at most where outlines can be made simpler."""
 _TOLERANCE_M = 0.15
+_KEPT = 0.7
+"""Share of its cells that a simplified outline leaves every room at least."""
 _DECIMALS = 3
 
 
 def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     """Write rooms as a file that `load_rooms` reads and a person can edit.
 
-    Outlines are simplified together, so that neighbours keep their common border: by 15
-    cm, more where the file would else have more than 2500 corners.
+    Outlines are simplified together, so that neighbours keep their common border: by 15 cm, up to
+    60 cm where the file would else have more than 20,000 corners, and not at all where a room would
+    lose much by it.
 
     Parameters
     ----------
@@ -41,69 +48,111 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     Raises
     ------
     RoomsError
-        When the file cannot be written, or a room has no cell.
+        When the file cannot be written, or could not be read again: a room has no free cell, or
+        none for the grid's robot radius, a named point lies outside the map or in an obstacle, or
+        there are too many rooms.
     """
-    shapes = [_outline(rooms.label_of == label) for label in range(len(rooms.names))]
-    for name, shape in zip(rooms.names, shapes, strict=True):
-        if shape.is_empty:
-            raise RoomsError(f"room {name!r}: has no cell to write")
+    where = f"rooms {printable(path)}"
+    check_rooms(rooms.names, rooms.label_of, where, grid)
+    check_points(rooms.points, where, grid)
+    text, n_values = _written(rooms, _rings_to_write(rooms, where, grid), grid)
+    size = len(text.encode())
+    if n_values > LIMITS.max_values or size > LIMITS.max_bytes:
+        raise RoomsError(
+            f"{where}: {len(rooms.names)} rooms take {n_values} values and {size} bytes, "
+            f"at most {LIMITS.max_values} and {LIMITS.max_bytes} are read"
+        )
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RoomsError(f"{where}: cannot write: {error.strerror}") from None
+
+
+def _rings_to_write(rooms: RoomLabels, where: str, grid: OccupancyGrid) -> list[list[FloatArray]]:
+    """Rings of each room in metres, float64 (n, 2), that read as the rooms they were."""
+    boxes = ndimage.find_objects(rooms.label_of + 1, len(rooms.names))
+    shapes = [_outline(rooms.label_of, label, *box) for label, box in enumerate(boxes)]
+    simple = [_rings(s, grid) for s in _simplified(shapes, _TOLERANCE_M / grid.resolution_m)]
+    outlines = {n: [in_cells(ring, grid) for ring in rings] for n, rings in enumerate(simple)}
+    try:
+        again = painted(outlines, rooms.names, where, grid)
+        check_rooms(rooms.names, again, where, grid)
+    except RoomsError:
+        return [_rings(shape, grid) for shape in shapes]
+    inside = rooms.label_of >= 0
+    is_kept = rooms.label_of[inside] == again[inside]
+    kept = np.bincount(rooms.label_of[inside], is_kept, len(rooms.names))
+    if (kept < _KEPT * np.bincount(rooms.label_of[inside])).any():
+        return [_rings(shape, grid) for shape in shapes]
+    return simple
+
+
+def _written(
+    rooms: RoomLabels, rings_of: list[list[FloatArray]], grid: OccupancyGrid
+) -> tuple[str, int]:
+    """The text of a file, and how many values it has for a reader."""
     lines = [
         f"# Rooms of {' '.join(grid.name.split())}: outlines in metres, map frame, [x, y].",
         "# Rename rooms, move corners, or give a room `seed: [x, y]` in place of an outline.",
-        "rooms:" if shapes else "rooms: []",
+        "rooms:" if rooms.names else "rooms: []",
     ]
-    for name, shape in zip(
-        rooms.names, _simplified(shapes, _TOLERANCE_M / grid.resolution_m), strict=True
-    ):
-        lines.append(f"- {yaml.safe_dump({'name': name}, allow_unicode=True, width=999).strip()}")
-        rings = [_ring(ring, grid) for ring in _rings(shape)]
+    for name, rings in zip(rooms.names, rings_of, strict=True):
+        lines.append(f"- {_name(name)}")
         if len(rings) == 1:
-            lines.append(f"  polygon: {rings[0]}")
+            lines.append(f"  polygon: {_ring(rings[0])}")
         else:
-            lines += ["  polygons:", *(f"  - {ring}" for ring in rings)]
+            lines += ["  polygons:", *(f"  - {_ring(ring)}" for ring in rings)]
         if name in rooms.points:
             lines.append(f"  point: {_corner(*rooms.points[name])}")
     others = {name: at for name, at in rooms.points.items() if name not in rooms.names}
     if others:
         lines.append("points:")
         for name, at in others.items():
-            lines.append(f"- {yaml.safe_dump({'name': name}, allow_unicode=True).strip()}")
-            lines.append(f"  point: {_corner(*at)}")
-    try:
-        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise RoomsError(f"rooms {path}: cannot write: {error.strerror}") from None
+            lines += [f"- {_name(name)}", f"  point: {_corner(*at)}"]
+    # A list counts as one value beside its own; a corner is a list of two.
+    n_corners = sum(len(ring) for rings in rings_of for ring in rings)
+    n_lists = sum(1 + len(rings) for rings in rings_of)
+    n_values = 5 + 4 * len(rooms.names) + n_lists + 3 * n_corners + 7 * len(rooms.points)
+    return "\n".join(lines) + "\n", n_values
 
 
-def _outline(mask: BoolArray) -> BaseGeometry:
-    """The area of some cells, x along columns and y along rows, one unit a cell."""
-    padded = np.pad(mask, ((0, 0), (1, 1))).astype(np.int8)
-    rows, starts = np.nonzero(np.diff(padded, axis=1) == 1)
-    _, ends = np.nonzero(np.diff(padded, axis=1) == -1)
-    return shapely.union_all(shapely.box(starts, rows, ends, rows + 1))
+def _name(name: str) -> str:
+    return yaml.safe_dump({"name": name}, allow_unicode=True, width=999).strip()
+
+
+def _outline(label_of: IntArray, label: int, rows: slice, cols: slice) -> BaseGeometry:
+    """The area of the cells of a label, x along columns and y along rows, one unit a cell."""
+    steps = np.diff(np.pad(label_of[rows, cols] == label, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    row, starts = np.nonzero(steps == 1)
+    _, ends = np.nonzero(steps == -1)
+    bottom, left = row + rows.start, cols.start
+    return shapely.union_all(shapely.box(starts + left, bottom, ends + left, bottom + 1))
 
 
 def _simplified(shapes: list[BaseGeometry], tolerance: float) -> list[BaseGeometry]:
     """Outlines with few corners, common borders kept; the tolerance is in cells."""
-    while True:
-        simple = list(shapely.coverage_simplify(shapes, tolerance))
+    for factor in (1, 2, 4):
+        simple = list(shapely.coverage_simplify(shapes, factor * tolerance))
         # What is so small that it vanishes keeps its corners.
         simple = [new if new.area > 0 else old for new, old in zip(simple, shapes, strict=True)]
-        few = sum(len(ring.coords) for shape in simple for ring in _rings(shape)) <= _MOST_CORNERS
-        if few or tolerance > 2.0**20:
-            return simple
-        tolerance *= 2
+        if sum(shapely.get_num_coordinates(shape) for shape in simple) <= _MOST_CORNERS:
+            break
+    return simple
 
 
-def _rings(shape: BaseGeometry) -> list[shapely.LinearRing]:
-    """Outer rings and holes; filled by the even-odd rule they make the shape again."""
-    parts = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"]
-    return [ring for part in parts for ring in (part.exterior, *part.interiors)]
+def _polygons(shape: BaseGeometry) -> list[shapely.Polygon]:
+    return [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"]
 
 
-def _ring(ring: shapely.LinearRing, grid: OccupancyGrid) -> str:
-    xy: FloatArray = shapely.get_coordinates(ring)[:-1]
-    points = grid.frame.points_of_grid(xy[:, ::-1])
+def _rings(shape: BaseGeometry, grid: OccupancyGrid) -> list[FloatArray]:
+    """Outer rings and holes in metres as they are written; filled by the even-odd rule they make
+    the shape again."""
+    rings = [ring for part in _polygons(shape) for ring in (part.exterior, *part.interiors)]
+    corners = [shapely.get_coordinates(ring)[:-1, ::-1] for ring in rings]
+    return [grid.frame.points_of_grid(ring).round(_DECIMALS) + 0.0 for ring in corners]
+
+
+def _ring(points: FloatArray) -> str:
     return f"[{', '.join(_corner(*point) for point in points.tolist())}]"
 
 

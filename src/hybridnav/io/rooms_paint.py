@@ -1,0 +1,136 @@
+"""Outlines painted on a grid, in time and memory that no file can drive up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import RoomsError
+from hybridnav.grid import NO_ROOM
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from hybridnav._typing import FloatArray, IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+_LEAST_OVERLAP = 0.01
+"""Share of the smaller room that two outlines may have in common: lines drawn by hand."""
+_MOST_COVERED = 0.5
+"""Share of a room that may lie in all others together: painting costs twice the map at most."""
+_MOST_CROSSINGS = 5_000_000
+"""Rows that all sides of a file cross together: a second and 400 MB. Rooms of a real floor cross
+some ten thousand."""
+
+
+def painted(
+    outlines: Mapping[int, Sequence[FloatArray]],
+    names: Sequence[str],
+    where: str,
+    grid: OccupancyGrid,
+) -> IntArray:
+    """Give each cell the room whose outline holds its centre, by the even-odd rule.
+
+    Where outlines overlap by a little, the room that comes first has the cells.
+
+    Parameters
+    ----------
+    outlines
+        Rings of each room, float64 (n, 2) in cells, x along columns and y along rows; any ring may
+        cross itself and others.
+    names
+        Names of all rooms, for what is wrong.
+    where
+        The file, for what is wrong.
+    grid
+        The map.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), -1 for no room.
+
+    Raises
+    ------
+    RoomsError
+        When two rooms overlap, or outlines have too many sides to be those of rooms.
+    """
+    n_crossings = sum(_n_crossings(ring) for rings in outlines.values() for ring in rings)
+    if n_crossings > _MOST_CROSSINGS:
+        raise RoomsError(
+            f"{where}: the outlines cross {n_crossings:,} rows of the map in all, "
+            f"at most {_MOST_CROSSINGS:,} are read"
+        )
+    label_of = np.full(grid.shape, NO_ROOM, dtype=np.int32)
+    flat = label_of.ravel()
+    n_cells = np.zeros(len(names), dtype=np.int64)
+    for room, rings in outlines.items():
+        cells = cells_inside(rings, grid.shape)
+        n_cells[room] = len(cells)
+        others = flat[cells]
+        is_taken = others != NO_ROOM
+        common = np.bincount(others[is_taken], minlength=len(names))
+        allowed = _LEAST_OVERLAP * np.minimum(n_cells, len(cells))
+        worst = int(np.argmax(common - allowed))
+        if common[worst] > allowed[worst]:
+            area_m2 = common[worst] * grid.resolution_m**2
+            raise RoomsError(
+                f"{where}: room {names[worst]!r} and room {names[room]!r} overlap "
+                f"in {area_m2:.2f} square metres"
+            )
+        if np.count_nonzero(is_taken) > _MOST_COVERED * len(cells):
+            raise RoomsError(f"{where}: room {names[room]!r}: most of it lies in other rooms")
+        flat[cells[~is_taken]] = room
+    return label_of
+
+
+def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArray:
+    """Cells whose centres lie inside rings by the even-odd rule, a scan line for each row.
+
+    Parameters
+    ----------
+    rings
+        float64 (n, 2) each, in cells, x along columns and y along rows; closed by themselves.
+    shape
+        Rows and columns of the grid.
+
+    Returns
+    -------
+    LongArray
+        int64 (n,), flat cells, ascending. A centre on a side counts as inside on the left and
+        lower sides alone, so that rooms with a common side share no cell.
+    """
+    crossed = [_crossings(ring) for ring in rings]
+    row = np.concatenate([rows for rows, _ in crossed])
+    # The first cell whose centre lies to the right of a crossing, or on it.
+    col = np.concatenate([np.ceil(x - 0.5) for _, x in crossed]).clip(0, shape[1])
+    inside = (row >= 0) & (row < shape[0])
+    order = np.lexsort((col[inside], row[inside]))
+    row, col = row[inside][order], col[inside][order].astype(np.int64)
+    # Closed rings cross every line an even number of times.
+    starts, lengths = row[::2] * shape[1] + col[::2], col[1::2] - col[::2]
+    ends = np.cumsum(lengths)
+    return np.repeat(starts - ends + lengths, lengths) + np.arange(ends[-1] if len(ends) else 0)
+
+
+def _rows_crossed(ring: FloatArray) -> tuple[LongArray, LongArray]:
+    """The first row whose centre line each side crosses, and the one after the last."""
+    rows = np.ceil(ring[:, 1] - 0.5).astype(np.int64)
+    other = np.roll(rows, -1)
+    return np.minimum(rows, other), np.maximum(rows, other)
+
+
+def _n_crossings(ring: FloatArray) -> int:
+    first, last = _rows_crossed(ring)
+    return int((last - first).sum())
+
+
+def _crossings(ring: FloatArray) -> tuple[LongArray, FloatArray]:
+    """Row of each crossing of a ring with a centre line of rows, and where on it that is."""
+    first, last = _rows_crossed(ring)
+    counts = last - first
+    side = np.repeat(np.arange(len(ring)), counts)
+    row = np.arange(len(side)) - np.repeat(np.cumsum(counts) - counts, counts) + first[side]
+    (x, y), (to_x, to_y) = ring[side].T, np.roll(ring, -1, axis=0)[side].T
+    return row, x + (row + 0.5 - y) / (to_y - y) * (to_x - x)
