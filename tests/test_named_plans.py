@@ -1,14 +1,19 @@
 """Plans between rooms with names, tours with stops, the way in words, and their command lines."""
 
 import itertools
+import math
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
 import hybridnav as hn
+from hybridnav.config import load_preset
 from hybridnav.grid import RoomLabels
+from hybridnav.planner.named import stop_points
 from hybridnav.route import RoomSearch
+from hybridnav.viz import plot_rooms, plot_tour
 from tests.strategies import drawn, occupancy_grid
 from tests.test_cli import cli  # noqa: F401 - the fixture
 
@@ -117,6 +122,72 @@ def test_legs_of_an_any_angle_path_share_its_length(planner):
     assert sum(leg.length_m for leg in tour.legs) == pytest.approx(tour.length_m)
 
 
+@pytest.fixture
+def driving():
+    """Makes planners with OMPL on the same map; skipped where it is not installed."""
+    pytest.importorskip("ompl")
+    grid = occupancy_grid(CLASSES, resolution_m=SIDE)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=labels())
+
+    def make(*settings):
+        preset = load_preset(
+            "ompl-rrtconnect", overrides=[f"planner.ompl.{setting}" for setting in settings]
+        )
+        return hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=preset)
+
+    return make
+
+
+def test_stops_have_headings_where_the_robot_has(driving):
+    stops: list[Any] = ["hall", "sink", (8.25, 0.75, 0.5), "lab"]
+    tour = hn.plan_tour(driving("space=se2"), stops)
+    assert tour.solved
+    yaws = [np.asarray(result.path.headings_rad) for result in tour.results if result.path]
+    # From the hall's cell below the doorway up to the sink.
+    assert yaws[0][0] == pytest.approx(math.pi / 2)
+    assert math.sin(yaws[0][-1]) > 0.7
+    assert yaws[1][-1] == yaws[2][0] == pytest.approx(0.5)
+    assert yaws[2][-1] == pytest.approx(math.pi / 2, abs=0.8)
+    assert [own[-1] for own in yaws[:-1]] == pytest.approx([own[0] for own in yaws[1:]])
+    assert any("(8.25, 0.75)" in line for line in tour.in_words())
+
+
+def test_a_named_stop_faces_the_way_on_a_turned_map():
+    pytest.importorskip("ompl")
+    classes = drawn("#######", "#.....#", "#######")
+    frame = hn.Frame(1.0, (3.0, -2.0), 0.7)
+    grid = hn.OccupancyGrid((classes == 0).astype(np.float32), frame)
+    points = {name: tuple(frame.points_of((1, col))) for name, col in (("west", 1), ("east", 5))}
+    rooms = RoomLabels(("hall",), np.zeros(classes.shape, dtype=np.int32), points)
+    planner = hn.HybridPlanner(
+        hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms)),
+        preset=load_preset("ompl-rrtconnect", overrides=["planner.ompl.space=se2"]),
+    )
+    east, west, again = map(np.asarray, stop_points(planner, ["east", "west", "west"]))
+    assert [east[2], west[2]] == pytest.approx([0.7 - math.pi] * 2)
+    assert again[2] == 0.0  # no way leads from a point to itself
+    east = np.asarray(stop_points(planner, [(*points["west"], 3.0), "east"])[1])
+    assert east[2] == pytest.approx(0.7)
+
+
+def test_points_without_the_heading_that_is_needed_are_explained(driving):
+    with pytest.raises(hn.InvalidValueError, match="x, y, yaw"):
+        hn.plan_tour(driving("space=se2"), ["kitchen", (8.25, 0.75)])
+
+
+def test_the_length_of_a_tour_is_in_metres_whatever_its_metric(driving):
+    planner = driving("objective=clearance", "clearance_m=3.0")
+    tour = hn.plan_tour(planner, ["sink", "lab", "hall"], at="point")
+    assert tour.solved
+    assert tour.metric == "clearance-weighted"
+    paths = [result.path for result in tour.results if result.path is not None]
+    along = [float(np.hypot(*np.diff(path.points, axis=0).T).sum()) for path in paths]
+    assert tour.length_m == pytest.approx(sum(along))
+    assert tour.length_m == pytest.approx(sum(leg.length_m for leg in tour.legs))
+    assert tour.cost == pytest.approx(sum(result.cost for result in tour.results))
+    assert tour.cost > 1.5 * tour.length_m >= 1.5 * tour.lower_bound
+
+
 def test_all_levels_agree_on_which_rooms_a_route_joins(planner):
     search = RoomSearch(planner.topology.rooms)
     for a, b in itertools.permutations(NAMES, 2):
@@ -124,6 +195,49 @@ def test_all_levels_agree_on_which_rooms_a_route_joins(planner):
         assert (route is not None) == planner.plan(a, b).solved == ("store" not in {a, b})
         if route is not None:
             assert (route.rooms[0], route.rooms[-1]) == (a, b)
+
+
+def by_gid(ax, gid):
+    return [artist for artist in ax.get_children() if artist.get_gid() == gid]
+
+
+def test_the_picture_of_a_named_plan_shows_its_paths_stops_rooms_and_scale(planner):
+    tour = hn.plan_tour(planner, ["sink", "lab", "hall"], at="point")
+    ax = plot_tour(planner.topology, tour)
+    paths = by_gid(ax, "path")
+    assert len(paths) == 2
+    for line, result in zip(paths, tour.results, strict=True):
+        assert result.path is not None
+        assert np.allclose(np.column_stack(line.get_data()), result.path.points)
+    ends = [np.column_stack(stop.get_data()) for stop in by_gid(ax, "stops")]
+    assert np.allclose(ends[0], [[0.75, 4.25], [5.75, 4.25]])
+    written = [by_gid(ax, f"room-{label}")[0] for label in range(len(NAMES))]
+    assert [text.get_text() for text in written] == list(NAMES)
+    for label, text in enumerate(written):
+        cell = planner.topology.grid.frame.cell_of(*text.get_position())
+        assert labels().label_of[cell] == label
+    (doors,) = by_gid(ax, "doors")
+    drawn_at = np.column_stack(doors.get_data())
+    assert np.allclose(drawn_at, [door.position for door in planner.topology.rooms.doors])
+    (bar,), (length,) = by_gid(ax, "scale-bar"), by_gid(ax, "scale-bar-label")
+    assert length.get_text() == f"{np.ptp(bar.get_xdata()):g} m"
+    assert f"{tour.length_m:.1f} m" in ax.get_title()
+
+
+def test_a_tour_without_a_path_is_drawn_as_rooms_with_the_reason(planner):
+    ax = plot_tour(planner.topology, hn.plan_tour(planner, ["kitchen", "store"]))
+    assert not by_gid(ax, "path")
+    assert "no path" in ax.get_title()
+
+
+def test_labels_are_drawn_with_their_own_map_only():
+    grid = occupancy_grid(CLASSES, resolution_m=SIDE)
+    ax = plot_rooms(labels(), grid)
+    assert len(by_gid(ax, "scale-bar")) == 1
+    with pytest.raises(hn.InvalidValueError, match="give the grid"):
+        plot_rooms(labels())
+    with pytest.raises(hn.InvalidValueError, match=r"\(10, 19\).*\(3, 3\)"):
+        plot_rooms(labels(), occupancy_grid(np.ones((3, 3), dtype=np.uint8)))
 
 
 @pytest.fixture
@@ -162,6 +276,32 @@ def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):  # n
         done.answer["length_m"]
     )
     assert (tmp_path / "tour.svg").read_text().count('id="path"') == 2
+
+
+def test_every_length_and_cost_names_its_metric(cli, map_file):  # noqa: F811
+    query = ("plan", map_file, "--from", "sink", "--to", "lab", "--robot-radius", "0")
+    done = cli(*query, "--alternatives", "2")
+    lines = [line for line in done.out.splitlines() if line.startswith(("length", "route"))]
+    assert lines
+    assert all(" m (octile)" in line for line in lines)
+    pytest.importorskip("ompl")
+    weigh = ("--set", "planner.ompl.objective=clearance", "--set", "planner.ompl.clearance_m=3")
+    done = cli(*query, "--at", "point", "--preset", "ompl-rrtconnect", *weigh)
+    told = dict(line.split(maxsplit=1) for line in done.out.splitlines())
+    assert told["length"].endswith(" m")
+    assert told["cost"].endswith(" (clearance-weighted)")
+    assert float(told["cost"].split()[0]) > float(told["length"].split()[0])
+    assert "(clearance-weighted)" in told["bound"]
+
+
+def test_plan_takes_stops_with_headings(cli, map_file):  # noqa: F811
+    pytest.importorskip("ompl")
+    done = cli(
+        *("plan", map_file, "--from", "kitchen", "--to", "8.25,0.75,1.5", "--robot-radius", "0"),
+        *("--preset", "ompl-rrtconnect", "--set", "planner.ompl.space=se2", "--json"),
+    )
+    assert done.answer["status"] == "solved"
+    assert done.answer["stops"] == ["kitchen", [8.25, 0.75, 1.5]]
 
 
 def test_plan_to_a_room_out_of_reach_exits_with_1(cli, map_file):  # noqa: F811
@@ -206,7 +346,8 @@ def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):  # noqa: F
     assert done.code == 0
     assert "room-1" in done.out
     assert hn.load_rooms(out, hn.load_map(map_file)).names[0] == "room-1"
-    assert "room-1" in picture.read_text() or 'id="room-0"' in picture.read_text()
+    assert 'id="room-0"' in picture.read_text()
+    assert 'id="scale-bar"' in picture.read_text()
     assert cli(*query).refuses(2, "found.yaml exists", "--force")
     assert cli(*query, "--force").code == 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from hybridnav.config.yaml_file import printable
 if TYPE_CHECKING:
     from hybridnav.planner.named import At
 
-Stop = str | tuple[float, float]
+Stop = str | tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -75,19 +76,20 @@ def beside(map_file: Path) -> Path | None:
 
 
 def parsed_stop(text: str) -> Stop:
-    """A point where the text is two numbers, else a name."""
-    parts = text.split(",")
+    """A point where the text is two numbers, or three with a heading, else a name."""
     try:
-        x, y = (float(part) for part in parts)
+        point = tuple(float(part) for part in text.split(","))
     except ValueError:
         return text
-    if not np.isfinite([x, y]).all():
-        raise UsageError(f"expected a name or two finite numbers of metres, got {text!r:.90}")
-    return x, y
+    if len(point) not in {2, 3}:
+        return text
+    if not np.isfinite(point).all():
+        raise UsageError(f"expected a name, or finite numbers X,Y or X,Y,YAW, got {text!r:.90}")
+    return point
 
 
 def _told(stop: Stop) -> str:
-    return stop if isinstance(stop, str) else f"({stop[0]:.10g}, {stop[1]:.10g})"
+    return stop if isinstance(stop, str) else f"({', '.join(f'{n:.10g}' for n in stop)})"
 
 
 def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
@@ -98,9 +100,10 @@ def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
         "stops": [stop if isinstance(stop, str) else list(stop) for stop in errand.stops],
         "query": " via ".join(map(_told, errand.stops[:-1])) + " to " + _told(errand.stops[-1]),
         "status": str(tour.status),
-        "metric": tour.results[0].metric,
+        "metric": tour.metric,
         "length_m": tour.length_m if tour.solved else None,
-        "lower_bound_m": sum(r.lower_bound for r in tour.results) if tour.solved else None,
+        "cost": tour.cost if tour.solved else None,
+        "lower_bound_m": tour.lower_bound if tour.solved else None,
         "legs": [leg.to_dict() for leg in tour.legs],
         "words": tour.in_words(),
         "points_m": points if tour.solved else None,
@@ -130,6 +133,7 @@ def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> list[dict[str, A
         ]
         routes.append(
             {
+                "metric": "octile",
                 "length_m": alternative.path.length_m,
                 "word": list(alternative.word),
                 "rooms": passed,
@@ -146,12 +150,24 @@ def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
         f"status     {figures['status']}",
     ]
     if figures["length_m"] is not None:
-        lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
+        lines += _measured(figures)
     for number, line in enumerate(figures["words"]):
         lines.append(f"{'' if number else 'way':<10} {line}")
     for number, other in enumerate(figures.get("alternatives", ()), start=1):
         word = " ".join(f"{letter:+d}" for letter in other["word"]) or "-"
         rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
-        lines.append(f"route {number:<4} {other['length_m']:.2f} m, class {word}{rooms}")
+        length = f"{other['length_m']:.2f} m ({other['metric']})"
+        lines.append(f"route {number:<4} {length}, class {word}{rooms}")
     lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"
+
+
+def _measured(figures: dict[str, Any]) -> list[str]:
+    """Length, cost where the metric weighs the length, and the bound, each with its metric."""
+    length_m, metric = figures["length_m"], figures["metric"]
+    if figures["cost"] == length_m:
+        lines = [f"length     {length_m:.2f} m ({metric})"]
+    else:
+        lines = [f"length     {length_m:.2f} m", f"cost       {figures['cost']:.2f} ({metric})"]
+    low = math.floor(figures["lower_bound_m"] * 100) / 100
+    return [*lines, f"bound      {low:.2f} ({metric}), between the points of these stops"]

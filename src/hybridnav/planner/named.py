@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.rooms import did_you_mean
+from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.stops import cheapest_stops
 
 if TYPE_CHECKING:
@@ -17,12 +20,16 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from hybridnav._typing import BoolArray, LongArray
+    from hybridnav.grid import OccupancyGrid
     from hybridnav.planner.blocked import Blocked
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.topology import TopologicalMap
 
 At = Literal["anywhere", "point"]
 """Where in a named room a way starts or ends."""
+
+_FACING_M = 1.0
+"""Length of the way that says which way a robot faces at a stop with a name."""
 
 
 def stop_points(
@@ -39,7 +46,8 @@ def stop_points(
     planner
         Says what may be entered.
     stops
-        Two or more points `(x, y)` in metres, names of rooms or of named points.
+        Two or more points `(x, y)` in metres, names of rooms or of named points. Where the
+        planner needs headings points are `(x, y, yaw)`, radians.
     at
         Where in a room: anywhere, or at the room's point.
     blocked
@@ -49,7 +57,9 @@ def stop_points(
     -------
     list
         Points `(x, y)` in metres, map frame; those given stay as they are. Where no way visits all
-        stops, or a point cannot be entered, rooms are represented by their points.
+        stops, or a point cannot be entered, rooms are represented by their points. Where the
+        planner needs headings, a name becomes `(x, y, yaw)` and faces the shortest way of cells by
+        which it is reached, the first stop the one by which it is left.
 
     Raises
     ------
@@ -65,8 +75,22 @@ def stop_points(
         enterable = enterable.copy()
         enterable.ravel()[planner.closed_cells(blocked)] = False
     fixed: list[Any] = [_point_of(topology, stop, at) for stop in stops]
+    points = _chosen(topology, enterable, stops, fixed)
+    if planner.needs_headings:
+        return _facing_the_way(topology, enterable, stops, points)
+    return points
+
+
+def _chosen(
+    topology: TopologicalMap,
+    enterable: BoolArray,
+    stops: Sequence[ArrayLike | str],
+    fixed: list[Any],
+) -> list[Any]:
+    """The points that are given, and for the rooms between those that make the way shortest."""
     if all(point is not None for point in fixed):
         return fixed
+    grid = topology.grid
     sets = [
         _cells_in_room(topology, enterable, str(stop))
         if point is None
@@ -85,6 +109,45 @@ def stop_points(
     return [
         centre if point is None else point for point, centre in zip(fixed, centres, strict=True)
     ]
+
+
+def _facing_the_way(
+    topology: TopologicalMap,
+    enterable: BoolArray,
+    stops: Sequence[ArrayLike | str],
+    points: list[Any],
+) -> list[Any]:
+    """Points whose stops are names with the headings of a shortest way of cells."""
+    grid = topology.grid
+    search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
+    cells = [_cell_at(topology, enterable, point) for point in points]
+    arriving = [math.nan]
+    leaving = []
+    for first, last in itertools.pairwise(cells):
+        way = None
+        if len(first) and len(last):
+            ends = (divmod(int(cell[0]), grid.shape[1]) for cell in (first, last))
+            way = search.search(*ends).cells
+        leaving.append(math.nan if way is None else _heading(grid, way[: _steps(grid) + 1]))
+        arriving.append(math.nan if way is None else _heading(grid, way[-_steps(grid) - 1 :]))
+    leaving.append(math.nan)
+    posed = list(points)
+    for number, stop in enumerate(stops):
+        if isinstance(stop, str):
+            known = [yaw for yaw in (arriving[number], leaving[number]) if math.isfinite(yaw)]
+            posed[number] = (*np.asarray(points[number]).tolist(), known[0] if known else 0.0)
+    return posed
+
+
+def _steps(grid: OccupancyGrid) -> int:
+    return max(1, round(_FACING_M / grid.resolution_m))
+
+
+def _heading(grid: OccupancyGrid, way: LongArray) -> float:
+    """Direction of a piece of a way in the map frame; NaN where it leads nowhere."""
+    points = grid.frame.points_of(way[[0, -1]])
+    x, y = (points[1] - points[0]).tolist()
+    return math.atan2(y, x) if len(way) > 1 else math.nan
 
 
 def _point_of(topology: TopologicalMap, stop: ArrayLike | str, at: At) -> ArrayLike | None:
@@ -114,8 +177,8 @@ def _cell_at(topology: TopologicalMap, enterable: BoolArray, point: ArrayLike) -
     """The cell that holds a point, none where it cannot be entered: what then is wrong, planning
     from it says."""
     try:
-        row, col = topology.grid.frame.cells_of(point).tolist()
-    except (InvalidValueError, TypeError, ValueError):
+        row, col = topology.grid.frame.cells_of(np.asarray(point)[:2]).tolist()
+    except (InvalidValueError, TypeError, ValueError, IndexError):
         return np.empty(0, dtype=np.int64)
     rows, cols = enterable.shape
     if not (0 <= row < rows and 0 <= col < cols and enterable[row, col]):

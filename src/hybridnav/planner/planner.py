@@ -84,6 +84,11 @@ class HybridPlanner:
 
             self._ompl = ompl_planner(topology, self._cells, settings)
 
+    @property
+    def needs_headings(self) -> bool:
+        """Whether ends are `(x, y, yaw)`: with OMPL in a space with headings."""
+        return self._ompl is not None and self._ompl.ompl.has_heading
+
     def plan(
         self,
         start: ArrayLike | str,
@@ -101,8 +106,8 @@ class HybridPlanner:
             `(x, y)` in metres, map frame. The path runs between the centres of the cells that hold
             them, an any-angle one between the points; nothing is snapped to free space. On a map
             with rooms also the name of a room or of a named point. With OMPL
-            in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis;
-            in its other spaces the third number means nothing.
+            in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis, and
+            named ends face the way; in its other spaces the third number means nothing.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one; None as the preset says.
         blocked
@@ -261,7 +266,7 @@ class HybridPlanner:
         """Position and, with OMPL, heading; float64 (2,) or (3,)."""
         if self._ompl is None:
             return read_point(name, given)
-        return read_pose(name, given, needs_heading=self._ompl.ompl.has_heading)
+        return read_pose(name, given, needs_heading=self.needs_headings)
 
     def _by_ompl(
         self,

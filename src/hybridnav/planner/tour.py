@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
     from hybridnav.planner.blocked import Blocked
     from hybridnav.planner.planner import HybridPlanner, Smooth
-    from hybridnav.result import PlanResult
+    from hybridnav.result import Metric, PlanResult
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,25 @@ class Tour:
     @property
     def length_m(self) -> float:
         """Length of the whole way in metres, infinite unless it is solved."""
+        if not self.solved:
+            return math.inf
+        return sum(result.path.length_m for result in self.results if result.path is not None)
+
+    @property
+    def metric(self) -> Metric:
+        """The metric of the plans."""
+        return self.results[0].metric
+
+    @property
+    def cost(self) -> float:
+        """Cost of the whole way in the metric, infinite unless it is solved: the length, but where
+        the metric weighs it."""
         return sum(result.cost for result in self.results)
+
+    @property
+    def lower_bound(self) -> float:
+        """A proved bound on the cost of a way between the points of the stops, in their order."""
+        return sum(result.lower_bound for result in self.results)
 
     def in_words(self) -> list[str]:
         """The way in sentences for a person; no lines where there are no legs."""
@@ -68,7 +87,8 @@ def plan_tour(
     planner
         Plans each part.
     stops
-        Two or more: points `(x, y)` in metres, names of rooms or of named points.
+        Two or more: points `(x, y)` in metres, names of rooms or of named points. With OMPL in a
+        space with headings points are `(x, y, yaw)`, and names face the way.
     at
         Where in a room: `"anywhere"`, chosen for all stops together so that the whole way is
         shortest, or at the room's `"point"`.
@@ -102,5 +122,5 @@ def plan_tour(
 def _told(stop: ArrayLike | str) -> str:
     if isinstance(stop, str):
         return stop
-    x, y = np.asarray(stop, dtype=np.float64).tolist()
+    x, y = np.asarray(stop, dtype=np.float64)[:2].tolist()
     return f"({x:.10g}, {y:.10g})"

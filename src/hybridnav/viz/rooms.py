@@ -10,12 +10,13 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from scipy import ndimage
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM
 from hybridnav.topology import Rooms, TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.colouring import colour_vertices
-from hybridnav.viz.layout import add_legend, add_title, fit_height
+from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
 from hybridnav.viz.maps import ground_entries, swatch
 
 if TYPE_CHECKING:
@@ -39,14 +40,14 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw rooms in colours that differ between neighbours, with names, and doors as dots.
+    """Draw rooms in colours that differ between neighbours, with names, doors as dots, scale bar.
 
     Parameters
     ----------
     rooms
         Labels of a grid; or a topological map with rooms, whose doors are then drawn too.
     grid
-        The map, with labels.
+        The map; needed with labels, which come without one.
     ax
         Where to draw; by default new axes in a new figure.
     names
@@ -60,12 +61,14 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     -------
     Axes
         The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    InvalidValueError
+        When labels come without their map or with one of another shape, or a topological map has
+        no rooms.
     """
-    view = rooms.rooms if isinstance(rooms, TopologicalMap) else None
-    labels = view.labels if view is not None else rooms
-    grid = view.grid if view is not None else grid
-    assert grid is not None  # noqa: S101 - labels come with their grid
-    assert not isinstance(labels, TopologicalMap)  # noqa: S101
+    view, labels, grid = _view_of(rooms, grid)
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     draw_cells(canvas, grid, labels.label_of, _colours(labels.label_of, len(labels.names)))
     entries: list[Entry] = [(swatch(style.PLACES), "rooms"), *ground_entries(grid)]
@@ -77,9 +80,25 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         _write_names(canvas, labels, grid)
     add_title(canvas, words if title is None else [title])
     canvas.ax.set_axis_off()
-    legend = add_legend(canvas, entries, bar=0, below=0.5 * canvas.sizes.font)
+    bar = add_scale_bar(canvas)
+    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
     fit_height(canvas, legend)
     return canvas.ax
+
+
+def _view_of(
+    rooms: RoomLabels | TopologicalMap, grid: OccupancyGrid | None
+) -> tuple[Rooms | None, RoomLabels, OccupancyGrid]:
+    """The rooms with their doors, where they come from a topological map; labels; the map."""
+    if isinstance(rooms, TopologicalMap):
+        return rooms.rooms, rooms.rooms.labels, rooms.grid
+    if grid is None:
+        raise InvalidValueError("labels of rooms are drawn with their map: give the grid too")
+    if rooms.label_of.shape != grid.shape:
+        raise InvalidValueError(
+            f"rooms are labels of {rooms.label_of.shape} cells, the grid has {grid.shape}"
+        )
+    return None, rooms, grid
 
 
 def plot_tour(
