@@ -18,6 +18,9 @@ from hybridnav.config.yaml_file import printable
 if TYPE_CHECKING:
     from hybridnav.planner.named import At
 
+_OPTIMAL = 1e-9
+"""Gap of a way that equals its bound, lengths being sums of rounded numbers."""
+
 Stop = str | tuple[float, ...]
 
 
@@ -169,5 +172,11 @@ def _measured(figures: dict[str, Any]) -> list[str]:
         lines = [f"length     {length_m:.2f} m ({metric})"]
     else:
         lines = [f"length     {length_m:.2f} m", f"cost       {figures['cost']:.2f} ({metric})"]
-    low = math.floor(figures["lower_bound_m"] * 100) / 100
-    return [*lines, f"bound      {low:.2f} ({metric}), between the points of these stops"]
+    bound, gap = figures["lower_bound_m"], 0.0
+    if bound > 0:
+        gap = figures["cost"] / bound - 1
+    told = "this way is optimal between its stops"
+    if gap > _OPTIMAL:
+        bound = math.floor(bound * 100) / 100
+        told = f"this way is at most {math.ceil(gap * 1000) / 10:.1f} % too long between its stops"
+    return [*lines, f"bound      {bound:.2f} ({metric}), {told}"]
