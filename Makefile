@@ -1,4 +1,5 @@
-# `make route` plans the demonstration route, `make test` passes all checks; both set up by themselves.
+# `make route` plans the demonstration route, `make test` passes all checks, `make docs` builds the
+# documentation; all set up by themselves.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -6,22 +7,26 @@ READY := $(VENV)/.ready
 
 NOJIT_TESTS := tests/test_blocks.py tests/test_pyramid_invariants.py tests/test_search.py
 
-.PHONY: route test test-full lint unit nojit full setup maps lock clean
+.PHONY: route test test-full lint docs unit nojit full setup maps lock clean
 
 route: setup
 	mkdir -p out
 	$(BIN)/hybridnav plan maps/office/office.yaml --start 1.0,13.2 --goal 40.6,19.4 --compare --plot out/route.png
 	@echo "picture: out/route.png"
 
-test: lint unit nojit
+test: lint docs unit nojit
 
-test-full: lint full nojit
+test-full: lint docs full nojit
 
 lint: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation's site, out/docs/index.html: a warning is an error, and nothing is fetched.
+docs: setup
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env docs out/docs
 
 # On all cores, a file of tests to each in turn.
 unit: setup
@@ -51,7 +56,7 @@ maps: setup
 
 # Needs uv (https://docs.astral.sh/uv); writes the versions that `setup` installs.
 lock:
-	uv pip compile --quiet --universal --no-header --no-annotate --python-version 3.11 --extra dev --extra cluster --extra study pyproject.toml --output-file requirements.lock
+	uv pip compile --quiet --universal --no-header --no-annotate --python-version 3.11 --extra dev --extra cluster --extra study --extra docs pyproject.toml --output-file requirements.lock
 
 clean:
 	rm -rf $(VENV) out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -1,0 +1,43 @@
+"""Settings of the documentation's build: `make docs` writes it to out/docs."""  # noqa: INP001 - Sphinx reads it
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import hybridnav
+
+sys.path.insert(0, str(Path(__file__).parent / "extensions"))
+
+project = "hybridnav"
+author = "the hybridnav maintainers"
+copyright = author  # noqa: A001 - Sphinx's name for it
+version = release = hybridnav.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "sphinx.ext.viewcode",
+    "command_help",
+]
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["images", "extensions"]
+default_role = "py:obj"  # single backticks in docstrings: code, and a link where it is a name here
+
+myst_heading_anchors = 3
+myst_enable_extensions = ["colon_fence", "deflist"]
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autosummary_generate = False
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 88
+
+html_theme = "furo"
+html_title = f"hybridnav {release}"
+html_show_sphinx = False
+html_copy_source = False
