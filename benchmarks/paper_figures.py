@@ -34,7 +34,7 @@ def draw_figure1(file: Path) -> None:
     grid = hn.load_map(MAPS / "figure1" / "figure1.yaml")
     top = hn.DualGraphPyramid.build(grid, merge_distance_m=10.0)[-1]
     print(f"figure1: {top.to_simple_graph().dropped}")
-    save_figure(plot_figure1(top, width_in=WIDTH_IN), file, dpi=150)
+    save_figure(plot_figure1(top, width_in=WIDTH_IN)[0], file, dpi=150)
 
 
 def draw_figure3(map_file: Path, file: Path) -> None:

@@ -262,20 +262,19 @@ def test_the_dual_of_figure_1_shows_a_ring_a_hole_and_the_outside(figure1):
 
 
 def test_figure_1_sets_both_graphs_side_by_side(figure1, tmp_path):
-    figure = plot_figure1(figure1, width_in=7.0)
-    surfaces, simple, graph, dual = figure.axes
+    surfaces, simple, graph, dual = plot_figure1(figure1, width_in=7.0)
     assert not lines(surfaces, "edges")
     assert len(lines(simple, "edges")) == 2
     assert len(lines(graph, "parallel-arcs")) == 2
     assert len(lines(graph, "self-loops")) == 1
     assert len(lines(dual, "dual-edges")) == 4
-    save_figure(figure, tmp_path / "figure.png", dpi=60)
+    save_figure(surfaces, tmp_path / "figure.png", dpi=60)
     assert (tmp_path / "figure.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize("width", [3.0, 7.0])
 def test_panels_and_legends_of_figure_1_do_not_touch(figure1, width):
-    figure = plot_figure1(figure1, width_in=width)
+    figure = plot_figure1(figure1, width_in=width)[0].figure.figure
     figure.draw_without_rendering()
     boxes = [ax.get_window_extent() for ax in figure.axes]
     boxes += [ax.title.get_window_extent() for ax in figure.axes if ax.title.get_text()]
@@ -293,6 +292,16 @@ def test_given_axes_are_drawn_on_and_their_figure_is_left_alone(figure1):
     assert plot_dual(figure1.level, ax=right, title="") is right
     assert (left.get_title(), right.get_title()) == ("mine", "")
     assert tuple(figure.get_size_inches()) == (9, 4)
+
+
+def test_figure_1_is_drawn_on_four_given_axes(figure1):
+    figure = Figure(figsize=(9, 7), layout="constrained")
+    axes = figure.subplots(2, 2).flatten().tolist()
+    assert plot_figure1(figure1, axes=axes) == tuple(axes)
+    assert tuple(figure.get_size_inches()) == (9, 7)
+    assert len(lines(axes[2], "parallel-arcs")) == 2
+    with pytest.raises(hn.InvalidValueError, match="4 panels, got 3 axes"):
+        plot_figure1(figure1, axes=axes[:3])
 
 
 @pytest.mark.parametrize("plot", [plot_topology, plot_dual])

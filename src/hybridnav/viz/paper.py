@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
 from hybridnav.viz.colouring import colour_vertices
@@ -26,6 +27,8 @@ from hybridnav.viz.topology import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
+
     from hybridnav._typing import ByteArray
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
@@ -37,9 +40,10 @@ _GAP_IN = 0.12
 def plot_figure1(
     places: Level | TopologicalMap,
     *,
+    axes: Sequence[Axes] | None = None,
     least_area_m2: float = LEAST_AREA_M2,
     width_in: float = style.FULL_WIDTH_IN,
-) -> Figure:
+) -> tuple[Axes, ...]:
     """Draw places, what a simple graph says of them, the graph that tells all, and its dual.
 
     Parameters
@@ -47,24 +51,32 @@ def plot_figure1(
     places
         The topological map, or any level of a pyramid; free and unexplored places alike have the
         colours of surfaces.
+    axes
+        Four axes to draw on; by default new ones in a new figure. Leave room below the last two for
+        their legends.
     least_area_m2
         Places under this area in square metres, their arcs, and self-loops round less than it are
         left out of the two graphs.
     width_in
-        Width of the figure in inches; its height follows.
+        Width of a new figure in inches; its height follows.
 
     Returns
     -------
-    Figure
-        A figure with four axes.
+    tuple of Axes
+        The four axes drawn on; `axes[0].figure` is the figure.
 
     Raises
     ------
     InvalidValueError
-        When the level has more than 20,000 vertices.
+        When the level has more than 20,000 vertices, or there are not four axes.
     """
     level = drawable(places)
-    figure, canvases = _panels(level, width_in)
+    if axes is None:
+        canvases = _panels(level, width_in)
+    elif len(axes) == len(_TITLES):
+        canvases = [Canvas.opened(ax, width_in, known_view(level.grid)) for ax in axes]
+    else:
+        raise InvalidValueError(f"Fig. 1 has {len(_TITLES)} panels, got {len(axes)} axes")
     graph, colours = Graph(level, least_area_m2), _surfaces(level)
     for canvas, title in zip(canvases, _TITLES, strict=True):
         share = 1.0 if canvas is canvases[0] else FAINT
@@ -81,15 +93,17 @@ def plot_figure1(
         add_legend(canvas, own, bar=0, below=0.4 * sizes.font)
         for canvas, own in zip(canvases[2:], entries, strict=True)
     ]
-    figure.draw_without_rendering()
-    lowest = min(legend.get_window_extent().y0 for legend in legends)
-    below = float(canvases[2].ax.get_window_extent().y0 - lowest) / figure.dpi
-    _arrange(figure, canvases, below + PAD_IN)
-    return figure
+    if axes is None:
+        figure = canvases[0].ax.figure.figure
+        figure.draw_without_rendering()
+        lowest = min(legend.get_window_extent().y0 for legend in legends)
+        below = float(canvases[2].ax.get_window_extent().y0 - lowest) / figure.dpi
+        _arrange(figure, canvases, below + PAD_IN)
+    return tuple(canvas.ax for canvas in canvases)
 
 
-def _panels(level: Level, width_in: float) -> tuple[Figure, list[Canvas]]:
-    """A figure with two rows of two panels, of the shape of the map."""
+def _panels(level: Level, width_in: float) -> list[Canvas]:
+    """Two rows of two panels in a new figure, of the shape of the map."""
     figure = Figure(figsize=(width_in, width_in))
     view = known_view(level.grid)
     share = (width_in - 3 * _GAP_IN) / 2 / width_in
@@ -98,7 +112,7 @@ def _panels(level: Level, width_in: float) -> tuple[Figure, list[Canvas]]:
         ax = figure.add_axes((0.0, 0.0, share, share))
         canvases.append(Canvas.opened(ax, width_in, view))
     _arrange(figure, canvases, 0.0)
-    return figure, canvases
+    return canvases
 
 
 def _arrange(figure: Figure, canvases: Sequence[Canvas], below_in: float) -> None:

@@ -11,27 +11,29 @@ if TYPE_CHECKING:
     from hybridnav._typing import ByteArray
 
 OCCUPIED = "#2b2b2b"
-BLOCKED = "#b4b4b4"
-UNEXPLORED = "#e4e4e4"
+BLOCKED = "#989898"
+UNEXPLORED = "#d2d2d2"
 FREE = "#ffffff"
 INK = "#1a1a1a"
 ARC = "#5c5c5c"
 RIM_ARC = "#868686"
-UNEXPLORED_ARC = "#c9c9c9"
-UNEXPLORED_DOT = "#a8a8a8"
+UNEXPLORED_ARC = "#a6a6a6"
+UNEXPLORED_DOT = "#8c8c8c"
 PATH = "#c4122f"
 PARALLEL = "#0077bb"
 SELF_LOOP = "#cc3311"
+SELF_LOOP_DASHES = (0.0, (3.0, 1.2))
+"""Lengths in line widths. Printed in grey, self-loops are no darker than parallel arcs."""
 HOLE = "#d55e00"
 OUTSIDE = "#882255"
 UNEXPLORED_NODE = "#8a8a8a"
 
-PLACES = ("#77aadd", "#eedd88", "#44bb99", "#ffaabb", "#bbcc33", "#99ddff")
-"""From Paul Tol's "light" scheme: made for filling areas, told apart by the colour-blind. Its
-orange is left out: it would lie too near the path's red."""
-UNEXPLORED_PLACES = ("#dcdcdc", "#ececec", "#e0e0e0", "#f0f0f0", "#e4e4e4", "#e8e8e8")
+PLACES = ("#3ba2b2", "#e0d59d", "#99a9ea", "#aea160", "#abcdec", "#daada3")
+"""Found by simulated annealing: as far apart as six can be for every kind of colour vision and in
+grey, from each other, from what is pale or unexplored, and from the path's red."""
+UNEXPLORED_PLACES = ("#c6c6c6", "#d2d2d2", "#cacaca", "#d6d6d6", "#cecece", "#d0d0d0")
 
-PALE = 0.36
+PALE = 0.3
 """Share of its colour that a place keeps where others are the ones to see; the rest is white."""
 
 FULL_WIDTH_IN = 7.0

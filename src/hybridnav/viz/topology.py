@@ -194,7 +194,9 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
         curves = graph.curves(_CLEARANCE * sizes.line / metre)
         for mask, colour, gid in graph.kinds():
             lines = [curves[arc] for arc in np.flatnonzero(mask).tolist() if arc in curves]
-            _add_lines(canvas, lines, colour, width, gid=gid)
+            drawn = _add_lines(canvas, lines, colour, width, gid=gid)
+            if gid == "self-loops":
+                drawn.set(linestyle=[style.SELF_LOOP_DASHES], capstyle="butt")
     free = level.classes == CellClass.FREE
     for mask, colour, size, gid in (
         (~free, style.UNEXPLORED_NODE, 4.2, "unexplored-dots"),
@@ -215,12 +217,13 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
 
 def _add_lines(
     canvas: Canvas, lines: Sequence[FloatArray], colour: str, width: float, *, gid: str
-) -> None:
+) -> LineCollection:
     drawn = LineCollection(
         list(lines), colors=colour, linewidths=width, capstyle="round", joinstyle="round", zorder=3
     )
     drawn.set_gid(gid)
     canvas.ax.add_collection(drawn, autolim=False)
+    return drawn
 
 
 def _words(graph: Graph, *, simple: bool) -> list[str]:
@@ -252,13 +255,15 @@ def graph_entries(graph: Graph, sizes: Sizes, *, simple: bool) -> list[Entry]:
         if (mask & graph.seen).any():
             dot = Line2D([], [], ls="", marker="o", ms=5.0 * sizes.line, color=colour, mec="none")
             entries.append((dot, label))
-    lines = [(graph.plain & ~graph.parallel | simple, style.INK, "edge" if simple else "arc")]
-    if not simple:
-        lines.append((graph.parallel, style.PARALLEL, "parallel arcs"))
-        lines.append((graph.level.is_self_loop, style.SELF_LOOP, "self-loop"))
-    for mask, colour, label in lines:
-        if mask.any():
-            entries.append((Line2D([], [], color=colour, lw=1.4 * sizes.line), label))
+    width = 1.4 * sizes.line
+    plain = graph.plain & ~graph.parallel | simple
+    if plain.any():
+        entries.append((Line2D([], [], color=style.INK, lw=width), "edge" if simple else "arc"))
+    if not simple and graph.parallel.any():
+        entries.append((Line2D([], [], color=style.PARALLEL, lw=width), "parallel arcs"))
+    if not simple and graph.level.is_self_loop.any():
+        loop = Line2D([], [], color=style.SELF_LOOP, lw=width, ls=style.SELF_LOOP_DASHES)
+        entries.append((loop, "self-loop"))
     return entries
 
 
