@@ -20,11 +20,10 @@ from PIL import Image
 import hybridnav as hn
 
 ROOT = Path(__file__).parents[1]
-_DOCS = ("harness", "ompl", "portals", "pyramid", "rooms")
-PAGES = ("README.md", *(f"docs/{name}.md" for name in _DOCS))
+PAGES = ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").rglob("*.md")))
 MAX_PICTURE_BYTES = 400_000
 
-_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\[[^\]]*\]\(([^)#]+)[^)]*\)")
 _IMAGE = re.compile(r"!\[[^\]]*\]\(([^)]+)\)")
 _ENDS = re.compile(r"--start (\S+) --goal (\S+)")
@@ -33,33 +32,23 @@ _ENDS = re.compile(r"--start (\S+) --goal (\S+)")
 class Example(NamedTuple):
     """Something a page runs, and what it says comes out; `...` stands for anything."""
 
-    page: str
+    language: str
     text: str
     expected: str
 
 
-def _blocks(page: str) -> list[tuple[str, str]]:
-    return _BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
-
-
-def _python_of(page: str) -> list[Example]:
-    """Blocks of Python, each with the block of text that follows it."""
-    blocks = [*_blocks(page), ("", "")]
-    return [
-        Example(page, code, output if kind == "text" else "")
-        for (language, code), (kind, output) in itertools.pairwise(blocks)
-        if language == "python"
-    ]
-
-
-def _commands_of(page: str) -> list[Example]:
-    """Lines that start with `$` in console blocks, each with the lines up to the next."""
+def _examples_of(page: str) -> list[Example]:
+    """What a reader types, in order: blocks of Python, each with the block of text that follows it,
+    and lines that start with `$` in console blocks, each with the lines up to the next."""
+    blocks = [*_BLOCK.findall((ROOT / page).read_text(encoding="utf-8")), ("", "")]
     found = []
-    for language, text in _blocks(page):
-        if language == "console":
+    for (language, text), (kind, output) in itertools.pairwise(blocks):
+        if language == "python":
+            found.append(Example(language, text, output if kind == "text" else ""))
+        elif language == "console":
             for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
-                command, _, output = part.partition("\n")
-                found.append(Example(page, command, output))
+                command, _, printed = part.partition("\n")
+                found.append(Example(language, command, printed))
     return found
 
 
@@ -78,38 +67,50 @@ def _check(expected: str, got: str) -> None:
         pytest.fail(f"the page shows\n{expected}\nand it prints\n{got}")
 
 
-@pytest.mark.parametrize("page", PAGES)
-@pytest.mark.usefixtures("folder")
-def test_python_of_a_page_prints_what_the_page_shows(page: str) -> None:
-    names: dict[str, object] = {}
-    for example in _python_of(page):
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
-            exec(compile(example.text, page, "exec"), names)  # noqa: S102 - our own page
-        _check(example.expected, printed.getvalue())
-    assert names, f"{page} shows no Python"
+def _run_python(text: str, page: str, names: dict[str, object]) -> str:
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(text, page, "exec"), names)  # noqa: S102 - our own page
+    return printed.getvalue()
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if _commands_of(page)])
-def test_commands_of_a_page_print_what_the_page_shows(page: str, folder: Path) -> None:
+def _run_command(text: str, folder: Path) -> str:
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-    for example in _commands_of(page):  # in order, in one folder, as a reader types them
-        run = subprocess.run(
-            ["sh", "-c", example.text],
-            cwd=folder,
-            env={**os.environ, "PATH": path},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert run.returncode in {0, 1}, run.stderr  # 1: not solved
-        _check(example.expected, run.stdout)
+    run = subprocess.run(
+        ["sh", "-c", text],
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode in {0, 1}, run.stderr  # 1: not solved
+    return run.stdout
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if _examples_of(page)])
+def test_a_page_shows_what_happens(page: str, folder: Path) -> None:
+    names: dict[str, object] = {"__name__": "__main__"}
+    for example in _examples_of(page):  # in order, in one folder, as a reader types them
+        if example.language == "python":
+            got = _run_python(example.text, page, names)
+        else:
+            got = _run_command(example.text, folder)
+        _check(example.expected, got)
+
+
+def test_every_guide_has_something_to_run() -> None:
+    guides = [page for page in PAGES if page.startswith(("docs/howto/", "docs/explanation/"))]
+    assert len(guides) > 8
+    assert [
+        page for page in ("README.md", "docs/tutorial.md", *guides) if not _examples_of(page)
+    ] == []
 
 
 def test_readme_plans_the_route_that_make_draws() -> None:
     recipe = _ENDS.findall((ROOT / "Makefile").read_text(encoding="utf-8"))
-    commands = _commands_of("README.md")
-    assert recipe[0] in [ends for command in commands for ends in _ENDS.findall(command.text)]
+    commands = [example.text for example in _examples_of("README.md")]
+    assert recipe[0] in [ends for command in commands for ends in _ENDS.findall(command)]
 
 
 def test_readme_lists_every_preset_with_its_settings() -> None:
@@ -123,7 +124,7 @@ def test_readme_lists_every_preset_with_its_settings() -> None:
         assert f"`{planner.refine}`" in row
 
 
-@pytest.mark.parametrize("page", [*PAGES, "CHANGELOG.md", "maps/README.md"])
+@pytest.mark.parametrize("page", [*PAGES, "CHANGELOG.md", "CONTRIBUTING.md", "maps/README.md"])
 def test_links_of_a_page_lead_to_files(page: str) -> None:
     links = _LINK.findall((ROOT / page).read_text(encoding="utf-8"))
     gone = [
