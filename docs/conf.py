@@ -26,7 +26,6 @@ exclude_patterns = ["images", "extensions"]
 default_role = "py:obj"  # single backticks in docstrings: code, and a link where it is a name here
 
 myst_heading_anchors = 3
-myst_enable_extensions = ["colon_fence", "deflist"]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
