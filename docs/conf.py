@@ -22,7 +22,7 @@ extensions = [
     "command_help",
 ]
 source_suffix = {".md": "markdown"}
-exclude_patterns = ["images", "extensions"]
+exclude_patterns = ["images", "extensions", "static"]
 default_role = "py:obj"  # single backticks in docstrings: code, and a link where it is a name here
 
 myst_heading_anchors = 3
@@ -38,5 +38,7 @@ python_maximum_signature_line_length = 88
 
 html_theme = "furo"
 html_title = f"hybridnav {release}"
+html_static_path = ["static"]
+html_css_files = ["wide.css"]
 html_show_sphinx = False
 html_copy_source = False

@@ -3,19 +3,39 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import subprocess
 import sys
+from functools import partial
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 from PIL import Image
 
 from hybridnav import viz
-from hybridnav.viz import style
-from tests.pictures import BASELINES, PICTURES, draw
+from hybridnav.viz import (
+    plot_dual,
+    plot_level,
+    plot_map,
+    plot_places,
+    plot_rooms,
+    plot_topology,
+    style,
+)
+from tests.pictures import BASELINES, PICTURES, draw, figure1, two_rooms
 
+NEW = {
+    "map": partial(plot_map, two_rooms().grid),
+    "places": partial(plot_places, two_rooms()),
+    "level": partial(plot_level, two_rooms().level),
+    "topology": partial(plot_topology, figure1()),
+    "dual": partial(plot_dual, figure1()),
+    "rooms": partial(plot_rooms, two_rooms()),
+}
 TOLERANCE = 4.0
 """Root mean square over all channels, out of 255; 256 colours and other rounding make about 1."""
 MAX_BYTES = 100_000
@@ -25,6 +45,10 @@ def difference(one, other):
     assert one.size == other.size
     pixels = [np.asarray(image.convert("RGB"), dtype=float) for image in (one, other)]
     return float(np.sqrt(np.mean((pixels[0] - pixels[1]) ** 2)))
+
+
+def legend_of(ax):
+    return ax.get_legend()
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -59,6 +83,29 @@ def test_axes_given_are_axes_returned_and_settings_stay(name):
     ax = Figure(figsize=(4, 3)).add_subplot()
     assert PICTURES[name](ax) is ax
     assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("width", [3.0, 12.0])
+@pytest.mark.parametrize("name", NEW)
+def test_words_fit_and_do_not_collide_at_any_width(name, width):
+    ax = NEW[name](width_in=width)
+    figure = ax.figure.figure
+    figure.draw_without_rendering()
+    legend = legend_of(ax)
+    boxes = [ax.title.get_window_extent(), legend.get_window_extent(), ax.get_window_extent()]
+    boxes += [a.get_window_extent() for a in ax.findobj(Text) if a.get_gid() == "scale-bar-label"]
+    if ax.axison:
+        boxes += [axis.get_tightbbox() for axis in (ax.xaxis, ax.yaxis) if axis.get_ticklocs().size]
+    for first, second in itertools.combinations(boxes, 2):
+        assert Bbox.intersection(first.padded(-1), second.padded(-1)) is None
+    for box in boxes:
+        assert figure.bbox.padded(1.5).containsx(box.x0)
+        assert figure.bbox.padded(1.5).containsx(box.x1)
+        assert figure.bbox.padded(1.5).containsy(box.y0)
+        assert figure.bbox.padded(1.5).containsy(box.y1)
+    sizes = {text.get_fontsize() for text in [ax.title, *legend.get_texts()]}
+    assert len(sizes) == 1
+    assert 5.5 <= sizes.pop() <= 12
 
 
 def test_every_picture_can_be_drawn_on_axes_given():
