@@ -377,6 +377,8 @@ def test_the_scale_bar_is_as_long_as_it_says(yaw):
 def test_titles_break_between_pieces_and_are_cut_where_one_is_too_long():
     assert wrapped(["one", "", "two"], 8, 1000) == "one  ·  two"
     assert wrapped(["one", "two"], 8, text_width("one · t", 8)) == "one\ntwo"
+    room = text_width("aaaa  ·  bbbb  ·  cccc  ·  d", 8)  # the last piece would stand alone
+    assert wrapped(["aaaa", "bbbb", "cccc", "dddd"], 8, room) == "aaaa  ·  bbbb\ncccc  ·  dddd"
     cut = wrapped(["x" * 500], 8, 200)
     assert cut.endswith("x…")
     assert text_width(cut, 8) <= 200

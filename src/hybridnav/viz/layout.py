@@ -29,6 +29,8 @@ Entry = tuple[Any, str]
 
 BAR_SHARE = 0.2
 """Length of the scale bar at most, as a share of the view's width."""
+_NARROWER = (0.9, 0.8, 0.7, 0.6, 0.5)
+"""Shares of the room that a title is tried in, to make its lines equally long."""
 _HANDLE, _GAP, _BETWEEN = 2.2, 0.6, 1.6  # legend measures, in font sizes
 
 
@@ -40,16 +42,28 @@ def text_width(text: str, font: float, weight: str = "normal") -> float:
 
 
 def wrapped(pieces: Sequence[str], font: float, room: float) -> str:
-    """Pieces joined by dots in as few lines as fit the room, in points; too long ones are cut."""
+    """Pieces joined by dots in as few lines as fit the room, in points, and these about equally
+    long; too long pieces are cut."""
+    fitting = [_cut(piece, font, room) for piece in filter(None, pieces)]
+    lines = _filled(fitting, font, room)
+    for share in _NARROWER:
+        narrower = _filled(fitting, font, share * room)
+        if len(narrower) > len(lines):
+            break
+        lines = narrower
+    return "\n".join(lines)
+
+
+def _filled(pieces: Sequence[str], font: float, room: float) -> list[str]:
+    """Lines as full as they get, one after the other."""
     lines: list[str] = []
-    for piece in filter(None, pieces):
-        fitting = _cut(piece, font, room)
-        longer = f"{lines[-1]}  ·  {fitting}" if lines else fitting
+    for piece in pieces:
+        longer = f"{lines[-1]}  ·  {piece}" if lines else piece
         if lines and text_width(longer, font) <= room:
             lines[-1] = longer
         else:
-            lines.append(fitting)
-    return "\n".join(lines)
+            lines.append(piece)
+    return lines
 
 
 def _cut(text: str, font: float, room: float) -> str:
