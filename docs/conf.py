@@ -33,7 +33,6 @@ autodoc_typehints_format = "short"
 autosummary_generate = False
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
-autodoc_preserve_defaults = True
 python_maximum_signature_line_length = 88
 
 html_theme = "furo"

@@ -17,7 +17,7 @@ import hybridnav as hn
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
-_DOCUMENTED = re.compile(r"^\.\. auto\w+:: hybridnav\.([\w.]+)$", re.MULTILINE)
+_DOCUMENTED = re.compile(r"^\.\. auto\w+:: hybridnav\.([\w.]+)(?:\(\))?$", re.MULTILINE)
 
 
 def _documented() -> list[str]:
