@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from matplotlib.figure import Figure
 
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
@@ -86,9 +87,9 @@ def test_nothing_becomes_of_the_apex(figure1):
 
 
 def test_levels_are_panels_with_their_own_fields(figure1):
-    figure = plot_levels(figure1, [2, 5, -1], columns=2, graph_up_to=30)
-    assert [ax.get_title().split(":")[0] for ax in figure.axes] == ["level 2", "level 5", "level 8"]
-    for ax, index in zip(figure.axes, (2, 5, 8), strict=True):
+    axes = plot_levels(figure1, [2, 5, -1], columns=2, graph_up_to=30)
+    assert [ax.get_title().split(":")[0] for ax in axes] == ["level 2", "level 5", "level 8"]
+    for ax, index in zip(axes, (2, 5, 8), strict=True):
         level = figure1[index]
         image = np.asarray(ax.images[0].get_array())[..., :3].astype(np.int64) @ [65536, 256, 1]
         inside = level.field_of >= 0
@@ -102,7 +103,7 @@ def test_levels_are_panels_with_their_own_fields(figure1):
         assert all(colour_of[tail] != colour_of[head] for tail, head in pairs)
         has_graph = any(artist.get_gid() == "free-dots" for artist in ax.findobj())
         assert has_graph == (level.n_vertices <= 30)
-    boxes = [ax.get_position() for ax in figure.axes]
+    boxes = [ax.get_position() for ax in axes]
     assert boxes[0].x1 < boxes[1].x0
     assert boxes[2].y1 < boxes[0].y0
 
@@ -112,8 +113,16 @@ def test_levels_need_a_level_and_a_column(figure1):
         plot_levels(figure1, [])
     with pytest.raises(hn.InvalidValueError, match="one column"):
         plot_levels(figure1, columns=0)
+    with pytest.raises(hn.InvalidValueError, match="2 levels need as many axes, got 1"):
+        plot_levels(figure1, [0, 1], axes=[Figure().add_subplot()])
     with pytest.raises(IndexError):
         plot_levels(figure1, [99])
+
+
+def test_levels_are_drawn_on_axes_given(figure1):
+    axes = Figure(figsize=(9, 4)).subplots(1, 2).tolist()
+    assert plot_levels(figure1, [2, -1], axes=axes) == tuple(axes)
+    assert tuple(axes[0].figure.get_size_inches()) == (9, 4)
 
 
 def test_a_search_is_drawn_where_it_was_and_only_its_corridor_is_tinted(figure1):

@@ -16,7 +16,10 @@ from hybridnav.viz.topology import Graph, draw_graph, draw_ground, frame_axes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
+
     from hybridnav.pyramid import DualGraphPyramid
+    from hybridnav.viz.canvas import View
 
 GRAPH_UP_TO = 150
 """Vertices up to which a panel shows the graph too: more would cover their own fields."""
@@ -24,18 +27,20 @@ _GAP_IN = 0.1
 _STRENGTH = 0.75
 
 
-def plot_levels(
+def plot_levels(  # noqa: PLR0913 - all but the first have defaults
     pyramid: DualGraphPyramid,
     levels: Sequence[int] | None = None,
     *,
+    axes: Sequence[Axes] | None = None,
     columns: int = 3,
     graph_up_to: int = GRAPH_UP_TO,
     width_in: float = style.FULL_WIDTH_IN,
-) -> Figure:
+) -> tuple[Axes, ...]:
     """Draw levels of a pyramid side by side, each with its fields and, high up, its graph.
 
     Neighbouring fields never have the same colour; unexplored ones are grey. Arcs are drawn as
-    `plot_topology` does: parallel ones in blue, self-loops in red.
+    `plot_topology` does: parallel ones in blue, self-loops in red
+    dashes.
 
     Parameters
     ----------
@@ -44,48 +49,61 @@ def plot_levels(
     levels
         Indices of levels, in the order of the panels; negative ones count from the apex. By default
         all.
+    axes
+        As many axes to draw on; by default new ones in a new figure.
     columns
-        Panels in a row, >= 1.
+        Panels in a row of a new figure, >= 1.
     graph_up_to
         Levels of more vertices are drawn as fields alone.
     width_in
-        Width of the figure in inches; its height follows.
+        Width of a new figure in inches; its height follows.
 
     Returns
     -------
-    Figure
-        A figure with one axes for each level.
+    tuple of Axes
+        The axes drawn on, one for each level; `axes[0].figure` is the figure.
 
     Raises
     ------
     IndexError
         When there is no such level.
     InvalidValueError
-        When there are no levels or no columns.
+        When there are no levels or no columns, or not as many axes as levels.
     """
     chosen = [pyramid[index] for index in (range(len(pyramid)) if levels is None else levels)]
     if not chosen or columns < 1:
         raise InvalidValueError(
             f"expected at least one level and one column, got {len(chosen)} and {columns}"
         )
-    view = known_view(pyramid.grid)
-    rows = math.ceil(len(chosen) / columns)
-    panel_in = (width_in - (columns - 1) * _GAP_IN - 2 * PAD_IN) / columns
-    tall_in = panel_in * float(view.size[1] / view.size[0])
-    font = style.Sizes.fitting(panel_in, 1.0).font
-    row_in = tall_in + 2.0 * font / 72
-    height_in = rows * row_in + (rows - 1) * _GAP_IN + 2 * PAD_IN
-    figure = Figure(figsize=(width_in, height_in))
-    for number, level in enumerate(chosen):
-        row, col = divmod(number, columns)
-        left_in = PAD_IN + col * (panel_in + _GAP_IN)
-        bottom_in = height_in - PAD_IN - (row + 1) * row_in - row * _GAP_IN
-        box = left_in / width_in, bottom_in / height_in, panel_in / width_in, tall_in / height_in
-        canvas = Canvas.opened(figure.add_axes(box), width_in, view)
+    if axes is None:
+        axes = _panels(len(chosen), columns, known_view(pyramid.grid), width_in)
+    elif len(axes) != len(chosen):
+        raise InvalidValueError(f"{len(chosen)} levels need as many axes, got {len(axes)}")
+    for ax, level in zip(axes, chosen, strict=True):
+        canvas = Canvas.opened(ax, width_in, known_view(level.grid))
         draw_ground(canvas, level.grid, level.field_of, Places(level).colours(), _STRENGTH)
         if level.n_vertices <= graph_up_to:
             draw_graph(canvas, Graph(level, 0.0), simple=False)
         frame_axes(canvas)
+        font = canvas.sizes.font
         title = f"level {level.index}: {level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
         canvas.ax.set_title(title, fontsize=font, pad=0.4 * font, color=style.INK)
-    return figure
+    return tuple(axes)
+
+
+def _panels(count: int, columns: int, view: View, width_in: float) -> list[Axes]:
+    """Axes in rows, of the shape of the map, in a new figure that has room for their titles."""
+    rows = math.ceil(count / columns)
+    panel_in = (width_in - (columns - 1) * _GAP_IN - 2 * PAD_IN) / columns
+    tall_in = panel_in * float(view.size[1] / view.size[0])
+    row_in = tall_in + 2.0 * style.Sizes.fitting(panel_in, 1.0).font / 72
+    height_in = rows * row_in + (rows - 1) * _GAP_IN + 2 * PAD_IN
+    figure = Figure(figsize=(width_in, height_in))
+    axes = []
+    for number in range(count):
+        row, col = divmod(number, columns)
+        left_in = PAD_IN + col * (panel_in + _GAP_IN)
+        bottom_in = height_in - PAD_IN - (row + 1) * row_in - row * _GAP_IN
+        box = left_in / width_in, bottom_in / height_in, panel_in / width_in, tall_in / height_in
+        axes.append(figure.add_axes(box))
+    return axes
