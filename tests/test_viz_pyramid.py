@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
@@ -88,7 +89,7 @@ def test_nothing_becomes_of_the_apex(figure1):
 
 def test_levels_are_panels_with_their_own_fields(figure1):
     axes = plot_levels(figure1, [2, 5, -1], columns=2, graph_up_to=30)
-    assert [ax.get_title().split(":")[0] for ax in axes] == ["level 2", "level 5", "level 8"]
+    assert [ax.get_title().split()[:2] for ax in axes] == [["level", n] for n in "258"]
     for ax, index in zip(axes, (2, 5, 8), strict=True):
         level = figure1[index]
         image = np.asarray(ax.images[0].get_array())[..., :3].astype(np.int64) @ [65536, 256, 1]
@@ -117,6 +118,17 @@ def test_levels_need_a_level_and_a_column(figure1):
         plot_levels(figure1, [0, 1], axes=[Figure().add_subplot()])
     with pytest.raises(IndexError):
         plot_levels(figure1, [99])
+
+
+@pytest.mark.parametrize("width", [3.0, 7.0, 12.0])
+def test_titles_of_levels_do_not_collide(figure1, width):
+    axes = plot_levels(figure1, columns=3, width_in=width)
+    figure = axes[0].figure.figure
+    figure.draw_without_rendering()
+    boxes = [box for ax in axes for box in (ax.title.get_window_extent(), ax.get_window_extent())]
+    for first, second in itertools.combinations(boxes, 2):
+        assert Bbox.intersection(first.padded(-1), second.padded(-1)) is None
+    assert all(box.y1 <= figure.bbox.y1 + 1 for box in boxes)
 
 
 def test_levels_are_drawn_on_axes_given(figure1):

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from hybridnav.errors import InvalidValueError
 from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
+from hybridnav.viz.layout import add_title, wrapped
 from hybridnav.viz.places import Places
 from hybridnav.viz.topology import Graph, draw_graph, draw_ground, frame_axes
 
@@ -18,8 +19,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from hybridnav.pyramid import DualGraphPyramid
-    from hybridnav.viz.canvas import View
+    from hybridnav.pyramid import DualGraphPyramid, Level
 
 GRAPH_UP_TO = 150
 """Vertices up to which a panel shows the graph too: more would cover their own fields."""
@@ -76,7 +76,7 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
             f"expected at least one level and one column, got {len(chosen)} and {columns}"
         )
     if axes is None:
-        axes = _panels(len(chosen), columns, known_view(pyramid.grid), width_in)
+        axes = _panels(chosen, columns, width_in)
     elif len(axes) != len(chosen):
         raise InvalidValueError(f"{len(chosen)} levels need as many axes, got {len(axes)}")
     for ax, level in zip(axes, chosen, strict=True):
@@ -85,22 +85,29 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
         if level.n_vertices <= graph_up_to:
             draw_graph(canvas, Graph(level, 0.0), simple=False)
         frame_axes(canvas)
-        font = canvas.sizes.font
-        title = f"level {level.index}: {level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
-        canvas.ax.set_title(title, fontsize=font, pad=0.4 * font, color=style.INK)
+        add_title(canvas, _words(level))
     return tuple(axes)
 
 
-def _panels(count: int, columns: int, view: View, width_in: float) -> list[Axes]:
+def _words(level: Level) -> list[str]:
+    """Pieces of a panel's title."""
+    return [f"level {level.index}", f"{level.n_vertices:,} vertices", f"{level.n_arcs:,} arcs"]
+
+
+def _panels(levels: Sequence[Level], columns: int, width_in: float) -> list[Axes]:
     """Axes in rows, of the shape of the map, in a new figure that has room for their titles."""
-    rows = math.ceil(count / columns)
+    view = known_view(levels[0].grid)
+    rows = math.ceil(len(levels) / columns)
     panel_in = (width_in - (columns - 1) * _GAP_IN - 2 * PAD_IN) / columns
     tall_in = panel_in * float(view.size[1] / view.size[0])
-    row_in = tall_in + 2.0 * style.Sizes.fitting(panel_in, 1.0).font / 72
+    font = style.Sizes.fitting(panel_in, 1.0).font
+    room = 72 * (panel_in - 2 * PAD_IN)
+    lines = max(wrapped(_words(level), font, room).count("\n") + 1 for level in levels)
+    row_in = tall_in + (0.6 + 1.4 * lines) * font / 72
     height_in = rows * row_in + (rows - 1) * _GAP_IN + 2 * PAD_IN
     figure = Figure(figsize=(width_in, height_in))
     axes = []
-    for number in range(count):
+    for number in range(len(levels)):
         row, col = divmod(number, columns)
         left_in = PAD_IN + col * (panel_in + _GAP_IN)
         bottom_in = height_in - PAD_IN - (row + 1) * row_in - row * _GAP_IN
