@@ -150,8 +150,8 @@ def soak(plans: int, *, seed: int = 0) -> dict[str, float]:
         longest = max(longest, time.perf_counter() - began)
         unsolved += not result.solved and result.status is not hn.PlanStatus.NO_PATH
         if number == max(plans // 100, 1):
-            before = _resident(os.getpid()) + _resident(worker._process.pid)  # noqa: SLF001
-    gained = _resident(os.getpid()) + _resident(worker._process.pid) - before  # noqa: SLF001
+            before = _resident(os.getpid()) + _resident(worker._running.process.pid)  # noqa: SLF001
+    gained = _resident(os.getpid()) + _resident(worker._running.process.pid) - before  # noqa: SLF001
     return {"plans": plans, "unsolved": unsolved, "longest_s": longest, "gained_bytes": gained}
 
 

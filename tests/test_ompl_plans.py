@@ -346,7 +346,7 @@ def test_two_thousand_plans_leak_and_hang_nowhere(
     planner_of: Any, office: hn.TopologicalMap
 ) -> None:
     made = planner_of("ompl-rrtconnect", "budget_s=0.25")
-    pids = (os.getpid(), made._ompl._worker._process.pid)
+    pids = (os.getpid(), made._ompl._worker._running.process.pid)
     rng = np.random.default_rng(0)
     free = np.argwhere(office.grid.classes == hn.CellClass.FREE)
 
@@ -366,3 +366,34 @@ def test_drawn_maps_without_a_way_have_no_path() -> None:
         hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl-rrtconnect"
     )
     assert made.plan((0.5, 0.5), (8.5, 0.5)).status is hn.PlanStatus.NO_PATH
+
+
+def test_words_and_route_are_those_of_the_path_that_ompl_found() -> None:
+    """The coarse way takes the narrow door, which the robot cannot turn into."""
+    free = np.zeros((60, 122), dtype=np.bool_)
+    free[2:58, 50:60] = free[2:58, 62:120] = True
+    free[14:20, 60:62] = free[32:56, 60:62] = True
+    labels = np.where(np.arange(122) <= 60, 0, 1) * np.ones((60, 1), dtype=np.int32)
+    grid = hn.OccupancyGrid((~free).astype(np.float32), hn.Frame(0.1), robot_radius_m=0.25)
+    rooms = hn.RoomLabels(("left", "right"), labels.astype(np.int32))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=rooms))
+    robot = "[[0.6, 0.25], [-0.6, 0.25], [-0.6, -0.25], [0.6, -0.25]]"
+    settings = f"{{space: se2, footprint: '{robot}', budget_s: 5}}"
+    preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
+    made = hn.HybridPlanner(topology, preset=preset)
+    tour = hn.plan_tour(made, [(5.5, 2.2, 1.57), (7.5, 2.4, 1.57)])
+    result = tour.results[0]
+    assert result.refinement is not None
+    assert result.refinement.steps[-1] == "widened corridor: solved"
+    path: Any = result.path
+    (side,) = np.flatnonzero(np.diff(np.sign(path.points[:, 0] - 6.1)))
+    (x0, y0), (x1, y1) = path.points[side : side + 2]
+    at = y0 + (6.1 - x0) / (x1 - x0) * (y1 - y0)
+    rows = path.cells[np.isin(path.cells[:, 1], (60, 61)), 0]
+    assert np.abs((rows + 0.5) * 0.1 - at).max() < 0.3
+    assert (np.abs(np.diff(path.cells, axis=0)).max(axis=1) == 1).all()
+    (door,) = [leg.door for leg in tour.legs if leg.door is not None]
+    narrow, wide = topology.rooms.doors
+    assert (narrow.width_m, wide.width_m) == pytest.approx((0.5, 2.1))
+    assert 3.2 < at < 5.6
+    assert door == wide

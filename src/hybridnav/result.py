@@ -46,7 +46,7 @@ class Path:
 
     cells: LongArray
     """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. Of an
-    any-angle path those of the cell path that was shortened."""
+    path shortened by line of sight those of the cell path that was shortened."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
     where an any-angle path turns."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.grid.lines import cells_of_line
 from hybridnav.metrics.judge import (
     Verdict,
     checked_points,
@@ -20,15 +20,13 @@ from hybridnav.metrics.judge import (
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._typing import FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
 Cell = tuple[int, int]
 
 _NEAR_CELLS = 2.0**-20
 """How far from the centre of its cell an end may be."""
-_SLIVER_CELLS = 1e-9
-"""Pieces of a line below this are rounding: the line passes the corner of a cell."""
 
 
 def judge_line(
@@ -98,40 +96,8 @@ def line_cells(
         When the points are no finite array of shape (n, 2) or there is none.
     """
     positions = grid_positions(grid.frame, checked_points(points))
-    free = np.pad(free_classes(allow_unexplored=allow_unexplored)[grid.classes], 1)
-    pieces = [_middles(*ends) for ends in itertools.pairwise(positions)]
-    cells = _free_cells_at(free, np.concatenate([positions[:1], *pieces, positions[-1:]]))
-    moved = np.ones(len(cells), dtype=np.bool_)
-    moved[1:] = (cells[1:] != cells[:-1]).any(axis=1)
-    passed: LongArray = cells[moved]
-    return passed
-
-
-def _middles(start: FloatArray, end: FloatArray) -> FloatArray:
-    """The middle of each piece of a segment between two lines of the lattice."""
-    way = end - start
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    cuts = [np.array([0.0, 1.0])]
-    for axis in np.flatnonzero(way):
-        lines = np.arange(math.ceil(low[axis]), math.floor(high[axis]) + 1)
-        cuts.append((lines - start[axis]) / way[axis])
-    along = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
-    whole = np.diff(along) * np.hypot(*way) > _SLIVER_CELLS
-    at = ((along[:-1] + along[1:]) / 2)[whole]
-    middles: FloatArray = start + at[:, None] * way
-    return middles
-
-
-def _free_cells_at(free: BoolArray, positions: FloatArray) -> LongArray:
-    """A free cell at each position, of the map whose padded free cells are given."""
-    above = np.floor(positions).astype(np.int64)
-    below = np.ceil(positions).astype(np.int64) - 1
-    cells = above.copy()
-    # Where a position lies on lines of the lattice the cells beside it are tried in turn.
-    for rows, cols in ((above, below), (below, above), (below, below)):
-        walled = ~free[tuple((cells + 1).T)]
-        cells[walled] = np.column_stack([rows[walled, 0], cols[walled, 1]])
-    return cells
+    free = free_classes(allow_unexplored=allow_unexplored)[grid.classes]
+    return cells_of_line(free, positions)
 
 
 def _wrong_ends(grid: OccupancyGrid, xy: FloatArray, start: Cell, goal: Cell) -> list[str]:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+import threading
 import time
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_plans import MaxDistance, OverPortals
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
@@ -103,6 +106,7 @@ class OmplPlanner:
         self._settings = settings
         self.ompl = settings.ompl
         self._field_of = field_of
+        self._one_at_a_time = threading.Lock()
         self._worker = Worker(Setup(grid, field_of, self.ompl, settings.allow_unexplored))
         self._warm_up()
 
@@ -134,20 +138,22 @@ class OmplPlanner:
         if refused is not None:
             nothing = Refinement((), by_grid=False, trace=(), iterations=0)
             return OmplPlan(refused, self._metric, None, None, math.inf, nothing)
-        query = Query(
-            start=ends[0],
-            goal=ends[1],
-            cells=cells,
-            deadline_s=time.monotonic() + max(self.ompl.budget_s - spent_s, 0.0),
-            corridors=self._corridors(cells),
-            closed=closed,
-            tells_search=tells_search,
-        )
-        self._worker.send(query)
-        # Made while the worker is at it, so that there is a path when its time is over.
-        is_late = self._worker.is_late()
-        by_line = self._by_line_of_sight(cells, ends, closed) if is_late else None
-        reply = self._worker.reply()
+        with self._one_at_a_time:
+            self._worker.ensure()
+            query = Query(
+                start=ends[0],
+                goal=ends[1],
+                cells=cells,
+                deadline_s=time.monotonic() + max(self.ompl.budget_s - spent_s, 0.0),
+                corridors=self._corridors(cells),
+                closed=closed,
+                tells_search=tells_search,
+            )
+            self._worker.send(query)
+            # Made while the worker is at it, so that there is a path when its time is over.
+            is_late = self._worker.is_late()
+            by_line = self._by_line_of_sight(cells, ends, closed) if is_late else None
+            reply = self._worker.reply()
         steps, by_grid = list(reply.steps), False
         path = self._path(cells, reply) if len(reply.points) else None
         status = _STATUS[reply.outcome]
@@ -168,8 +174,21 @@ class OmplPlanner:
         )
 
     def close(self) -> None:
-        """End the process; the next query starts another."""
+        """End the process; the next query waits for another."""
         self._worker.close()
+
+    def __reduce__(self) -> Any:
+        """Refuse to be copied.
+
+        Raises
+        ------
+        InvalidValueError
+            Always: it holds a process.
+        """
+        raise InvalidValueError(
+            "a planner with OMPL holds a process and cannot be copied or pickled: make another one "
+            "of its topology and preset"
+        )
 
     def _refused(self, ends: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
         """Status of a query at one of whose ends the footprint does not fit."""
@@ -256,7 +275,17 @@ class OmplPlanner:
                 pieces.append(curve.poses(self._grid.resolution_m)[1:])
             states = np.concatenate(pieces)
         headings = states[:, 2].copy() if self.ompl.has_heading else None
-        return Path(cells, states[:, :2].copy(), reply.length_m, headings)
+        points = states[:, :2].copy()
+        return Path(self._passed(points, cells), points, reply.length_m, headings)
+
+    def _passed(self, points: FloatArray, cells: LongArray) -> LongArray:
+        """The cells that a path passes; those it was made from where its points, which follow a
+        curve from chord to chord, touch a cell that may not be entered."""
+        free = self._free
+        positions = np.array([self._grid.frame.position_of(*point) for point in points.tolist()])
+        passed = cells_of_line(free, positions)
+        inside = ((passed >= 0) & (passed < free.shape)).all()
+        return passed if inside and free[tuple(passed.T)].all() else cells
 
     def _by_line_of_sight(
         self, cells: LongArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
@@ -272,7 +301,7 @@ class OmplPlanner:
         steps = np.diff(points, axis=0)
         length_m = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
         if not self.ompl.has_heading:
-            return Path(cells, points, length_m)
+            return Path(self._passed(points, cells), points, length_m)
         # Turn on the spot at every bend, drive ahead between.
         ahead = np.repeat(np.arctan2(steps[:, 1], steps[:, 0]), 2)
         headings = np.concatenate([[ends[0][2]], ahead, [ends[1][2]]])
@@ -280,7 +309,7 @@ class OmplPlanner:
         poses = np.column_stack([points, headings])
         if not self._check.confined(closed=closed).path_valid(poses):
             return None
-        return Path(cells, points, length_m, headings)
+        return Path(self._passed(points, cells), points, length_m, headings)
 
     def _weighted_cost(self, path: Path | None) -> float | None:
         if path is None or self._clearance is None:
@@ -293,6 +322,10 @@ class OmplPlanner:
             return None
         allowed = self._settings.allow_unexplored
         return Clearance(self._grid, self.ompl, allow_unexplored=allowed)
+
+    @cached_property
+    def _free(self) -> BoolArray:
+        return self._grid.enterable(allow_unexplored=self._settings.allow_unexplored)
 
     @cached_property
     def _check(self) -> MotionCheck:

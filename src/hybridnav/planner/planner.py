@@ -49,7 +49,8 @@ _BAD_GOAL = {
 
 
 class HybridPlanner:
-    """Plans paths between points of one map by a preset.
+    """Plans paths between points of one map by a preset; one query after the other, for searches
+    share what they write to.
 
     Parameters
     ----------
@@ -109,7 +110,8 @@ class HybridPlanner:
             in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis, and
             named ends face the way; in its other spaces the third number means nothing.
         smooth
-            `"line-of-sight"` shortens the path to an any-angle one; None as the preset says.
+            `"line-of-sight"` shortens the path to an any-angle one; None as the preset says. Of no
+            effect with OMPL, whose paths are any-angle ones.
         blocked
             What is closed for this query: a `Blocked`, a shapely geometry in metres, or a mapping
             with keys of `Blocked`. Where it lies in the way the whole map is searched.
@@ -128,6 +130,7 @@ class HybridPlanner:
             When a point is not two finite numbers, a name is not known, or what is blocked is not
             on the map.
         """
+        began = time.perf_counter()
         if isinstance(start, str) or isinstance(goal, str):
             from hybridnav.planner.named import stop_points  # noqa: PLC0415 - most queries are points
 
@@ -156,7 +159,7 @@ class HybridPlanner:
         if closed is not None and plan.cells is not None:
             plan = self._round(closed, plan, first, last)
         if self._ompl is not None and plan.cells is not None:
-            return self._by_ompl(self._ompl, plan, poses, closed)
+            return self._by_ompl(self._ompl, plan, poses, closed, began)
         return self._result(plan, ends, finish, closed)
 
     def plan_many(
@@ -187,7 +190,7 @@ class HybridPlanner:
         return plan_many(self, cells, first, last, finish)
 
     def close(self) -> None:
-        """End the process that a preset with OMPL plans in; the next query starts another."""
+        """End the process that a preset with OMPL plans in; the next query waits for another."""
         if self._ompl is not None:
             self._ompl.close()
 
@@ -274,13 +277,17 @@ class HybridPlanner:
         plan: CellPlan,
         poses: tuple[FloatArray, FloatArray],
         closed: LongArray | None,
+        began: float,
     ) -> PlanResult:
         """The coarse path refined by OMPL."""
         assert plan.cells is not None  # noqa: S101 - the caller has looked
         ends = poses[0][:2], poses[1][:2]
-        began = time.perf_counter()
-        found = planner.plan(plan.cells, poses, closed, spent_s=sum(plan.seconds.values()))
-        seconds = {**plan.seconds, "ompl": time.perf_counter() - began}
+        now = time.perf_counter()
+        found = planner.plan(plan.cells, poses, closed, spent_s=now - began)
+        seconds = {**plan.seconds, "ompl": time.perf_counter() - now}
+        source = self._route_source(plan)
+        if source is not None and found.path is not None:
+            source = partial(self._walked, found.path.cells)
         bound = max(found.lower_bound, self._any_angle_bound(plan.cells, ends))
         if found.path is not None and found.status is PlanStatus.SOLVED:
             bound = min(bound, found.weighted_cost or found.path.length_m)
@@ -288,7 +295,7 @@ class HybridPlanner:
             found.status,
             metric=found.metric,
             path=found.path,
-            route_source=self._route_source(plan),
+            route_source=source,
             lower_bound=bound,
             weighted_cost=found.weighted_cost,
             refinement=found.refinement,

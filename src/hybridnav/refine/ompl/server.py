@@ -143,6 +143,8 @@ def _run(base: Base, query: Query, replies: Connection) -> None:
 
 
 if __name__ == "__main__":
+    # Whoever ignores the ends of children hands that on, and no child could be waited for.
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     # The planner's process closes the connection when it is done, or is gone.
     with contextlib.suppress(EOFError, OSError):
         serve(Connection(int(sys.argv[1])))

@@ -50,7 +50,10 @@ def require_ompl() -> None:
 
 
 class Worker:
-    """A process that answers queries on one map, started anew after it had to be given up.
+    """A process that answers queries on one map, one after the other.
+
+    It is started anew where it died, owed an answer for long or was closed, and in a process that
+    was forked from the one it belongs to.
 
     Parameters
     ----------
@@ -69,39 +72,51 @@ class Worker:
         self._until = self._late = 0.0
         self._number = self._answered = 0
         self._best = without_answer()
-        self._starting: threading.Thread | None = None
-        self._problem: str | None = None
-        self._start()
-        self._raise_problem()
+        self._running: _Running | None = None
+        self._starting: _Start | None = None
+        self._problem = ""
+        self._start_and_wait()
+        if self._running is None:
+            raise OmplError(self._problem)
+
+    def ensure(self) -> None:
+        """Have a process, before the time of a query runs.
+
+        Where it was closed, or belongs to the process that this one was forked from, a new one is
+        waited for. Where it died it is started beside the next query, which has its own time.
+        """
+        running = self._running
+        if running is not None and running.owner != os.getpid():
+            self._answered = self._number
+            self._running = self._starting = None
+            self._start_and_wait()
+            return
+        owes = not self._has_ended(0.0) and time.monotonic() > self._until + _PATIENCE_S
+        if running is not None and (owes or running.has_ended()):
+            self.close()
+            self._start_beside()
+        elif running is None and self._starting is None:
+            if self._problem:
+                self._start_beside()
+            else:
+                self._start_and_wait()
 
     def send(self, query: Query) -> None:
-        """Give the process a query; `reply` waits for what comes of it.
-
-        Where the process died, or owes an answer for long, a new one is started, and the query
-        waits for it no longer than for a reply.
-
-        Raises
-        ------
-        OmplError
-            When the new process does not start.
-        """
+        """Give the process a query; `reply` waits for what comes of it."""
         left_s = query.deadline_s - time.monotonic()
-        owes = not self._has_ended(0.0)
-        given_up = owes and time.monotonic() > self._until + _PATIENCE_S
         self._until = query.deadline_s + _GRACE * max(left_s, 0.0)
         if query.tells_search:
             self._until += SEARCH_S
         self._late = query.deadline_s - _LATE * max(left_s, 0.0)
-        if self._starting is None and (given_up or self._is_dead()):
-            self.close()
-            self._answered = self._number
-            self._starting = threading.Thread(target=self._start, daemon=True)
-            self._starting.start()
         self._number += 1
         self._best = without_answer()
-        if self._is_up():
+        if self._starting is not None:
+            self._starting.join(max(self._late - time.monotonic(), 0.0))
+            if not self._starting.is_alive():
+                self._take(self._starting)
+        if self._running is not None:
             with contextlib.suppress(OSError):
-                self._connection.send((self._number, query))
+                self._running.connection.send((self._number, query))
 
     def is_late(self) -> bool:
         """Wait for the reply until most of the time is over; whether it still has not come."""
@@ -112,70 +127,114 @@ class Worker:
         best so far, which says that no other came."""
         if self._has_ended(self._until):
             return self._best
-        return ended(self._best, "the worker did not answer in time")
+        return ended(self._best, self._problem or "the worker did not answer in time")
 
     def close(self) -> None:
         """End the process and what it forked."""
-        self._finalizer()
+        if self._starting is not None:
+            self._starting.give_up()
+        if self._running is not None:
+            self._running.end()
+        self._running = self._starting = None
+        self._answered, self._problem = self._number, ""
 
     def _has_ended(self, until_s: float) -> bool:
         """Wait for the last reply to the last query; what comes of earlier ones is dropped."""
+        running = self._running
+        if running is None:
+            return self._answered == self._number
         try:
             while self._answered < self._number:
-                left_s = max(until_s - time.monotonic(), 0.0)
-                if self._starting is not None or not self._connection.poll(left_s):
+                if not running.connection.poll(max(until_s - time.monotonic(), 0.0)):
                     return False
-                number, reply = self._connection.recv()
+                number, reply = running.connection.recv()
                 if number == self._number:
                     self._best = reply
                 if reply.is_last:
                     self._answered = number
         except (EOFError, OSError):
-            self.close()
+            running.end()
             return False
-        return True
-
-    def _is_dead(self) -> bool:
-        return not self._finalizer.alive or self._process.poll() is not None
-
-    def _is_up(self) -> bool:
-        """Wait for a process that is being started until a reply would be late."""
-        if self._starting is not None:
-            self._starting.join(max(self._late - time.monotonic(), 0.0))
-            if self._starting.is_alive():
-                return False
-            self._starting = None
-            self._raise_problem()
-        return True
-
-    def _start(self) -> None:
-        """Start a process and wait until it is ready; `_problem` says why it is not."""
-        ours, theirs = socket.socketpair()
-        with theirs:
-            self._process = _launch(theirs.fileno())
-        self._connection = Connection(ours.detach())
-        self._finalizer = weakref.finalize(self, _end, self._process, self._connection)
-        self._problem = (
-            "the process that runs OMPL does not start; "
-            "`python -c 'import ompl.geometric'` may say why"
-        )
-        with contextlib.suppress(EOFError, OSError):
-            self._connection.send(self._setup)
-            if self._connection.poll(_START_S):
-                refusal = self._connection.recv()
-                self._problem = None if refusal is None else refusal.reason
-
-    def _raise_problem(self) -> None:
-        if self._problem is not None:
+        except BaseException:
+            # Half a message was read, as when the user interrupts: the rest means nothing.
             self.close()
-            raise OmplError(self._problem)
+            raise
+        return True
+
+    def _start_and_wait(self) -> None:
+        starting = _Start(self._setup)
+        starting.run()
+        self._take(starting)
+
+    def _start_beside(self) -> None:
+        self._starting = _Start(self._setup)
+        self._starting.start()
+
+    def _take(self, starting: _Start) -> None:
+        self._starting, self._problem = None, starting.problem
+        if starting.process is not None and not starting.problem:
+            self._running = _Running(self, starting.process, starting.connection)
+
+
+_NO_START = (
+    "the process that runs OMPL does not start; `python -c 'import ompl.geometric'` may say why"
+)
+
+
+class _Start(threading.Thread):
+    """A start of the process, which takes seconds; `problem` says afterwards why it failed."""
+
+    def __init__(self, setup: Setup) -> None:
+        super().__init__(daemon=True)
+        self._setup = setup
+        self._is_given_up = False
+        self.problem = ""
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def run(self) -> None:
+        """Start the process and wait until it is ready."""
+        try:
+            ours, theirs = socket.socketpair()
+            self.connection = Connection(ours.detach())
+            with theirs:
+                self.process = _launch(theirs.fileno())
+            self.connection.send(self._setup)
+            refusal = self.connection.recv() if self.connection.poll(_START_S) else _NO_START
+            self.problem = "" if refusal is None else getattr(refusal, "reason", _NO_START)
+        except Exception as error:  # noqa: BLE001 - no process or thread, too many files, at exit
+            self.problem = f"{_NO_START} ({error})" if str(error) else _NO_START
+        if self.process is not None and (self.problem or self._is_given_up):
+            _end(self.process, self.connection, os.getpid())
+
+    def give_up(self) -> None:
+        """End what was started, now or when it is there."""
+        self._is_given_up = True
+        if not self.is_alive() and self.process is not None:
+            _end(self.process, self.connection, os.getpid())
+
+
+class _Running:
+    """A process that answers; it ends with the worker, and with the process that started it."""
+
+    def __init__(
+        self, worker: Worker, process: subprocess.Popen[bytes], connection: Connection
+    ) -> None:
+        self.connection = connection
+        self.owner = os.getpid()
+        self.process = process
+        self.end = weakref.finalize(worker, _end, process, connection, self.owner)
+
+    def has_ended(self) -> bool:
+        """Whether it was ended, or died."""
+        return not self.end.alive or self.process.poll() is not None
 
 
 def _launch(descriptor: int) -> subprocess.Popen[bytes]:
     # By its own command: a spawned process of multiprocessing would run the caller's main module.
+    # Without the working directory, whose files may have the names of modules.
     paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
     return subprocess.Popen(  # noqa: S603 - this interpreter and a module of our own
-        [sys.executable, "-m", "hybridnav.refine.ompl.server", str(descriptor)],
+        [sys.executable, "-P", "-m", "hybridnav.refine.ompl.server", str(descriptor)],
         pass_fds=[descriptor],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
@@ -184,9 +243,11 @@ def _launch(descriptor: int) -> subprocess.Popen[bytes]:
     )
 
 
-def _end(process: subprocess.Popen[bytes], connection: Connection) -> None:
+def _end(process: subprocess.Popen[bytes], connection: Connection, owner: int) -> None:
     with contextlib.suppress(OSError):
         connection.close()
+    if os.getpid() != owner:
+        return  # forked, as by multiprocessing: the process is the parent's
     with contextlib.suppress(OSError):
         os.killpg(process.pid, signal.SIGKILL)  # its session, so what it forked too
     with contextlib.suppress(subprocess.TimeoutExpired):
