@@ -125,11 +125,8 @@ def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
             read.seeds[number] = _xy(entry["seed"], f"{at}: seed")
             continue
         rings = [entry["polygon"]] if "polygon" in entry else entry["polygons"]
-        corners = [
-            np.array([_xy(corner, f"{at}: polygon") for corner in _list_of(ring, f"{at}: polygon")])
-            for ring in _list_of(rings, f"{at}: polygons")
-        ]
-        read.outlines[number] = _checked([in_cells(ring, grid) for ring in corners], at, grid)
+        outlines = [_ring(ring, f"{at}: polygon") for ring in _list_of(rings, f"{at}: polygons")]
+        read.outlines[number] = _checked([in_cells(ring, grid) for ring in outlines], at, grid)
     taken = {*read.points, *read.names}
     for entry in _list_of(values.get("points", []), f"{where}: points"):
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
@@ -289,6 +286,12 @@ def _list_of(value: Any, at: str) -> list[Any]:
     if not isinstance(value, list):
         raise RoomsError(f"{at}: expected a list, got {reprlib.repr(value)}")
     return value
+
+
+def _ring(value: Any, at: str) -> FloatArray:
+    """Corners in metres, float64 (n, 2), none of an empty list."""
+    corners = [_xy(corner, at) for corner in _list_of(value, at)]
+    return np.array(corners, dtype=np.float64).reshape(-1, 2)
 
 
 _FARTHEST = 1e9
