@@ -325,6 +325,33 @@ def test_rooms_that_could_not_be_read_again_are_not_written(grid, tmp_path):
         hn.save_rooms(tmp_path / "rooms.yaml", RoomLabels(("a",), full.label_of), fat)
 
 
+def test_a_disc_that_is_full_leaves_the_file_that_was_there(grid, write, tmp_path):
+    resource = pytest.importorskip("resource")
+    path = write(two())
+    before = path.read_bytes()
+    rooms = hn.load_rooms(path, grid)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
+    try:
+        with pytest.raises(hn.RoomsError, match="cannot write"):
+            hn.save_rooms(path, rooms, grid)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_file_that_is_replaced_keeps_its_mode_and_the_link_to_it(grid, write, tmp_path):
+    path = write(two())
+    path.chmod(0o640)
+    link = tmp_path / "link.yaml"
+    link.symlink_to(path)
+    hn.save_rooms(link, hn.load_rooms(path, grid), grid)
+    assert link.is_symlink()
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert path.read_text().startswith("# Rooms of")
+
+
 def test_rooms_without_cells_or_a_folder_are_not_written(grid, tmp_path):
     empty = RoomLabels(("a",), np.full(FLAT.shape, -1, dtype=np.int32))
     with pytest.raises(hn.RoomsError, match="'a'"):

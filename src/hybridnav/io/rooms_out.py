@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,9 +65,25 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
             f"at most {LIMITS.max_values} and {LIMITS.max_bytes} are read"
         )
     try:
-        Path(path).write_text(text, encoding="utf-8")
+        _replace(Path(path), text)
     except OSError as error:
         raise RoomsError(f"{where}: cannot write: {error.strerror}") from None
+
+
+def _replace(path: Path, text: str) -> None:
+    """Write a file whole or not at all: names given by hand outlive a full disc."""
+    if path.exists() and not path.is_file():  # a pipe or a terminal has nothing to lose
+        path.write_text(text, encoding="utf-8")
+        return
+    path = path.resolve()  # a link stays a link
+    beside = path.with_name(f".{path.name[:200]}.{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        if path.exists():
+            shutil.copymode(path, beside)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _rings_to_write(rooms: RoomLabels, where: str, grid: OccupancyGrid) -> list[list[FloatArray]]:
