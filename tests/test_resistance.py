@@ -1,5 +1,7 @@
 """Contraction that narrow boundaries resist: levels of the pyramid like all others."""
 
+from typing import Any
+
 import networkx as nx
 import numpy as np
 import pytest
@@ -120,6 +122,19 @@ def test_shares_and_clearances_that_mean_nothing_are_refused(share):
         Resistance(np.zeros((2, 2)), share)
     with pytest.raises(hn.InvalidValueError, match="finite"):
         Resistance(np.full((2, 2), np.inf), 0.5)
+
+
+def test_a_clearance_may_be_lists_and_must_be_rows_of_columns():
+    grid = occupancy_grid(np.ones((2, 3), dtype=np.uint8))
+    rows: Any = [[1, 1, 0], [1, 1, 0]]
+    built = [
+        hn.DualGraphPyramid.build(grid, resistance=Resistance(clearance, 0.8))
+        for clearance in (rows, np.array(rows, dtype=np.float64))
+    ]
+    np.testing.assert_array_equal(built[0][-1].field_of, built[1][-1].field_of)
+    for wrong in ([1.0, 2.0], [[1.0], [1.0, 2.0]], [["a"]]):
+        with pytest.raises(hn.InvalidValueError, match="clearance"):
+            Resistance(wrong, 0.8)  # type: ignore[arg-type]
 
 
 def test_a_resistance_of_another_map_or_with_rooms_is_refused():

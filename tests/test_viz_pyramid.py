@@ -156,6 +156,18 @@ def test_a_search_is_drawn_where_it_was_and_only_its_corridor_is_tinted(figure1)
     assert {"states drawn", "motions of the trees", "path", "corridor"} <= set(labels(ax))
 
 
+@pytest.mark.parametrize("given", [np.int64, np.uint8, list])
+def test_a_corridor_of_numbers_tints_the_cells_that_a_mask_tints(figure1, given):
+    corridor = np.zeros(figure1.grid.shape, dtype=np.bool_)
+    corridor[2:9, 2:12] = True
+    numbers = corridor.astype(int).tolist() if given is list else corridor.astype(given)
+    drawn, tinted = (
+        np.asarray(plot_search(figure1.grid, None, corridor=mask).images[0].get_array())
+        for mask in (corridor, numbers)
+    )
+    np.testing.assert_array_equal(tinted, drawn)
+
+
 def test_a_search_that_looked_at_nothing_and_a_corridor_of_another_map(figure1):
     ax = plot_search(figure1.grid, None)
     assert "0 states" in ax.get_title()

@@ -36,7 +36,8 @@ class Resistance:
     Raises
     ------
     InvalidValueError
-        When the clearance is not finite or negative, or the share is not in that range.
+        When the clearance has another shape, is not finite or negative, or the share is not in
+        that range.
     """
 
     clearance: FloatArray
@@ -45,8 +46,16 @@ class Resistance:
     def __post_init__(self) -> None:
         if not 0 < self.share <= 1:
             raise InvalidValueError(f"share must be above 0 and at most 1, got {self.share}")
-        if not (np.isfinite(self.clearance) & (self.clearance >= 0)).all():
+        try:
+            clearance = np.array(self.clearance, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InvalidValueError("clearance must be an array of numbers (rows, cols)") from None
+        if clearance.ndim != 2:  # noqa: PLR2004
+            raise InvalidValueError(f"clearance must be (rows, cols), got {clearance.shape}")
+        if not (np.isfinite(clearance) & (clearance >= 0)).all():
             raise InvalidValueError("clearance must be finite and >= 0 in every cell")
+        clearance.flags.writeable = False
+        object.__setattr__(self, "clearance", clearance)
 
     def peaks(self, field_of: IntArray, n_vertices: int) -> FloatArray:
         """float64 (n_vertices,), greatest clearance in each field.

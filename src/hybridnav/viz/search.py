@@ -70,10 +70,12 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     InvalidValueError
         When the corridor has another shape than the grid.
     """
-    if corridor is not None and corridor.shape != grid.shape:
-        raise InvalidValueError(
-            f"the corridor has {corridor.shape} cells, the grid has {grid.shape}"
-        )
+    if corridor is not None:
+        corridor = np.asarray(corridor, dtype=np.bool_)
+        if corridor.shape != grid.shape:
+            raise InvalidValueError(
+                f"the corridor has {corridor.shape} cells, the grid has {grid.shape}"
+            )
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     _draw_ground(canvas, grid, corridor)
     n_states = 0 if search is None else len(search.states)
