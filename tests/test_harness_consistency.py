@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hybridnav.baselines.grid import GridAstar
 from hybridnav.config import Preset
 from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
@@ -293,3 +294,20 @@ def test_a_reference_that_finds_no_path_where_there_is_one_is_caught():
     assert judge.oracles(answer, pair, length_m)[1] == [
         "the optimum by scipy is 4.000000 m, not inf m"
     ]
+
+
+class Held(GridAstar):
+    """A method of one's own that holds something until it is closed."""
+
+    is_held = True
+
+    def close(self):
+        """Let go of it."""
+        self.is_held = False
+
+
+def test_whatever_method_has_something_to_close_is_closed():
+    method = Held(ROOMS)
+    Prepared(method, None, 0, 0).close()
+    assert not method.is_held
+    Prepared(GridAstar(ROOMS), None, 0, 0).close()

@@ -66,7 +66,8 @@ class Answer:
 
 
 class Method(Protocol):
-    """One method prepared for one map. Preparation happens when it is made."""
+    """One method prepared for one map. Preparation happens when it is made; where it has a `close`,
+    that is called when no more is asked."""
 
     @property
     def name(self) -> str:

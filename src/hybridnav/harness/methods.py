@@ -258,8 +258,9 @@ class Prepared:
 
     def close(self) -> None:
         """End the processes that it has; it answers no more."""
-        if isinstance(self.method, HybridMethod):
-            self.method.close()
+        close = getattr(self.method, "close", None)
+        if callable(close):
+            close()
 
 
 def prepare(spec: MethodSpec, grid: OccupancyGrid) -> Prepared:
