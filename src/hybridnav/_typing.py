@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
 IntArray = NDArray[np.int32]
-IndexArray = NDArray[np.intp]
 LongArray = NDArray[np.int64]
 KeyArray = NDArray[np.uint64]
 FloatArray = NDArray[np.float64]

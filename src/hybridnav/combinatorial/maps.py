@@ -9,7 +9,6 @@ import numpy as np
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +34,6 @@ class CombinatorialMap:
     def __post_init__(self) -> None:
         for array in (self.sigma, self.origin, self.protected, self.base_edge):
             array.flags.writeable = False
-
-    @classmethod
-    def of_grid(cls, grid: OccupancyGrid) -> CombinatorialMap:
-        """Build the base map of a grid: free and unexplored cells, joined to their 4 neighbours.
-
-        Vertices and edges are numbered in the order of flat cells. Sigma runs east, north, west,
-        south, seen with y upwards.
-        """
-        from hybridnav.combinatorial import _kernels  # noqa: PLC0415 - numba loads on first use
-
-        vertex, edge, n_vertices, n_edges = _kernels.number_base(grid.classes)
-        darts = _kernels.base_darts(grid.classes, vertex, edge, n_edges)
-        return cls(darts.sigma, darts.origin, darts.protected, darts.base_edge, n_vertices)
 
     @property
     def n_edges(self) -> int:

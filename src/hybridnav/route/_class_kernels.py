@@ -265,7 +265,6 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, room)
     Returns the states, the tree, the states at the goal in the order of cost, and the reason.
     """
     start, goal = ends
-    stride = apart
     head = np.full(moves.size, np.int32(-1), np.int32)
     tree = new_tree(room)
     states = new_states(room)
@@ -302,7 +301,7 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, room)
             states.jump[state] = further if even else before
             states.run[state] = states.run[before] if states.word[before] == word else state
         # Farther off than the cell itself only now and then, and all along a path that is found.
-        reach = apart if states.depth[state] % stride == 0 else 0
+        reach = apart if states.depth[state] % apart == 0 else 0
         winds = _winds(states, tree, letters, of_edge, moves, head, state, reach, cols)
         if winds == 0 and cell == goal:
             passed = np.int64(state)
