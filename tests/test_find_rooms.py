@@ -147,8 +147,9 @@ def test_unknown_methods_and_areas_are_refused():
     grid = hn.OccupancyGrid(np.zeros((5, 5), np.float32))
     with pytest.raises(hn.InvalidValueError, match="walls, watershed, contraction"):
         hn.find_rooms(grid, method="magic")  # type: ignore[arg-type]
-    with pytest.raises(hn.InvalidValueError, match="positive"):
-        hn.find_rooms(grid, least_area_m2=0.0)
+    for area_m2 in (0.0, -1.0, math.nan, math.inf, 1e308):
+        with pytest.raises(hn.InvalidValueError, match="positive"):
+            hn.find_rooms(grid, least_area_m2=area_m2)
 
 
 def test_the_main_direction_is_that_of_the_walls():

@@ -358,5 +358,9 @@ def test_rooms_lists_those_of_a_file(cli, map_file):  # noqa: F811
     assert "hall (1: 0.50 m)" in done.out
 
 
+def test_rooms_refuses_an_endless_least_area(cli, map_file):  # noqa: F811
+    assert cli("rooms", map_file, "--least-area", "inf").refuses(2, "least area", "inf")
+
+
 def test_rooms_refuses_an_unknown_method(cli, map_file):  # noqa: F811
     assert cli("rooms", map_file, "--method", "magic").refuses(2, "walls, watershed", "'magic'")

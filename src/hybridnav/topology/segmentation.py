@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _UNEXPLORED_RIM = 0.8
 """Share of the cells round free space that must be unexplored for them to count as walls."""
+_LARGEST_LEAST_M2 = 1e9
+"""Least areas beyond it are taken for a mistake."""
 _SPLINTER_M2 = 0.5
 """Smaller pieces are merged first: they would be convex with anything."""
 _SOLIDITY = 0.8
@@ -53,8 +55,8 @@ def find_rooms(
         transform; `"contraction"`, where boundaries resist the contraction of a pyramid. The pieces
         are then merged in the same way, where their union is nearly convex and hardly walled.
     least_area_m2
-        In square metres of free cells, positive. Smaller pieces go to the neighbour with the
-        longest open border; what has none is no room.
+        In square metres of free cells, positive, at most 1e9. Smaller pieces go to the neighbour
+        with the longest open border; what has none is no room.
 
     Returns
     -------
@@ -64,15 +66,16 @@ def find_rooms(
     Raises
     ------
     InvalidValueError
-        When the method is not known, the area not positive, or there are too many rooms.
+        When the method is not known, the area out of range, or there are too many rooms.
     """
     if method not in get_args(Segmentation):
         raise InvalidValueError(
             f"method must be one of {', '.join(get_args(Segmentation))}, got {method!r:.80}"
         )
-    if not least_area_m2 > 0:
+    if not 0 < least_area_m2 <= _LARGEST_LEAST_M2:
         raise InvalidValueError(
-            f"least area must be a positive number of square metres, got {least_area_m2}"
+            "least area must be a positive number of square metres, at most "
+            f"{_LARGEST_LEAST_M2:g}, got {least_area_m2}"
         )
     grid = _walled(grid)
     pieces = Pieces(_pieces(grid, method, least_area_m2), grid.resolution_m)
