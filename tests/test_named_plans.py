@@ -358,6 +358,12 @@ def test_rooms_lists_those_of_a_file(cli, map_file):  # noqa: F811
     assert "hall (1: 0.50 m)" in done.out
 
 
+@pytest.mark.parametrize("option", [("--method", "walls"), ("--least-area", "1")])
+def test_rooms_of_a_file_are_not_found_too(cli, map_file, option):  # noqa: F811
+    query = ("rooms", map_file, "--rooms", map_file.parent / "rooms.yaml", *option)
+    assert cli(*query).refuses(2, option[0], "--rooms")
+
+
 def test_rooms_refuses_an_endless_least_area(cli, map_file):  # noqa: F811
     assert cli("rooms", map_file, "--least-area", "inf").refuses(2, "least area", "inf")
 

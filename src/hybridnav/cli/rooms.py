@@ -20,16 +20,22 @@ OutOption = Annotated[
     typer.Option("--out", "-o", metavar="FILE", help="Write the rooms as YAML, to be edited."),
 ]
 MethodOption = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--method",
         metavar="NAME",
         help=f"How rooms are found: {', '.join(get_args(Segmentation))}.",
+        show_default="walls",
     ),
 ]
 LeastAreaOption = Annotated[
-    float,
-    typer.Option("--least-area", metavar="A", help="Square metres of free cells that a room has."),
+    float | None,
+    typer.Option(
+        "--least-area",
+        metavar="A",
+        help="Square metres of free cells that a room has.",
+        show_default="1.0",
+    ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 
@@ -40,8 +46,8 @@ _TOLD = 5
 def rooms(
     map_file: MapArgument,
     out: OutOption = None,
-    method: MethodOption = "walls",
-    least_area_m2: LeastAreaOption = 1.0,
+    method: MethodOption = None,
+    least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
     preset: PresetOption = "balanced",
     robot_radius_m: RadiusOption = None,
@@ -52,6 +58,11 @@ def rooms(
     check_picture(plot)
     if out is not None and out.exists() and not force:
         raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
+    if rooms_file is not None:
+        for option, given in (("--method", method), ("--least-area", least_area_m2)):
+            if given is not None:
+                raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
+    method = "walls" if method is None else method
     checked = next((known for known in get_args(Segmentation) if known == method), None)
     if checked is None:
         known = ", ".join(get_args(Segmentation))
@@ -62,7 +73,11 @@ def rooms(
         grid = hn.load_map(map_file, robot_radius_m=settings.pyramid.robot_radius_m)
     with stage("finding rooms", seconds, "rooms"):
         labels = (
-            hn.find_rooms(grid, method=checked, least_area_m2=least_area_m2)
+            hn.find_rooms(
+                grid,
+                method=checked,
+                least_area_m2=1.0 if least_area_m2 is None else least_area_m2,
+            )
             if rooms_file is None
             else hn.load_rooms(rooms_file, grid)
         )
