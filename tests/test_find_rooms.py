@@ -2,6 +2,7 @@
 
 import math
 
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,6 +13,7 @@ from hybridnav.grid import CellClass
 from hybridnav.metrics import compare_rooms
 from hybridnav.topology.merging import Pieces
 from hybridnav.topology.pieces import main_direction
+from hybridnav.topology.segmentation import divide_rooms
 from tests.strategies import class_grids, occupancy_grid
 
 METHODS = ["walls", "watershed", "contraction"]
@@ -150,6 +152,24 @@ def test_unknown_methods_and_areas_are_refused():
     for area_m2 in (0.0, -1.0, math.nan, math.inf, 1e308):
         with pytest.raises(hn.InvalidValueError, match="positive"):
             hn.find_rooms(grid, least_area_m2=area_m2)
+
+
+@given(classes=class_grids(12), seed=st.integers(0, 2**32 - 1))
+def test_rooms_are_divided_by_the_way_to_walk_from_the_seeds(classes, seed):
+    rng = np.random.default_rng(seed)
+    room_of = np.where(classes > 0, rng.integers(0, 2, classes.shape), -1).astype(np.int32)
+    inside = np.argwhere(room_of >= 0)
+    if len(inside) == 0:
+        return
+    seeds = {label: tuple(cell) for label, cell in enumerate(rng.permutation(inside)[:4].tolist())}
+    walks = nx.grid_2d_graph(*room_of.shape)
+    walks.remove_edges_from([(a, b) for a, b in walks.edges if room_of[a] != room_of[b]])
+    divided = divide_rooms(room_of, seeds)
+    steps = {n: nx.single_source_shortest_path_length(walks, at) for n, at in seeds.items()}
+    for cell in map(tuple, np.argwhere(room_of >= -1).tolist()):
+        reached = {label: far[cell] for label, far in steps.items() if cell in far}
+        nearest = {n for n, far in reached.items() if far == min(reached.values())}
+        assert divided[cell] in (nearest or {-1})
 
 
 def test_the_main_direction_is_that_of_the_walls():

@@ -199,11 +199,11 @@ def _is_straight(ring: FloatArray) -> bool:
 def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     """Rooms that segmentation finds round the seeds; where several seeds lie in one, each takes the
     cells that are nearest to it."""
-    from hybridnav.topology._segmentation_kernels import grow_labels  # noqa: PLC0415 - scipy, numba
-    from hybridnav.topology.segmentation import find_rooms  # noqa: PLC0415
+    # Loads scipy and numba.
+    from hybridnav.topology.segmentation import divide_rooms, find_rooms  # noqa: PLC0415
 
     found = find_rooms(grid).label_of
-    seeded = np.full(grid.shape, NO_ROOM, dtype=np.int32)
+    seeded: dict[tuple[int, int], int] = {}
     for room, point in read.seeds.items():
         row, col = grid.frame.cell_of(*point)
         if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
@@ -212,16 +212,16 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
             )
         if grid.classes[row, col] != CellClass.FREE:
             raise RoomsError(f"{read.of(room)}: the seed lies in no free cell")
-        if label_of[row, col] != NO_ROOM or seeded[row, col] != NO_ROOM:
-            other = max(label_of[row, col], seeded[row, col])
+        other = seeded.get((row, col), int(label_of[row, col]))
+        if other != NO_ROOM:
             raise RoomsError(f"{read.of(room)}: the seed lies in room {read.names[other]!r}")
         if found[row, col] == NO_ROOM:
             raise RoomsError(f"{read.of(room)}: no room is found round the seed, draw a polygon")
         seeded[row, col] = room
     # All at once: each spreads inside the room that was found round it, and stops at outlines.
     region = np.where(label_of == NO_ROOM, found, np.int32(NO_ROOM))
-    grow_labels(seeded, region, region.size)
-    return np.where(label_of == NO_ROOM, seeded, label_of)
+    divided = divide_rooms(region, {room: cell for cell, room in seeded.items()})
+    return np.where(label_of == NO_ROOM, divided, label_of)
 
 
 def check_rooms(names: Sequence[str], label_of: IntArray, where: str, grid: OccupancyGrid) -> None:

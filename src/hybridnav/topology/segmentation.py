@@ -21,8 +21,12 @@ from hybridnav.topology.pieces import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from hybridnav._typing import IntArray
     from hybridnav.grid import OccupancyGrid
+
+Cell = tuple[int, int]
 
 _UNEXPLORED_RIM = 0.8
 """Share of the cells round free space that must be unexplored for them to count as walls."""
@@ -94,6 +98,29 @@ def find_rooms(
         )
     names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
     return RoomLabels(names, _reaching(labels, grid))
+
+
+def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
+    """Divide rooms among the seeds that lie in them: each cell goes to the nearest by walking.
+
+    Parameters
+    ----------
+    room_of
+        int32 (rows, cols), -1 for cells of no room.
+    seeds
+        A label >= 0 and the cell (row, col) that it spreads from, inside a room.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), the labels; -1 where none spreads to: outside the rooms with seeds.
+        Distances are counted in steps along sides, ties go to the lower cell's label.
+    """
+    divided = np.full(room_of.shape, NO_ROOM, dtype=np.int32)
+    for label, cell in seeds.items():
+        divided[cell] = label
+    _segmentation_kernels.grow_labels(divided, room_of, room_of.size)
+    return divided
 
 
 def _pieces(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
