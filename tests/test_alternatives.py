@@ -240,7 +240,7 @@ def test_the_command_line_lists_alternatives(cli, map_file):  # noqa: F811
     query = ("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
     done = cli(*query, "--alternatives", "3")
     assert done.code == 0
-    assert "route 1    4.00 m, class -, by kitchen (door 1), hall (door 2), lab" in done.out
+    assert "route 1    4.00 m (octile), class -, by kitchen (door 1), hall (door 2), lab" in done.out
     assert "route 2" not in done.out
     answer = cli(*query, "--alternatives", "3", "--json").answer
     assert [len(route["points_m"]) > 1 for route in answer["alternatives"]] == [True]
@@ -268,7 +268,7 @@ def test_the_command_line_leads_through_either_door(cli, two_doors_file):  # noq
     # Ten straight steps and one diagonal; and up to the other door and down again.
     lengths = [10 + math.sqrt(2), 4 + 5 * math.sqrt(2) + 2 + 4 * math.sqrt(2)]
     assert len(lines) == 2
-    assert lines[0].startswith(f"route 1    {lengths[0]:.2f} m, class ")
+    assert lines[0].startswith(f"route 1    {lengths[0]:.2f} m (octile), class ")
     routes = cli(*query, "--json").answer["alternatives"]
     ways = [[y for x, y in route["points_m"] if 6 < x < 8] for route in routes]
     assert [set(way) for way in ways] == [{2.5}, {6.5}]
