@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 
 import hybridnav as hn
@@ -168,6 +169,30 @@ def test_a_named_stop_faces_the_way_on_a_turned_map():
     assert again[2] == 0.0  # no way leads from a point to itself
     east = np.asarray(stop_points(planner, [(*points["west"], 3.0), "east"])[1])
     assert east[2] == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("half_m", [0.2, 0.45, 0.6, 0.9])
+def test_a_footprint_fits_at_the_stops_chosen_for_it(driving, half_m):
+    """The nearest cells of the rooms are in doorways half a metre wide, where it does not; 0.9 is
+    too long to turn in any room."""
+    corners = [[half_m, 0.15], [-half_m, 0.15], [-half_m, -0.15], [half_m, -0.15]]
+    planner = driving("space=se2", f"footprint={corners}", "budget_s=0.5")
+    rooms, points_of = planner.topology.rooms, planner.topology.grid.frame.points_of
+    low = np.argwhere(CLASSES == 0)[:, ::-1] * SIDE
+    walls = shapely.union_all(shapely.box(*low.T, *(low + SIDE).T))
+    for start, goal in (("kitchen", "hall"), ("hall", "lab")):
+        clear = []
+        for name, pose in zip((start, goal), stop_points(planner, [start, goal]), strict=True):
+            cells = np.argwhere((CLASSES == 1) & (rooms.labels.label_of == NAMES.index(name)))
+            room = shapely.points(points_of(cells))
+            fits = room[shapely.distance(room, walls) >= math.hypot(half_m, 0.15)]
+            at = shapely.Point(np.asarray(pose)[:2])
+            clear.append(len(fits) > 0)
+            assert at in (fits if clear[-1] else [shapely.Point(rooms.point_of(name))])
+        assert all(clear) == (half_m < 0.9)
+        if all(clear):
+            assert "occupied" not in str(planner.plan(start, goal).status)
+    planner.close()
 
 
 def test_points_without_the_heading_that_is_needed_are_explained(driving):

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.grid.clearance import clearance_cells
 from hybridnav.grid.rooms import did_you_mean
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.stops import cheapest_stops
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.planner.blocked import Blocked
     from hybridnav.planner.planner import HybridPlanner
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 At = Literal["anywhere", "point"]
 """Where in a named room a way starts or ends."""
 
+_ROUNDING_CELLS = 1e-6
 _FACING_M = 1.0
 """Length of the way that says which way a robot faces at a stop with a name."""
 
@@ -57,7 +60,8 @@ def stop_points(
     -------
     list
         Points `(x, y)` in metres, map frame; those given stay as they are. Where no way visits all
-        stops, or a point cannot be entered, rooms are represented by their points. Where the
+        stops, or a point cannot be entered, rooms are represented by their points, and so is a room
+        without a cell at whose centre the robot's footprint fits with any heading. Where the
         planner needs headings, a name becomes `(x, y, yaw)` and faces the shortest way of cells by
         which it is reached, the first stop the one by which it is left.
 
@@ -75,7 +79,7 @@ def stop_points(
         enterable = enterable.copy()
         enterable.ravel()[planner.closed_cells(blocked)] = False
     fixed: list[Any] = [_point_of(topology, stop, at) for stop in stops]
-    points = _chosen(topology, enterable, stops, fixed)
+    points = _chosen(topology, enterable, stops, fixed, _radius_m(planner))
     if planner.needs_headings:
         return _facing_the_way(topology, enterable, stops, points)
     return points
@@ -86,15 +90,23 @@ def _chosen(
     enterable: BoolArray,
     stops: Sequence[ArrayLike | str],
     fixed: list[Any],
+    radius_m: float,
 ) -> list[Any]:
     """The points that are given, and for the rooms between those that make the way shortest."""
     if all(point is not None for point in fixed):
         return fixed
     grid = topology.grid
+    rooms = {
+        stop: _where_it_fits(grid, _cells_in_room(topology, enterable, stop), radius_m)
+        for stop, point in zip(stops, fixed, strict=True)
+        if point is None and isinstance(stop, str)
+    }
+    fixed = [
+        topology.rooms.point_of(str(stop)) if point is None and not len(rooms[str(stop)]) else point
+        for stop, point in zip(stops, fixed, strict=True)
+    ]
     sets = [
-        _cells_in_room(topology, enterable, str(stop))
-        if point is None
-        else _cell_at(topology, enterable, point)
+        rooms[str(stop)] if point is None else _cell_at(topology, enterable, point)
         for stop, point in zip(stops, fixed, strict=True)
     ]
     found = None
@@ -171,6 +183,47 @@ def _point_of(topology: TopologicalMap, stop: ArrayLike | str, at: At) -> ArrayL
 def _cells_in_room(topology: TopologicalMap, enterable: BoolArray, name: str) -> LongArray:
     labels = topology.rooms.labels
     return np.flatnonzero(enterable & (labels.label_of == labels.index(name)))
+
+
+def _radius_m(planner: HybridPlanner) -> float:
+    """Radius of the disc about the base that a robot's footprint stays in; 0 for a disc, which the
+    map was inflated by."""
+    ompl = planner.preset.planner.ompl
+    if ompl is None or ompl.footprint is None:
+        return 0.0
+    # Loads shapely.
+    from hybridnav.refine.footprint import Footprint  # noqa: PLC0415
+
+    return Footprint.of(ompl.footprint).circumscribed_radius_m
+
+
+def _where_it_fits(grid: OccupancyGrid, cells: LongArray, radius_m: float) -> LongArray:
+    """Of some flat cells those whose centre no occupied cell, as measured, is nearer to than a
+    radius: there a footprint fits with any heading."""
+    if radius_m <= 0 or not len(cells):
+        return cells
+    radius_cells = radius_m / grid.resolution_m + _ROUNDING_CELLS
+    rows, cols = np.divmod(cells, grid.shape[1])
+    # Farther off nothing matters; the window has a cell of slack on every side.
+    reach = min(math.ceil(radius_cells), max(grid.shape)) + 1
+    row, col = max(rows.min() - reach, 0), max(cols.min() - reach, 0)
+    window = grid.measured[row : rows.max() + reach + 1, col : cols.max() + reach + 1]
+    distance = _to_sides(window == CellClass.OCCUPIED)[rows - row, cols - col]
+    fitting: LongArray = cells[distance >= radius_cells]
+    return fitting
+
+
+def _to_sides(occupied: BoolArray) -> FloatArray:
+    """Distance from the centre of each cell to the nearest occupied square, in cells, exactly.
+
+    On points half a cell apart: each square has its nearest one to any centre among its own nine.
+    """
+    rows, cols = occupied.shape
+    within = np.zeros((2 * rows + 1, 2 * cols + 1), dtype=np.bool_)
+    for up, right in itertools.product(range(3), repeat=2):
+        within[up : up + 2 * rows : 2, right : right + 2 * cols : 2] |= occupied
+    distance: FloatArray = clearance_cells(within)[1::2, 1::2] / 2
+    return distance
 
 
 def _cell_at(topology: TopologicalMap, enterable: BoolArray, point: ArrayLike) -> LongArray:
