@@ -72,7 +72,7 @@ def test_without_a_path_there_are_no_alternatives():
     assert hn.plan_alternatives(planner_of(walled), (1.5, 1.5), (12.5, 2.5), 3) == []
 
 
-@pytest.mark.parametrize("count", [0, 21])
+@pytest.mark.parametrize("count", [0, 21, 2.5, "3", None])
 def test_counts_out_of_range_are_refused(count):
     with pytest.raises(hn.InvalidValueError, match="from 1 to 20"):
         hn.plan_alternatives(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), count)

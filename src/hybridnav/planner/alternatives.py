@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -72,11 +73,10 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     Raises
     ------
     InvalidValueError
-        When the count or the area is out of range, an end is not valid, the planner refines with
-        OMPL, or its grid allows corner cutting.
+        When the count is no whole number or out of range, the area is, an end is not valid, the
+        planner refines with OMPL, or its grid allows corner cutting.
     """
-    if not 1 <= count <= MOST:
-        raise InvalidValueError(f"alternatives must be from 1 to {MOST}, got {count}")
+    count = _checked(count)
     if planner.preset.planner.refine == "ompl":
         raise InvalidValueError(
             "alternatives are paths of the grid: ask a preset without OMPL for them, "
@@ -101,3 +101,15 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
             path = Path(other.cells, grid.frame.points_of(other.cells), length_m)
             alternatives[other.word] = path
     return [Alternative(path, word) for word, path in alternatives.items()]
+
+
+def _checked(count: int) -> int:
+    try:
+        wanted = operator.index(count)
+    except TypeError:
+        wanted = 0
+    if not 1 <= wanted <= MOST:
+        raise InvalidValueError(
+            f"alternatives must be a whole number from 1 to {MOST}, got {count!r:.80}"
+        )
+    return wanted
