@@ -14,7 +14,7 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav.grid import CellClass
 from hybridnav.metrics import judge_path
-from hybridnav.route import Walks
+from hybridnav.route import Walks, alternatives
 from hybridnav.route.alternatives import AlternativeSearch
 from tests.rays import Rays
 from tests.strategies import class_grids, drawn, occupancy_grid
@@ -69,13 +69,29 @@ def test_a_hole_that_is_too_small_makes_no_second_route():
 def test_without_a_path_there_are_no_alternatives():
     walled = TWO_DOORS.copy()
     walled[:, 6] = 0
-    assert hn.plan_alternatives(planner_of(walled), (1.5, 1.5), (12.5, 2.5), 3) == []
+    assert len(hn.plan_alternatives(planner_of(walled), (1.5, 1.5), (12.5, 2.5), 3)) == 0
 
 
 @pytest.mark.parametrize("count", [0, 21, 2.5, "3", None])
 def test_counts_out_of_range_are_refused(count):
     with pytest.raises(hn.InvalidValueError, match="from 1 to 20"):
         hn.plan_alternatives(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), count)
+
+
+def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path(monkeypatch):
+    ends = (1.5, 1.5), (12.5, 6.5)
+    planner = planner_of(TWO_DOORS, "paper", merge_distance_m=6.0)
+    optimum = planner_of(TWO_DOORS).plan(*ends).cost
+    whole = hn.plan_alternatives(planner, *ends, 3)
+    assert whole.complete
+    assert len(whole) == 2
+    for room in (1, 20, 100):
+        monkeypatch.setattr(alternatives, "MOST_STATES", room)
+        found = hn.plan_alternatives(planner, *ends, 3)
+        assert not found.complete
+        assert found[0].path.length_m == pytest.approx(optimum)
+        assert [other.word for other in found] == [other.word for other in whole][: len(found)]
+    assert hn.plan_alternatives(planner, *ends, 1).complete
 
 
 def test_one_obstacle_has_two_sides_and_no_turns_round_it():
@@ -240,7 +256,8 @@ def test_the_command_line_lists_alternatives(cli, map_file):  # noqa: F811
     query = ("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
     done = cli(*query, "--alternatives", "3")
     assert done.code == 0
-    assert "route 1    4.00 m (octile), class -, by kitchen (door 1), hall (door 2), lab" in done.out
+    way = "by kitchen (door 1), hall (door 2), lab"
+    assert f"route 1    4.00 m (octile), class -, {way}" in done.out
     assert "route 2" not in done.out
     answer = cli(*query, "--alternatives", "3", "--json").answer
     assert [len(route["points_m"]) > 1 for route in answer["alternatives"]] == [True]
@@ -276,3 +293,13 @@ def test_the_command_line_leads_through_either_door(cli, two_doors_file):  # noq
     small = cli(*query, "--least-hole", "7").out
     assert "route 1" in small
     assert "route 2" not in small
+
+
+def test_the_command_line_tells_no_more_from_gave_up(cli, two_doors_file, monkeypatch):  # noqa: F811
+    ends = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
+    query = ("plan", two_doors_file, *ends, "--robot-radius", "0", "--alternatives", "3")
+    assert "gave up" not in cli(*query).out
+    assert cli(*query, "--json").answer["alternatives_complete"] is True
+    monkeypatch.setattr(alternatives, "MOST_STATES", 100)
+    assert "routes     the search gave up: there may be more\n" in cli(*query).out
+    assert cli(*query, "--json").answer["alternatives_complete"] is False

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from hybridnav.io import load_map, load_rooms, save_rooms
     from hybridnav.planner import (
         Alternative,
+        Alternatives,
         Blocked,
         HybridPlanner,
         Tour,
@@ -42,6 +43,7 @@ __version__ = "0.1.0"
 
 _HOME_OF = {
     "Alternative": "planner",
+    "Alternatives": "planner",
     "Blocked": "planner",
     "CellClass": "grid",
     "Door": "topology",
@@ -83,6 +85,7 @@ _HOME_OF = {
 
 __all__ = [
     "Alternative",
+    "Alternatives",
     "Blocked",
     "CellClass",
     "Door",

@@ -56,7 +56,7 @@ def run_errand(errand: Errand) -> bool:
     figures = _figures(errand, tour)
     if errand.alternatives > 1:
         with stage("finding alternatives", seconds, "alternatives"):
-            figures["alternatives"] = _alternatives(errand, planner)
+            figures |= _alternatives(errand, planner)
     figures["seconds"] = seconds
     if errand.as_json:
         answer(json.dumps(figures, allow_nan=False) + "\n")
@@ -113,8 +113,9 @@ def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
     }
 
 
-def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> list[dict[str, Any]]:
-    """Routes of different classes between the two stops, with the rooms and doors they pass."""
+def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> dict[str, Any]:
+    """Routes of different classes between the two stops, with the rooms and doors they pass, and
+    whether there may be more."""
     # Loads numba, which help and wrong usage can do without.
     from hybridnav.planner.itinerary import NOWHERE, Guide  # noqa: PLC0415
 
@@ -143,7 +144,7 @@ def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> list[dict[str, A
                 "points_m": np.round(alternative.path.points, 6).tolist(),
             }
         )
-    return routes
+    return {"alternatives": routes, "alternatives_complete": found.complete}
 
 
 def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
@@ -161,6 +162,8 @@ def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
         rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
         length = f"{other['length_m']:.2f} m ({other['metric']})"
         lines.append(f"route {number:<4} {length}, class {word}{rooms}")
+    if not figures.get("alternatives_complete", True):
+        lines.append("routes     the search gave up: there may be more")
     lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"
 

@@ -9,11 +9,12 @@ from hybridnav.planner.planner import HybridPlanner
 from hybridnav.planner.tour import Tour, plan_tour
 
 if TYPE_CHECKING:
-    from hybridnav.planner.alternatives import Alternative, plan_alternatives
+    from hybridnav.planner.alternatives import Alternative, Alternatives, plan_alternatives
     from hybridnav.planner.blocked import Blocked
 
 __all__ = [
     "Alternative",
+    "Alternatives",
     "Blocked",
     "HybridPlanner",
     "Tour",
@@ -25,6 +26,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     homes = {
         "Alternative": "alternatives",
+        "Alternatives": "alternatives",
         "Blocked": "blocked",
         "plan_alternatives": "alternatives",
     }

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, overload
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.named import At, stop_points
 from hybridnav.result import Path
 from hybridnav.route.alternatives import AlternativeSearch
+from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from hybridnav._typing import LongArray
     from hybridnav.planner.planner import HybridPlanner
+    from hybridnav.topology import TopologicalMap
     from hybridnav.topology.homotopy import Word
 
 MOST = 20
@@ -33,6 +35,31 @@ class Alternative:
     """Reduced word of its homotopy class; the same for paths that differ by cells alone."""
 
 
+@dataclass(frozen=True, eq=False)
+class Alternatives(Sequence[Alternative]):
+    """Paths of different classes, the shortest first, and whether there may be more."""
+
+    found: tuple[Alternative, ...]
+    """The paths; none where no path exists."""
+    complete: bool
+    """Whether there are as many as were asked for, or all there are: False where the search gave
+    up, so that there may be more."""
+
+    @overload
+    def __getitem__(self, index: int) -> Alternative: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Alternative, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Alternative | tuple[Alternative, ...]:
+        """One of them, or some."""
+        return self.found[index]
+
+    def __len__(self) -> int:
+        """How many were found."""
+        return len(self.found)
+
+
 def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     planner: HybridPlanner,
     start: ArrayLike | str,
@@ -41,7 +68,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     *,
     least_hole_m2: float = 1.0,
     at: At = "anywhere",
-) -> list[Alternative]:
+) -> Alternatives:
     """Plan paths of different homotopy classes: by another door, on the other side of an obstacle.
 
     Octile paths, whatever the preset's `smooth`. The first is a shortest path, the planner's own
@@ -66,9 +93,10 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
 
     Returns
     -------
-    list of Alternative
+    Alternatives
         Of different classes, the shortest first; none where no path exists. Fewer than `count`
-        where there are no more, or where a million pairs of a cell and a class were looked at.
+        where there are no more, or, `complete` being False, where the search gave up after a
+        million pairs of a cell and a class.
 
     Raises
     ------
@@ -76,7 +104,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
         When the count is no whole number or out of range, the area is, an end is not valid, the
         planner refines with OMPL, or its grid allows corner cutting.
     """
-    count = _checked(count)
+    wanted = _checked(count)
     if planner.preset.planner.refine == "ompl":
         raise InvalidValueError(
             "alternatives are paths of the grid: ask a preset without OMPL for them, "
@@ -88,19 +116,25 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     search = AlternativeSearch(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)
     own = planner.plan(*ends, smooth="none").path
     if own is None:
-        return []
+        return Alternatives((), complete=True)
     first, last = (tuple(own.cells[i].tolist()) for i in (0, -1))
-    found = search.paths(first, last, count).paths
-    least = min((other.length_cells for other in found), default=np.inf)
-    shortest = path_length_in_cells(own.cells) <= least * (1 + 1e-12)
-    alternatives = {search.classes.word_of_path(own.cells): own} if shortest else {}
-    grid = topology.grid
-    for other in found:
-        if len(alternatives) < count and other.word not in alternatives:
-            length_m = other.length_cells * grid.resolution_m
-            path = Path(other.cells, grid.frame.points_of(other.cells), length_m)
-            alternatives[other.word] = path
-    return [Alternative(path, word) for word, path in alternatives.items()]
+    found = search.paths(first, last, wanted)
+    alternatives = {}
+    if path_length_in_cells(own.cells) <= found.shortest_cells * (1 + 1e-12):
+        alternatives[search.classes.word_of_path(own.cells)] = own
+    elif not found.paths:  # it gave up before it came to the goal
+        enterable = topology.grid.enterable(allow_unexplored=allowed)
+        cells = GridSearch(enterable, corner_cutting=False).search(first, last).cells
+        if cells is not None:  # always: the planner found a path
+            word = search.classes.word_of_path(cells)
+            alternatives[word] = _path(topology, cells, found.shortest_cells)
+    for other in found.paths:
+        if len(alternatives) < wanted and other.word not in alternatives:
+            alternatives[other.word] = _path(topology, other.cells, other.length_cells)
+    return Alternatives(
+        tuple(Alternative(path, word) for word, path in alternatives.items()),
+        complete=found.complete or len(alternatives) == wanted,
+    )
 
 
 def _checked(count: int) -> int:
@@ -113,3 +147,8 @@ def _checked(count: int) -> int:
             f"alternatives must be a whole number from 1 to {MOST}, got {count!r:.80}"
         )
     return wanted
+
+
+def _path(topology: TopologicalMap, cells: LongArray, length_cells: float) -> Path:
+    grid = topology.grid
+    return Path(cells, grid.frame.points_of(cells), length_cells * grid.resolution_m)

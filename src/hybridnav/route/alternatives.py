@@ -47,6 +47,8 @@ class ClassPaths:
     """The shortest first, no class twice."""
     complete: bool
     """Whether there are as many as were asked for, or all: False where the search gave up."""
+    shortest_cells: float
+    """Octile length of a shortest path from start to goal, infinite where there is none."""
 
 
 class AlternativeSearch:
@@ -116,7 +118,8 @@ class AlternativeSearch:
         first, last = start[0] * cols + start[1], goal[0] * cols + goal[1]
         label = np.where(self._enterable, np.int32(0), np.int32(-1)).ravel()
         left = field_distances(self._enterable.astype(np.uint8), label, np.array([last]))
-        shortest = length_in_cells(left[[first]])[0] if left[first] >= 0 else 0.0
+        shortest = float(length_in_cells(left[[first]])[0]) if left[first] >= 0 else math.inf
+        apart = self._apart if shortest == math.inf else min(self._apart, int(shortest / 2))
         states, tree, goals, reason = _class_kernels.find_classes(
             self._moves,
             cols,
@@ -125,7 +128,7 @@ class AlternativeSearch:
             self.classes.cell_words.of_edge,
             self._letters,
             count,
-            max(1, min(self._apart, int(shortest / 2))),
+            max(1, apart),
             MOST_STATES,
         )
         found = []
@@ -135,4 +138,4 @@ class AlternativeSearch:
             length = float(length_in_cells(states.cost[[state]])[0])
             cells = np.stack(np.divmod(flat, cols), axis=1)
             found.append(ClassPath(cells, word, length))
-        return ClassPaths(tuple(found), reason != _class_kernels.LIMITED)
+        return ClassPaths(tuple(found), reason != _class_kernels.LIMITED, shortest)
