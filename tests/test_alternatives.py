@@ -1,7 +1,9 @@
 """Alternatives: other doors and other sides of obstacles, not the same way by other cells, and not
 round and round."""
 
+import gc
 import math
+import weakref
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +17,7 @@ import hybridnav as hn
 from hybridnav.grid import CellClass
 from hybridnav.metrics import judge_path
 from hybridnav.route import Walks, alternatives
-from hybridnav.route.alternatives import AlternativeSearch
+from hybridnav.route.alternatives import AlternativeSearch, alternative_search
 from tests.rays import Rays
 from tests.strategies import class_grids, drawn, occupancy_grid
 from tests.test_cli import cli  # noqa: F401 - the fixture
@@ -92,6 +94,20 @@ def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path(monkeypa
         assert found[0].path.length_m == pytest.approx(optimum)
         assert [other.word for other in found] == [other.word for other in whole][: len(found)]
     assert hn.plan_alternatives(planner, *ends, 1).complete
+
+
+def test_the_search_on_a_map_is_kept_while_the_map_is():
+    topology = topology_of(TWO_DOORS)
+    first = alternative_search(topology)
+    assert alternative_search(topology, least_hole_m2=1) is first
+    assert alternative_search(topology_of(TWO_DOORS)) is not first
+    others = [alternative_search(topology, least_hole_m2=area) for area in (2.0, 7.0)]
+    others.append(alternative_search(topology, allow_unexplored=True))
+    assert len({id(search) for search in (first, *others)}) == 4
+    gone = weakref.ref(others[1])
+    del first, others, topology
+    gc.collect()
+    assert gone() is None
 
 
 def test_one_obstacle_has_two_sides_and_no_turns_round_it():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, overload
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.named import At, stop_points
 from hybridnav.result import Path
-from hybridnav.route.alternatives import AlternativeSearch
+from hybridnav.route.alternatives import alternative_search
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import path_length_in_cells
 
@@ -113,7 +113,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     ends = stop_points(planner, [start, goal], at=at)
     topology = planner.topology
     allowed = planner.preset.planner.allow_unexplored
-    search = AlternativeSearch(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)
+    search = alternative_search(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)
     own = planner.plan(*ends, smooth="none").path
     if own is None:
         return Alternatives((), complete=True)

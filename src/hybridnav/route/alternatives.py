@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -49,6 +50,26 @@ class ClassPaths:
     """Whether there are as many as were asked for, or all: False where the search gave up."""
     shortest_cells: float
     """Octile length of a shortest path from start to goal, infinite where there is none."""
+
+
+def alternative_search(
+    topology: TopologicalMap, *, allow_unexplored: bool = False, least_hole_m2: float = 1.0
+) -> AlternativeSearch:
+    """The search on a map, made for the first query: it takes up to a second.
+
+    Kept as long as the map is, for the last few areas asked for. Parameters and errors are those of
+    `AlternativeSearch`.
+    """
+    kept = _KEPT.setdefault(topology, {})
+    asked = bool(allow_unexplored), float(least_hole_m2)
+    if asked not in kept:
+        made = AlternativeSearch(
+            topology, allow_unexplored=allow_unexplored, least_hole_m2=least_hole_m2
+        )
+        while len(kept) >= _MOST_KEPT:
+            del kept[next(iter(kept))]
+        kept[asked] = made
+    return kept[asked]
 
 
 class AlternativeSearch:
@@ -139,3 +160,9 @@ class AlternativeSearch:
             cells = np.stack(np.divmod(flat, cols), axis=1)
             found.append(ClassPath(cells, word, length))
         return ClassPaths(tuple(found), reason != _class_kernels.LIMITED, shortest)
+
+
+_MOST_KEPT = 4
+_KEPT: WeakKeyDictionary[TopologicalMap, dict[tuple[bool, float], AlternativeSearch]] = (
+    WeakKeyDictionary()
+)
