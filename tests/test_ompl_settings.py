@@ -120,3 +120,13 @@ def test_clearance_weighs_walls_and_is_never_less_than_the_length(yaw_rad: float
         line = grid.frame.points_of_grid(ends * grid.shape)
         assert cost(line) == pytest.approx(cost(line[::-1]))
         assert cost(line) >= np.hypot(*(line[1] - line[0])) * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_settings_that_go_only_together_are_checked_together(order: tuple[int, int]) -> None:
+    given = ["planner.ompl.space=dubins", "planner.ompl.turning_radius_m=0.8"]
+    preset = load_preset("ompl-rrtconnect", overrides=[given[index] for index in order])
+    assert preset.planner.ompl is not None
+    assert (preset.planner.ompl.space, preset.planner.ompl.turning_radius_m) == ("dubins", 0.8)
+    with pytest.raises(hn.PresetError, match="dubins or reeds-shepp needs turning_radius_m"):
+        load_preset("ompl-rrtconnect", overrides=given[:1])

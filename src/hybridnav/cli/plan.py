@@ -74,9 +74,11 @@ ViaOption = Annotated[
     typer.Option("--via", metavar="ROOM|X,Y", help="Stop there on the way; may be repeated."),
 ]
 AtOption = Annotated[
-    str,
+    str | None,
     typer.Option(
-        "--at", metavar="WHERE", help="Where in a room: anywhere (the nearest cell), or its point."
+        "--at",
+        metavar="WHERE",
+        help="Where in a room: anywhere (the nearest cell), or its point (with --alternatives).",
     ),
 ]
 AlternativesOption = Annotated[
@@ -110,7 +112,7 @@ def plan(
     origin: FromOption = None,
     to: ToOption = None,
     via: ViaOption = None,
-    at: AtOption = "anywhere",
+    at: AtOption = None,
     rooms_file: RoomsOption = None,
     alternatives: AlternativesOption = 1,
     least_hole_m2: LeastHoleOption = 1.0,
@@ -146,7 +148,7 @@ def plan(
             map_file,
             rooms_file,
             stops,
-            _checked_at(at),
+            _checked_at(at or ("anywhere" if alternatives == 1 else "point")),
             settings,
             plot,
             as_json,

@@ -196,7 +196,11 @@ class OmplSettings(BaseModel):
     @model_validator(mode="after")
     def _space_is_whole(self) -> Self:
         curved = self.space in {"dubins", "reeds-shepp"}
-        if curved != (self.turning_radius_m is not None):
+        if curved and self.turning_radius_m is None:
+            raise PydanticCustomError(
+                "turning_radius", "space: dubins or reeds-shepp needs turning_radius_m"
+            )
+        if not curved and self.turning_radius_m is not None:
             raise PydanticCustomError(
                 "turning_radius", "turning_radius_m goes with space: dubins or reeds-shepp"
             )

@@ -164,7 +164,8 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
         Name of a preset that comes with the package, or a path to a YAML file: anything with a
         suffix or a separator is a path. A `Preset` is taken as it is.
     overrides
-        Settings that win over the file, each `section.key=value`, the value in YAML.
+        Settings that win over the file, each `section.key=value`, the value in YAML; checked
+        together.
 
     Returns
     -------
@@ -179,11 +180,11 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
         When a key is unknown or a value is out of range; names the key and where it stands.
     """
     preset = source if isinstance(source, Preset) else _read(_find(source))
-    tree = preset.model_dump()
-    for override in overrides:
+    tree, given = preset.model_dump(), list(overrides)
+    for override in given:
         _apply(tree, override)
-        preset = _checked(tree, where="setting ")
-    return preset
+    # All at once, for some keys go only together.
+    return _checked(tree, where="setting ") if given else preset
 
 
 def _read(path: Path) -> Preset:

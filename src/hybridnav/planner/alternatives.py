@@ -67,7 +67,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     count: int,
     *,
     least_hole_m2: float = 1.0,
-    at: At = "anywhere",
+    at: At = "point",
 ) -> Alternatives:
     """Plan paths of different homotopy classes: by another door, on the other side of an obstacle.
 
@@ -89,7 +89,8 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
         Holes of a smaller area do not count: obstacles and, unless they may be entered, unexplored
         islands, with all that they surround, in square metres.
     at
-        Where in a named room.
+        Where in a named room; at the cells that make the shortest way short, other ways would have
+        to start and end too.
 
     Returns
     -------
