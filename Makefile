@@ -5,9 +5,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
+SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env
 NOJIT_TESTS := tests/test_blocks.py tests/test_pyramid_invariants.py tests/test_search.py
 
-.PHONY: route test test-full lint docs unit nojit full setup maps lock clean
+.PHONY: route test test-full lint docs site unit nojit full setup maps lock clean
 
 route: setup
 	mkdir -p out
@@ -26,7 +27,12 @@ lint: setup
 
 # The documentation's site, out/docs/index.html: a warning is an error, and nothing is fetched.
 docs: setup
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env docs out/docs
+	$(SPHINX) docs out/docs
+
+# The same with the notebooks executed, out/site/index.html: minutes, and seconds where nothing that
+# they run on has changed.
+site: setup
+	$(SPHINX) -D nb_execution_mode=cache docs out/site
 
 # On all cores, a file of tests to each in turn.
 unit: setup

@@ -9,23 +9,33 @@ import hybridnav
 
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
+from notebook_pages import execution_cache
+
 project = "hybridnav"
 author = "the hybridnav maintainers"
 copyright = author  # noqa: A001 - Sphinx's name for it
 version = release = hybridnav.__version__
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "numpydoc",
     "sphinx.ext.viewcode",
     "command_help",
+    "notebook_pages",
 ]
-source_suffix = {".md": "markdown"}
+source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 exclude_patterns = ["images", "extensions", "static"]
 default_role = "py:obj"  # single backticks in docstrings: code, and a link where it is a name here
 
 myst_heading_anchors = 3
+
+nb_execution_mode = "off"  # `make site` sets it to "cache"
+nb_execution_cache_path = str(execution_cache())
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300  # of a cell, in seconds
+nb_merge_streams = True
+nb_output_stderr = "remove-warn"
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
