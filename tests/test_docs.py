@@ -1,16 +1,19 @@
-"""The pages are complete: every public name, the layers, how to cite."""
+"""The pages are complete: every public name, the notebooks, the layers, how to cite."""
 
 from __future__ import annotations
 
 import importlib
 import inspect
+import os
 import pkgutil
 import re
 import tomllib
 from pathlib import Path
 
+import nbformat
 import pytest
 import yaml
+from docs.extensions import notebook_pages
 
 import hybridnav as hn
 
@@ -18,6 +21,12 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 _DOCUMENTED = re.compile(r"^\.\. auto\w+:: hybridnav\.([\w.]+)(?:\(\))?$", re.MULTILINE)
+_LINK = re.compile(r"\[[^\]]*\]\(([^)#]+)[^)]*\)")
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+PAGES_OF_THE_SITE = {
+    **{path.relative_to(ROOT / "docs").as_posix(): path for path in (ROOT / "docs").rglob("*.md")},
+    **{path.relative_to(ROOT).as_posix(): path for path in NOTEBOOKS},
+}
 
 
 def _documented() -> list[str]:
@@ -58,6 +67,54 @@ def test_what_the_reference_shows_is_documented(name: str) -> None:
         text = str(inspect.getdoc(thing))
         assert "Parameters\n-----" in text
         assert all(re.search(rf"\b{p}\b", text) for p in inspect.signature(thing).parameters)
+
+
+def _prose(path: Path) -> str:
+    """The text of a page, or of a notebook's cells that are text."""
+    if path.suffix != ".ipynb":
+        return path.read_text(encoding="utf-8")
+    cells = nbformat.read(path, as_version=4).cells
+    return "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+
+
+@pytest.mark.parametrize("page", PAGES_OF_THE_SITE)
+def test_links_of_the_site_lead_to_pages_and_pictures_of_it(page: str) -> None:
+    source = [_prose(PAGES_OF_THE_SITE[page])]
+    notebook_pages.mend_links(None, page.rpartition(".")[0], source)
+    links = [link for link in _LINK.findall(source[0]) if not link.startswith("http")]
+    for link in links:
+        target = os.path.normpath(Path(page).parent / link)
+        picture = target.startswith("images/") and (ROOT / "docs" / target).is_file()
+        assert picture or target in PAGES_OF_THE_SITE, link
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_links_of_a_notebook_lead_to_files_of_the_checkout(path: Path) -> None:
+    links = [link for link in _LINK.findall(_prose(path)) if not link.startswith("http")]
+    assert [link for link in links if not (path.parent / link).is_file()] == []
+
+
+def test_the_site_lists_every_notebook() -> None:
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^(\d\d) .+ <notebooks/(.+)>$", index, re.MULTILINE)
+    assert listed == [(path.stem[:2], path.stem) for path in NOTEBOOKS]
+
+
+def test_executed_notebooks_are_kept_until_the_code_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(notebook_pages, "ROOT", tmp_path)
+    monkeypatch.setattr(notebook_pages, "CACHES", tmp_path / "out")
+    code = tmp_path / "src" / "package" / "code.py"
+    code.parent.mkdir(parents=True)
+    code.write_text("answer = 42\n", encoding="utf-8")
+    first = notebook_pages.execution_cache()
+    first.mkdir(parents=True)
+    assert notebook_pages.execution_cache() == first
+    assert first.is_dir()
+    code.write_text("answer = 43\n", encoding="utf-8")
+    assert notebook_pages.execution_cache() != first
+    assert not first.exists()
 
 
 def test_the_picture_of_the_layers_is_the_contract() -> None:
