@@ -1,5 +1,5 @@
 # `make route` plans the demonstration route, `make test` passes all checks, `make docs` builds the
-# documentation; all set up by themselves.
+# documentation, `make site` with executed notebooks; all set up by themselves.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
