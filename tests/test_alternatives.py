@@ -134,6 +134,20 @@ def test_no_route_goes_into_a_room_round_a_table_and_out_again():
     assert len(inside) == 2
 
 
+def test_between_points_of_a_room_with_one_door_the_search_soon_knows_that_there_is_no_more(
+    monkeypatch,
+):
+    """Beyond the door are a hundred pillars; the paths round them would take hours to list."""
+    classes = np.ones((31, 45), np.uint8)
+    classes[2:30:3, 15:44:3] = 0
+    classes[:, 12] = 0
+    classes[15, 12] = 1
+    monkeypatch.setattr(alternatives, "MOST_STATES", 5000)
+    found = AlternativeSearch(topology_of(classes)).paths((3, 2), (28, 9), 3)
+    assert found.complete
+    assert len(found.paths) == 1
+
+
 def any_two(classes, seed):
     free = np.argwhere(classes == CellClass.FREE)
     if len(free) == 0:

@@ -11,12 +11,13 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.route import _class_kernels
+from hybridnav.route.dead_ends import DeadEnds
 from hybridnav.search._kernels import field_distances, legal_moves
 from hybridnav.search.octile import length_in_cells
 from hybridnav.topology.homotopy import HomotopyClasses
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
+    from hybridnav._typing import BoolArray, LongArray
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.homotopy import Word
 
@@ -123,7 +124,7 @@ class AlternativeSearch:
             np.array([letter for word in words for letter in word], dtype=np.int32),
         )
         self._enterable = np.ascontiguousarray(self.classes.enterable_cells)
-        self._moves = legal_moves(self._enterable, False).ravel()  # corners are not cut
+        self._dead_ends: DeadEnds | None = None
 
     def paths(self, start: Cell, goal: Cell, count: int) -> ClassPaths:
         """Find paths of different classes.
@@ -142,7 +143,7 @@ class AlternativeSearch:
         shortest = float(length_in_cells(left[[first]])[0]) if left[first] >= 0 else math.inf
         apart = self._apart if shortest == math.inf else min(self._apart, int(shortest / 2))
         states, tree, goals, reason = _class_kernels.find_classes(
-            self._moves,
+            legal_moves(self._remaining(start, goal, max(1, apart)), False).ravel(),
             cols,
             (first, last),
             left,
@@ -160,6 +161,13 @@ class AlternativeSearch:
             cells = np.stack(np.divmod(flat, cols), axis=1)
             found.append(ClassPath(cells, word, length))
         return ClassPaths(tuple(found), reason != _class_kernels.LIMITED, shortest)
+
+    def _remaining(self, start: Cell, goal: Cell, apart: int) -> BoolArray:
+        """The cells that a path may enter which is a shortest of its class and does not wind."""
+        dead_ends = self._dead_ends
+        if dead_ends is None or dead_ends.reach != apart:
+            self._dead_ends = dead_ends = DeadEnds(self._enterable, apart)
+        return dead_ends.left(start, goal)
 
 
 _MOST_KEPT = 4
