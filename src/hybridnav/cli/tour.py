@@ -182,4 +182,5 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     if gap > _OPTIMAL:
         bound = math.floor(bound * 100) / 100
         told = f"this way is at most {math.ceil(gap * 1000) / 10:.1f} % too long between its stops"
-    return [*lines, f"bound      {bound:.2f} ({metric}), {told}"]
+    unit = "m " if figures["cost"] == length_m else ""
+    return [*lines, f"bound      {bound:.2f} {unit}({metric}), {told}"]
