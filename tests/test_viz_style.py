@@ -76,6 +76,13 @@ def test_lines_of_one_picture_are_told_apart(names, vision):
 
 
 @pytest.mark.parametrize("vision", VISION)
+def test_routes_are_told_apart_and_stand_out_from_pale_places(vision):
+    routes = style.rgb(*style.ROUTES)
+    assert least_within(routes, vision) > 20
+    assert least(routes, np.concatenate([PALE, style.rgb(style.FREE)]), vision) > 20
+
+
+@pytest.mark.parametrize("vision", VISION)
 def test_places_are_told_apart(vision):
     assert least_within(style.rgb(*style.PLACES), vision) > 8
     assert least_within(PALE, vision) > 2.5

@@ -6,12 +6,14 @@ from hybridnav.viz.levels import plot_levels
 from hybridnav.viz.maps import plot_level, plot_map, plot_places
 from hybridnav.viz.paper import plot_figure1
 from hybridnav.viz.plan import plot_plan
-from hybridnav.viz.rooms import plot_rooms, plot_tour
+from hybridnav.viz.rooms import plot_rooms
 from hybridnav.viz.save import save_figure
 from hybridnav.viz.search import plot_search
 from hybridnav.viz.topology import plot_topology
+from hybridnav.viz.ways import plot_alternatives, plot_tour
 
 __all__ = [
+    "plot_alternatives",
     "plot_dual",
     "plot_figure1",
     "plot_kernels",

@@ -33,11 +33,19 @@ class Marker:
     point: FloatArray
 
 
-def draw_markers(canvas: Canvas, markers: Sequence[Marker], path: FloatArray) -> None:
-    """Draw start and goal. One outside the view is drawn at its rim, with its coordinates."""
+def draw_markers(
+    canvas: Canvas,
+    markers: Sequence[Marker],
+    path: FloatArray,
+    *,
+    avoid: Sequence[FloatArray] = (),
+) -> None:
+    """Draw start and goal, labelled beside boxes to avoid. One outside the view is drawn at its
+    rim, with its coordinates."""
     ax, view, sizes = canvas.ax, canvas.view, canvas.sizes
     points = [np.clip(marker.point, view.low, view.high) for marker in markers]
     boxes = [_box_round(point, np.full(2, 4.5 * sizes.line), sizes) for point in points]
+    boxes += avoid
     for marker, point in zip(markers, points, strict=True):
         shape, diameter = _SHAPES[marker.name]
         drawn = Line2D(

@@ -1,14 +1,11 @@
-"""Pictures of rooms: areas with names on them, and doors."""
+"""Pictures of rooms: areas with names on them, and doors with numbers."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import patheffects
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
-from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM
@@ -18,17 +15,22 @@ from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.colouring import colour_vertices
 from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
 from hybridnav.viz.maps import ground_entries, swatch
+from hybridnav.viz.room_labels import RoomWriter
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import ByteArray, FloatArray, IntArray
+    from hybridnav._typing import ByteArray, IntArray
     from hybridnav.grid import OccupancyGrid, RoomLabels
-    from hybridnav.planner import Tour
+    from hybridnav.topology import Door
     from hybridnav.viz.layout import Entry
 
-_LEAST_DOOR_M = 0.3
+LEAST_DOOR_M = 0.3
 """Narrower doors are not drawn: a scan's noise makes many."""
+DOOR_POINTS = 1.2
+"""Half the side of a door's dot."""
 
 
 def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
@@ -41,6 +43,9 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw rooms in colours that differ between neighbours, with names, doors as dots, scale bar.
+
+    A name that does not fit its room, or would hide another, is written smaller or left out; the
+    legend counts those left out. Doors have their numbers where there is room for them.
 
     Parameters
     ----------
@@ -70,14 +75,21 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     """
     view, labels, grid = _view_of(rooms, grid)
     canvas = Canvas.opened(ax, width_in, known_view(grid))
-    draw_cells(canvas, grid, labels.label_of, _colours(labels.label_of, len(labels.names)))
-    entries: list[Entry] = [(swatch(style.PLACES), "rooms"), *ground_entries(grid)]
+    draw_room_cells(canvas, labels, grid)
     words = [grid.name, f"{len(labels.names)} rooms"]
+    writer, left_out = RoomWriter(canvas, grid, labels), 0
+    doors: list[Door] = []
     if view is not None:
-        entries.append((_draw_doors(canvas, view), "doors"))
         words.append(f"{len(view.doors)} doors")
+        doors = [door for door in view.doors if door.width_m >= LEAST_DOOR_M]
+        writer.keep_free([door.position for door in doors], DOOR_POINTS)
     if names:
-        _write_names(canvas, labels, grid)
+        left_out = writer.write_names()
+    entries: list[Entry] = [room_entry(left_out)]
+    if view is not None:
+        entries.append((draw_doors(canvas, doors), "doors"))
+        writer.number_doors(sorted(doors, key=lambda door: -door.width_m))
+    entries += ground_entries(grid)
     add_title(canvas, words if title is None else [title])
     canvas.ax.set_axis_off()
     bar = add_scale_bar(canvas)
@@ -101,58 +113,21 @@ def _view_of(
     return None, rooms, grid
 
 
-def plot_tour(
-    topology: TopologicalMap,
-    tour: Tour,
-    *,
-    ax: Axes | None = None,
-    title: str | None = None,
-    width_in: float = style.FULL_WIDTH_IN,
-) -> Axes:
-    """Draw a way through rooms: the rooms as `plot_rooms` does, and the paths from stop to stop.
-
-    Parameters
-    ----------
-    topology
-        The map with rooms.
-    tour
-        The way; without a path only the rooms are drawn, and the title says why.
-    ax
-        Where to draw; by default new axes in a new figure.
-    title
-        Replaces the title that names the map and tells the length; an empty one leaves it out.
-    width_in
-        Width of a new figure in inches; its height follows.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-    """
-    told = f"{tour.length_m:.1f} m" if tour.solved else str(tour.status)
-    words = f"{topology.grid.name}  ·  {told}" if title is None else title
-    ax = plot_rooms(topology, ax=ax, title=words, width_in=width_in)
-    for result in tour.results:
-        if result.path is None:
-            continue
-        line = Line2D(*result.path.points.T, color=style.PATH, linewidth=1.6, zorder=7)
-        line.set_gid("path")
-        ax.add_line(line)
-        ends = Line2D(
-            *result.path.points[[0, -1]].T,
-            color=style.PATH,
-            marker="o",
-            markerfacecolor=style.FREE,
-            linestyle="none",
-            markersize=5.0,
-            zorder=8,
-        )
-        ends.set_gid("stops")
-        ax.add_line(ends)
-    return ax
+def draw_room_cells(
+    canvas: Canvas, labels: RoomLabels, grid: OccupancyGrid, *, strength: float = 1.0
+) -> None:
+    """Draw the map with each room in a colour of some strength."""
+    colours = _colours(labels.label_of, len(labels.names), strength)
+    draw_cells(canvas, grid, labels.label_of, colours)
 
 
-def _colours(label_of: IntArray, n_rooms: int) -> ByteArray:
+def room_entry(left_out: int, strength: float = 1.0) -> Entry:
+    """The legend's entry for rooms, some of which are left without their names."""
+    told = f"rooms ({left_out} without their name)" if left_out else "rooms"
+    return swatch(style.PLACES, strength), told
+
+
+def _colours(label_of: IntArray, n_rooms: int, strength: float) -> ByteArray:
     """RGB per room and one row more, white for no room."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
     for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
@@ -160,57 +135,26 @@ def _colours(label_of: IntArray, n_rooms: int) -> ByteArray:
         pairs.append(np.stack([tail[between], head[between]], axis=1))
     arcs = np.unique(np.concatenate(pairs), axis=0).astype(np.int32)
     index = colour_vertices(arcs, n_rooms)
-    return np.concatenate([style.rgb(*style.PLACES)[index], style.rgb(style.FREE)])
+    return np.concatenate(
+        [style.rgb(*style.PLACES, strength=strength)[index], style.rgb(style.FREE)]
+    )
 
 
-def _draw_doors(canvas: Canvas, rooms: Rooms) -> Line2D:
+def draw_doors(canvas: Canvas, doors: Sequence[Door]) -> Line2D:
     """Draw doors as dots; gives one for the legend."""
-    at = [door.position for door in rooms.doors if door.width_m >= _LEAST_DOOR_M]
+    at = [door.position for door in doors]
     dots, sample = (
         Line2D(
             [x for x, _ in points],
             [y for _, y in points],
             color=style.PATH,
             marker="o",
-            markersize=2.4 * canvas.sizes.line,
+            markersize=2 * DOOR_POINTS * canvas.sizes.line,
             linestyle="none",
-            zorder=6,
+            zorder=8,
         )
         for points in (at, [])
     )
     dots.set_gid("doors")
     canvas.ax.add_line(dots)
     return sample
-
-
-def _write_names(canvas: Canvas, labels: RoomLabels, grid: OccupancyGrid) -> None:
-    """Write each name in the middle of its room: where the room's own rim is farthest."""
-    boxes = ndimage.find_objects(labels.label_of + 1, len(labels.names))
-    for label, (name, window) in enumerate(zip(labels.names, boxes, strict=True)):
-        if window is None:
-            continue
-        point = _middle(labels.label_of[window] == label, window, grid)
-        text = Text(
-            float(point[0]),
-            float(point[1]),
-            name,
-            fontsize=0.75 * canvas.sizes.font,
-            color=style.INK,
-            horizontalalignment="center",
-            verticalalignment="center",
-            parse_math=False,
-            path_effects=[patheffects.withStroke(linewidth=1.5, foreground=style.FREE)],
-            zorder=9,
-        )
-        text.set_gid(f"room-{label}")
-        canvas.ax.add_artist(text)
-
-
-def _middle(
-    inside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
-    window: tuple[slice, ...],
-    grid: OccupancyGrid,
-) -> FloatArray:
-    depth = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
-    row, col = np.unravel_index(int(np.argmax(depth)), depth.shape)
-    return grid.frame.points_of((int(row) + window[0].start, int(col) + window[1].start))

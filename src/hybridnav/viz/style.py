@@ -26,6 +26,9 @@ SELF_LOOP_DASHES = (0.0, (3.0, 1.2))
 """Lengths in line widths. Printed in grey, self-loops are no darker than parallel arcs."""
 HOLE = "#d55e00"
 OUTSIDE = "#882255"
+ROUTES = (PATH, "#4837b6", "#e49b34", "#110328", "#8c8d8c")
+"""Routes in one picture, the shortest first: as far apart as five can be for every kind of colour
+vision, from each other and from pale places."""
 UNEXPLORED_NODE = "#8a8a8a"
 
 PLACES = ("#3ba2b2", "#e0d59d", "#99a9ea", "#aea160", "#abcdec", "#daada3")

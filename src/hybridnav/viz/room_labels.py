@@ -1,0 +1,184 @@
+"""What is written on rooms: their names, and numbers at doors, where nothing else is hidden."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.text import Text
+from scipy import ndimage
+
+from hybridnav.grid import NO_ROOM
+from hybridnav.viz import style
+from hybridnav.viz.layout import text_width
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav.grid import OccupancyGrid, RoomLabels
+    from hybridnav.topology import Door
+    from hybridnav.viz.canvas import Canvas
+
+_NAME_SIZES = (0.75, 0.65, 0.55)
+"""Font sizes that a name is tried in, of the picture's."""
+_LEAST_FONT = 4.0
+"""Points; nobody reads less."""
+_NUMBER_SIZE = 0.7
+_SIDES = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
+_PARTS = 4
+"""Parts per side of a room's bounding box, each with a spot for the name."""
+_SAMPLES = 9
+"""Points per side of a name's box that are looked up in the map."""
+
+
+class RoomWriter:
+    """Writes names and numbers so that none hides another.
+
+    Parameters
+    ----------
+    canvas
+        Where to write.
+    grid
+        The map.
+    labels
+        Its rooms.
+    """
+
+    def __init__(self, canvas: Canvas, grid: OccupancyGrid, labels: RoomLabels) -> None:
+        self._canvas = canvas
+        self._grid = grid
+        self._labels = labels
+        self.taken: list[FloatArray] = []
+        """Boxes of what is written: lower left and upper right corner, `(x, y)` in metres."""
+
+    def keep_free(self, points: Iterable[ArrayLike], reach: float) -> None:
+        """Write nothing nearer to points than a reach in points of the page, times line width."""
+        half = np.full(2, reach * self._canvas.sizes.line)
+        self.taken += [self._box(np.asarray(point), half) for point in points]
+
+    def number_doors(self, doors: Sequence[Door], *, always: bool = False) -> None:
+        """Write the numbers of doors beside their dots.
+
+        Parameters
+        ----------
+        doors
+            The doors.
+        always
+            Write a number even where it hides another one; else it is left out.
+        """
+        font = _NUMBER_SIZE * self._canvas.sizes.font
+        reach = 1.6 * self._canvas.sizes.line
+        for door in doors:
+            half = np.array([text_width(str(door.number), font, "bold") / 2, 0.45 * font])
+            shifts = _SIDES * (half + reach) / self._canvas.sizes.points_per_metre
+            centres = np.asarray(door.position) + shifts
+            boxes = [self._box(centre, half) for centre in centres]
+            hidden = [self._n_hidden(box) for box in boxes]
+            best = int(np.argmin(hidden))
+            if hidden[best] and not always:
+                continue
+            self._write(centres[best], str(door.number), font, f"door-{door.number}", bold=True)
+            self.taken.append(boxes[best])
+
+    def write_names(self, first: Collection[str] = ()) -> int:
+        """Write each name well inside its room, smaller where it must be.
+
+        Parameters
+        ----------
+        first
+            Names that are written before the others, which follow from the largest room down.
+
+        Returns
+        -------
+        int
+            How many rooms are left without their names: those that would reach into another room,
+            over the rim of the picture or over what is written already.
+        """
+        names = self._labels.names
+        areas = np.bincount(self._labels.label_of.ravel() + 1, minlength=len(names) + 1)[1:]
+        order = sorted(range(len(names)), key=lambda n: (names[n] not in first, -areas[n], n))
+        boxes = ndimage.find_objects(self._labels.label_of + 1, len(names))
+        left_out = 0
+        for label in order:
+            window = boxes[label]
+            if window is not None and not self._wrote_name(label, window):
+                left_out += 1
+        return left_out
+
+    def _wrote_name(self, label: int, window: tuple[slice, ...]) -> bool:
+        name = self._labels.names[label]
+        points = _depths(self._labels.label_of[window] == label, window, self._grid)
+        for size, point in itertools.product(_NAME_SIZES, points):
+            font = max(size * self._canvas.sizes.font, _LEAST_FONT)
+            half = np.array([text_width(name, font) / 2, 0.55 * font])
+            box = self._box(point, half)
+            if not self._n_hidden(box) and self._is_in_room(box, label):
+                self._write(point, name, font, f"room-{label}")
+                self.taken.append(box)
+                return True
+        return False
+
+    def _is_in_room(self, box: FloatArray, label: int) -> bool:
+        """Whether a box lies in the picture and covers no other room; walls may be covered."""
+        view = self._canvas.view
+        if (box[0] < view.low).any() or (box[1] > view.high).any():
+            return False
+        xy = np.meshgrid(*np.linspace(box[0], box[1], _SAMPLES).T)
+        cells = self._grid.frame.cells_of(np.stack([axis.ravel() for axis in xy], axis=1))
+        cells = cells[((cells >= 0) & (cells < self._grid.shape)).all(axis=1)]
+        found = self._labels.label_of[tuple(cells.T)]
+        return bool(np.isin(found, (label, NO_ROOM)).all())
+
+    def _box(self, centre: FloatArray, half_points: FloatArray) -> FloatArray:
+        half = half_points / self._canvas.sizes.points_per_metre
+        return np.stack([centre - half, centre + half])
+
+    def _n_hidden(self, box: FloatArray) -> int:
+        """How much of what is written a box would hide."""
+        if not self.taken:
+            return 0
+        taken = np.stack(self.taken)
+        return int(((taken[:, 0] < box[1]) & (taken[:, 1] > box[0])).all(axis=1).sum())
+
+    def _write(
+        self, point: FloatArray, words: str, font: float, gid: str, *, bold: bool = False
+    ) -> None:
+        text = Text(
+            float(point[0]),
+            float(point[1]),
+            words,
+            fontsize=font,
+            fontweight="bold" if bold else "normal",
+            color=style.PATH if bold else style.INK,
+            horizontalalignment="center",
+            verticalalignment="center",
+            parse_math=False,
+            path_effects=[patheffects.withStroke(linewidth=1.5, foreground=style.FREE)],
+            zorder=9,
+        )
+        text.set_gid(gid)
+        self._canvas.ax.add_artist(text)
+
+
+def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -> list[FloatArray]:
+    """Where a room's rim is farthest, in all of it and in each part of its bounding box; the
+    farthest first."""
+    depth = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
+    rows, cols = np.indices((_PARTS, _PARTS)).reshape(2, -1)
+    found = []
+    for row, col in zip(rows.tolist(), cols.tolist(), strict=True):
+        low = row * depth.shape[0] // _PARTS, col * depth.shape[1] // _PARTS
+        part = depth[
+            low[0] : (row + 1) * depth.shape[0] // _PARTS,
+            low[1] : (col + 1) * depth.shape[1] // _PARTS,
+        ]
+        if part.size and part.max() > 0:
+            at = np.add(np.unravel_index(int(part.argmax()), part.shape), low)
+            found.append((-float(part.max()), tuple(at.tolist())))
+    corner = tuple(side.start for side in window)
+    return [grid.frame.points_of(np.add(at, corner)) for _, at in sorted(found)]

@@ -1,0 +1,225 @@
+"""Pictures of ways through rooms: tours from stop to stop, and routes beside each other."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.lines import Line2D
+
+from hybridnav.planner.itinerary import Guide
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.labels import Marker, draw_markers
+from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.maps import ground_entries, swatch
+from hybridnav.viz.places import Places
+from hybridnav.viz.room_labels import RoomWriter
+from hybridnav.viz.rooms import (
+    DOOR_POINTS,
+    LEAST_DOOR_M,
+    draw_doors,
+    draw_room_cells,
+    room_entry,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import FloatArray
+    from hybridnav.planner import Tour
+    from hybridnav.planner.alternatives import Alternatives
+    from hybridnav.planner.itinerary import Leg
+    from hybridnav.topology import Door, Rooms, TopologicalMap
+    from hybridnav.viz.layout import Entry
+
+_TOUR_WIDTH, _STOP_POINTS = 1.6, 5.0
+_ROUTE_WIDTH, _WIDER, _CASING = 1.6, 1.3, 1.2
+"""Longer routes are wider, below the shorter ones: where routes share their way each shows."""
+_Dashes = tuple[float, tuple[float, ...]]
+_DASHES: tuple[_Dashes | None, ...] = (
+    None,
+    (0.0, (2.2, 1.2)),
+    (0.0, (0.8, 0.8)),
+    (0.0, (4.0, 1.0, 1.0, 1.0)),
+)
+"""For as many routes as there are colours, each."""
+
+
+def plot_tour(
+    topology: TopologicalMap,
+    tour: Tour,
+    *,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw a way through rooms: the rooms as `plot_rooms` does, and the paths from stop to stop.
+
+    The doors on the way have their numbers, those of `Tour.in_words`.
+
+    Parameters
+    ----------
+    topology
+        The map with rooms.
+    tour
+        The way; without a path only the rooms are drawn, and the title says why.
+    ax
+        Where to draw; by default new axes in a new figure.
+    title
+        Replaces the title that names the map and tells the length; an empty one leaves it out.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+    """
+    told = f"{tour.length_m:.1f} m" if tour.solved else str(tour.status)
+    paths = [result.path.points for result in tour.results if result.path is not None]
+    canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
+    ends = [point for points in paths for point in points[[0, -1]]]
+    entries, _ = _draw_ground(canvas, topology, tour.legs, ends, 1.0)
+    for points in paths:
+        line = Line2D(*points.T, color=style.PATH, linewidth=_TOUR_WIDTH, zorder=7)
+        line.set_gid("path")
+        canvas.ax.add_line(line)
+        stops = Line2D(
+            *points[[0, -1]].T,
+            color=style.PATH,
+            marker="o",
+            markerfacecolor=style.FREE,
+            linestyle="none",
+            markersize=_STOP_POINTS,
+            zorder=8,
+        )
+        stops.set_gid("stops")
+        canvas.ax.add_line(stops)
+    if paths:
+        entries.insert(0, (Line2D([], [], color=style.PATH, lw=_TOUR_WIDTH), "path"))
+    return _finished(canvas, [topology.grid.name, told] if title is None else [title], entries)
+
+
+def plot_alternatives(
+    topology: TopologicalMap,
+    alternatives: Alternatives,
+    *,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw routes of different homotopy classes, each in its own colour, on rooms or places.
+
+    The legend tells each route's number, the shortest being 1, and its length. Where routes share
+    their way the longer one is the wider line below. With rooms, the doors that any of them passes
+    have their numbers. More than five routes differ by dashes too.
+
+    Parameters
+    ----------
+    topology
+        The map that they were planned on.
+    alternatives
+        The routes; without any the title says that there is no path.
+    ax
+        Where to draw; by default new axes in a new figure.
+    title
+        Replaces the title that names the map and counts the routes; an empty one leaves it out.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+    """
+    paths = [alternative.path for alternative in alternatives]
+    canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
+    legs: list[Leg] = []
+    if paths and topology.pyramid.rooms is not None:
+        guide = Guide(topology.rooms)
+        legs = [leg for path in paths for leg in guide.legs(path)]
+    ends = list(paths[0].points[[0, -1]]) if paths else []
+    ground, taken = _draw_ground(canvas, topology, legs, ends, style.PALE)
+    entries: list[Entry] = []
+    styles = itertools.product(_DASHES, style.ROUTES)
+    for number, (path, (dashes, colour)) in enumerate(zip(paths, styles, strict=False)):
+        line = _route_line(canvas, path.points, number, colour, dashes)
+        line.set_gid(f"route-{number + 1}")
+        canvas.ax.add_line(line)
+        sample = Line2D([], [], color=colour, linestyle=dashes or "-", lw=2.2 * canvas.sizes.line)
+        entries.append((sample, f"route {number + 1}, {path.length_m:.2f} m"))
+    markers = [Marker(name, end) for name, end in zip(("start", "goal"), ends, strict=False)]
+    along = np.concatenate([path.points for path in paths]) if paths else np.empty((0, 2))
+    draw_markers(canvas, markers, along, avoid=taken)
+    told = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
+    words = [topology.grid.name, told] if title is None else [title]
+    return _finished(canvas, words, entries + ground)
+
+
+def _route_line(
+    canvas: Canvas, points: FloatArray, number: int, colour: str, dashes: _Dashes | None
+) -> Line2D:
+    """A route's line: from the second on wider, and below those before it."""
+    steps = min(number, len(style.ROUTES) - 1)
+    width = (_ROUTE_WIDTH + _WIDER * steps) * canvas.sizes.line
+    casing = patheffects.withStroke(
+        linewidth=width + _CASING * canvas.sizes.line, foreground=style.FREE
+    )
+    return Line2D(
+        *points.T,
+        color=colour,
+        linestyle=dashes or "-",
+        linewidth=width,
+        solid_capstyle="round",
+        solid_joinstyle="round",
+        path_effects=[casing] if dashes is None else [],
+        zorder=7 - number / 20,
+    )
+
+
+def _draw_ground(
+    canvas: Canvas,
+    topology: TopologicalMap,
+    legs: Sequence[Leg],
+    ends: Sequence[FloatArray],
+    strength: float,
+) -> tuple[list[Entry], list[FloatArray]]:
+    """Draw rooms with names and doors, or places where there are no rooms; entries of the legend,
+    and the boxes of what is written."""
+    grid = topology.grid
+    if topology.pyramid.rooms is None:
+        places = Places(topology.level)
+        draw_cells(canvas, grid, topology.level.field_of, places.colours(~places.free))
+        entry: Entry = (swatch(style.PLACES, style.PALE), "places")
+        return [entry, *ground_entries(grid)], []
+    rooms = topology.rooms
+    draw_room_cells(canvas, rooms.labels, grid, strength=strength)
+    passed = list({leg.door.number: leg.door for leg in legs if leg.door is not None}.values())
+    doors = _drawn_doors(rooms, passed)
+    writer = RoomWriter(canvas, grid, rooms.labels)
+    writer.keep_free(ends, _STOP_POINTS / 2)
+    writer.keep_free([door.position for door in doors], DOOR_POINTS)
+    writer.number_doors(passed, always=True)
+    left_out = writer.write_names({leg.room for leg in legs if leg.room is not None})
+    entries: list[Entry] = [room_entry(left_out, strength), (draw_doors(canvas, doors), "doors")]
+    return entries + ground_entries(grid), writer.taken
+
+
+def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
+    """Doors wide enough to draw, and all that the way passes."""
+    numbers = {door.number for door in passed}
+    return [d for d in rooms.doors if d.width_m >= LEAST_DOOR_M or d.number in numbers]
+
+
+def _finished(canvas: Canvas, words: Sequence[str], entries: Sequence[Entry]) -> Axes:
+    canvas.ax.set_axis_off()
+    add_title(canvas, words)
+    bar = add_scale_bar(canvas)
+    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
+    fit_height(canvas, legend)
+    return canvas.ax
