@@ -12,6 +12,7 @@ import hybridnav as hn
 from hybridnav.grid import RoomLabels
 from hybridnav.viz import plot_alternatives, plot_rooms, plot_tour
 from tests.strategies import drawn, occupancy_grid
+from tests.test_cli import cli  # noqa: F401 - the fixture
 
 # A ring of corridor round a block, and a closet that nothing leads to.
 RING = drawn(
@@ -142,3 +143,23 @@ def test_alternatives_on_a_map_without_rooms_and_without_a_path():
     ax = plot_alternatives(topology, none)
     assert not routes_of(ax)
     assert "no path" in ax.get_title()
+
+
+@pytest.mark.parametrize("ends", [("0.75,1.75", "3.75,1.75"), ("west", "3.75,1.75")])
+def test_the_command_draws_all_routes(cli, tmp_path, ring, ends):  # noqa: F811 - the fixture
+    grid = occupancy_grid(RING, resolution_m=0.5)
+    image = np.where(np.flipud(grid.measured) == hn.CellClass.OCCUPIED, 0, 254).astype(np.uint8)
+    (tmp_path / "m.pgm").write_bytes(b"P5\n13 7\n255\n" + image.tobytes())
+    (tmp_path / "m.yaml").write_text(
+        "image: m.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    rooms = ring.topology.rooms
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms.labels, rooms.grid)
+    picture = tmp_path / "m.svg"
+    query = ("--from", ends[0], "--to", ends[1], "--alternatives", 2, "--robot-radius", 0)
+    done = cli("plan", tmp_path / "m.yaml", *query, "--plot", picture)
+    assert done.code == 0
+    drawn_routes = set(re.findall(r'id="(route-\d)"', picture.read_text()))
+    assert drawn_routes == {f"route-{n}" for n in (1, 2)}
+    assert done.out.count("\nroute ") == 2

@@ -53,19 +53,22 @@ def run_errand(errand: Errand) -> bool:
         planner = hn.HybridPlanner(topology, preset=errand.settings)
     with stage("planning", seconds, "plan"):
         tour = hn.plan_tour(planner, errand.stops, at=errand.at)
-    figures = _figures(errand, tour)
+    figures, found = _figures(errand, tour), None
     if errand.alternatives > 1:
         with stage("finding alternatives", seconds, "alternatives"):
-            figures |= _alternatives(errand, planner)
+            found = _found(errand, planner)
+            figures |= _alternatives(topology, found)
     figures["seconds"] = seconds
     if errand.as_json:
         answer(json.dumps(figures, allow_nan=False) + "\n")
     else:
         answer(_summary(topology.grid, figures))
     if errand.plot is not None:
-        from hybridnav.viz import plot_tour, save_figure  # noqa: PLC0415 - matplotlib on demand
+        # Loads matplotlib.
+        from hybridnav.viz import plot_alternatives, plot_tour, save_figure  # noqa: PLC0415
 
-        save_figure(plot_tour(topology, tour), errand.plot)
+        ax = plot_alternatives(topology, found) if found else plot_tour(topology, tour)
+        save_figure(ax, errand.plot)
     return tour.solved
 
 
@@ -113,14 +116,9 @@ def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
     }
 
 
-def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> dict[str, Any]:
-    """Routes of different classes between the two stops, with the rooms and doors they pass, and
-    whether there may be more."""
-    # Loads numba, which help and wrong usage can do without.
-    from hybridnav.planner.itinerary import NOWHERE, Guide  # noqa: PLC0415
-
-    guide = Guide(planner.topology.rooms)
-    found = hn.plan_alternatives(
+def _found(errand: Errand, planner: hn.HybridPlanner) -> hn.Alternatives:
+    """Routes of different classes between the two stops."""
+    return hn.plan_alternatives(
         planner,
         errand.stops[0],
         errand.stops[-1],
@@ -128,6 +126,14 @@ def _alternatives(errand: Errand, planner: hn.HybridPlanner) -> dict[str, Any]:
         least_hole_m2=errand.least_hole_m2,
         at=errand.at,
     )
+
+
+def _alternatives(topology: hn.TopologicalMap, found: hn.Alternatives) -> dict[str, Any]:
+    """Routes with the rooms and doors that they pass, and whether there may be more."""
+    # Loads numba, which help and wrong usage can do without.
+    from hybridnav.planner.itinerary import NOWHERE, Guide  # noqa: PLC0415
+
+    guide = Guide(topology.rooms)
     routes = []
     for alternative in found:
         legs = guide.legs(alternative.path)
