@@ -198,6 +198,12 @@ def test_points_are_in_the_map_frame_of_a_turned_map(cli, draw):
     assert "extent     x 8.00 to 10.00 m, y 20.00 to 23.00 m\n" in cli("show", path).out
 
 
+def test_the_version_is_the_packages(cli):
+    done = cli("--version")
+    assert (done.code, done.out, done.err) == (0, f"hybridnav {hn.__version__}\n", "")
+    assert "--version" in cli("--help").out
+
+
 # --- settings -----------------------------------------------------------------------------------
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 import warnings
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
-from hybridnav.cli.common import complain
+import hybridnav as hn
+from hybridnav.cli.common import answer, complain
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
 from hybridnav.cli.evaluate import compare, evaluate
 from hybridnav.cli.plan import plan
@@ -27,6 +28,27 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,  # rich takes [m] for markup
 )
+
+
+def _print_version(asked: bool) -> None:  # noqa: FBT001 - called by Typer
+    if asked:
+        answer(f"hybridnav {hn.__version__}\n")
+        raise typer.Exit
+
+
+VersionOption = Annotated[
+    bool,
+    typer.Option(
+        "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+    ),
+]
+
+
+@app.callback()
+def _options(version: VersionOption = False) -> None:
+    """Take what comes before a command."""
+
+
 app.command()(plan)
 app.command()(show)
 app.command()(rooms)
