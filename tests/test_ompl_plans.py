@@ -243,7 +243,7 @@ def test_poses_are_refused_where_the_robot_does_not_fit(rooms: hn.TopologicalMap
 
 def test_a_map_inflated_by_more_than_the_robot_is_refused() -> None:
     grid = hn.OccupancyGrid(np.zeros((40, 40), np.float32), hn.Frame(0.1), robot_radius_m=0.4)
-    with pytest.raises(hn.OmplError, match=r"inflated by 0.4 m, but .* has a radius of 0.3 m"):
+    with pytest.raises(hn.OmplError, match=r"by 0.4 m, .* of 0.3 m: .* \(--robot-radius 0.3\)"):
         long_robot(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "se2", "budget_s: 1")
 
 

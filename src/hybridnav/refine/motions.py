@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+import math
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -274,7 +275,9 @@ def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ..
         raise InvalidValueError(
             f"the map is inflated by {grid.robot_radius_m:g} m, but the largest circle about the "
             f"base inside the footprint has a radius of {footprint.inscribed_radius_m:g} m: load "
-            "the map with that robot_radius_m, or ways that the robot can take are closed"
+            "the map with that robot_radius_m (--robot-radius "
+            f"{math.floor(footprint.inscribed_radius_m * 1e4 + 1e-6) / 1e4:g}), or ways that the "
+            "robot can take are closed"
         )
     parts = footprint.convex_parts()
     offsets = np.cumsum([0, *map(len, parts)])
