@@ -7,11 +7,13 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
 import hybridnav as hn
 from hybridnav.cli import main
+from hybridnav.cli.plan import summary
 
 MAPS = Path(__file__).parents[1] / "maps"
 FIGURE = MAPS / "figure1" / "figure1.yaml"
@@ -148,6 +150,16 @@ def test_a_path_equal_to_its_bound_is_called_optimal(cli, rooms):
     assert "bound      0.00 m, the path is optimal" in done.out
     assert "loss 0.00 %" in done.out
     assert "arcs       0\n" in done.out
+
+
+def test_a_path_that_ends_short_of_the_goal_says_by_how_much():
+    points = np.array([[1.0, 1.0], [1.5, 1.0]])
+    path = hn.Path(np.zeros((2, 2), dtype=np.int64), points, 0.5)
+    result = hn.PlanResult(hn.PlanStatus.APPROXIMATE, "any-angle", path)
+    grid = hn.OccupancyGrid(np.zeros((4, 4), np.float32), hn.Frame(1.0))
+    text = summary(grid, ((1.0, 1.0), (1.5, 3.25, 0.5)), result.to_dict())
+    assert "status     approximate\n" in text
+    assert "path       ends 2.25 m short of the goal after 0.50 m\n" in text
 
 
 @pytest.mark.parametrize(

@@ -171,7 +171,7 @@ def plan(
     if as_json:
         answer(json.dumps(figures, allow_nan=False) + "\n")
     else:
-        answer(_summary(topology.grid, (start, goal), figures))
+        answer(summary(topology.grid, (start, goal), figures))
     if plot is not None:
         _draw(topology, result, (start, goal), figures.get("optimum_m"), plot)
     if not result.solved:
@@ -238,7 +238,8 @@ def _draw(
     save_figure(ax, path)
 
 
-def _summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str, Any]) -> str:
+def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str, Any]) -> str:
+    """What a plan's figures say, line by line."""
     start, goal = (f"({', '.join(f'{value:.10g}' for value in end)})" for end in ends)
     radius = f"robot radius {grid.robot_radius_m:g} m"
     lines = [
@@ -248,7 +249,9 @@ def _summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[st
     if "outside" in figures["status"]:
         lines.append(f"extent     {extent(grid)}")
     if figures["length_m"] is not None and figures["lower_bound_m"] is None:
-        lines.append(f"length     {figures['length_m']:.2f} m, short of the goal")
+        short_m = math.dist(figures["points_m"][-1], ends[1][:2])
+        told = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"
+        lines.append(f"path       {told}")
     elif figures["length_m"] is not None:
         lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
         lines.append(f"bound      {_bound(figures['lower_bound_m'], figures['gap'])}")
