@@ -238,6 +238,19 @@ def test_an_option_wins_over_set_and_set_over_the_preset(cli, rooms):
     assert cli(*query, "--robot-radius", "1e-5").answer["status"] == "solved"
 
 
+@pytest.mark.parametrize("command", ["plan", "tour", "rooms"])
+def test_a_radius_that_leaves_no_free_cell_is_told_as_that(cli, rooms, command):
+    ends = {
+        "plan": ("--start", "1.5,3.5", "--goal", "7.5,3.5"),
+        "tour": ("--from", "room-1", "--to", "7.5,3.5"),
+        "rooms": (),
+    }[command]
+    name = "rooms" if command == "rooms" else "plan"
+    done = cli(name, rooms, *ends, "--robot-radius", 25)
+    assert done.refuses(2, "a robot radius of 25 m leaves no free cell on m", "--robot-radius")
+    assert cli(name, rooms, *ends, "--robot-radius", 0.5).code == 0
+
+
 def test_an_infinite_merge_distance_still_gives_strict_json(cli, rooms):
     query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "7.5,3.5")
     done = cli(*query, "--set", "pyramid.merge_distance_m=.inf", "--json")

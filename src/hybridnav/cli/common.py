@@ -15,6 +15,7 @@ import hybridnav as hn
 from hybridnav.cli.errors import UsageError
 from hybridnav.config import load_preset
 from hybridnav.config.preset import is_preset_name
+from hybridnav.config.yaml_file import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -106,19 +107,33 @@ def check_picture(path: Path | None) -> None:
         raise UsageError(f"--plot must name a file, {str(path)!r} is a folder")
 
 
+def load_grid(path: Path, preset: Preset, seconds: dict[str, float]) -> hn.OccupancyGrid:
+    """Load a map, inflated as a preset says."""
+    with stage(f"reading {path}", seconds, "load"):
+        return hn.load_map(path, robot_radius_m=preset.pyramid.robot_radius_m)
+
+
+def check_radius(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) -> None:
+    """Refuse a robot radius that leaves no cell of a map to be in."""
+    was_free = (grid.measured == hn.CellClass.FREE).any()
+    if was_free and not grid.enterable(allow_unexplored=allow_unexplored).any():
+        raise UsageError(
+            f"a robot radius of {grid.robot_radius_m:g} m leaves no free cell on "
+            f"{printable(grid.name)}: give a smaller one with --robot-radius"
+        )
+
+
 def grow_topology(
-    path: Path,
+    grid: hn.OccupancyGrid,
     preset: Preset,
     seconds: dict[str, float],
     *,
     rooms_file: Path | None = None,
     find_rooms: bool = False,
 ) -> hn.TopologicalMap:
-    """Load a map and build its pyramid as a preset says: with the rooms of a file; without one, if
-    asked for, with those that are found."""
+    """Build the pyramid of a map as a preset says: with the rooms of a file; without one, if asked
+    for, with those that are found."""
     settings = preset.pyramid
-    with stage(f"reading {path}", seconds, "load"):
-        grid = hn.load_map(path, robot_radius_m=settings.robot_radius_m)
     rooms = None
     if rooms_file is not None:
         with stage(f"reading {rooms_file}", seconds, "rooms"):

@@ -12,8 +12,10 @@ import hybridnav as hn
 from hybridnav.cli.common import (
     answer,
     check_picture,
+    check_radius,
     extent,
     grow_topology,
+    load_grid,
     read_settings,
     stage,
     timings,
@@ -160,7 +162,9 @@ def plan(
         return
     start, goal = ends
     seconds: dict[str, float] = {}
-    topology = grow_topology(map_file, settings, seconds)
+    grid = load_grid(map_file, settings, seconds)
+    check_radius(grid, allow_unexplored=settings.planner.allow_unexplored)
+    topology = grow_topology(grid, settings, seconds)
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=settings)
     result = planner.plan(start, goal)

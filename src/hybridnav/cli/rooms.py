@@ -9,7 +9,16 @@ import numpy as np
 import typer
 
 import hybridnav as hn
-from hybridnav.cli.common import answer, check_picture, complain, read_settings, stage, timings
+from hybridnav.cli.common import (
+    answer,
+    check_picture,
+    check_radius,
+    complain,
+    load_grid,
+    read_settings,
+    stage,
+    timings,
+)
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import MapArgument, PlotOption, PresetOption, RadiusOption, RoomsOption
 from hybridnav.config.yaml_file import printable
@@ -69,8 +78,8 @@ def rooms(
         raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
     settings = read_settings(preset, None, robot_radius_m, None)
     seconds: dict[str, float] = {}
-    with stage(f"reading {map_file}", seconds, "load"):
-        grid = hn.load_map(map_file, robot_radius_m=settings.pyramid.robot_radius_m)
+    grid = load_grid(map_file, settings, seconds)
+    check_radius(grid)
     with stage("finding rooms", seconds, "rooms"):
         labels = (
             hn.find_rooms(

@@ -12,6 +12,7 @@ from hybridnav.cli.common import (
     check_picture,
     extent,
     grow_topology,
+    load_grid,
     read_settings,
     timings,
 )
@@ -51,7 +52,8 @@ def show(
     check_picture(plot)
     settings = read_settings(preset, overrides, robot_radius_m, seed)
     seconds: dict[str, float] = {}
-    pyramid = grow_topology(map_file, settings, seconds).pyramid
+    grid = load_grid(map_file, settings, seconds)
+    pyramid = grow_topology(grid, settings, seconds).pyramid
     if not -len(pyramid) <= level < len(pyramid):
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
     seconds = {"load": seconds["load"], **pyramid.stats.seconds}

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.cli.common import answer, complain, grow_topology, stage, timings
+from hybridnav.cli.common import (
+    answer,
+    check_radius,
+    complain,
+    grow_topology,
+    load_grid,
+    stage,
+    timings,
+)
 from hybridnav.cli.errors import UsageError
 from hybridnav.config.yaml_file import printable
 
@@ -42,8 +50,10 @@ class Errand:
 def run_errand(errand: Errand) -> bool:
     """Plan a way between rooms and points, and tell it; gives whether there is one."""
     seconds: dict[str, float] = {}
+    grid = load_grid(errand.map_file, errand.settings, seconds)
+    check_radius(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
     topology = grow_topology(
-        errand.map_file,
+        grid,
         errand.settings,
         seconds,
         rooms_file=errand.rooms_file or beside(errand.map_file),
