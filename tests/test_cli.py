@@ -192,6 +192,33 @@ def test_what_is_not_solved_exits_with_1_and_names_the_status(cli, rooms, preset
     assert all(answer[key] is None for key in nothing)
 
 
+@pytest.mark.parametrize("compare", [(), ("--compare",)])
+def test_ends_outside_the_map_are_told_before_anything_is_prepared(cli, rooms, tmp_path, compare):
+    query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "99,3.5", *compare)
+    early = cli(*query, "--json").answer
+    assert early["seconds"].keys() == {"load"}
+    # A picture needs all that was prepared: the answer is the same.
+    late = cli(*query, "--json", "--plot", tmp_path / "a.svg").answer
+    assert "prepare" in late["seconds"]
+    for key in ("seconds", "grid_seconds"):
+        early.pop(key, None), late.pop(key, None)
+    assert early == late
+
+
+@pytest.mark.parametrize("more", [(), ("--alternatives", 2)])
+def test_points_of_a_tour_outside_the_map_are_told_at_once_too(cli, rooms, tmp_path, more):
+    for start, goal in (("-1,3.5", "room-1"), ("room-1", "99,3.5"), ("-1,3.5", "99,3.5")):
+        query = ("plan", rooms, "--from", start, "--to", goal, *more)
+        done = cli(*query, "--json")
+        assert (done.code, done.err) == (1, "")
+        early = done.answer
+        late = json.loads(cli(*query, "--json", "--plot", tmp_path / "a.svg").out)
+        assert early.pop("seconds").keys() == {"load"}
+        assert late.pop("seconds").keys() > {"load"}
+        assert early == late
+        assert "extent     x 0.00 to 9.00 m, y 0.00 to 7.00 m\n" in cli(*query).out
+
+
 def test_negative_coordinates_are_no_options(cli, draw):
     path = draw("...", "...", origin=[-3, -2, 0])
     for ends in (

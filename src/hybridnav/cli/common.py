@@ -18,7 +18,7 @@ from hybridnav.config.preset import is_preset_name
 from hybridnav.config.yaml_file import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from contextlib import AbstractContextManager
     from pathlib import Path
 
@@ -150,6 +150,19 @@ def grow_topology(
             rooms=rooms,
         )
     return hn.TopologicalMap(pyramid)
+
+
+def outside(
+    grid: hn.OccupancyGrid, stops: Sequence[str | tuple[float, ...]]
+) -> hn.PlanStatus | None:
+    """What a planner would say of a point that lies outside the map, before it is prepared."""
+    for number, stop in enumerate(stops):
+        if isinstance(stop, str):
+            continue
+        row, col = grid.frame.cells_of(stop[:2]).tolist()
+        if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+            return hn.PlanStatus.GOAL_OUTSIDE if number else hn.PlanStatus.START_OUTSIDE
+    return None
 
 
 def extent(grid: hn.OccupancyGrid) -> str:

@@ -16,6 +16,7 @@ from hybridnav.cli.common import (
     extent,
     grow_topology,
     load_grid,
+    outside,
     read_settings,
     stage,
     timings,
@@ -164,22 +165,45 @@ def plan(
     seconds: dict[str, float] = {}
     grid = load_grid(map_file, settings, seconds)
     check_radius(grid, allow_unexplored=settings.planner.allow_unexplored)
+    status = outside(grid, ends) if plot is None else None
+    if status is not None:
+        refused = hn.PlanResult(status, settings=_told(settings))
+        figures = _figures(map_file, refused, seconds) | _whole_grid(refused, None, asked=compare)
+        _answer(grid, ends, figures, as_json=as_json)
+        raise typer.Exit(EXIT_NOT_SOLVED)
     topology = grow_topology(grid, settings, seconds)
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=settings)
     result = planner.plan(start, goal)
-    figures = result.to_dict() | {"map": str(map_file)}
-    figures["seconds"] = seconds | figures["seconds"]
+    figures = _figures(map_file, result, seconds)
     if compare:
         figures |= _compare(topology, settings, (start, goal), result)
-    if as_json:
-        answer(json.dumps(figures, allow_nan=False) + "\n")
-    else:
-        answer(summary(topology.grid, (start, goal), figures))
+    _answer(grid, (start, goal), figures, as_json=as_json)
     if plot is not None:
         _draw(topology, result, (start, goal), figures.get("optimum_m"), plot)
     if not result.solved:
         raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _told(settings: hn.Preset) -> dict[str, Any]:
+    """Settings as a planner tells them, which here is not made."""
+    return {
+        "preset": settings.name,
+        "planner": settings.planner.model_dump(),
+        "pyramid": settings.pyramid.model_dump(),
+    }
+
+
+def _figures(map_file: Path, result: hn.PlanResult, seconds: dict[str, float]) -> dict[str, Any]:
+    figures = result.to_dict() | {"map": str(map_file)}
+    figures["seconds"] = seconds | figures["seconds"]
+    return figures
+
+
+def _answer(
+    grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str, Any], *, as_json: bool
+) -> None:
+    answer(json.dumps(figures, allow_nan=False) + "\n" if as_json else summary(grid, ends, figures))
 
 
 def _one_of(option: str, point: Any, other: str, text: str | None) -> Any:
@@ -216,10 +240,19 @@ def _compare(
     )
     baseline = settings.model_copy(update={"name": "grid-astar", "planner": whole})
     grid_result = hn.HybridPlanner(topology, preset=baseline).plan(ends[0][:2], ends[1][:2])
+    return _whole_grid(grid_result, result)
+
+
+def _whole_grid(
+    grid_result: hn.PlanResult, result: hn.PlanResult | None, *, asked: bool = True
+) -> dict[str, Any]:
+    """What a plan on the whole grid came to, and a result's loss against it, if asked for."""
+    if not asked:
+        return {}
     optimum_m, loss = None, None
     if grid_result.solved:
         optimum_m = grid_result.cost
-        if result.solved and result.metric == grid_result.metric:
+        if result is not None and result.solved and result.metric == grid_result.metric:
             loss = result.cost / optimum_m - 1 if optimum_m > 0 else 0.0
     return {
         "optimum_m": optimum_m,

@@ -15,8 +15,10 @@ from hybridnav.cli.common import (
     answer,
     check_radius,
     complain,
+    extent,
     grow_topology,
     load_grid,
+    outside,
     stage,
     timings,
 )
@@ -52,6 +54,13 @@ def run_errand(errand: Errand) -> bool:
     seconds: dict[str, float] = {}
     grid = load_grid(errand.map_file, errand.settings, seconds)
     check_radius(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
+    status = outside(grid, errand.stops) if errand.plot is None else None
+    if status is not None:
+        figures = _figures(errand, hn.Tour((hn.PlanResult(status),), ()))
+        if errand.alternatives > 1:
+            figures |= {"alternatives": [], "alternatives_complete": True}
+        _answer(errand, grid, figures | {"seconds": seconds})
+        return False
     topology = grow_topology(
         grid,
         errand.settings,
@@ -68,11 +77,7 @@ def run_errand(errand: Errand) -> bool:
         with stage("finding alternatives", seconds, "alternatives"):
             found = _found(errand, planner)
             figures |= _alternatives(topology, found)
-    figures["seconds"] = seconds
-    if errand.as_json:
-        answer(json.dumps(figures, allow_nan=False) + "\n")
-    else:
-        answer(_summary(topology.grid, figures))
+    _answer(errand, grid, figures | {"seconds": seconds})
     if errand.plot is not None:
         # Loads matplotlib.
         from hybridnav.viz import plot_alternatives, plot_tour, save_figure  # noqa: PLC0415
@@ -80,6 +85,11 @@ def run_errand(errand: Errand) -> bool:
         ax = plot_alternatives(topology, found) if found else plot_tour(topology, tour)
         save_figure(ax, errand.plot)
     return tour.solved
+
+
+def _answer(errand: Errand, grid: hn.OccupancyGrid, figures: dict[str, Any]) -> None:
+    whole = json.dumps(figures, allow_nan=False) + "\n"
+    answer(whole if errand.as_json else _summary(grid, figures))
 
 
 def beside(map_file: Path) -> Path | None:
@@ -169,6 +179,8 @@ def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
         f"query      {printable(grid.name)}, {figures['query']}, {radius}",
         f"status     {figures['status']}",
     ]
+    if "outside" in figures["status"]:
+        lines.append(f"extent     {extent(grid)}")
     if figures["length_m"] is not None:
         lines += _measured(figures)
     for number, line in enumerate(figures["words"]):
