@@ -433,6 +433,7 @@ def test_progress_is_for_terminals_only(cli, draw, monkeypatch):
         monkeypatch.setenv(colour, "1")
     assert cli("show", path).err == ""
     monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "500")  # long names of folders are not wrapped
     monkeypatch.setattr(sys, "stderr", terminal := _Terminal())
     done = cli("show", path)
     assert (done.code, done.out[:14]) == (0, "map        [m]")
