@@ -57,8 +57,8 @@ class RoomWriter:
         """Boxes of what is written: lower left and upper right corner, `(x, y)` in metres."""
 
     def keep_free(self, points: Iterable[ArrayLike], reach: float) -> None:
-        """Write nothing nearer to points than a reach in points of the page, times line width."""
-        half = np.full(2, reach * self._canvas.sizes.line)
+        """Write nothing nearer to points than a reach in points of the page."""
+        half = np.full(2, reach)
         self.taken += [self._box(np.asarray(point), half) for point in points]
 
     def number_doors(self, doors: Sequence[Door], *, always: bool = False) -> None:
@@ -72,10 +72,11 @@ class RoomWriter:
             Write a number even where it hides another one; else it is left out.
         """
         font = _NUMBER_SIZE * self._canvas.sizes.font
-        reach = 1.6 * self._canvas.sizes.line
+        near, far = 1.6 * self._canvas.sizes.line, 5.0
         for door in doors:
             half = np.array([text_width(str(door.number), font, "bold") / 2, 0.45 * font])
-            shifts = _SIDES * (half + reach) / self._canvas.sizes.points_per_metre
+            shifts = np.concatenate([_SIDES * (half + near), _SIDES * (half + far)])
+            shifts /= self._canvas.sizes.points_per_metre
             centres = np.asarray(door.position) + shifts
             boxes = [self._box(centre, half) for centre in centres]
             hidden = [self._n_hidden(box) for box in boxes]

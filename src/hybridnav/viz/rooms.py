@@ -82,7 +82,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     if view is not None:
         words.append(f"{len(view.doors)} doors")
         doors = [door for door in view.doors if door.width_m >= LEAST_DOOR_M]
-        writer.keep_free([door.position for door in doors], DOOR_POINTS)
+        writer.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     if names:
         left_out = writer.write_names()
     entries: list[Entry] = [room_entry(left_out)]

@@ -202,8 +202,8 @@ def _draw_ground(
     passed = list({leg.door.number: leg.door for leg in legs if leg.door is not None}.values())
     doors = _drawn_doors(rooms, passed)
     writer = RoomWriter(canvas, grid, rooms.labels)
-    writer.keep_free(ends, _STOP_POINTS / 2)
-    writer.keep_free([door.position for door in doors], DOOR_POINTS)
+    writer.keep_free(ends, 0.6 * _STOP_POINTS)
+    writer.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     writer.number_doors(passed, always=True)
     left_out = writer.write_names({leg.room for leg in legs if leg.room is not None})
     entries: list[Entry] = [room_entry(left_out, strength), (draw_doors(canvas, doors), "doors")]
