@@ -31,12 +31,6 @@ if TYPE_CHECKING:
     from hybridnav.result import Metric
     from hybridnav.topology import TopologicalMap
 
-_STATUS = {
-    "solved": PlanStatus.SOLVED,
-    "approximate": PlanStatus.APPROXIMATE,
-    "timeout": PlanStatus.TIMEOUT,
-}
-
 
 @dataclass(frozen=True, eq=False)
 class OmplPlan:
@@ -156,7 +150,7 @@ class OmplPlanner:
             reply = self._worker.reply()
         steps, by_grid = list(reply.steps), False
         path = self._path(cells, reply) if len(reply.points) else None
-        status = _STATUS[reply.outcome]
+        status = PlanStatus(reply.outcome)
         if status is not PlanStatus.SOLVED:
             if not is_late:
                 by_line = self._by_line_of_sight(cells, ends, closed)
