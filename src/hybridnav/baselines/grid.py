@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from hybridnav.grid import CellClass
 from hybridnav.search import _kernels
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import length_in_cells, path_length_in_cells
+from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,7 +45,7 @@ class GridAstar:
         self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
         moves = _kernels.legal_moves(enterable, grid.corner_cutting)
         self.n_nodes, self.n_edges = _graph_size(enterable, moves)
-        self.memory_bytes = array_bytes(self._search)
+        self.memory_bytes = self._search.memory_bytes
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Find a shortest path between two free cells; the bound is 1."""
@@ -70,15 +72,16 @@ class GridDijkstra:
     def __init__(self, grid: OccupancyGrid) -> None:
         self.name = "grid-dijkstra"
         self.region_of: IntArray | None = None
-        self._work = _Workspace(grid)
-        self.n_nodes, self.n_edges = self._work.graph_size
-        self.memory_bytes = array_bytes(self._work)
+        self._works, (self.n_nodes, self.n_edges) = _workspaces(grid)
+        with self._works.lent() as work:
+            self.memory_bytes = array_bytes(work)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Find a shortest path between two free cells; the bound is 1."""
         began = time.perf_counter()
-        found, expanded = self._work.search(_weighted_kernels.dijkstra, start, goal)
-        cells = self._work.path(start, goal) if found else None
+        with self._works.lent() as work:
+            found, expanded = work.search(_weighted_kernels.dijkstra, start, goal)
+            cells = work.path(start, goal) if found else None
         seconds = {"refine": time.perf_counter() - began}
         bound = 1.0 if found else math.inf
         return Answer(cells, bound=bound, expanded=expanded, seconds=seconds)
@@ -112,17 +115,18 @@ class WeightedAstar:
         self.name = f"weighted-astar-{weight:g}"
         self.region_of: IntArray | None = None
         self._weight = float(weight)
-        self._work = _Workspace(grid)
-        self.n_nodes, self.n_edges = self._work.graph_size
-        self.memory_bytes = array_bytes(self._work)
+        self._works, (self.n_nodes, self.n_edges) = _workspaces(grid)
+        with self._works.lent() as work:
+            self.memory_bytes = array_bytes(work)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Find a path between two free cells, and prove how much longer than the shortest it is."""
         began = time.perf_counter()
-        lower, expanded = self._work.search(
-            _weighted_kernels.weighted_astar, start, goal, self._weight
-        )
-        cells = self._work.path(start, goal) if lower >= 0 else None
+        with self._works.lent() as work:
+            lower, expanded = work.search(
+                _weighted_kernels.weighted_astar, start, goal, self._weight
+            )
+            cells = work.path(start, goal) if lower >= 0 else None
         bound = math.inf if cells is None else self._bound(cells, lower)
         seconds = {"refine": time.perf_counter() - began}
         return Answer(cells, bound=bound, expanded=expanded, seconds=seconds)
@@ -136,20 +140,17 @@ class WeightedAstar:
 
 
 class _Workspace:
-    """Legal moves of a grid and the arrays that its searches share: 18 bytes a cell.
+    """Legal moves of a grid and the arrays of one search at a time: 18 bytes a cell.
 
     Searches are told apart by their generation, so nothing is cleared between them.
     """
 
-    def __init__(self, grid: OccupancyGrid) -> None:
-        enterable = grid.classes == CellClass.FREE
-        self._cols = grid.shape[1]
-        moves: ByteArray = _kernels.legal_moves(enterable, grid.corner_cutting)
-        self.graph_size = _graph_size(enterable, moves)
-        self._moves: ByteArray = moves.ravel()
-        self._cost_of = np.zeros(enterable.size, dtype=np.int64)
-        self._came = np.zeros(enterable.size, dtype=np.uint8)
-        self._mark = np.zeros(enterable.size, dtype=np.int64)
+    def __init__(self, moves: ByteArray, cols: int) -> None:
+        self._cols = cols
+        self._moves = moves
+        self._cost_of = np.zeros(moves.size, dtype=np.int64)
+        self._came = np.zeros(moves.size, dtype=np.uint8)
+        self._mark = np.zeros(moves.size, dtype=np.int64)
         self._generation = 0
 
     def search(
@@ -177,6 +178,14 @@ class _Workspace:
 
     def _flat(self, cell: Cell) -> int:
         return cell[0] * self._cols + cell[1]
+
+
+def _workspaces(grid: OccupancyGrid) -> tuple[Pool[_Workspace], tuple[int, int]]:
+    """Work space for searches of the free cells, and the numbers of cells and moves."""
+    enterable = grid.classes == CellClass.FREE
+    moves: ByteArray = _kernels.legal_moves(enterable, grid.corner_cutting)
+    works = Pool(partial(_Workspace, moves.ravel(), grid.shape[1]))
+    return works, _graph_size(enterable, moves)
 
 
 def _graph_size(enterable: BoolArray, moves: ByteArray) -> tuple[int, int]:

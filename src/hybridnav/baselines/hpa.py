@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,10 +11,12 @@ import numpy as np
 from hybridnav.baselines import _hpa_kernels
 from hybridnav.baselines._hpa_kernels import AbstractGraph
 from hybridnav.baselines.protocol import Answer, Cell
+from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.search._costs import STRAIGHT
 from hybridnav.search._kernels import legal_moves
+from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
@@ -78,21 +81,19 @@ class HpaStar:
         self._graph = _abstract_graph(enterable, self._moves, self._side)
         self.n_nodes = len(self._graph.cells)
         self.n_edges = len(self._graph.ends) // 2
-        self._cost_of = np.zeros(self.n_nodes, dtype=np.int64)
-        self._previous = np.zeros(self.n_nodes, dtype=np.int32)
-        self._mark = np.zeros(self.n_nodes, dtype=np.int64)
-        self._position = np.full(enterable.size if smooth else 0, -1, dtype=np.int32)
-        self._turn = 0
-        arrays = (
-            *(self.region_of, self._moves, self._cost_of, self._previous, self._mark),
-            *(self._position, *self._graph),
-        )
-        self.memory_bytes = sum(array.nbytes for array in arrays)
+        self._works = Pool(partial(_Work, self.n_nodes, enterable.size if smooth else 0))
+        with self._works.lent() as work:
+            own = sum(array.nbytes for array in (self.region_of, self._moves, *self._graph))
+            self.memory_bytes = own + array_bytes(work)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Plan between two free cells."""
+        with self._works.lent() as work:
+            return self._solve(work, start, goal)
+
+    def _solve(self, work: _Work, start: Cell, goal: Cell) -> Answer:
         began = time.perf_counter()
-        self._turn += 1
+        work.turn += 1
         cols = self._moves.shape[1]
         passed, expanded_nodes, expanded = _hpa_kernels.abstract_search(
             self._moves,
@@ -100,10 +101,10 @@ class HpaStar:
             self._graph,
             start[0] * cols + start[1],
             goal[0] * cols + goal[1],
-            self._cost_of,
-            self._previous,
-            self._mark,
-            self._turn,
+            work.cost_of,
+            work.previous,
+            work.mark,
+            work.turn,
         )
         seconds = {"coarse": time.perf_counter() - began, "refine": 0.0}
         if passed.size == 0:
@@ -117,7 +118,7 @@ class HpaStar:
         path, refined = _hpa_kernels.refine(self._moves, self._side, passed)
         nodes = self._regions_along(path)
         if self._smooth:
-            path = _hpa_kernels.smooth(self._moves, path, self._reach, self._position)
+            path = _hpa_kernels.smooth(self._moves, path, self._reach, work.position)
         cells = np.stack(divmod(path, cols), axis=1)
         seconds["refine"] = time.perf_counter() - began
         return Answer(
@@ -134,6 +135,17 @@ class HpaStar:
         regions = self.region_of.ravel()[path]
         entered = np.concatenate([[True], regions[1:] != regions[:-1]])
         return tuple(regions[entered].tolist())
+
+
+class _Work:
+    """What one query at a time writes to."""
+
+    def __init__(self, n_nodes: int, n_cells: int) -> None:
+        self.cost_of = np.zeros(n_nodes, dtype=np.int64)
+        self.previous = np.zeros(n_nodes, dtype=np.int32)
+        self.mark = np.zeros(n_nodes, dtype=np.int64)
+        self.position = np.full(n_cells, -1, dtype=np.int32)
+        self.turn = 0
 
 
 def _name(*, smooth: bool, line_cells: int | None) -> str:

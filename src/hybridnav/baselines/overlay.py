@@ -71,10 +71,9 @@ class ExactOverlay:
         self._component_of = self._components()
         self._arcs = np.unique(self._pair_keys(*level.arcs.T.astype(np.int64)))
         self._search = GridSearch(free, corner_cutting=grid.corner_cutting)
-        self._in_field = np.zeros(level.n_vertices, dtype=np.bool_)
         self.n_nodes = len(self._node_cell)
         self.n_edges = int((sizes * (sizes - 1) // 2).sum()) + len(self._cross_head) // 2
-        self.memory_bytes = array_bytes(self, self._search)
+        self.memory_bytes = array_bytes(self) + self._search.memory_bytes
 
     def _distances_inside(self) -> AnyArray:
         """Matrices of all cliques in a row; of 32 bits where that is enough."""
@@ -183,16 +182,15 @@ class ExactOverlay:
         stops = [start, *zip(rows.tolist(), cols.tolist(), strict=True), goal]
         crossed = [*by_cross.tolist(), False]
         pieces, expanded = [np.array([start], dtype=np.int64)], 0
+        in_field = np.zeros(len(self._boxes), dtype=np.bool_)
         for here, there, across in zip(stops[:-1], stops[1:], crossed, strict=True):
             if across:
                 pieces.append(np.array([there], dtype=np.int64))
                 continue
             field = self.region_of[here]
-            self._in_field[field] = True
-            leg = self._search.search(
-                here, there, field_of=self.region_of, in_corridor=self._in_field
-            )
-            self._in_field[field] = False
+            in_field[field] = True
+            leg = self._search.search(here, there, field_of=self.region_of, in_corridor=in_field)
+            in_field[field] = False
             expanded += leg.expanded
             if leg.cells is not None:
                 pieces.append(leg.cells[1:])

@@ -41,8 +41,7 @@ class RegionPlanner:
         self._region_of = region_of
         self._graph = graph
         self._grid_search = GridSearch(region_of >= 0, corner_cutting=corner_cutting)
-        self._in_corridor = np.zeros(graph.n_vertices, dtype=np.bool_)
-        self.memory_bytes = array_bytes(self, graph, self._grid_search)
+        self.memory_bytes = array_bytes(self, graph) + self._grid_search.memory_bytes
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Plan between two free cells.
@@ -60,10 +59,10 @@ class RegionPlanner:
         if plan.vertices is None:
             return Answer(None, expanded_nodes=plan.expanded, seconds=seconds)
         began = time.perf_counter()
-        self._in_corridor[:] = False
-        self._in_corridor[plan.vertices] = True
+        in_corridor = np.zeros(self._graph.n_vertices, dtype=np.bool_)
+        in_corridor[plan.vertices] = True
         found = self._grid_search.search(
-            start, goal, field_of=self._region_of, in_corridor=self._in_corridor
+            start, goal, field_of=self._region_of, in_corridor=in_corridor
         )
         seconds["refine"] = time.perf_counter() - began
         return Answer(

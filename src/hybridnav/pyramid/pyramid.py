@@ -161,8 +161,8 @@ class DualGraphPyramid:
         at = index + len(self) if index < 0 else index
         if not 0 <= at < len(self):
             raise IndexError(f"the pyramid has levels 0 to {len(self) - 1}, got {index}")
-        if at not in self._levels:
-            self._levels[at] = Level(self.grid, self._record, at, self._find_islands)
+        if at not in self._levels:  # in one call, so that all threads get the same one
+            self._levels.setdefault(at, Level(self.grid, self._record, at, self._find_islands))
         return self._levels[at]
 
     def ancestor(self, vertices: ArrayLike, *, level: int, to: int) -> IntArray:

@@ -10,17 +10,18 @@ A* (Canonical orderings on grids, 2016).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav.search import _kernels
+from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._typing import BoolArray, ByteArray, LongArray
 
 Cell = tuple[int, int]
 
@@ -36,10 +37,21 @@ class CellPath:
     expanded: int
 
 
+class _Work:
+    """What one search at a time writes to: a record for each cell, and the open list."""
+
+    def __init__(self, n_cells: int) -> None:
+        self.records = np.zeros(n_cells, dtype=np.uint32)
+        self.waiting = np.empty(_kernels.BUCKETS * _ROOM, dtype=np.int32)
+        self.generation = 0
+
+
 class GridSearch:
-    """A* on the cells of one grid; holds 5 bytes a cell that all its searches share, one for the
-    legal moves and four for the record of the search, and some 32 kB for the open list, which grows
-    with the longest one that a search needed.
+    """A* on the cells of one grid; threads may share it.
+
+    It holds one byte a cell for the legal moves, and for each search that ran at the same time as
+    others four for its record and some 32 kB for its open list, which grows with the longest one
+    that it needed; one byte a cell more where searches had blocked cells.
 
     Moves go to the 8 neighbours; a diagonal needs both side cells enterable (no corner cutting).
     They are judged once, on the whole grid; a corridor limits only the cells stood on.
@@ -57,9 +69,14 @@ class GridSearch:
         self._corner_cutting = corner_cutting
         moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting)
         self._moves = moves.ravel()
-        self._records = np.zeros(enterable.size, dtype=np.uint32)
-        self._waiting = np.empty(_kernels.BUCKETS * _ROOM, dtype=np.int32)
-        self._generation = 0
+        self._works = Pool(partial(_Work, enterable.size))
+        self._moves_to_edit: Pool[ByteArray] = Pool(self._moves.copy)
+
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes that it holds between searches which do not overlap."""
+        with self._works.lent() as work:
+            return int(self._moves.nbytes + work.records.nbytes + work.waiting.nbytes)
 
     def search(  # noqa: PLR0913 - independent limits of one search
         self,
@@ -92,45 +109,47 @@ class GridSearch:
         corridor = (None if field_of is None else field_of.ravel(), in_corridor)
         bound = _UNLIMITED if limit is None else limit
         if blocked is None or len(blocked) == 0:
-            return self._path(first, last, bound, corridor)
+            return self._path(self._moves, (first, last), bound, corridor)
         if first in blocked or last in blocked:
             return CellPath(None, 0)
-        touched, masks = _kernels.forbid(self._moves, self._cols, blocked, self._corner_cutting)
-        try:
-            return self._path(first, last, bound, corridor)
-        finally:
-            self._moves[touched] = masks
+        with self._moves_to_edit.lent() as moves:
+            touched, masks = _kernels.forbid(moves, self._cols, blocked, self._corner_cutting)
+            found = self._path(moves, (first, last), bound, corridor)
+            moves[touched] = masks
+        return found
 
     def _path(
         self,
-        first: int,
-        last: int,
+        moves: ByteArray,
+        ends: tuple[int, int],
         limit: int,
         corridor: tuple[NDArray[np.int16 | np.int32] | None, BoolArray | None],
     ) -> CellPath:
         """Find a shortest path between two flat cells; `search` says what the rest means."""
-        cost = _kernels.NO_ROOM
-        while cost == _kernels.NO_ROOM:
-            if self._generation == _kernels.GENERATIONS:
-                self._records.fill(0)
-                self._generation = 0
-            self._generation += 1
-            cost, expanded = _kernels.astar(
-                self._moves,
-                self._cols,
-                (first, last),
-                limit,
-                *move_tables(corner_cutting=self._corner_cutting),
-                *corridor,
-                self._records,
-                self._generation,
-                self._waiting,
-            )
-            if cost == _kernels.NO_ROOM:
-                self._waiting = np.empty(2 * self._waiting.size, dtype=np.int32)
-        if cost < 0:
-            return CellPath(None, int(expanded))
-        cells: LongArray = _kernels.trace_cells(self._records, self._cols, first, last)
+        tables = move_tables(corner_cutting=self._corner_cutting)
+        with self._works.lent() as work:
+            cost = _kernels.NO_ROOM
+            while cost == _kernels.NO_ROOM:
+                if work.generation == _kernels.GENERATIONS:
+                    work.records.fill(0)
+                    work.generation = 0
+                work.generation += 1
+                cost, expanded = _kernels.astar(
+                    moves,
+                    self._cols,
+                    ends,
+                    limit,
+                    *tables,
+                    *corridor,
+                    work.records,
+                    work.generation,
+                    work.waiting,
+                )
+                if cost == _kernels.NO_ROOM:
+                    work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
+            if cost < 0:
+                return CellPath(None, int(expanded))
+            cells: LongArray = _kernels.trace_cells(work.records, self._cols, *ends)
         return CellPath(cells, int(expanded))
 
 
