@@ -39,13 +39,13 @@ class AbstractGraph(NamedTuple):
     """int64 (n_edges,), integer cost of each edge."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cluster_at(cols, side, cell):
     """Index of the cluster that holds a flat cell."""
     return cell // cols // side * ((cols + side - 1) // side) + cell % cols // side
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def label_regions(enterable, moves, side):
     """Region of each cell, -1 where none may be entered: the connected pieces of the clusters."""
     rows, cols = moves.shape
@@ -79,7 +79,7 @@ def label_regions(enterable, moves, side):
     return region_of
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def transitions(enterable, side):
     """Flat cell pairs (n, 2) of the transitions between clusters that share a side.
 
@@ -126,7 +126,7 @@ def transitions(enterable, side):
     return pairs[:n_pairs]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def flood(moves, side, cell, distance, waiting):
     """Fill `distance` (side, side) with the costs of shortest paths from a cell to those of its
     cluster that stay in it, -1 where there is none; return how many cells were reached.
@@ -175,13 +175,13 @@ def flood(moves, side, cell, distance, waiting):
     return reached
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def distance_in_cluster(distance, cols, side, cell):
     """What the last flood found for a flat cell of the same cluster."""
     return distance[cell // cols % side, cell % cols % side]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def intra_edges(moves, side, cells, cluster_first):
     """Tails, heads and costs of the edges between nodes that a path inside their cluster joins."""
     cols = moves.shape[1]
@@ -204,7 +204,7 @@ def intra_edges(moves, side, cells, cluster_first):
     return tails[:n_edges], heads[:n_edges], costs[:n_edges]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, generation):
     """Flat cells that the cheapest abstract path passes, start and goal included, none where there
     is none; the nodes expanded; the cells expanded to join start and goal to the graph.
@@ -288,7 +288,7 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
     return passed, expanded, n_cells
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def refine(moves, side, passed):
     """Flat cells of the path that fills in an abstract one, and the cells expanded.
 
@@ -328,7 +328,7 @@ def refine(moves, side, passed):
     return path[:size], expanded
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def smooth(moves, path, reach, position):
     """A path made shorter by straight lines, as the authors of HPA* do it.
 

@@ -16,7 +16,7 @@ from hybridnav.search._kernels import _COL_STEP, _ROW_STEP, grow, octile_cost
 _NONE = np.int64(1) << 62
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def field_boxes(labels, cols, n_fields):
     """Bounding boxes of fields: least row, least column, greatest row, greatest column."""
     boxes = np.empty((n_fields, 4), np.int64)
@@ -33,7 +33,7 @@ def field_boxes(labels, cols, n_fields):
     return boxes
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def boundary_cells(labels, moves, cols):
     """Flat cells with a legal move into another field, ascending."""
     found = np.empty(1024, np.int64)
@@ -50,7 +50,7 @@ def boundary_cells(labels, moves, cols):
     return found[:count].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cross_edges(labels, moves, cols, node_cell):
     """Legal moves between fields, by the node they start from: first, heads, costs."""
     node_of = np.empty(labels.size, np.int32)
@@ -78,7 +78,7 @@ def cross_edges(labels, moves, cols, node_cell):
     return first, heads[:count].copy(), costs[:count].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def inner_moves(labels, moves, cols, field, box):
     """Moves that stay in a field, one byte mask for each cell of its bounding box."""
     width = box[3] - box[1] + 1
@@ -98,7 +98,7 @@ def inner_moves(labels, moves, cols, field, box):
     return inner
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def keep_table():
     """Moves worth trying after a move in each direction out of a cell that has all eight.
 
@@ -114,7 +114,7 @@ def keep_table():
     return keep
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def distances_from(inner, width, source, keep, distance, closed, came, open_cells):
     """Cost of the shortest path inside a field from one cell to every other, `_NONE` for none.
 
@@ -158,7 +158,7 @@ def distances_from(inner, width, source, keep, distance, closed, came, open_cell
         turn += 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def room_for(size):
     """Arrays that `distances_from` works in, for a box of so many cells."""
     return (
@@ -169,7 +169,7 @@ def room_for(size):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def local_of(cells, cols, box):
     """Indices of flat cells in the bounding box of their field."""
     width = box[3] - box[1] + 1
@@ -179,7 +179,7 @@ def local_of(cells, cols, box):
     return local
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first, clique):
     """Distances inside every field between its boundary cells, as square matrices one by one.
 
@@ -207,7 +207,7 @@ def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, other):
     """Distances inside its field from a cell to the boundary cells and to another cell, `_NONE`
     where that lies in another field; and the cells of the field that were reached."""
@@ -223,7 +223,7 @@ def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, 
     return distance[local], direct, closed.sum()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def relax(heap, best, came, by_cross, node_cell, cols, goal, bound, node, new_cost, via, across):
     """Note a cheaper way to a node, unless no path through it can cost less than `bound`."""
     if new_cost >= best[node]:
@@ -238,7 +238,7 @@ def relax(heap, best, came, by_cross, node_cell, cols, goal, bound, node, new_co
     heapq.heappush(heap, (new_cost + rest, node))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def overlay_search(
     node_field,
     node_cell,

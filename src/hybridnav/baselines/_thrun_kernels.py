@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def draw_lines(free, cells, basis):
     """Free cells on the lines from critical points to their basis points.
 
@@ -38,7 +38,7 @@ def draw_lines(free, cells, basis):
     return on_line
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def give_away(labels, on_line):
     """Give each cell of a line to a region beside it, in rounds outwards from the regions.
 

@@ -17,7 +17,7 @@ ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
 COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def push(keys, items, size, key, item):
     """Put an item into a heap of `size` items, four below each, that has room for one more."""
     at = size
@@ -30,7 +30,7 @@ def push(keys, items, size, key, item):
     keys[at], items[at] = key, item
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def drop_least(keys, items, size):
     """Remove the first item, the one of the least key, from a heap of `size` items."""
     size -= 1
@@ -48,7 +48,7 @@ def drop_least(keys, items, size):
     keys[at], items[at] = key, item
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
     """Whether there is a path between two flat cells, and the expansions up to the goal's.
 
@@ -97,7 +97,7 @@ def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
     return False, expanded
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, generation):
     """Lower bound on the cost of a shortest path, -1 where there is none, and the expansions.
 

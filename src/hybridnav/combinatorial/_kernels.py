@@ -35,7 +35,7 @@ class Darts(NamedTuple):
     """int32, id of the edge in the base."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def step_integral(dart, base_edge, cols):
     """Line integral of x dy along the base step of a dart: zero for steps east and west."""
     base = base_edge[dart >> 1]
@@ -45,14 +45,14 @@ def step_integral(dart, base_edge, cols):
     return col if dart & 1 == 0 else -col
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def loop_area(dart, sweep, base_edge, cols):
     """Signed area in cells inside a self-loop, positive where the dart runs counter-clockwise."""
     step = step_integral(dart, base_edge, cols)
     return np.int32(sweep[dart] + step - sweep[dart ^ 1])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touched, cols):
     """Contract the stars of a kernel, in place.
 
@@ -98,7 +98,7 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     return count, any_loop
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def unlink(dart, sigma, inverse):
     """Take one dart out of its vertex's rotation."""
     before = inverse[dart]
@@ -107,7 +107,7 @@ def unlink(dart, sigma, inverse):
     inverse[after] = before
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
     """A dart of the ordinary face of `start` whose edge is redundant, -1 if there is none, and one
     of the edge that runs beside it.
@@ -138,7 +138,7 @@ def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
     return np.int32(-1), np.int32(-1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def start_cell(dart, base_edge, cols):
     """Row and column of the cell where the base edge of a dart starts."""
     base = base_edge[dart >> 1]
@@ -148,7 +148,7 @@ def start_cell(dart, base_edge, cols):
     return cell // cols, cell % cols
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def start_together(dart, partner, darts, whole_at, level, cols):
     """Whether two edges between the same vertices start in the same fields.
 
@@ -168,7 +168,7 @@ def start_together(dart, partner, darts, whole_at, level, cols):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, all_whole):
     """Remove redundant edges through ordinary faces until none is left, in place.
 
@@ -220,7 +220,7 @@ def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, al
             state[dart >> 1] = REMOVED
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def compact_darts(darts, state, new_edge, level, edge_end):
     """Close the gaps that gone edges left, in place; gives the number of edges that stay.
 

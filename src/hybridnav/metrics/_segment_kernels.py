@@ -19,7 +19,7 @@ CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
 passes between two that meet at a corner, runs along the side that two of them share."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _rounding_error(first, second, product):
     """What rounding took from a product (T. J. Dekker: A floating-point technique, 1971)."""
     scaled = 134217729.0 * first
@@ -32,7 +32,7 @@ def _rounding_error(first, second, product):
     return first_low * second_low - (error - first_high * second_low)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def compare_products(first, second, third, fourth):
     """Sign of first * second - third * fourth, exact."""
     left, right = first * second, third * fourth
@@ -43,7 +43,7 @@ def compare_products(first, second, third, fourth):
     return int(left > right) - int(left < right)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _is_free(classes, free_of, row, col):
     """Whether a cell is in the map and free."""
     if row < 0 or col < 0 or row >= classes.shape[0] or col >= classes.shape[1]:
@@ -51,7 +51,7 @@ def _is_free(classes, free_of, row, col):
     return free_of[classes[row, col]]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def crossing_at(classes, free_of, row, col):
     """Whether two free and two blocked cells face each other across a corner of the lattice.
 
@@ -69,7 +69,7 @@ def crossing_at(classes, free_of, row, col):
     return 1 if south_west else -1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _point_code(classes, free_of, row, col):
     for r in range(math.ceil(row) - 1, math.floor(row) + 1):
         for c in range(math.ceil(col) - 1, math.floor(col) + 1):
@@ -78,7 +78,7 @@ def _point_code(classes, free_of, row, col):
     return BLOCKED
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _level_code(classes, free_of, fixed, low, high, along_row):
     """Judge a segment along a row (or column) of the lattice at `fixed`, from `low` to `high`."""
     line = math.floor(fixed)
@@ -100,7 +100,7 @@ def _level_code(classes, free_of, fixed, low, high, along_row):
     return CLEAR
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def segment_code(classes, free_of, row0, col0, row1, col1):
     """First thing that a segment does wrong, 0 for nothing; the ends count as touched only.
 
@@ -146,7 +146,7 @@ def segment_code(classes, free_of, row0, col0, row1, col1):
             row += turn
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def segment_codes(classes, free_of, positions):
     """Code of each segment of a polyline; of a single point, its own."""
     n = positions.shape[0]
@@ -159,7 +159,7 @@ def segment_codes(classes, free_of, positions):
     return codes
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def crossed_joints(classes, free_of, positions):
     """Whether a polyline turns at each point from one free cell into another across a corner.
 
@@ -186,7 +186,7 @@ def crossed_joints(classes, free_of, positions):
     return crossed
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sees(classes, free_of, positions, i, j):
     """Whether a segment between two of some positions is legal."""
     return (
@@ -197,7 +197,7 @@ def _sees(classes, free_of, positions, i, j):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def visible_pairs(classes, free_of, corners, slopes):
     """Pairs i < j of corners that see each other and may follow each other on a shortest path.
 
@@ -223,7 +223,7 @@ def visible_pairs(classes, free_of, corners, slopes):
     return pairs[:n_pairs]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def visible_from(classes, free_of, row, col, corners, slopes):
     """Distance from a position to each corner that it sees, infinite to the others."""
     distances = np.full(corners.shape[0], np.inf)
@@ -236,7 +236,7 @@ def visible_from(classes, free_of, row, col, corners, slopes):
     return distances
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cheapest_corners(offsets, heads, lengths, from_start, to_goal, to_goal_bound):
     """Corners on a shortest path between two positions, in order; empty where there is no path.
 
@@ -275,7 +275,7 @@ def cheapest_corners(offsets, heads, lengths, from_start, to_goal, to_goal_bound
     return path[:size][::-1]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def pull(classes, free_of, positions):
     """Indices of a polyline's points that are left when each sees the next, greedily far on."""
     n = positions.shape[0]
@@ -298,7 +298,7 @@ def pull(classes, free_of, positions):
     return kept[:size]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def shortcut(classes, free_of, positions):
     """Indices of the points on the shortest way along a polyline that may skip points."""
     n = positions.shape[0]
@@ -322,13 +322,13 @@ def shortcut(classes, free_of, positions):
     return kept[: size + 1][::-1]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _turn(a_row, a_col, b_row, b_col, c_row, c_col):
     """Twice the signed area of a triangle."""
     return (b_row - a_row) * (c_col - a_col) - (b_col - a_col) * (c_row - a_row)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def taut_chain(classes, free_of, first, bend, last):
     """Corners that a string from `first` over `bend` to `last` touches when it is pulled tight.
 

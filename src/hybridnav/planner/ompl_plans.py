@@ -168,8 +168,9 @@ class OmplPlanner:
         )
 
     def close(self) -> None:
-        """End the process; the next query waits for another."""
-        self._worker.close()
+        """End the process once no query waits for it; the next one waits for another."""
+        with self._one_at_a_time:
+            self._worker.close()
 
     def __reduce__(self) -> Any:
         """Refuse to be copied.

@@ -49,8 +49,8 @@ _BAD_GOAL = {
 
 
 class HybridPlanner:
-    """Plans paths between points of one map by a preset; one query after the other, for searches
-    share what they write to.
+    """Plans paths between points of one map by a preset; threads may share it, with OMPL one query
+    waits for the other.
 
     Parameters
     ----------

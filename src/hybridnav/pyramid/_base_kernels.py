@@ -11,7 +11,7 @@ from hybridnav.pyramid._kernels import Vertices
 _SURVIVES = 255
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def uniform_squares(classes):
     """Class of every aligned square of 2x2 entries that are equal, else 0."""
     rows, cols = classes.shape[0] // 2, classes.shape[1] // 2
@@ -28,7 +28,7 @@ def uniform_squares(classes):
     return squares
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def amid_its_class(halves, row, col):
     """Whether the 4x4 squares of half the side round a square are all of one class."""
     if row == 0 or col == 0 or 2 * row + 2 >= halves.shape[0] or 2 * col + 2 >= halves.shape[1]:
@@ -41,7 +41,7 @@ def amid_its_class(halves, row, col):
     return of_class != 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def block_powers(classes, largest):
     """Power of the block of every aligned 2x2 cells, 0 where they are in none.
 
@@ -65,7 +65,7 @@ def block_powers(classes, largest):
     return power
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record as if there were only the blocks; gives the numbers of their vertices and
     edges. `new_edge` takes the numbers of the edges that stay."""
@@ -106,14 +106,14 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
     return n_vertices, n_edges
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def filled(classes, row, col):
     """Whether there is a cell and it is a vertex."""
     rows, cols = classes.shape
     return 0 <= row < rows and 0 <= col < cols and classes[row, col] != 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def block_vertices(classes, power, vertex_end, n_vertices):
     """Vertices of the map of the blocks and the cells in none, in the order of surviving cells."""
     cols = classes.shape[1]
@@ -136,7 +136,7 @@ def block_vertices(classes, power, vertex_end, n_vertices):
     return Vertices(cells, boxes, of_class, whole_at)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def block_darts(classes, power, vertices, new_edge, n_edges):
     """Darts of the map of the blocks and the cells in none: counter-clockwise round each.
 
@@ -195,7 +195,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
     return Darts(sigma, origin, sweep, protected, base_edge)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def protect_faces(sigma, protected):
     """Make all darts of a face protected where one is."""
     for d in range(sigma.size):
@@ -206,7 +206,7 @@ def protect_faces(sigma, protected):
                 follow = sigma[follow ^ 1]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def count_bytes(values):
     """How often each of the 256 values occurs."""
     count = np.zeros((2, 256), np.int64)  # two, for runs of equal values wait for each other

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def label_fields(vertex_end, vertex_parent, level):
     """Dense vertex of each flat cell at a level (-1: no vertex) and the surviving cells."""
     n_cells = vertex_end.size
@@ -34,7 +34,7 @@ def label_fields(vertex_end, vertex_parent, level):
     return field_of, survivors
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def field_extents(field_of, cols, n_vertices):
     """Cells per field and their bounding boxes (least row, least column, greatest row, column)."""
     areas = np.zeros(n_vertices, np.int64)
@@ -54,7 +54,7 @@ def field_extents(field_of, cols, n_vertices):
     return areas, boxes
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def turn(points, i, j, row, col):
     """Cross product of the steps i -> j and j -> (row, col); positive is counter-clockwise."""
     ax = np.int64(points[j, 1] - points[i, 1])
@@ -64,7 +64,7 @@ def turn(points, i, j, row, col):
     return ax * by - ay * bx
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def chain(rows, cols, count, side, points, start):
     """Append one side of the hull of points sorted by row (monotone chain, Andrew 1979)."""
     end = start
@@ -77,7 +77,7 @@ def chain(rows, cols, count, side, points, start):
     return end
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def field_hulls(field_of, cols, boxes):
     """Convex hulls of connected fields, from the first and last cell of each of their rows."""
     n_vertices = boxes.shape[0]
@@ -105,7 +105,7 @@ def field_hulls(field_of, cols, boxes):
     return start, points[:end].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def merge_hulls(start, points, parent, new_vertex, n_survivors):
     """Hulls of the next level from those of the stars that were contracted."""
     size = np.zeros(n_survivors + 1, np.int64)
@@ -147,7 +147,7 @@ def merge_hulls(start, points, parent, new_vertex, n_survivors):
     return merged_start, merged[:end].copy()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def hull_distances(start, points, arcs):
     """Largest squared distance between a cell of one field and a cell of the other, per arc."""
     squared = np.zeros(arcs.shape[0], np.int64)
@@ -161,7 +161,7 @@ def hull_distances(start, points, arcs):
     return squared
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def find(root, i):
     """Representative of i in a union-find forest, halving the path."""
     while root[i] != i:
@@ -170,14 +170,14 @@ def find(root, i):
     return i
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def edge_ends(base_edge, cols):
     """The two flat cells of a base edge, lower one first."""
     cell = base_edge >> 1
     return cell, cell + (cols if base_edge & 1 else 1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def other_crack(field_of, cols, corner, base_edge):
     """The other crack of a full 2x2 block that holds exactly two, -1 where it does not."""
     a, b, c, d = corner, corner + 1, corner + cols, corner + cols + 1
@@ -194,7 +194,7 @@ def other_crack(field_of, cols, corner, base_edge):
     return other if count == 2 else -1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def find_cracks(field_of, rows, cols):
     """Base edges whose cells lie in different fields, ascending, and the class of each.
 
@@ -248,7 +248,7 @@ def find_cracks(field_of, rows, cols):
     return cracks, root
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def next_at_cell(cell, direction, edge_end, cols):
     """First dart of a base cell counter-clockwise after a direction (0 east to 3 south), else -1.
 
@@ -269,7 +269,7 @@ def next_at_cell(cell, direction, edge_end, cols):
     return -1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def base_sigma(dart, edge_end, cols):
     """Next dart counter-clockwise in the base."""
     edge = dart >> 1
@@ -281,7 +281,7 @@ def base_sigma(dart, edge_end, cols):
     return next_at_cell(cell, direction, edge_end, cols)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def base_protected(dart, vertex_end, rows, cols):
     """Whether the base face on the right of a dart is anything but a full 2x2 block."""
     edge = dart >> 1
@@ -302,7 +302,7 @@ def base_protected(dart, vertex_end, rows, cols):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
     """Sigma, origin and protection of the darts of a level, by walks through the base.
 
@@ -342,7 +342,7 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
     return sigma, origin, protected
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def loop_line(base_edge, field_of, edge_end, level, rows, cols):
     """Base edges of the line that the dual edge of a self-loop takes through its field.
 
@@ -398,7 +398,7 @@ def loop_line(base_edge, field_of, edge_end, level, rows, cols):
     return np.concatenate((line, np.array([base_edge], np.int64)))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def darts_at_corners(cells, direction, edges, edge_end, level, cols):
     """Dart of a level on whose face a direction at each cell points, -1 where there is none.
 

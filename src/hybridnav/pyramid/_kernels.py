@@ -47,7 +47,7 @@ class Hulls(NamedTuple):
     points: np.ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def make_key(attribute, base_edge, seed, position):
     """Order of an edge: attribute, then a seeded hash of its base id (MurmurHash3's finaliser)."""
     h = np.uint64(base_edge) ^ seed  # below 2^32, so no product overflows
@@ -60,7 +60,7 @@ def make_key(attribute, base_edge, seed, position):
     return high | h >> np.uint64(11) << np.uint64(30) | np.uint64(position)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def far_corner(cells, u, boxes, v):
     """Squared distance from the surviving cell of u to the farthest corner of the box of v."""
     row, col = cells[u, 0], cells[u, 1]
@@ -69,7 +69,7 @@ def far_corner(cells, u, boxes, v):
     return rows * rows + cols * cols
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def field_within(cells, u, hull_start, hull_points, v, limit):
     """Whether the whole field of v lies nearer to the surviving cell of u than the limit."""
     for i in range(hull_start[v], hull_start[v + 1]):
@@ -80,7 +80,7 @@ def field_within(cells, u, hull_start, hull_points, v, limit):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def near_enough(u, v, hull_start, hull_points, limit):
     """Whether every two cells of two fields lie nearer to each other than the limit."""
     for i in range(hull_start[u], hull_start[u + 1]):
@@ -92,7 +92,7 @@ def near_enough(u, v, hull_start, hull_points, limit):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
     """Which of two vertices may survive their merging, or UNDECIDED.
 
@@ -125,7 +125,7 @@ def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
     return way
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed, keys, ways, best):
     """Fill `keys` with the contractible edges; gives their number, or UNDECIDED without hulls.
 
@@ -165,7 +165,7 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def open_candidates(origin, keys, ways, best):
     """Let either end of every candidate survive, and give each vertex its least key in `best`."""
     for v in range(best.size):
@@ -178,7 +178,7 @@ def open_candidates(origin, keys, ways, best):
             best[end] = min(best[end], key)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def match(origin, keys, best, matched, rest):
     """Greedy maximal matching in the order of keys, by rounds of locally best edges (Preis 1999).
 
@@ -218,7 +218,7 @@ def match(origin, keys, best, matched, rest):
             best[v] = min(best[v], key)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
     """Let every vertex without a partner join the best matched neighbour that may survive it."""
     for v in range(matched.size):
@@ -241,7 +241,7 @@ def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
             kernel_dart[u] = dart + np.uint64(1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
     """Undo the joins that would make a star's field wider than the limit (linkage "diameter").
 
@@ -268,7 +268,7 @@ def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
                 last_leaf[p] = v
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, seed, stars):
     """Stars from a maximal matching (MIES): the parent of each vertex and the dart to it.
 
@@ -316,7 +316,7 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
             kernel_dart[u] = 2 * edge + 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vertex_parent):
     """Merge boxes into survivors and close the gaps, in place; gives the number of survivors.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def step(row, col, heading):
     """The corner one side further."""
     if heading == 0:
@@ -23,7 +23,7 @@ def step(row, col, heading):
     return row - 1, col
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def field_left(field_of, row, col, heading):
     """Field of the cell to the left of the side that a heading leads along, -1 for none."""
     if heading == 1 or heading == 2:
@@ -35,7 +35,7 @@ def field_left(field_of, row, col, heading):
     return field_of[row, col]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def put(corners, at, row, col):
     """Write a corner, unless the corners are only counted; returns where the next one goes."""
     if corners.size:
@@ -44,7 +44,7 @@ def put(corners, at, row, col):
     return at + 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def walk_ring(field_of, start, noded, visited, corners, at):
     """Corners of the ring that starts east along the lower side of a flat cell; the first twice.
 
@@ -74,7 +74,7 @@ def walk_ring(field_of, start, noded, visited, corners, at):
             return at
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def find_rings(field_of, noded):
     """Rings round all fields: flat cell above the start of each, its field, its corners.
 
@@ -96,7 +96,7 @@ def find_rings(field_of, noded):
     return np.array(starts)[1:], np.array(fields)[1:], np.array(sizes)[1:]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def ring_corners(field_of, starts, offsets, noded):
     """Corners of rings, int32 (offsets[-1], 2)."""
     visited = np.empty(field_of.shape, np.bool_)
@@ -106,7 +106,7 @@ def ring_corners(field_of, starts, offsets, noded):
     return corners
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def side_at(corner, heading, cols):
     """Base edge across the side that leads from an inner corner, given the cell south-west of it.
 
@@ -121,14 +121,14 @@ def side_at(corner, heading, cols):
     return 2 * corner
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def is_crack(flat, cols, edge):
     """Whether the cells of a base edge lie in different fields."""
     cell = edge >> 1
     return flat[cell] != flat[cell + (cols if edge & 1 else 1)]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def next_heading(field_of, row, col, heading, members):
     """Heading in which a line goes on beyond a corner, -1 where it ends.
 
@@ -157,7 +157,7 @@ def next_heading(field_of, row, col, heading, members):
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def line_start(field_of, edge, members):
     """Corner and heading where the line through a side starts, its lower cell on the left.
 
@@ -186,7 +186,7 @@ def line_start(field_of, edge, members):
         at_row, at_col = step(at_row, at_col, at_heading)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def walk_line(field_of, start, members, corners, at):
     """Corners of the line from its start on, written as `walk_ring` does."""
     row, col, heading = start
@@ -203,7 +203,7 @@ def walk_line(field_of, start, members, corners, at):
         heading = turned
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def boundary_corners(field_of, edges, members, bounds):
     """Lines through given sides: where the corners of each begin, and the corners.
 

@@ -10,7 +10,7 @@ from hybridnav.pyramid._kernels import make_key
 _LEAST_ATTRIBUTE = 8191
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def yielding(origin, base_edge, classes, widths, peaks, share, seed, keys):
     """Fill `keys` with the arcs that may be contracted, widest first; gives their number."""
     widest = 0.0
@@ -28,7 +28,7 @@ def yielding(origin, base_edge, classes, widths, peaks, share, seed, keys):
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def refuse_narrow_leaves(leaves, parent, kernel_dart, widths, peaks, share):
     """Keep a leaf only if its arc would not resist what the star has become by then.
 

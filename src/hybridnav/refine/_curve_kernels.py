@@ -18,21 +18,21 @@ LARGEST_HEADING = 1e6
 """Headings in radians above which too few digits are left."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _forward(angle):
     """Bring an angle to [0, 2 pi)."""
     angle -= _FULL * math.floor(angle / _FULL)
     return 0.0 if angle > _FULL - _ROUNDING else angle
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _wrapped(angle):
     """Bring an angle to [-pi, pi]; of the two ends the upper one."""
     angle -= _FULL * np.rint(angle / _FULL)
     return angle + _FULL if angle < -math.pi + _ROUNDING else angle
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
     """Keep a word if it is shorter than the best, mirrored, driven the other way, from its end."""
     total = 0.0
@@ -49,7 +49,7 @@ def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _dubins(x, y, phi, kinds, lengths):
     """Shortest word forwards from the origin to a pose (L. E. Dubins, 1957); its length.
 
@@ -77,7 +77,7 @@ def _dubins(x, y, phi, kinds, lengths):
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _tau_omega(u, v, xi, eta, phi):
     """First and last arc of four, the middle two being u and v."""
     delta = _wrapped(u - v)
@@ -89,7 +89,7 @@ def _tau_omega(u, v, xi, eta, phi):
     return tau, _wrapped(tau - u + v - phi)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     """Words of an arc, a straight line and an arc."""
     xi, eta = x - sine, y - 1 + cosine
@@ -108,7 +108,7 @@ def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     """Words of four arcs, the middle two equally long."""
     xi, eta = x + sine, y - 1 - cosine
@@ -130,7 +130,7 @@ def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     """Words with a straight line between two quarter turns."""
     quarter = math.pi / 2
@@ -147,7 +147,7 @@ def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     """Words that may also be driven from their end: three arcs, or one quarter turn."""
     quarter = math.pi / 2
@@ -178,7 +178,7 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _reeds_shepp(x, y, phi, kinds, lengths):
     """Shortest word forwards and backwards from the origin to a pose; its length.
 
@@ -201,7 +201,7 @@ def _reeds_shepp(x, y, phi, kinds, lengths):
     return best
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
     """Shortest curve between two poses, with lengths in the unit of the radius.
 

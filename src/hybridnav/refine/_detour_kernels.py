@@ -21,7 +21,7 @@ _SLACK = 0.002
 be tried; one of two is always tried, so no point stays that can be left out."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cell_at(marks, u_row, u_col, w_row, w_col):
     """Row and column of the free cell touched by u that lies nearest to w; row -1 for none."""
     best, best_row, best_col = np.inf, -1, -1
@@ -34,7 +34,7 @@ def _cell_at(marks, u_row, u_col, w_row, w_col):
     return best_row, best_col
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add(string, size, row, col):
     """Append a point that may give way; points of no size on the map's scale are rounded off."""
     string[size, 0], string[size, 1] = (
@@ -45,7 +45,7 @@ def _add(string, size, row, col):
     return size + 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     """Walk cells straight from u to w, and round what is in the way always on one hand.
 
@@ -122,7 +122,7 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     return 0, step
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _length(string, first, last):
     """Length of a part of a string."""
     total = 0.0
@@ -132,7 +132,7 @@ def _length(string, first, last):
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def improve(marks, string, n, budget):
     """Lead parts of a taut string past other sides of obstacles wherever that makes it shorter.
 

@@ -17,7 +17,7 @@ than the optimum, with these steps 0.13 %, with 3000 and 4 a cell 0.09 % (for ha
 without a limit 0.04 % (for five times the time)."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _finish(marks, string, n, budget, points, size):
     """Shorten a legal string and append its points to others, each place once."""
     string[:n, 2] = 1.0
@@ -33,7 +33,7 @@ def _finish(marks, string, n, budget, points, size):
     return points, size
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def shorten(marks, cells, metres, origin, per_metre, corner_cutting):
     """Any-angle path between two points, positions (m, 2), from a legal path of cells.
 

@@ -28,7 +28,7 @@ from hybridnav.refine._sweep_kernels import (
 _LONGEST_TURN = 2 * math.pi + 1e-6
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _position(place, x, y):
     """Position (row, col) of a point, rounded."""
     x -= place[0]
@@ -36,14 +36,14 @@ def _position(place, x, y):
     return rounded(place[2] * x + place[3] * y), rounded(place[4] * x + place[5] * y)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def point_stands(marks, place, x, y):
     """Whether a point may be stood on."""
     row, col = _position(place, x, y)
     return in_map(marks, row, col) and stands(marks, row, col)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def point_runs(marks, place, x0, y0, x1, y1):
     """Whether a point may run straight from one place to another."""
     a_row, a_col = _position(place, x0, y0)
@@ -51,7 +51,7 @@ def point_runs(marks, place, x0, y0, x1, y1):
     return runs(marks, a_row, a_col, b_row, b_col)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _legal_bend(marks, positions, i):
     """Whether a polyline that bends at a corner of the lattice does not change sides there.
 
@@ -75,7 +75,7 @@ def _legal_bend(marks, positions, i):
     return (came > 0) == (goes > 0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def polyline_runs(marks, place, points):
     """Whether a point may run along a polyline of one or more points, bends included."""
     positions = np.empty((points.shape[0], 2))
@@ -100,7 +100,7 @@ def polyline_runs(marks, place, points):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def body_stands(marks, place, body, x, y, yaw):
     """Whether a body may be at a point with a heading."""
     row, col = _position(place, x, y)
@@ -111,7 +111,7 @@ def body_stands(marks, place, body, x, y, yaw):
     return body_fits(body, row, col, yaw - place[6])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
     """Whether a body may go straight from one place to another while it turns the short way."""
     row, col = _position(place, x0, y0)
@@ -134,7 +134,7 @@ def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def body_drives(
     marks,
     place,
@@ -193,7 +193,7 @@ def body_drives(
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def body_steers(
     marks,
     place,

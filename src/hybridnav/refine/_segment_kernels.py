@@ -12,7 +12,7 @@ from numba import njit
 from hybridnav.refine._taut_kernels import turn_of
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
     """Whether a segment, which is not a point, stays in the closed cells it may stand on; exact.
 

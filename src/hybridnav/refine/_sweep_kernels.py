@@ -38,19 +38,19 @@ _HALF_DIAGONAL = 0.7075
 _FARTHEST = 255
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def rounded(value):
     """Round a coordinate so that tests on it are exact."""
     return np.rint(value * _DIGITS) / _DIGITS
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def in_map(marks, row, col):
     """Whether a position lies in the map, rim included; what is not a number does not."""
     return 0.0 <= row <= marks.shape[0] and 0.0 <= col <= marks.shape[1]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def stands(marks, row, col):
     """Whether a position of the map lies in the closed square of a cell that may be stood on."""
     for r in range(max(math.ceil(row) - 1, 0), min(math.floor(row) + 1, marks.shape[0])):
@@ -60,7 +60,7 @@ def stands(marks, row, col):
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def runs(marks, a_row, a_col, b_row, b_col):
     """Whether a point may run straight from one position to another; exact for rounded ones."""
     if not in_map(marks, a_row, a_col) or not in_map(marks, b_row, b_col):
@@ -70,7 +70,7 @@ def runs(marks, a_row, a_col, b_row, b_col):
     return is_legal(marks, a_row, a_col, b_row, b_col, STAND, OPEN)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def look_ahead(occupied):
     """Columns from each cell to the next occupied one of its row, or to none within reach."""
     rows, cols = occupied.shape
@@ -83,7 +83,7 @@ def look_ahead(occupied):
     return ahead
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def moved(row, col, heading, d_row, d_col, turn, radius, share):
     """Base and heading after a share of a motion."""
     now = heading + share * turn
@@ -94,7 +94,7 @@ def moved(row, col, heading, d_row, d_col, turn, radius, share):
     return row, col, now
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _following(part, level):
     """Part after one that is free, as large as it can be; level 0 where that was the last.
 
@@ -107,7 +107,7 @@ def _following(part, level):
     return part, level
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _place(corners, row, col, heading, placed):
     """Rounded positions of the corners of a body."""
     cosine, sine = math.cos(heading), math.sin(heading)
@@ -117,7 +117,7 @@ def _place(corners, row, col, heading, placed):
         placed[i, 1] = rounded(col + cosine * x - sine * y)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
     """Widen the columns that each row from `first` to `end` sees by those of an edge."""
     if b_row < a_row:
@@ -136,7 +136,7 @@ def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
         columns[k, 1] = max(columns[k, 1], right)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _turns_right(points, size, row, col):
     """Whether the way over the last two of some points to another turns right or goes straight."""
     a_row, a_col = points[size - 2]
@@ -144,7 +144,7 @@ def _turns_right(points, size, row, col):
     return (b_col - a_col) * (row - b_row) - (b_row - a_row) * (col - b_col) <= 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _hull(before, after, first, last):
     """Corners of the convex hull of a polygon in two places, the first again at the end.
 
@@ -181,7 +181,7 @@ def _hull(before, after, first, last):
     return points[:size]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
     """Whether the hull of a convex polygon in two places meets no occupied cell, with a margin.
 
@@ -226,7 +226,7 @@ def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _is_free(ahead, offsets, before, after, margin, moves, columns):
     """Whether the hulls of all convex parts of a body meet no occupied cell."""
     for k in range(offsets.size - 1):
@@ -236,13 +236,13 @@ def _is_free(ahead, offsets, before, after, margin, moves, columns):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _room(rows, reach, length):
     """Where `_part_is_free` notes the columns of a body that moves so far."""
     return np.empty((int(min(float(rows), 2 * reach + length)) + 6, 2))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _near(clearance, row, col):
     """Bounds on the distance to the nearest occupied square and to its centre from a position."""
     r = min(max(math.floor(row), 0), clearance.shape[0] - 1)
@@ -251,7 +251,7 @@ def _near(clearance, row, col):
     return clearance[r, c] - offset - _HALF_DIAGONAL, clearance[r, c] + offset
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def body_fits(body, row, col, heading):
     """Whether a body meets no occupied cell with its base at a position of the map."""
     ahead, clearance, corners, offsets, radii = body
@@ -268,7 +268,7 @@ def body_fits(body, row, col, heading):
     return _is_free(ahead, offsets, placed, placed, 0.0, STAYS, columns)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     """Whether a body meets no occupied cell all along a motion whose base stays in the map."""
     ahead, clearance, corners, offsets, radii = body
@@ -315,7 +315,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
         level += 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sliver_stands(marks, a_row, a_col, b_row, b_col, margin):
     """Whether all cells may be stood on that a segment comes nearer to than a margin."""
     rows, cols = marks.shape
@@ -334,7 +334,7 @@ def _sliver_stands(marks, a_row, a_col, b_row, b_col, margin):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def arc_runs(marks, row, col, heading, turn, radius):
     """Whether a point may run along an arc."""
     part, level = 0, 0

@@ -22,7 +22,7 @@ _LONGEST = FREE - _KINDS
 """Columns to the next such corner, or to none, that the rest of a mark can tell."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def marks_of(free):
     """Mark for each cell: whether it is free, and the kind of its lower corner or how far the next.
 
@@ -46,7 +46,7 @@ def marks_of(free):
     return marks
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _rounding_error(first, second, product):
     """What rounding took from a product (T. J. Dekker: A floating-point technique, 1971)."""
     scaled = 134217729.0 * first
@@ -59,7 +59,7 @@ def _rounding_error(first, second, product):
     return first_low * second_low - (error - first_high * second_low)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def turn_of(a_row, a_col, b_row, b_col, c_row, c_col):
     """On which side of the line from a to b a point c lies: 1, -1 or 0, exact."""
     p, q = b_row - a_row, c_col - a_col
@@ -71,7 +71,7 @@ def turn_of(a_row, a_col, b_row, b_col, c_row, c_col):
     return int(left > right) - int(left < right)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _faces(d_row, d_col, kind):
     """On which side of a direction the blocked cell of a corner lies that the line touches."""
     left = d_row if kind & 1 else -d_row
@@ -79,7 +79,7 @@ def _faces(d_row, d_col, kind):
     return int(left > right) - int(left < right)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def grown(array, size):
     """An array with room for `size` rows."""
     larger = np.empty((max(2 * array.shape[0], size), array.shape[1]), array.dtype)
@@ -87,7 +87,7 @@ def grown(array, size):
     return larger
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _insert(chain, size, side, v_row, v_col, row, col):
     """Put a corner into the chain that a string from chain[0] to chain[size - 1] hangs on.
 
@@ -133,7 +133,7 @@ def _insert(chain, size, side, v_row, v_col, row, col):
     return size - gap + 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
     """Let go of the bend v between u and w: the chain of points that the string then hangs on.
 
@@ -195,7 +195,7 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
     return size
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def tighten(marks, string, n):
     """Pull a legal string of n points taut; returns it and its number of points.
 

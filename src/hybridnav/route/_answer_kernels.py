@@ -10,7 +10,7 @@ from hybridnav.route._portal_kernels import FAR, cells_of_way, field_at
 from hybridnav.route._side_kernels import best_gates, side_costs, ways_by_sides
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon, frame):
     """Path over gates between two cells that may be entered, if it costs less than `inside`, the
     cost of the shortest path inside one field where start and goal share it, else FAR.
@@ -71,7 +71,7 @@ def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon,
     return cost, lower, walked, cells, points
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def answers(portals, tables, cols, starts, goals, pairs, is_exact, epsilon, frame):
     """`answer` for many pairs of flat cells, int64 (n,) each, as if no two shared a field.
 

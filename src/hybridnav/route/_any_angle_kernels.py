@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def least_over_boxes(box, portal, between, sides, start, goal):
     """Least length of a way from a point to another over portals.
 
@@ -24,7 +24,7 @@ def least_over_boxes(box, portal, between, sides, start, goal):
     return least
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _gap(box, side, point):
     """Distance from a point to a side's box."""
     down = max(box[side, 0] - point[0], point[0] - box[side, 1], 0.0)

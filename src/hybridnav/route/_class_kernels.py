@@ -63,7 +63,7 @@ class States(NamedTuple):
     other: np.ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def new_tree(room):
     """A tree of the identity alone."""
     tree = Tree(
@@ -83,7 +83,7 @@ def new_tree(room):
     return tree
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def new_states(room):
     """No states yet."""
     return States(
@@ -99,7 +99,7 @@ def new_states(room):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _times_letter(tree, word, letter):
     if tree.letter[word] == -letter:
         return tree.above[word]
@@ -119,7 +119,7 @@ def _times_letter(tree, word, letter):
     return new
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _times(tree, letters, word, number):
     """The product with a numbered word, or with the inverse of one; -1 when there is no room."""
     if number == 0 or word < 0:
@@ -146,7 +146,7 @@ def _times(tree, letters, word, number):
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _along(of_edge, cell, direction, cols):
     """Numbered word of a step to a neighbour by a side; directions 0, 2, 4, 6."""
     if direction == 0:
@@ -158,7 +158,7 @@ def _along(of_edge, cell, direction, cols):
     return -np.int64(of_edge[2 * (cell - cols) + 1])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _after(tree, letters, of_edge, word, cell, direction, cols):
     """The word after a step; a diagonal goes by the cell in its own row."""
     if direction & 1 == 0:
@@ -170,7 +170,7 @@ def _after(tree, letters, of_edge, word, cell, direction, cols):
     return _times(tree, letters, word, _along(of_edge, beside, upwards, cols))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _leads_to(states, earlier, later):
     """Whether the path to one taken state passes another."""
     depth = states.depth[earlier]
@@ -187,7 +187,7 @@ def _leads_to(states, earlier, later):
     return at == earlier
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _winds(states, tree, letters, of_edge, moves, head, state, apart, cols):
     """Whether a path has come back: stands on, or sees along a row or a column, at most `apart`
     cells off, a cell that it passed before it circled a hole. 1 or 0, -1 when there is no room."""
@@ -222,7 +222,7 @@ def _winds(states, tree, letters, of_edge, moves, head, state, apart, cols):
     return 0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _push(heap, n, key):
     at = n
     while at > 0:
@@ -234,7 +234,7 @@ def _push(heap, n, key):
     heap[at] = key
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _pop(heap, n):
     """Take the least of n keys out."""
     least, key = heap[0], heap[n - 1]
@@ -256,7 +256,7 @@ def _pop(heap, n):
     return least
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, room):
     """Shortest paths of the first classes that do not wind, and why there are no more.
 
@@ -353,7 +353,7 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, room)
     return states, tree, goals[:n_goals], reason
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def path_to(states, state):
     """Flat cells of the path to a state, from the start."""
     cells = np.empty(states.depth[state] + 1, np.int64)
@@ -363,7 +363,7 @@ def path_to(states, state):
     return cells
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def word_at(tree, word):
     """Letters of a word of the tree."""
     count = 0

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def behind_passages(first, neighbour, is_passage, start, goal):
     """Nodes that some passage, when it is taken out, parts from start and goal; bool (n,).
 

@@ -13,7 +13,7 @@ from hybridnav.route._portal_kernels import FAR, cost_to_gate
 from hybridnav.search._kernels import grow
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def descend(portals, table, shift, gate_field, gate, source, last):
     """Follow a source's row of the table from a gate to the source, and cross to gate `last`.
 
@@ -77,7 +77,7 @@ def descend(portals, table, shift, gate_field, gate, source, last):
     return out[:n], into[:n], legs[: n + 1], over
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def with_ends(portals, gate_field, cols, start, goal, out, into, legs, over):
     """Cost of the whole way from start to goal, which lie in the fields of its ends; sets the first
     and the last leg."""

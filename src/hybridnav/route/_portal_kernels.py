@@ -39,7 +39,7 @@ class Tables(NamedTuple):
     """int32 (G,), a source at each gate, -1 for none."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def position_of(index, cols, cell):
     """Position of a cell in the order of `Portals.position`."""
     row, col = np.uint64(cell // cols), np.uint64(cell % cols)
@@ -48,7 +48,7 @@ def position_of(index, cols, cell):
     return np.int64(index[tile << np.uint64(6) | inside])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def field_at(portals, cols, cell):
     """The field of a cell that may be entered."""
     index = portals.position
@@ -57,7 +57,7 @@ def field_at(portals, cols, cell):
     return np.searchsorted(field_start, position, side="right") - 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count, cell, costs):
     """Costs of the stored paths from a cell to the first `count` of some gates of its field.
 
@@ -94,7 +94,7 @@ def costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count,
             i += 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cost_to_gate(index, rows, first, begin, end, cols, cell):
     """Cost of the stored path from a cell to a gate; `first` is where its field begins in the
     order of cells, `begin` the gate's row, `end` its cell."""
@@ -114,14 +114,14 @@ def cost_to_gate(index, rows, first, begin, end, cols, cell):
     return cost
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def moves_of(cost):
     """Moves of a path of an integer cost."""
     diagonal = cost % STRAIGHT * _INVERSE % STRAIGHT
     return (cost - diagonal * DIAGONAL) // STRAIGHT + diagonal
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame):
     """Cells of a way, int64 (n, 2), and their centres, float64 (n, 2).
 
@@ -187,7 +187,7 @@ def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
     return cells, centres(cells, frame)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def centres(cells, frame):
     """Centres of (row, col) in the map frame, as `Frame.points_of` has them."""
     resolution, origin_x, origin_y, cosine, sine = frame

@@ -13,7 +13,7 @@ from hybridnav.route._portal_kernels import FAR, UNREACHED, costs_to_gates, posi
 from hybridnav.search._kernels import octile_cost
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def side_costs(portals, cols, field, cell):
     """Costs from a cell to the nearest gate of each of its field's sides, rounded down."""
     side_start = portals.side_start
@@ -32,7 +32,7 @@ def side_costs(portals, cols, field, cell):
     return low
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def ways_by_sides(between, shift, first, last, low_start, low_goal):
     """Lower bounds on the ways by each pair of sides of two fields, int64; FAR for none.
 
@@ -49,7 +49,7 @@ def ways_by_sides(between, shift, first, last, low_start, low_goal):
     return low
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _weigh_gates(portals, cols, cell, begin, end, low, known, costs):
     """Lower bounds on the costs from a cell to a side's gates, the costs where they are known."""
     side_gates = portals.side_gates
@@ -63,7 +63,7 @@ def _weigh_gates(portals, cols, cell, begin, end, low, known, costs):
             costs[q - begin] = max(low, line)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _walk(portals, cols, cell, field, begin, end, is_wanted, known):
     """Make the costs known from a cell to those gates of a side that are wanted."""
     index = portals.position
@@ -89,7 +89,7 @@ def _walk(portals, cols, cell, field, begin, end, is_wanted, known):
     return walked
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def entries_of(portals, source_at, begin, end):
     """Crossings by which paths enter a field over the gates `side_gates[begin:end]`.
 
@@ -117,7 +117,7 @@ def entries_of(portals, source_at, begin, end):
     return place[:count], source[:count], step[:count]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, known_goal, limit):
     """The gates of two sides by which the shortest way leads, among those cheaper than `limit`.
 

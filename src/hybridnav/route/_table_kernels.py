@@ -11,7 +11,7 @@ LANES = 16
 """Portals that are searched from together."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def costs_to_gates(
     sources, field_of, gate_start, clique_start, clique, exit_start, exit_gate, exit_cost, shift,
     table,

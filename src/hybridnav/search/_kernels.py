@@ -37,7 +37,7 @@ _BUCKET_SHIFT = 15
 BUCKETS = 8
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def octile_cost(rows, cols):
     """Cost of the shortest path between cells without obstacles, from their offsets."""
     rows, cols = abs(rows), abs(cols)
@@ -46,7 +46,7 @@ def octile_cost(rows, cols):
     return STRAIGHT * (rows - cols) + DIAGONAL * cols
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def legal_moves(enterable, corner_cutting):
     """Byte mask of the legal moves of each cell, bit k for direction k.
 
@@ -78,7 +78,7 @@ def legal_moves(enterable, corner_cutting):
     return moves
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def grow(array):
     """A copy of an array with twice the room."""
     larger = np.empty(2 * array.size, array.dtype)
@@ -86,7 +86,7 @@ def grow(array):
     return larger
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def forbid(moves, cols, blocked, corner_cutting):
     """Take all moves into some flat cells, out of them and past their corners out of the masks.
 
@@ -117,7 +117,7 @@ def forbid(moves, cols, blocked, corner_cutting):
     return touched, masks
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def astar(
     moves,
     cols,
@@ -254,7 +254,7 @@ def astar(
     return (bound if bound < limit else -1), expanded
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def trace(came, cols, start, goal):
     """Flat cells of the path that a search left behind, from start to goal.
 
@@ -276,7 +276,7 @@ def trace(came, cols, start, goal):
     return path
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def trace_cells(came, cols, start, goal):
     """The same path as (row, col), shape (n, 2)."""
     flat = trace(came, cols, start, goal)
@@ -287,7 +287,7 @@ def trace_cells(came, cols, start, goal):
     return cells
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def field_distances(classes, field_of, sources):
     """Cost of the shortest path inside each field from its source cell to every cell of it, -1
     where a cell belongs to no field.
@@ -344,7 +344,7 @@ def field_distances(classes, field_of, sources):
     return distance
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def cheapest_arcs(first, neighbour, arc, costs, ties, allowed, start, goal):
     """Dijkstra over the arcs of a multigraph: arcs of the cheapest walk, ties by a second cost.
 

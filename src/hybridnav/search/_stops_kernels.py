@@ -11,7 +11,7 @@ from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def spread(moves, cols, sources, costs, is_target, all_targets):
     """Dijkstra's algorithm from cells with costs of their own.
 

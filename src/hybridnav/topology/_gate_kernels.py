@@ -25,7 +25,7 @@ _STRAIGHTS = np.int32(LEAP * STRAIGHT)
 _DIAGONALS = np.int32(LEAP * DIAGONAL)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def neighbours_in_field(moves, cols, index, cells, first, out):
     """Fill `out[i]` with the neighbours of each cell of a field, all legal moves inside it."""
     n = cells.size
@@ -40,7 +40,7 @@ def neighbours_in_field(moves, cols, index, cells, first, out):
                     out[i, k] = j
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def leaps_in_field(near, n, out):
     """Fill `out[i]` with the cells `LEAP` moves away in each direction, inside the field."""
     for k in range(8):
@@ -53,7 +53,7 @@ def leaps_in_field(near, n, out):
             out[i, k] = j
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def wave(near, n, source, cost, ring, order):
     """Costs from one cell to all of its field, and the cells in the order they are reached.
 
@@ -98,7 +98,7 @@ def wave(near, n, source, cost, ring, order):
     return reached
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _sweep(near, order, begin, end, step, cost, row, stale, lanes):
     """Relax the stale cells of order[begin:end:step], all lanes at once; says if any changed.
 
@@ -133,7 +133,7 @@ def _sweep(near, order, begin, end, step, cost, row, stale, lanes):
     return any_changed
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def relax(near, n, order, prefix, cost, row, stale, lanes):
     """Costs from all lanes' sources, which lie among the first `prefix` cells of the order.
 
@@ -154,7 +154,7 @@ def relax(near, n, order, prefix, cost, row, stale, lanes):
         pass
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def directions(near, far, n, cost, row, lanes, out):
     """First direction of the path from each cell to each lane's source, `out` (LANES, n).
 
@@ -199,7 +199,7 @@ def directions(near, far, n, cost, row, lanes, out):
             out[lane, i] = row[lane]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _pack(directions_of_lane, n, rows, begin):
     for i in range(n // 2):
         rows[begin + i] = directions_of_lane[2 * i] | directions_of_lane[2 * i + 1] << 4
@@ -207,7 +207,7 @@ def _pack(directions_of_lane, n, rows, begin):
         rows[begin + n // 2] = directions_of_lane[n - 1]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def shift_of(cost):
     """Bits to drop so that twice the largest cost, which bounds all in the field, fits uint16."""
     bound = 2 * np.int64(cost.max())
@@ -217,7 +217,7 @@ def shift_of(cost):
     return shift
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lower_steps(cost, n, lanes, sides, count, shift, steps):
     """Set steps[i, side] to the least of itself and the shifted costs of some lanes."""
     for i in range(n):
@@ -227,7 +227,7 @@ def _lower_steps(cost, n, lanes, sides, count, shift, steps):
                 steps[i, sides[q]] = there
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def fill_field(near, far, n, gates, row_start, rows, clique, begin, side, steps, scratch):
     """Paths from all gates of a field.
 

@@ -8,7 +8,7 @@ from numba import njit
 from hybridnav.pyramid._field_kernels import find
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def flood_basins(clearance, order, cols, ratio, broad):
     """Basin of each flat cell, -1 outside `order`, by a flood from the clearest cells down.
 
@@ -46,7 +46,7 @@ def flood_basins(clearance, order, cols, ratio, broad):
     return basin
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def gaps_in_rows(wall, free, longest, short, window, side, both, share):
     """Cells of the gaps between walls that continue each other along a row.
 
@@ -79,7 +79,7 @@ def gaps_in_rows(wall, free, longest, short, window, side, both, share):
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def grow_labels(label_of, region, most_steps):
     """Spread labels by steps along sides, each cell taking the nearest, in place.
 

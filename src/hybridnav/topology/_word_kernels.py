@@ -8,7 +8,7 @@ from numba import njit
 from hybridnav.search._kernels import grow
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def spread_words(enterable, removed, word_of):
     """Words of the removed edges, so that every full 2x2 block of cells reads the identity.
 
@@ -76,7 +76,7 @@ def spread_words(enterable, removed, word_of):
     return factors[:n_factors].reshape(-1, 3)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _side(at, side, cols):
     """Base edge on the south, east, north or west side of a block."""
     if side == 0:
@@ -88,14 +88,14 @@ def _side(at, side, cols):
     return 2 * at + 1
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _along(word_of, at, side, cols):
     """The word of a side as it is met counter-clockwise round the block."""
     word = np.int64(word_of[_side(at, side, cols)])
     return word if side < 2 else -word
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _beyond(at, side, cols):
     """The block on the other side of a side, -1 below the first row."""
     if side == 0:

@@ -10,7 +10,7 @@ _STEP = 0.5
 """Cells between samples at most."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def weighted_length(factors, origin, cosine, sine, resolution_m, x0, y0, x1, y1):
     """Length of a straight line in metres, each step times the factor of the cell at its middle.
 

@@ -115,8 +115,14 @@ class Worker:
             if not self._starting.is_alive():
                 self._take(self._starting)
         if self._running is not None:
-            with contextlib.suppress(OSError):
+            try:
                 self._running.connection.send((self._number, query))
+            except OSError:
+                pass  # it died: `reply` says so
+            except BaseException:
+                # Half a message was written, as when the user interrupts: the rest never comes.
+                self.close()
+                raise
 
     def is_late(self) -> bool:
         """Wait for the reply until most of the time is over; whether it still has not come."""
@@ -163,7 +169,11 @@ class Worker:
 
     def _start_and_wait(self) -> None:
         starting = _Start(self._setup)
-        starting.run()
+        try:
+            starting.run()
+        except BaseException:
+            starting.give_up()
+            raise
         self._take(starting)
 
     def _start_beside(self) -> None:
