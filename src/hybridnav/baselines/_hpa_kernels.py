@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 from hybridnav.baselines._weighted_kernels import COL_STEP, ROW_STEP, drop_least, push
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import grow, octile_cost
@@ -181,6 +182,7 @@ def distance_in_cluster(distance, cols, side, cell):
     return distance[cell // cols % side, cell % cols % side]
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def intra_edges(moves, side, cells, cluster_first):
     """Tails, heads and costs of the edges between nodes that a path inside their cluster joins."""
@@ -204,6 +206,7 @@ def intra_edges(moves, side, cells, cluster_first):
     return tails[:n_edges], heads[:n_edges], costs[:n_edges]
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, generation):
     """Flat cells that the cheapest abstract path passes, start and goal included, none where there
@@ -288,6 +291,7 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
     return passed, expanded, n_cells
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def refine(moves, side, passed):
     """Flat cells of the path that fills in an abstract one, and the cells expanded.

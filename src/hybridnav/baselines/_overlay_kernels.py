@@ -10,6 +10,7 @@ import heapq
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP, grow, octile_cost
 
@@ -50,6 +51,7 @@ def boundary_cells(labels, moves, cols):
     return found[:count].copy()
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def cross_edges(labels, moves, cols, node_cell):
     """Legal moves between fields, by the node they start from: first, heads, costs."""
@@ -207,6 +209,7 @@ def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first
     return True
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, other):
     """Distances inside its field from a cell to the boundary cells and to another cell, `_NONE`
@@ -238,6 +241,7 @@ def relax(heap, best, came, by_cross, node_cell, cols, goal, bound, node, new_co
     heapq.heappush(heap, (new_cost + rest, node))
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def overlay_search(
     node_field,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import grow, octile_cost
 
@@ -48,6 +49,7 @@ def drop_least(keys, items, size):
     keys[at], items[at] = key, item
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
     """Whether there is a path between two flat cells, and the expansions up to the goal's.
@@ -97,6 +99,7 @@ def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
     return False, expanded
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, generation):
     """Lower bound on the cost of a shortest path, -1 where there is none, and the expansions.

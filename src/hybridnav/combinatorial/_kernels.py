@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
+
 ALIVE = 0
 CONTRACTED = 1
 REMOVED = 2
@@ -52,6 +54,7 @@ def loop_area(dart, sweep, base_edge, cols):
     return np.int32(sweep[dart] + step - sweep[dart ^ 1])
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touched, cols):
     """Contract the stars of a kernel, in place.

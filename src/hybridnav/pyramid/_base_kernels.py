@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from hybridnav.combinatorial._kernels import Darts
-from hybridnav.pyramid._kernels import Vertices
+from hybridnav._guard import guarded
 
 _SURVIVES = 255
 
@@ -65,6 +64,7 @@ def block_powers(classes, largest):
     return power
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record as if there were only the blocks; gives the numbers of their vertices and
@@ -113,6 +113,7 @@ def filled(classes, row, col):
     return 0 <= row < rows and 0 <= col < cols and classes[row, col] != 0
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def block_vertices(classes, power, vertex_end, n_vertices):
     """Vertices of the map of the blocks and the cells in none, in the order of surviving cells."""
@@ -133,9 +134,10 @@ def block_vertices(classes, power, vertex_end, n_vertices):
         of_class[v] = classes[row, col]
         whole_at[v] = 2 * p
         v += 1
-    return Vertices(cells, boxes, of_class, whole_at)
+    return cells, boxes, of_class, whole_at
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def block_darts(classes, power, vertices, new_edge, n_edges):
     """Darts of the map of the blocks and the cells in none: counter-clockwise round each.
@@ -192,7 +194,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
             sigma[last] = first
             protected[first] |= open_corner
     protect_faces(sigma, protected)
-    return Darts(sigma, origin, sweep, protected, base_edge)
+    return sigma, origin, sweep, protected, base_edge
 
 
 @njit(cache=True, nogil=True)

@@ -11,7 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 
+
+@guarded
 @njit(cache=True, nogil=True)
 def label_fields(vertex_end, vertex_parent, level):
     """Dense vertex of each flat cell at a level (-1: no vertex) and the surviving cells."""
@@ -34,6 +37,7 @@ def label_fields(vertex_end, vertex_parent, level):
     return field_of, survivors
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def field_extents(field_of, cols, n_vertices):
     """Cells per field and their bounding boxes (least row, least column, greatest row, column)."""
@@ -77,6 +81,7 @@ def chain(rows, cols, count, side, points, start):
     return end
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def field_hulls(field_of, cols, boxes):
     """Convex hulls of connected fields, from the first and last cell of each of their rows."""
@@ -105,6 +110,7 @@ def field_hulls(field_of, cols, boxes):
     return start, points[:end].copy()
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def merge_hulls(start, points, parent, new_vertex, n_survivors):
     """Hulls of the next level from those of the stars that were contracted."""
@@ -194,6 +200,7 @@ def other_crack(field_of, cols, corner, base_edge):
     return other if count == 2 else -1
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def find_cracks(field_of, rows, cols):
     """Base edges whose cells lie in different fields, ascending, and the class of each.
@@ -302,6 +309,7 @@ def base_protected(dart, vertex_end, rows, cols):
     )
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
     """Sigma, origin and protection of the darts of a level, by walks through the base.

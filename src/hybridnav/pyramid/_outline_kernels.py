@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
+
 
 @njit(cache=True, nogil=True)
 def step(row, col, heading):
@@ -74,6 +76,7 @@ def walk_ring(field_of, start, noded, visited, corners, at):
             return at
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def find_rings(field_of, noded):
     """Rings round all fields: flat cell above the start of each, its field, its corners.
@@ -203,6 +206,7 @@ def walk_line(field_of, start, members, corners, at):
         heading = turned
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def boundary_corners(field_of, edges, members, bounds):
     """Lines through given sides: where the corners of each begin, and the corners.

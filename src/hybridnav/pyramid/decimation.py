@@ -206,9 +206,11 @@ class _Decimation:
             record.edge_end,
             new_edge,
         )
-        vertices = _base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices)
+        vertices = _kernels.Vertices(
+            *_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices)
+        )
         darts = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
-        return darts, vertices
+        return dart_kernels.Darts(*darts), vertices
 
     def exhaust(self) -> None:
         """Go on until no edge may be contracted, and take down the level that this makes."""

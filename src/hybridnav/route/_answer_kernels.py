@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 from hybridnav.route._descent_kernels import descend, with_ends
 from hybridnav.route._portal_kernels import FAR, cells_of_way, field_at
 from hybridnav.route._side_kernels import best_gates, side_costs, ways_by_sides
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon, frame):
     """Path over gates between two cells that may be entered, if it costs less than `inside`, the
@@ -71,6 +73,7 @@ def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon,
     return cost, lower, walked, cells, points
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def answers(portals, tables, cols, starts, goals, pairs, is_exact, epsilon, frame):
     """`answer` for many pairs of flat cells, int64 (n,) each, as if no two shared a field.

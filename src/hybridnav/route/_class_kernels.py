@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 
@@ -45,6 +46,16 @@ class Tree(NamedTuple):
     # Words, and products met before.
     used: np.ndarray
 
+    @classmethod
+    def of_room(cls, room: int) -> Tree:
+        """A tree of the identity alone, with room for so many words and products."""
+        arrays = [np.empty(room, np.int32) for _ in range(8)]
+        tree = cls._make([*arrays, np.zeros(2, np.int64)])
+        tree.above[0] = tree.child[0] = tree.sibling[0] = tree.known[0] = -1
+        tree.letter[0] = 0
+        tree.used[0] = 1
+        return tree
+
 
 class States(NamedTuple):
     """Pairs of a cell and a word, in the order in which they were met."""
@@ -62,41 +73,11 @@ class States(NamedTuple):
     # The next state of the same cell.
     other: np.ndarray
 
-
-@njit(cache=True, nogil=True)
-def new_tree(room):
-    """A tree of the identity alone."""
-    tree = Tree(
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.zeros(2, np.int64),
-    )
-    tree.above[0] = tree.child[0] = tree.sibling[0] = tree.known[0] = -1
-    tree.letter[0] = 0
-    tree.used[0] = 1
-    return tree
-
-
-@njit(cache=True, nogil=True)
-def new_states(room):
-    """No states yet."""
-    return States(
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int64),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.int32),
-        np.empty(room, np.uint8),
-        np.empty(room, np.int32),
-    )
+    @classmethod
+    def of_room(cls, room: int) -> States:
+        """No states yet, with room for so many."""
+        kinds = {"cost": np.int64, "status": np.uint8}
+        return cls(*(np.empty(room, kinds.get(field, np.int32)) for field in cls._fields))
 
 
 @njit(cache=True, nogil=True)
@@ -256,18 +237,19 @@ def _pop(heap, n):
     return least
 
 
+@guarded
 @njit(cache=True, nogil=True)
-def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, room):
+def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, states, tree):
     """Shortest paths of the first classes that do not wind, and why there are no more.
 
     `left` is the exact cost of the way from each flat cell to the goal, -1 where there is none: a
     consistent estimate, so that each state is taken at its least cost among paths that do not wind.
-    Returns the states, the tree, the states at the goal in the order of cost, and the reason.
+    Fills the states and the tree; returns the states at the goal in the order of cost, and the
+    reason.
     """
     start, goal = ends
     head = np.full(moves.size, np.int32(-1), np.int32)
-    tree = new_tree(room)
-    states = new_states(room)
+    room = states.cell.size
     heap = np.empty(2 * room, np.int64)
     goals = np.empty(wanted, np.int64)
     n_goals = n_states = n_heap = 0
@@ -350,7 +332,7 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, room)
             n_heap += 1
         if reason == LIMITED:
             break
-    return states, tree, goals[:n_goals], reason
+    return goals[:n_goals], reason
 
 
 @njit(cache=True, nogil=True)

@@ -63,14 +63,15 @@ def alternative_search(
     """
     kept = _KEPT.setdefault(topology, {})
     asked = bool(allow_unexplored), float(least_hole_m2)
-    if asked not in kept:
+    made = kept.get(asked)
+    if made is None:
         made = AlternativeSearch(
             topology, allow_unexplored=allow_unexplored, least_hole_m2=least_hole_m2
         )
-        while len(kept) >= _MOST_KEPT:
-            del kept[next(iter(kept))]
         kept[asked] = made
-    return kept[asked]
+        for oldest in list(kept)[:-_MOST_KEPT]:
+            kept.pop(oldest, None)  # another thread may have been here
+    return made
 
 
 class AlternativeSearch:
@@ -142,7 +143,9 @@ class AlternativeSearch:
         left = field_distances(self._enterable.astype(np.uint8), label, np.array([last]))
         shortest = float(length_in_cells(left[[first]])[0]) if left[first] >= 0 else math.inf
         apart = self._apart if shortest == math.inf else min(self._apart, int(shortest / 2))
-        states, tree, goals, reason = _class_kernels.find_classes(
+        states = _class_kernels.States.of_room(MOST_STATES)
+        tree = _class_kernels.Tree.of_room(MOST_STATES)
+        goals, reason = _class_kernels.find_classes(
             legal_moves(self._remaining(start, goal, max(1, apart)), False).ravel(),
             cols,
             (first, last),
@@ -151,7 +154,8 @@ class AlternativeSearch:
             self._letters,
             count,
             max(1, apart),
-            MOST_STATES,
+            states,
+            tree,
         )
         found = []
         for state in goals.tolist():

@@ -13,6 +13,7 @@ import heapq
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 
 # A record of A*: generation, cost modulo 2^19, direction of arrival (see `astar`).
@@ -86,6 +87,7 @@ def grow(array):
     return larger
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def forbid(moves, cols, blocked, corner_cutting):
     """Take all moves into some flat cells, out of them and past their corners out of the masks.
@@ -117,6 +119,7 @@ def forbid(moves, cols, blocked, corner_cutting):
     return touched, masks
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def astar(
     moves,
@@ -344,6 +347,7 @@ def field_distances(classes, field_of, sources):
     return distance
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def cheapest_arcs(first, neighbour, arc, costs, ties, allowed, start, goal):
     """Dijkstra over the arcs of a multigraph: arcs of the cheapest walk, ties by a second cost.

@@ -7,10 +7,12 @@ import heapq
 import numpy as np
 from numba import njit
 
+from hybridnav._guard import guarded
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def spread(moves, cols, sources, costs, is_target, all_targets):
     """Dijkstra's algorithm from cells with costs of their own.

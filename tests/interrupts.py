@@ -1,0 +1,62 @@
+"""Interrupts at chosen moments: before any line of the package, or by a timer."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import hybridnav
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import FrameType
+
+_PACKAGE = str(Path(hybridnav.__file__).parent)
+
+
+class Struck(BaseException):
+    """An interrupt of these tests, which nothing may catch but they."""
+
+
+def lines_of(call: Callable[[], object], *, strike_at: int | None = None) -> int:
+    """Run a call and count the lines of the package that it runs; raise `Struck` before one."""
+    count = 0
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal count
+        name = frame.f_code.co_filename
+        # Kernels are no lines where they are compiled.
+        if not name.startswith(_PACKAGE) or name.endswith("kernels.py"):
+            return None
+        if event == "line":
+            count += 1
+            if count == strike_at:
+                raise Struck
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        call()
+    finally:
+        sys.settrace(before)
+    return count
+
+
+@contextmanager
+def timer(delay_s: float) -> Iterator[None]:
+    """Raise `Struck` in the main thread after a while, wherever it is by then."""
+
+    def strike(*_: object) -> None:
+        raise Struck
+
+    before = signal.signal(signal.SIGALRM, strike)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, delay_s)
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
