@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav.baselines import _hpa_kernels
 from hybridnav.baselines._hpa_kernels import AbstractGraph
-from hybridnav.baselines.protocol import Answer, Cell
+from hybridnav.baselines.protocol import CUT_CORNERS, Answer, Cell
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -39,7 +39,8 @@ class HpaStar:
     proved of its length. `n_nodes` and `n_edges` are those of the abstract graph.
 
     Transitions lie between facing cells only. On a grid that allows cutting corners, paths that
-    pass from cluster to cluster only between two occupied cells are therefore not found.
+    pass from cluster to cluster only between two occupied cells are therefore not found: there the
+    method gives up and does not claim that no path exists.
 
     Parameters
     ----------
@@ -76,6 +77,7 @@ class HpaStar:
         self._side = min(cluster_cells, max(2, *grid.shape))
         self._reach = cluster_cells if line_cells is None else line_cells
         enterable = grid.classes == CellClass.FREE
+        self._corner_cutting = grid.corner_cutting
         self._moves: ByteArray = legal_moves(enterable, grid.corner_cutting)
         self.region_of: IntArray = _hpa_kernels.label_regions(enterable, self._moves, self._side)
         self._graph = _abstract_graph(enterable, self._moves, self._side)
@@ -113,6 +115,7 @@ class HpaStar:
                 expanded=int(expanded),
                 expanded_nodes=int(expanded_nodes),
                 seconds=seconds,
+                gave_up=CUT_CORNERS if self._corner_cutting else "",
             )
         began = time.perf_counter()
         path, refined = _hpa_kernels.refine(self._moves, self._side, passed)

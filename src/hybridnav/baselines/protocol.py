@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 
+CUT_CORNERS = "moves past corners are not in its graph"
+"""Why a method whose nodes are joined by sides alone gives up where corners may be cut."""
+
 
 @dataclass(frozen=True, eq=False)
 class Line:

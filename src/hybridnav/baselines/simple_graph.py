@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.baselines.protocol import CUT_CORNERS
 from hybridnav.baselines.regions import RegionPlanner, free_fields
 from hybridnav.grid import CellClass
 from hybridnav.search.arc_search import ArcSearch
@@ -26,7 +28,8 @@ class SimpleGraphPyramid:
     `max_distance_m` of its arcs, which is the same for all of them; ties are decided by the
     `through_m` of the arc with the lowest index, since a simple graph keeps whichever it meets
     first and cannot know that there are others. (`Level.to_simple_graph` is kinder: it keeps the
-    shortest.) The path is the shortest inside the fields of the route.
+    shortest.) The path is the shortest inside the fields of the route. Where corners may be cut, a
+    missing route proves nothing, and the method gives up.
 
     Parameters
     ----------
@@ -44,14 +47,16 @@ class SimpleGraphPyramid:
         self.n_nodes = int(free.sum())
         self.n_edges = len(kept)
         graph = ArcSearch(free, level.arcs, level.max_distance_m, level.through_m, kept=kept)
-        self._planner = RegionPlanner(
-            self.region_of, graph, corner_cutting=topology.grid.corner_cutting
-        )
+        self._corner_cutting = topology.grid.corner_cutting
+        self._planner = RegionPlanner(self.region_of, graph, corner_cutting=self._corner_cutting)
         self.memory_bytes = self._planner.memory_bytes
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Plan between two free cells; nodes are dense indices of places. See `RegionPlanner`."""
-        return self._planner.solve(start, goal)
+        answer = self._planner.solve(start, goal)
+        if self._corner_cutting and not answer.is_path:
+            return replace(answer, gave_up=CUT_CORNERS)
+        return answer
 
 
 def first_arcs(level: Level) -> LongArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
@@ -67,7 +67,11 @@ class WholeMap:
 
 
 class MaxDistance:
-    """The cheapest coarse route by max-distance arcs, and grid A* in its corridor."""
+    """The cheapest coarse route by max-distance arcs, and grid A* in its corridor.
+
+    Where corners may be cut a path can pass between fields that no arc joins, so that a missing
+    route proves nothing: the whole map is searched then.
+    """
 
     def __init__(
         self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
@@ -76,6 +80,7 @@ class MaxDistance:
         self._refiner = refiner
         self._search = MaxDistanceSearch(topology, allow_unexplored=settings.allow_unexplored)
         self._beside = self._search.enterable if settings.corridor == "neighbours" else None
+        self._corner_cutting = topology.grid.corner_cutting
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
         """Find the shortest path in the corridor; see `CellPlanner`."""
@@ -83,6 +88,9 @@ class MaxDistance:
         topology = self._topology
         route = self._search.search(topology.place_at(start), topology.place_at(goal))
         seconds = {"coarse": time.perf_counter() - began}
+        if route is None and self._corner_cutting:
+            whole = WholeMap(self._refiner).plan(start, goal)
+            return replace(whole, seconds=seconds | whole.seconds)
         if route is None:
             return CellPlan(None, seconds=seconds)
         corridor = corridor_of(topology, route.places, neighbours=self._beside)

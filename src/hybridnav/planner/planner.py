@@ -329,7 +329,7 @@ class HybridPlanner:
 
     def _route_source(self, plan: CellPlan) -> Callable[[], Route] | None:
         """What finds the route of a plan with a path; None where the whole map was searched."""
-        if plan.route_source is None and self.preset.planner.coarse == "portals":
+        if plan.route_source is None and self.preset.planner.coarse != "none":
             assert plan.cells is not None  # noqa: S101 - the caller has looked
             return partial(self._walked, plan.cells)
         return plan.route_source

@@ -1,0 +1,109 @@
+"""Where corners may be cut: every status is true, though the topological map joins fewer cells."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+
+import hybridnav as hn
+from hybridnav.baselines.grid import GridAstar
+from hybridnav.baselines.hpa import HpaStar
+from hybridnav.baselines.overlay import ExactOverlay
+from hybridnav.baselines.simple_graph import SimpleGraphPyramid
+from hybridnav.baselines.thrun import ThrunMap
+from hybridnav.grid import CellClass
+from tests.strategies import MAX_SIDE, drawn
+
+if TYPE_CHECKING:
+    from hybridnav.baselines import Method
+
+PRESETS = ["paper", "fast", "balanced", "certified", "grid-astar"]
+# Two free places that only a move between two blocked cells joins.
+PINCHED = drawn("..###", "..###", "##...", "##...")
+
+
+def cutting_map(classes: Any, merge_distance_m: float = 50.0) -> hn.TopologicalMap:
+    probability = np.where(classes == CellClass.UNEXPLORED, 0.4, classes == CellClass.OCCUPIED)
+    grid = hn.OccupancyGrid(probability.astype(np.float32), robot_radius_m=0.0, corner_cutting=True)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=merge_distance_m)
+    return hn.TopologicalMap(pyramid)
+
+
+def joined(enterable: Any) -> Any:
+    """Component of each cell by the moves of eight neighbours, 0 for none."""
+    return ndimage.label(enterable, np.ones((3, 3)))[0]
+
+
+def pairs(enterable: Any, seed: int, n: int) -> Any:
+    cells = np.argwhere(enterable)
+    rng = np.random.default_rng(seed)
+    return cells[rng.integers(len(cells), size=(n, 2))].tolist() if len(cells) else []
+
+
+@st.composite
+def mazes(draw: Any) -> Any:
+    """Small maps with many moves between two blocked cells."""
+    side = st.integers(2, min(9, MAX_SIDE))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    classes = rng.choice(np.array([0, 1, 2], np.uint8), (draw(side), draw(side)), p=[0.4, 0.5, 0.1])
+    return cutting_map(classes, draw(st.sampled_from([1.5, 3.0, 50.0])))
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_path_between_two_blocked_cells_is_found(preset: str) -> None:
+    topology = cutting_map(PINCHED)
+    result = hn.HybridPlanner(topology, preset=preset).plan((0.5, 3.5), (4.5, 0.5))
+    assert result.status is hn.PlanStatus.SOLVED
+    assert result.cost == pytest.approx(1 + 3 * np.sqrt(2))
+    if preset != "grid-astar":
+        assert result.route is not None
+        assert result.route.arcs == (-1,)
+
+
+@given(topology=mazes(), seed=st.integers(0, 99))
+@settings(max_examples=25, deadline=None)
+def test_every_status_is_true(topology: hn.TopologicalMap, seed: int) -> None:
+    grid = topology.grid
+    for preset in PRESETS:
+        for unexplored, corridor in ((False, "route"), (True, "neighbours")):
+            planner = hn.HybridPlanner(
+                topology,
+                preset=hn.load_preset(
+                    preset,
+                    overrides=[
+                        f"planner.allow_unexplored={str(unexplored).lower()}",
+                        f"planner.corridor={corridor}",
+                    ],
+                ),
+            )
+            enterable = grid.enterable(allow_unexplored=unexplored)
+            part = joined(enterable)
+            for start, goal in pairs(enterable, seed, 4):
+                ends = grid.frame.points_of(start), grid.frame.points_of(goal)
+                result = planner.plan(*ends)
+                assert result.solved == (part[tuple(start)] == part[tuple(goal)])
+                assert result.cost >= result.lower_bound - 1e-9
+
+
+@given(topology=mazes(), seed=st.integers(0, 99))
+@settings(max_examples=25, deadline=None)
+def test_no_baseline_denies_a_path_that_exists(topology: hn.TopologicalMap, seed: int) -> None:
+    grid = topology.grid
+    part = joined(grid.enterable())
+    methods: list[Method] = [
+        GridAstar(grid),
+        HpaStar(grid, cluster_cells=4),
+        ExactOverlay(topology),
+        SimpleGraphPyramid(topology),
+        ThrunMap(grid, epsilon_cells=2),
+    ]
+    for start, goal in pairs(grid.enterable(), seed, 4):
+        for method in methods:
+            found = method.solve(tuple(start), tuple(goal))
+            if not found.gave_up:
+                assert found.is_path == (part[tuple(start)] == part[tuple(goal)])
