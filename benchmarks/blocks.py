@@ -51,7 +51,7 @@ def main() -> None:
     print("| map | U_d, m | linkage | places | without blocks | change | build time |")
     print("|---|---|---|---|---|---|---|")
     changes: dict[str, list[float]] = {linkage: [] for linkage in LINKAGES}
-    hn.DualGraphPyramid.build(hn.load_map(OFFICE))
+    hn.DualGraphPyramid.build(hn.load_map(OFFICE, robot_radius_m=0))
     for path in paths:
         grid = hn.load_map(path, robot_radius_m=RADIUS_M)
         for distance_m in (1.0, 2.0, 4.0):

@@ -31,7 +31,7 @@ WIDTH_IN = 7.0
 
 def draw_figure1(file: Path) -> None:
     """A map of three surfaces: simple graph, dual graph pyramid's top, and its dual."""
-    grid = hn.load_map(MAPS / "figure1" / "figure1.yaml")
+    grid = hn.load_map(MAPS / "figure1" / "figure1.yaml", robot_radius_m=0)
     top = hn.DualGraphPyramid.build(grid, merge_distance_m=10.0)[-1]
     print(f"figure1: {top.to_simple_graph().dropped}")
     save_figure(plot_figure1(top, width_in=WIDTH_IN)[0], file, dpi=150)

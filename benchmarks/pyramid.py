@@ -42,9 +42,9 @@ def measure(rows: int, cols: int) -> dict[str, object]:
     import hybridnav as hn  # noqa: PLC0415 - in the child only
     from hybridnav.grid.worlds import office_world, tiled  # noqa: PLC0415
 
-    grid = tiled(office_world(), rows=rows, cols=cols).grid()
+    grid = tiled(office_world(), rows=rows, cols=cols).grid(robot_radius_m=0)
     vertices = int((grid.classes != hn.CellClass.OCCUPIED).sum())
-    hn.DualGraphPyramid.build(office_world().grid())
+    hn.DualGraphPyramid.build(office_world().grid(robot_radius_m=0))
     before = _resident("VmRSS")
     _CLEAR.write_text("5")
     pyramid = hn.DualGraphPyramid.build(grid)

@@ -36,7 +36,9 @@ FIGURE1 = Path(__file__).parents[1] / "maps" / "figure1" / "figure1.yaml"
 @cache
 def figure1() -> hn.TopologicalMap:
     """One place that encloses another, and two arcs round an obstacle."""
-    return hn.TopologicalMap(hn.DualGraphPyramid.build(hn.load_map(FIGURE1), merge_distance_m=10.0))
+    return hn.TopologicalMap(
+        hn.DualGraphPyramid.build(hn.load_map(FIGURE1, robot_radius_m=0), merge_distance_m=10.0)
+    )
 
 
 @cache

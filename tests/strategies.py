@@ -38,7 +38,7 @@ def occupancy_grid(classes: Classes, *, resolution_m: float = 1.0) -> OccupancyG
     probability = np.zeros(classes.shape, dtype=np.float32)
     for cell_class, value in _PROBABILITY.items():
         probability[classes == cell_class] = value
-    return OccupancyGrid(probability, frame=Frame(resolution_m=resolution_m))
+    return OccupancyGrid(probability, frame=Frame(resolution_m=resolution_m), robot_radius_m=0)
 
 
 @dataclass(frozen=True)

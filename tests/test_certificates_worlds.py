@@ -94,7 +94,7 @@ def test_bounds_hold_in_figure_1(overrides: tuple[str, ...]) -> None:
 def test_bounds_are_lengths_in_metres_whatever_the_frame() -> None:
     probability = office_world().grid(robot_radius_m=0.25).classes != hn.CellClass.FREE
     frame = hn.Frame(0.1, origin_m=(431_207.3, -12.5), yaw_rad=2.3)
-    grid = hn.OccupancyGrid(probability[:120, :160].astype(np.float32), frame)
+    grid = hn.OccupancyGrid(probability[:120, :160].astype(np.float32), frame, robot_radius_m=0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=3.0))
     check_pairs(planners_of(topology), pairs_of(grid, 60, 7), by_scipy=False)
 

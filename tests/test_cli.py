@@ -457,7 +457,7 @@ def test_show_tells_what_the_library_knows(cli):
     assert "map        figure1, 40 x 30 cells of 0.1 m, 4.00 x 3.00 m\n" in done.out
     counts = "501 free, 494 unexplored, 205 occupied, 0 blocked by a robot radius of 0 m"
     assert f"cells      {counts}\n" in done.out
-    pyramid = hn.DualGraphPyramid.build(hn.load_map(FIGURE), merge_distance_m=10)
+    pyramid = hn.DualGraphPyramid.build(hn.load_map(FIGURE, robot_radius_m=0), merge_distance_m=10)
     table = _table(done.out)
     assert len(table) == len(pyramid)
     for index, row in enumerate(table):

@@ -195,7 +195,7 @@ def test_the_base_of_an_open_map_has_a_face_for_each_block_and_the_outside():
 @each_linkage
 def test_figure_1_has_an_obstacle_a_wall_and_the_ring_round_the_island(linkage):
     pyramid = DualGraphPyramid.build(
-        figure1_world().grid(), merge_distance_m=np.inf, linkage=linkage
+        figure1_world().grid(robot_radius_m=0), merge_distance_m=np.inf, linkage=linkage
     )
     level, dual = pyramid[-1], pyramid[-1].dual
     assert sorted(dual.kinds.tolist()) == [PLAIN, HOLE, OUTSIDE]

@@ -38,7 +38,7 @@ def edges_by_key(graph):
 
 @pytest.fixture(scope="module")
 def figure1():
-    return DualGraphPyramid.build(hn.load_map(FIGURE1), merge_distance_m=10.0)[-1]
+    return DualGraphPyramid.build(hn.load_map(FIGURE1, robot_radius_m=0), merge_distance_m=10.0)[-1]
 
 
 @SOME

@@ -128,20 +128,22 @@ def test_rooms_of_any_map_hold_free_cells_of_one_connected_part(classes, method)
 def test_walls_that_a_scan_left_unexplored_part_rooms_too(method):
     grid, true = floor()
     probability = np.where(grid.probability > 0, 0.5, 0.0).astype(np.float32)
-    rooms = hn.find_rooms(hn.OccupancyGrid(probability, grid.frame), method=method)
+    rooms = hn.find_rooms(
+        hn.OccupancyGrid(probability, grid.frame, robot_radius_m=0), method=method
+    )
     known = (true >= 0) & (grid.classes == CellClass.FREE)
     assert compare_rooms(true[known], rooms.label_of[known]).mcc > 0.9
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_open_ground_without_a_wall_is_one_room(method):
-    grid = hn.OccupancyGrid(np.zeros((40, 60), np.float32), hn.Frame(0.1))
+    grid = hn.OccupancyGrid(np.zeros((40, 60), np.float32), hn.Frame(0.1), robot_radius_m=0)
     assert hn.find_rooms(grid, method=method).names == ("room-1",)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_map_without_free_cells_has_no_rooms(method):
-    grid = hn.OccupancyGrid(np.ones((5, 5), np.float32), hn.Frame(0.1))
+    grid = hn.OccupancyGrid(np.ones((5, 5), np.float32), hn.Frame(0.1), robot_radius_m=0)
     assert hn.find_rooms(grid, method=method).names == ()
 
 

@@ -37,7 +37,7 @@ def noise(seed, shape, unexplored, occupied):
     """Map of independent cells; Generator.random of PCG64 is a stable stream."""
     value = np.random.Generator(np.random.PCG64(seed)).random(shape)
     probability = np.where(value < occupied, 1.0, np.where(value < occupied + unexplored, 0.5, 0.0))
-    return OccupancyGrid(probability, Frame(0.05))
+    return OccupancyGrid(probability, Frame(0.05), robot_radius_m=0)
 
 
 def office(seed=0, radius_m=0.25, **settings):
@@ -55,7 +55,9 @@ def two_offices():
 
 
 PYRAMIDS = {
-    "figure1": lambda: DualGraphPyramid.build(figure1_world().grid(), merge_distance_m=10.0),
+    "figure1": lambda: DualGraphPyramid.build(
+        figure1_world().grid(robot_radius_m=0), merge_distance_m=10.0
+    ),
     "no-limit": lambda: noisy(4, (120, 120), 0.0, 0.35, merge_distance_m=float("inf")),
     "office": office,
     "office-diameter": lambda: office(linkage="diameter"),

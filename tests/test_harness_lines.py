@@ -102,7 +102,7 @@ def test_a_sound_method_has_no_fault(study, method):
 
 def test_losses_refer_to_the_shortest_any_angle_path(study):
     outcome = outcome_of(study, faulty.SoundLine)
-    graph = VisibilityGraph(load_map(outcome.preparation["file"]))
+    graph = VisibilityGraph(load_map(outcome.preparation["file"], robot_radius_m=0))
     lengths = [
         graph.shortest(tuple(record["start"]), tuple(record["goal"])).length_m
         for record in outcome.references
@@ -313,7 +313,7 @@ def test_what_ompl_does_not_find_is_not_its_own(tmp_path):
 
 def test_a_planner_that_is_closed_answers_again():
     pytest.importorskip("ompl")
-    grid = hn.load_map(FIGURE)
+    grid = hn.load_map(FIGURE, robot_radius_m=0)
     planner = hn.HybridPlanner(
         hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl-rrtconnect"
     )

@@ -24,7 +24,7 @@ from hybridnav.io.movingai import Scenario
 from tests.strategies import drawn, occupancy_grid, scenes
 
 TWO_PARTS = occupancy_grid(drawn("....#..", "....#..", "....#.."))
-OFFICE = office_world().grid()
+OFFICE = office_world().grid(robot_radius_m=0)
 
 
 def lengths_m(grid, pairs):

@@ -242,7 +242,7 @@ def test_many_maps_tell_what_lies_inside_what(scene, linkage, seed):
 @each_linkage
 def test_figure_1_tells_meeting_twice_from_lying_inside(linkage):
     pyramid = DualGraphPyramid.build(
-        figure1_world().grid(), merge_distance_m=np.inf, linkage=linkage
+        figure1_world().grid(robot_radius_m=0), merge_distance_m=np.inf, linkage=linkage
     )
     topology = TopologicalMap(pyramid)
     a, b, c = (topology.place_at(cell) for cell in ((5, 5), (5, 35), (14, 9)))

@@ -4,6 +4,7 @@ import csv
 import math
 import re
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from PIL import Image
 
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning
 from hybridnav.grid import CellClass
-from hybridnav.io import load_map
+from hybridnav.io import load_map as load_inflated
+
+load_map = partial(load_inflated, robot_radius_m=0)
+"""Cell by cell what the file says."""
 
 FREE, OCCUPIED, UNEXPLORED = CellClass.FREE, CellClass.OCCUPIED, CellClass.UNEXPLORED
 DEFAULTS = {

@@ -30,7 +30,7 @@ yaws = st.sampled_from([0.0, 0.7, -2.5])
 def framed(classes: Any, yaw_rad: float = 0.0, *, corner_cutting: bool = False) -> OccupancyGrid:
     frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
     probability = occupancy_grid(classes).probability
-    return OccupancyGrid(probability, frame=frame, corner_cutting=corner_cutting)
+    return OccupancyGrid(probability, frame=frame, corner_cutting=corner_cutting, robot_radius_m=0)
 
 
 def paths_of(

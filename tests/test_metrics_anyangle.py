@@ -34,7 +34,7 @@ yaws = st.sampled_from([0.0, 0.7])
 
 def framed(classes: Any, yaw_rad: float = 0.0) -> OccupancyGrid:
     frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
-    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame)
+    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame, robot_radius_m=0)
 
 
 def two_cells(classes: Any, seed: int) -> tuple[Cell, Cell]:

@@ -30,7 +30,7 @@ small_maps = class_grids(max_side=7)
 def framed(classes: Any, *, yaw_rad: float = 0.4) -> OccupancyGrid:
     """The map with a resolution, an origin and a yaw that no rounding is kind to."""
     frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
-    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame)
+    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame, robot_radius_m=0)
 
 
 def faults_of(grid: OccupancyGrid, *positions: tuple[float, float]) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ ROOM = drawn(
 def framed(classes: Any) -> OccupancyGrid:
     """The map with a resolution, an origin and a yaw that no rounding is kind to."""
     frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=0.4)
-    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame)
+    return OccupancyGrid(occupancy_grid(classes).probability, frame=frame, robot_radius_m=0)
 
 
 @given(class_grids(max_side=8), st.integers(0, 2**32 - 1))

@@ -26,7 +26,7 @@ yaws = st.sampled_from([0.0, 0.7, -2.5])
 def framed(classes: Any, yaw_rad: float = 0.0, *, corner_cutting: bool = False) -> OccupancyGrid:
     frame = Frame(resolution_m=0.05, origin_m=(12.3, -7.1), yaw_rad=yaw_rad)
     probability = occupancy_grid(classes).probability
-    return OccupancyGrid(probability, frame=frame, corner_cutting=corner_cutting)
+    return OccupancyGrid(probability, frame=frame, corner_cutting=corner_cutting, robot_radius_m=0)
 
 
 def segments_of(grid: OccupancyGrid, rng: np.random.Generator, n: int) -> list[Any]:
@@ -228,7 +228,9 @@ def test_truck_drives_through_its_door_and_no_narrower_one() -> None:
 def test_post_as_thin_as_a_cell_stops_every_motion_over_it() -> None:
     occupied = np.zeros((100, 100), dtype=np.float32)
     occupied[50, 50] = 1
-    check = MotionCheck(OccupancyGrid(occupied, frame=Frame(CELL_M)), footprint=TRUCK)
+    check = MotionCheck(
+        OccupancyGrid(occupied, frame=Frame(CELL_M), robot_radius_m=0), footprint=TRUCK
+    )
     x, y = 2.525, 2.525
     assert not check.turn_valid(x - 1.5, y, 0.0, x + 1.5, y, 0.0)
     assert not check.turn_valid(x, y - 1.0, 0.0, x, y + 1.0, 0.0)
@@ -313,7 +315,7 @@ def test_poses_and_curves_that_make_no_sense_are_not_valid(wrong: float) -> None
 
 
 def test_footprint_of_thousands_of_cells_is_refused() -> None:
-    grid = OccupancyGrid(np.zeros((3, 3), dtype=np.float32), frame=Frame(1e-4))
+    grid = OccupancyGrid(np.zeros((3, 3), dtype=np.float32), frame=Frame(1e-4), robot_radius_m=0)
     with pytest.raises(InvalidValueError, match=r"reaches 0\.948683 m on cells of 0\.0001 m"):
         MotionCheck(grid, footprint=TRUCK)
 

@@ -157,7 +157,7 @@ def test_a_named_stop_faces_the_way_on_a_turned_map():
     pytest.importorskip("ompl")
     classes = drawn("#######", "#.....#", "#######")
     frame = hn.Frame(1.0, (3.0, -2.0), 0.7)
-    grid = hn.OccupancyGrid((classes == 0).astype(np.float32), frame)
+    grid = hn.OccupancyGrid((classes == 0).astype(np.float32), frame, robot_radius_m=0)
     points = {name: tuple(frame.points_of((1, col))) for name, col in (("west", 1), ("east", 5))}
     rooms = RoomLabels(("hall",), np.zeros(classes.shape, dtype=np.int32), points)
     planner = hn.HybridPlanner(
@@ -275,7 +275,7 @@ def map_file(tmp_path):
         f"image: house.pgm\nresolution: {SIDE}\norigin: [0, 0, 0]\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
-    hn.save_rooms(tmp_path / "rooms.yaml", labels(), hn.load_map(path))
+    hn.save_rooms(tmp_path / "rooms.yaml", labels(), hn.load_map(path, robot_radius_m=0))
     return path
 
 
@@ -370,7 +370,7 @@ def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):  # noqa: F
     done = cli(*query)
     assert done.code == 0
     assert "room-1" in done.out
-    assert hn.load_rooms(out, hn.load_map(map_file)).names[0] == "room-1"
+    assert hn.load_rooms(out, hn.load_map(map_file, robot_radius_m=0)).names[0] == "room-1"
     assert 'id="room-0"' in picture.read_text()
     assert 'id="scale-bar"' in picture.read_text()
     assert cli(*query).refuses(2, "found.yaml exists", "--force")

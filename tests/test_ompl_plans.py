@@ -121,7 +121,7 @@ def field_of_pillars() -> hn.OccupancyGrid:
     occupied[2::6, 3::6] = occupied[5::6, ::6] = 1
     occupied[3::6, 3::6] = occupied[2::6, 4::6] = 1
     occupied[3, 3] = occupied[56, 76] = 0
-    return hn.OccupancyGrid(occupied, hn.Frame(0.25))
+    return hn.OccupancyGrid(occupied, hn.Frame(0.25), robot_radius_m=0)
 
 
 def test_where_time_is_short_the_grid_path_takes_over_and_says_so(planner_of: Any) -> None:
@@ -300,7 +300,7 @@ def test_on_small_random_maps_paths_are_legal_and_not_below_the_optimum() -> Non
     for yaw_rad in (0.0, 0.7):
         occupied = (rng.random((24, 30)) < 0.25).astype(np.float32)
         frame = hn.Frame(0.1, (3.0, -2.0), yaw_rad)
-        grid = hn.OccupancyGrid(occupied, frame)
+        grid = hn.OccupancyGrid(occupied, frame, robot_radius_m=0)
         made = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset=preset)
         exact = VisibilityGraph(grid)
         free = np.argwhere(grid.classes == hn.CellClass.FREE)

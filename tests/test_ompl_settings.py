@@ -107,7 +107,7 @@ def test_the_section_goes_with_its_refiner_and_single_keys_can_be_set() -> None:
 def test_clearance_weighs_walls_and_is_never_less_than_the_length(yaw_rad: float) -> None:
     occupied = np.zeros((20, 40), dtype=np.float32)
     occupied[10, :] = 1
-    grid = hn.OccupancyGrid(occupied, hn.Frame(0.1, (3.0, -2.0), yaw_rad))
+    grid = hn.OccupancyGrid(occupied, hn.Frame(0.1, (3.0, -2.0), yaw_rad), robot_radius_m=0)
     settings = OmplSettings(objective="clearance", clearance_m=0.5, clearance_weight=3.0)
     cost = Clearance(grid, settings).cost_of
     along = grid.frame.points_of(np.array([[9, 2], [9, 30]]))

@@ -47,7 +47,7 @@ def grid_of(classes: Any, *, corner_cutting: bool = False) -> hn.OccupancyGrid:
     """A grid of a few centimetres, turned and away from the origin."""
     probability = np.where(classes == 2, 0.5, classes == 0).astype(np.float32)
     frame = hn.Frame(0.05, origin_m=(3.1, -20.4), yaw_rad=0.7)
-    return hn.OccupancyGrid(probability, frame, corner_cutting=corner_cutting)
+    return hn.OccupancyGrid(probability, frame, corner_cutting=corner_cutting, robot_radius_m=0)
 
 
 def scene_map(scene: Scene, *, corner_cutting: bool = False) -> hn.TopologicalMap:
@@ -269,7 +269,9 @@ def closed_grid(grid: hn.OccupancyGrid, closed: Any) -> hn.OccupancyGrid:
     classes = grid.classes.copy()
     classes.ravel()[closed] = hn.CellClass.OCCUPIED
     probability = np.where(classes == 2, 0.5, classes == 0).astype(np.float32)
-    return hn.OccupancyGrid(probability, grid.frame, corner_cutting=grid.corner_cutting)
+    return hn.OccupancyGrid(
+        probability, grid.frame, corner_cutting=grid.corner_cutting, robot_radius_m=0
+    )
 
 
 def random_blocked(topology: hn.TopologicalMap, rng: np.random.Generator) -> Blocked:

@@ -169,7 +169,7 @@ def test_what_is_no_point_is_an_error_of_one_line(point: Any) -> None:
 @pytest.mark.parametrize("far", [(1e308, 1e308), (1.7e308, -1.7e308), (-1e308, 0.0)])
 def test_a_point_at_the_end_of_the_number_range_is_just_outside(far: tuple[float, float]) -> None:
     frame = hn.Frame(resolution_m=0.05, origin_m=(3.0, 4.0), yaw_rad=0.7)
-    grid = hn.OccupancyGrid(np.zeros((4, 4), dtype=np.float32), frame=frame)
+    grid = hn.OccupancyGrid(np.zeros((4, 4), dtype=np.float32), frame=frame, robot_radius_m=0)
     result = hn.HybridPlanner(map_of(grid)).plan(far, centre(grid, (0, 0)))
     assert result.status is hn.PlanStatus.START_OUTSIDE
 
@@ -179,7 +179,9 @@ def test_a_point_at_the_end_of_the_number_range_is_just_outside(far: tuple[float
 def test_a_turned_and_shifted_frame_changes_the_points_alone(preset: str, yaw_rad: float) -> None:
     frame = hn.Frame(resolution_m=0.1, origin_m=(-7.0, 3.0), yaw_rad=yaw_rad)
     grid = hn.OccupancyGrid(
-        np.where(SEALED == CellClass.OCCUPIED, 1.0, 0.0).astype(np.float32), frame=frame
+        np.where(SEALED == CellClass.OCCUPIED, 1.0, 0.0).astype(np.float32),
+        frame=frame,
+        robot_radius_m=0,
     )
     planner = hn.HybridPlanner(map_of(grid, merge_distance_m=0.3), preset=preset)
     start, goal = centre(grid, (0, 1)), centre(grid, (4, 7))
@@ -320,7 +322,9 @@ def test_of_two_doors_between_two_rooms_the_nearer_one_is_taken() -> None:
 
 
 def test_the_two_regions_of_figure_1_meet_along_two_arcs() -> None:
-    topology = map_of(hn.load_map(MAPS / "figure1" / "figure1.yaml"), merge_distance_m=math.inf)
+    topology = map_of(
+        hn.load_map(MAPS / "figure1" / "figure1.yaml", robot_radius_m=0), merge_distance_m=math.inf
+    )
     planner = hn.HybridPlanner(topology, preset=WITH_UNEXPLORED)
     result = planner.plan((0.15, 1.5), (3.85, 1.5)).raise_for_status()
     assert result.route is not None

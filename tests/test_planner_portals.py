@@ -129,7 +129,7 @@ def test_any_merge_distance_of_the_places_will_do(distance_m, most):
 def test_unexplored_cells_are_entered_where_they_may_be(preset):
     classes = np.zeros((9, 30), dtype=np.float32)
     classes[:, 12:18] = 0.5
-    grid = hn.OccupancyGrid(classes, hn.Frame(0.05))
+    grid = hn.OccupancyGrid(classes, hn.Frame(0.05), robot_radius_m=0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=0.3))
     plain = hn.HybridPlanner(topology, preset=preset)
     assert planned(plain, (4, 2), (4, 27)).status is hn.PlanStatus.NO_PATH

@@ -144,7 +144,9 @@ def test_paths_and_bounds_on_generated_worlds(
     name: str, merge_distance_m: float, gates: str
 ) -> None:
     world = figure1_world() if name == "figure1" else office_world()
-    pyramid = DualGraphPyramid.build(world.grid(), merge_distance_m=merge_distance_m, seed=1)
+    pyramid = DualGraphPyramid.build(
+        world.grid(robot_radius_m=0), merge_distance_m=merge_distance_m, seed=1
+    )
     Judge.of(TopologicalMap(pyramid), gates).run(7, 6)
 
 

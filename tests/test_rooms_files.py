@@ -128,7 +128,7 @@ def test_seeds_in_one_room_share_it_by_the_way_to_walk(write):
 
 def test_a_polygon_is_where_the_frame_puts_it(write):
     frame = Frame(0.5, (10.0, -3.0), 0.7)
-    grid = hn.OccupancyGrid(np.zeros((20, 30), np.float32), frame)
+    grid = hn.OccupancyGrid(np.zeros((20, 30), np.float32), frame, robot_radius_m=0)
     corners = frame.points_of_grid([[2, 3], [2, 9], [8, 9], [8, 3]])
     ring = ", ".join(f"[{x:.6f}, {y:.6f}]" for x, y in corners.tolist())
     rooms = hn.load_rooms(write(f"rooms:\n- name: a\n  polygon: [{ring}]\n"), grid)
@@ -155,7 +155,7 @@ def test_rooms_that_are_written_are_read_again(tmp_path, yaw_rad):
     def at(x, y):
         return tuple(frame.points_of_grid(np.array([y, x]) / 0.05).round(3).tolist())
 
-    grid = hn.OccupancyGrid(np.zeros((60, 80), np.float32), frame, name="a\nb")
+    grid = hn.OccupancyGrid(np.zeros((60, 80), np.float32), frame, name="a\nb", robot_radius_m=0)
     labels = np.full((60, 80), -1, dtype=np.int32)
     labels[5:40, 3:41], labels[5:40, 41:77] = 0, 1
     labels[15:25, 10:30] = 2  # inside the first

@@ -50,7 +50,7 @@ class Site:
         with warnings.catch_warnings():
             # Some maps call grey free; they are planned on all the same.
             warnings.simplefilter("ignore", hn.MapWarning)
-            raw = hn.load_map(path)
+            raw = hn.load_map(path, robot_radius_m=0)
             grid = hn.load_map(path, robot_radius_m=RADIUS_M)
         blocked = inflated(raw.classes == CellClass.OCCUPIED, RADIUS_M / raw.resolution_m)
         enterable = (raw.classes == CellClass.FREE) & ~blocked

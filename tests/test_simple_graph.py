@@ -24,7 +24,7 @@ SOME = settings(max_examples=60, deadline=None)
 
 @pytest.fixture(scope="module")
 def figure1():
-    grid = hn.load_map(MAPS / "figure1" / "figure1.yaml")
+    grid = hn.load_map(MAPS / "figure1" / "figure1.yaml", robot_radius_m=0)
     return hn.TopologicalMap(DualGraphPyramid.build(grid, merge_distance_m=10.0))
 
 

@@ -36,7 +36,9 @@ def _two_rooms(frame=None, margin=0, name="two rooms"):
 
 
 def _grid(cells, resolution_m=1.0, **settings):
-    return hn.OccupancyGrid(np.asarray(cells, np.float32), hn.Frame(resolution_m), **settings)
+    return hn.OccupancyGrid(
+        np.asarray(cells, np.float32), hn.Frame(resolution_m), **{"robot_radius_m": 0, **settings}
+    )
 
 
 def _plan(topology, start, goal, preset="paper"):
@@ -67,7 +69,7 @@ def plan(rooms):
 
 @pytest.fixture(scope="module")
 def figure1():
-    return _topology(hn.load_map(MAPS / "figure1" / "figure1.yaml"))
+    return _topology(hn.load_map(MAPS / "figure1" / "figure1.yaml", robot_radius_m=0))
 
 
 def _find(ax, gid):

@@ -29,7 +29,7 @@ WIDE = 1.5
 
 @pytest.fixture(scope="module")
 def figure1():
-    grid = hn.load_map(MAPS / "figure1" / "figure1.yaml")
+    grid = hn.load_map(MAPS / "figure1" / "figure1.yaml", robot_radius_m=0)
     return hn.TopologicalMap(DualGraphPyramid.build(grid, merge_distance_m=10.0))
 
 
@@ -166,7 +166,7 @@ def test_noise_is_left_out_and_counted():
     cells = np.full((30, 30), 0.0)
     cells[5, 5] = 0.5
     cells[15:22, 15:22] = 0.5
-    grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(0.1), name="speck")
+    grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(0.1), name="speck", robot_radius_m=0)
     level = DualGraphPyramid.build(grid, merge_distance_m=10.0)[-1]
     ax = plot_topology(level)
     assert len(points(ax, "unexplored-dots")) == 1

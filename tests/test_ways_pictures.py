@@ -54,7 +54,7 @@ def many_rooms(side):
     rows, cols = np.indices(cells.shape)
     wall = (rows % side == 0) | (cols % side == 0)
     label_of = np.where(wall, -1, rows // side * 8 + cols // side).astype(np.int32)
-    grid = hn.OccupancyGrid(wall.astype(np.float32), hn.Frame(0.1))
+    grid = hn.OccupancyGrid(wall.astype(np.float32), hn.Frame(0.1), robot_radius_m=0)
     return RoomLabels(tuple(f"laboratory {n}" for n in range(64)), label_of), grid
 
 

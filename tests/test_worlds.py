@@ -124,7 +124,7 @@ def test_a_world_needs_a_byte_image(pixels):
 
 def test_a_world_becomes_a_grid_with_its_lowest_row_first():
     pixels = np.array([[0, 205, 254], [254, 254, 254]], dtype=np.uint8)
-    grid = World(pixels, Frame(0.5, (1.0, 2.0)), "w").grid()
+    grid = World(pixels, Frame(0.5, (1.0, 2.0)), "w").grid(robot_radius_m=0)
     assert isinstance(grid, OccupancyGrid)
     assert grid.classes.tolist() == [[1, 1, 1], [0, 2, 1]]
     assert (grid.name, grid.frame) == ("w", Frame(0.5, (1.0, 2.0)))
@@ -236,7 +236,7 @@ def test_main_route_ends_are_clear():
 
 
 def test_figure1_has_a_double_boundary_and_an_inclusion():
-    classes = figure1_world().grid().classes
+    classes = figure1_world().grid(robot_radius_m=0).classes
     free, free_count = ndimage.label(classes == CellClass.FREE)
     unexplored, unexplored_count = ndimage.label(classes == CellClass.UNEXPLORED)
     _, obstacles = ndimage.label(

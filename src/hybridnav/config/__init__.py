@@ -2,6 +2,7 @@
 
 from hybridnav.config.ompl import OmplSettings
 from hybridnav.config.preset import (
+    DEFAULT_ROBOT_RADIUS_M,
     PlannerSettings,
     Preset,
     PyramidSettings,
@@ -10,6 +11,7 @@ from hybridnav.config.preset import (
 )
 
 __all__ = [
+    "DEFAULT_ROBOT_RADIUS_M",
     "OmplSettings",
     "PlannerSettings",
     "Preset",

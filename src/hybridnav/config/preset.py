@@ -32,6 +32,9 @@ _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")
 """Where presets are: inside an installed package, or beside `src` in a checkout."""
 
+DEFAULT_ROBOT_RADIUS_M = 0.25
+"""Radius of the robot in metres where nobody gives one: of presets and of every map."""
+
 _MAX_SHOWN = 80
 """Characters of a setting that a message quotes."""
 
@@ -60,7 +63,7 @@ class PyramidSettings(_Section):
     """What stays below U_d."""
     seed: Annotated[_Int, Field(ge=0, lt=2**32)] = 0
     """Breaks ties."""
-    robot_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 0.25
+    robot_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = DEFAULT_ROBOT_RADIUS_M
     """Radius by which occupied cells are inflated, in metres."""
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
+from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.clearance import within_radius
 from hybridnav.grid.frame import Frame
@@ -28,6 +29,25 @@ class CellClass(IntEnum):
     OCCUPIED = 0
     FREE = 1
     UNEXPLORED = 2
+
+
+class _RobotRadius:
+    """The radius of a grid: may be set to None, for the default, and is a number when read."""
+
+    @overload
+    def __get__(self, grid: None, owner: type[OccupancyGrid]) -> None: ...
+
+    @overload
+    def __get__(self, grid: OccupancyGrid, owner: type[OccupancyGrid]) -> float: ...
+
+    def __get__(self, grid: OccupancyGrid | None, owner: type[OccupancyGrid]) -> float | None:
+        if grid is None:  # dataclass asks for the default of its parameter
+            return None
+        radius_m: float | None = grid.__dict__["robot_radius_m"]
+        return DEFAULT_ROBOT_RADIUS_M if radius_m is None else radius_m
+
+    def __set__(self, grid: OccupancyGrid, radius_m: float | None) -> None:
+        grid.__dict__["robot_radius_m"] = radius_m
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +71,15 @@ class OccupancyGrid:
     free_threshold, occupied_threshold
         U1 and U2, `0 <= U1 < U2 <= 1`.
     robot_radius_m
-        Radius in metres by which occupied cells are inflated; 0 blocks the occupied cells alone.
+        Radius in metres by which occupied cells are inflated; 0, for a robot that is a point,
+        blocks the occupied cells alone. None is the default, 0.25 m.
     corner_cutting
         Whether a diagonal move may pass between two cells of which one, or both, are not free. With
         it the grid and the topological map are no longer consistent.
     name
         What to call the map in messages and pictures.
+    radius_is_default
+        Whether nobody gave the radius: set where it is None, and kept by `dataclasses.replace`.
 
     Raises
     ------
@@ -69,9 +92,10 @@ class OccupancyGrid:
     frame: Frame = field(default_factory=Frame)
     free_threshold: float = 0.196
     occupied_threshold: float = 0.65
-    robot_radius_m: float = 0.0
+    robot_radius_m: _RobotRadius = _RobotRadius()
     corner_cutting: bool = False
     name: str = "map"
+    radius_is_default: bool = False
     measured: ByteArray = field(init=False, repr=False)
     """Class of each cell by the thresholds alone, uint8 `CellClass`."""
     classes: ByteArray = field(init=False, repr=False)
@@ -80,6 +104,9 @@ class OccupancyGrid:
     def __post_init__(self) -> None:
         probability = np.array(self.probability, dtype=np.float32, order="C")
         _check_probability(probability)
+        given = self.__dict__["robot_radius_m"]
+        kept = self.radius_is_default and given == DEFAULT_ROBOT_RADIUS_M
+        object.__setattr__(self, "radius_is_default", given is None or kept)
         for name in ("free_threshold", "occupied_threshold", "robot_radius_m"):
             object.__setattr__(self, name, float(getattr(self, name)))
         low, high = self.free_threshold, self.occupied_threshold

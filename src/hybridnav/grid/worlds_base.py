@@ -58,13 +58,14 @@ class World:
         pixels.flags.writeable = False
         object.__setattr__(self, "pixels", pixels)
 
-    def grid(self, *, robot_radius_m: float = 0.0) -> OccupancyGrid:
+    def grid(self, *, robot_radius_m: float | None = None) -> OccupancyGrid:
         """Occupancy grid of the world, of the classes its map file has when it is loaded.
 
         Parameters
         ----------
         robot_radius_m
-            Radius in metres by which occupied cells are inflated.
+            Radius in metres by which occupied cells are inflated, 0 for a robot that is a point;
+            None as in `OccupancyGrid`.
 
         Returns
         -------

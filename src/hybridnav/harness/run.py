@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import REFERENCE, MethodSpec, baseline_spec, preset_spec
 from hybridnav.harness.pairs import (
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 RUNS_FILE = "runs.jsonl"
 
-ROS_RADIUS_M = 0.25
 MOVINGAI_MERGE_DISTANCE_M = 40.0
 """On MovingAI maps, whose cells are 1 m by agreement, the robot is a point and places are 40 cells
 wide unless said otherwise."""
@@ -149,7 +149,7 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
     ros = Path(name).suffix.lower() != ".map"
     radius_m = settings.robot_radius_m
     if radius_m is None:
-        radius_m = ROS_RADIUS_M if ros else 0.0
+        radius_m = DEFAULT_ROBOT_RADIUS_M if ros else 0.0
     merge_distance_m = settings.merge_distance_m
     if merge_distance_m is None and not ros:
         merge_distance_m = MOVINGAI_MERGE_DISTANCE_M

@@ -237,7 +237,7 @@ def _warm_up(spec: MethodSpec) -> None:
     """Compile or load the kernels of a method on a small map, so that no time includes it."""
     if spec.digest in _WARM:
         return
-    grid = figure1_world().grid()
+    grid = figure1_world().grid(robot_radius_m=0)
     with closing(prepare(spec, grid)) as prepared:
         Judge(grid, prepared, reference=False)
         for goal in ((2, 2), (grid.shape[0] - 3, 12)):

@@ -21,7 +21,7 @@ _IMAGES = {".pgm", ".png", ".pnm", ".ppm", ".pbm", ".bmp", ".tif", ".tiff", ".gi
 def load_map(
     path: PathLike,
     *,
-    robot_radius_m: float = 0.0,
+    robot_radius_m: float | None = None,
     free_threshold: float | None = None,
     occupied_threshold: float | None = None,
 ) -> OccupancyGrid:
@@ -33,7 +33,7 @@ def load_map(
         A ROS map (.yaml or .yml, beside its image) or a MovingAI map (.map, cells of 1 m).
     robot_radius_m
         Radius in metres: a cell is blocked when its centre lies within it of the centre of an
-        occupied cell.
+        occupied cell. 0 for a robot that is a point; None is the default, 0.25 m.
     free_threshold, occupied_threshold
         U1 and U2: occupancy up to U1 is free, from U2 on occupied. By default what the file says.
 

@@ -56,7 +56,7 @@ class Scenario:
 def load_movingai_map(
     path: PathLike,
     *,
-    robot_radius_m: float = 0.0,
+    robot_radius_m: float | None = None,
     free_threshold: float | None = None,
     occupied_threshold: float | None = None,
 ) -> OccupancyGrid:
@@ -67,7 +67,8 @@ def load_movingai_map(
     path
         The .map file. Its last line is row 0.
     robot_radius_m
-        Radius in metres by which blocked cells are inflated.
+        Radius in metres by which blocked cells are inflated; None is the default, 0.25 m. Less than
+        a cell, as that is, blocks no further cells.
     free_threshold, occupied_threshold
         U1 and U2 of the grid; every cell has the occupancy 0 or 1, so none changes the classes.
 

@@ -32,7 +32,7 @@ _UNKNOWN_GREY = 205
 def load_ros_map(
     path: PathLike,
     *,
-    robot_radius_m: float = 0.0,
+    robot_radius_m: float | None = None,
     free_threshold: float | None = None,
     occupied_threshold: float | None = None,
 ) -> OccupancyGrid:
@@ -47,7 +47,8 @@ def load_ros_map(
     path
         The YAML file.
     robot_radius_m
-        Radius in metres by which occupied cells are inflated.
+        Radius in metres by which occupied cells are inflated, 0 for a robot that is a point; None
+        is the default, 0.25 m.
     free_threshold, occupied_threshold
         U1 and U2 instead of the file's `free_thresh` and `occupied_thresh`.
 

@@ -16,6 +16,7 @@ from hybridnav.grid import CellClass
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
 from hybridnav.planner.ends import read_point, read_points, read_pose
+from hybridnav.planner.radius import check_radius
 from hybridnav.refine import GridRefiner, LineOfSight
 from hybridnav.result import Path, PlanResult, PlanStats, PlanStatus, Route
 from hybridnav.route import Walks
@@ -64,11 +65,14 @@ class HybridPlanner:
     ------
     PresetError
         When the preset does not exist or is not valid.
+    InvalidValueError
+        When nobody gave the map's radius, so that it has the default, and the preset names another.
     """
 
     def __init__(self, topology: TopologicalMap, *, preset: PathLike | Preset = "balanced") -> None:
         self.topology = topology
         self.preset = load_preset(preset)
+        check_radius(topology.grid, self.preset)
         settings = self.preset.planner
         self._refiner = GridRefiner(topology.grid, allow_unexplored=settings.allow_unexplored)
         self._cells: CellPlanner

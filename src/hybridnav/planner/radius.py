@@ -1,0 +1,30 @@
+"""The robot's radius, which map and preset both name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from hybridnav.config import Preset
+    from hybridnav.grid import OccupancyGrid
+
+
+def check_radius(grid: OccupancyGrid, preset: Preset) -> None:
+    """Refuse a map of the default radius under a preset for a robot of another one.
+
+    A radius that the caller gave with the map wins over the preset's, and results record it.
+
+    Raises
+    ------
+    InvalidValueError
+        When nobody gave the map's radius and the preset names another.
+    """
+    wanted_m, radius_m = preset.pyramid.robot_radius_m, grid.robot_radius_m
+    if grid.radius_is_default and wanted_m != radius_m:
+        raise InvalidValueError(
+            f"preset {preset.name} is for a robot radius of {wanted_m} m, the map was made with "
+            f"the default of {radius_m} m: make it with robot_radius_m={wanted_m}, or with "
+            f"robot_radius_m={radius_m} if that is meant"
+        )
