@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -316,8 +315,3 @@ def test_what_fails_at_a_new_start_is_said_and_the_grid_takes_over(
     assert "/nowhere/python" in result.refinement.steps[0]
     planner.close()
     assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]
-
-
-def test_a_planner_with_a_process_is_not_copied(planner: hn.HybridPlanner) -> None:
-    with pytest.raises(hn.InvalidValueError, match="holds a process and cannot be copied"):
-        pickle.dumps(planner)

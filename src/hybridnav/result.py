@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import PlanError
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class PlanStatus(StrEnum):
     """A sampling-based planner found nothing in its time."""
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class Path:
     """A path through the grid: from the centre of the start's cell to that of the goal's, or an
@@ -59,6 +61,8 @@ class Path:
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False
         self.points.flags.writeable = False
+        if self.headings_rad is not None:
+            self.headings_rad.flags.writeable = False
 
 
 @dataclass(frozen=True)
@@ -142,8 +146,8 @@ class PlanResult:
     status: PlanStatus
     metric: Metric = "octile"
     path: Path | None = None
-    route_source: Callable[[], Route] | None = field(default=None, repr=False)
-    """What finds the route once somebody asks for it."""
+    route_source: Callable[[], Route] | Route | None = field(default=None, repr=False)
+    """The route, or what finds it once somebody asks for it."""
     lower_bound: float = math.inf
     """A proved bound on the optimum in the metric, metres; infinite where there is no path."""
     stats: PlanStats = field(default_factory=PlanStats)
@@ -157,7 +161,12 @@ class PlanResult:
     @cached_property
     def route(self) -> Route | None:
         """The places and arcs; None too where the preset searches the whole map."""
-        return None if self.route_source is None else self.route_source()
+        return self.route_source() if callable(self.route_source) else self.route_source
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All that there is to tell, found by now: pickles and copies do without the planner."""
+        told = {name: value for name, value in vars(self).items() if name != "route"}
+        return told | {"route_source": self.route}
 
     @property
     def solved(self) -> bool:

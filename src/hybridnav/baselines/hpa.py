@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.baselines import _hpa_kernels
 from hybridnav.baselines._hpa_kernels import AbstractGraph
 from hybridnav.baselines.protocol import CUT_CORNERS, Answer, Cell
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 
+@copies_alike
 class HpaStar:
     """HPA* with one abstract level.
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from hybridnav._copies import copies_alike
 from hybridnav.baselines import _overlay_kernels as kernels
 from hybridnav.baselines.protocol import Answer
 from hybridnav.baselines.regions import array_bytes, free_fields, region_at
@@ -26,6 +27,7 @@ MAX_CLIQUE_BYTES = 1_500_000_000
 """What the distances between boundary cells may take at most."""
 
 
+@copies_alike
 class ExactOverlay:
     """Customizable route planning on the places of a topological map: exact, one level.
 

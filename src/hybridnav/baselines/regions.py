@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.baselines.protocol import Answer
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 
+@copies_alike
 class RegionPlanner:
     """A coarse search on a graph of regions, then grid A* on the cells of the regions it passes.
 

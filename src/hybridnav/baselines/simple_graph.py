@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.baselines.protocol import CUT_CORNERS
 from hybridnav.baselines.regions import RegionPlanner, free_fields
 from hybridnav.grid import CellClass
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 
+@copies_alike
 class SimpleGraphPyramid:
     """What is left of the topological map when two places share at most one edge.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._copies import copies_alike
 from hybridnav.baselines import _thrun_kernels as kernels
 from hybridnav.baselines.regions import RegionPlanner, joined_regions
 from hybridnav.errors import InvalidValueError
@@ -25,6 +26,7 @@ _OPPOSITE = -0.5
 on two sides."""
 
 
+@copies_alike
 class ThrunMap:
     """Thrun's topological map of a grid, planned on as he does: regions first, then cells.
 

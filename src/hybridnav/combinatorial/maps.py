@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
+
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, IntArray, LongArray
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class CombinatorialMap:
     """A plane graph and its dual, both held by one permutation of darts.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.clearance import within_radius
@@ -50,6 +51,7 @@ class _RobotRadius:
         grid.__dict__["robot_radius_m"] = radius_m
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class OccupancyGrid:
     """A grid of occupancy probabilities and the classes its two thresholds make (Moravec-Elfes).

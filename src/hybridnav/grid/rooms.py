@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ Segmentation = Literal["walls", "watershed", "contraction"]
 Point = tuple[float, float]
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class RoomLabels:
     """Which room each cell belongs to, and points that have names of their own.

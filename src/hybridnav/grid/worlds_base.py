@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.occupancy import OccupancyGrid
 
@@ -20,6 +21,7 @@ OCCUPIED = np.uint8(0)
 """The three grey values that map_server writes."""
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class World:
     """A generated map, as a map_server file would hold it.

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 
@@ -33,6 +34,7 @@ _CHUNK = 1 << 16
 _QUARTERS = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class Blocked:
     """What is closed for one query: arcs, places, cells, and areas in metres.

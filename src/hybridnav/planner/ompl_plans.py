@@ -8,11 +8,11 @@ import threading
 import time
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError
+from hybridnav._copies import copies_alike
 from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_plans import MaxDistance, OverPortals
 from hybridnav.refine import LineOfSight, MotionCheck
@@ -67,11 +67,13 @@ def ompl_planner(
     return OmplPlanner(topology.grid, settings, field_of)
 
 
+@copies_alike
 class OmplPlanner:
     """OMPL inside the fields that a coarse path passes, and nowhere else.
 
     Where it finds no path there, the fields beside are taken in; where it still finds none, the
-    grid's own path is shortened by line of sight.
+    grid's own path is shortened by line of sight. A copy, or what comes out of a pickle, starts a
+    process of its own when it is first asked.
 
     Parameters
     ----------
@@ -171,19 +173,6 @@ class OmplPlanner:
         """End the process once no query waits for it; the next one waits for another."""
         with self._one_at_a_time:
             self._worker.close()
-
-    def __reduce__(self) -> Any:
-        """Refuse to be copied.
-
-        Raises
-        ------
-        InvalidValueError
-            Always: it holds a process.
-        """
-        raise InvalidValueError(
-            "a planner with OMPL holds a process and cannot be copied or pickled: make another one "
-            "of its topology and preset"
-        )
 
     def _refused(self, ends: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
         """Status of a query at one of whose ends the footprint does not fit."""

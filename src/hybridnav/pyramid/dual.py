@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
+
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, LongArray
     from hybridnav.combinatorial import CombinatorialMap
@@ -24,6 +26,7 @@ class FaceKind(IntEnum):
     """What lies round a component of the graph; every component has one."""
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class DualGraph:
     """Dual of one level. Dual vertices are faces, numbered in the order of their first darts; dual

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid.simple import SimpleGraph
 
 
+@copies_alike
 class Level:
     """A plane graph of connected sets of cells, and its dual; every level answers the same.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels, _resistance_kernels
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid._kernels import Vertices
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class Resistance:
     """Says which arcs resist: those whose boundary is narrow against both of the fields it joins.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ _FARTHEST_M = 1e4
 _ROUNDING = 1e-12
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class Footprint:
     """Outline of a robot in its own frame: x ahead, y to its left, the base at the origin.

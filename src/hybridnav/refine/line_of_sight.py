@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import Frame
 from hybridnav.refine import _line_of_sight_kernels as kernels
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 
+@copies_alike
 class LineOfSight:
     """Shortens cell paths of one grid to any-angle paths; holds one byte a cell.
 

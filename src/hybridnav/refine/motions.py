@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame
 from hybridnav.refine import _motion_kernels as kernels
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _FARTHEST_CELLS = 5000
 
 
+@copies_alike
 class MotionCheck:
     """Exact validity of states and motions of a robot against free space, in the map frame.
 

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
+
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
     from hybridnav.topology import Rooms, TopologicalMap
 
 
+@copies_alike
 class Walks:
     """Finds the places and arcs that paths pass.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.search import _kernels
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ class ArcWalk:
     expanded: int
 
 
+@copies_alike
 class ArcSearch:
     """Searches an undirected graph for the cheapest walks.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import networkx as nx
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 
@@ -36,6 +37,7 @@ class Component:
     index: int
 
 
+@copies_alike
 class TopologicalMap:
     """The place level of a pyramid, seen as places and arcs with lasting ids.
 

@@ -52,8 +52,8 @@ def require_ompl() -> None:
 class Worker:
     """A process that answers queries on one map, one after the other.
 
-    It is started anew where it died, owed an answer for long or was closed, and in a process that
-    was forked from the one it belongs to.
+    It is started anew where it died, owed an answer for long or was closed, in a process that was
+    forked from the one it belongs to, and for a copy.
 
     Parameters
     ----------
@@ -68,6 +68,16 @@ class Worker:
 
     def __init__(self, setup: Setup) -> None:
         require_ompl()
+        self.__setstate__(setup)
+        self._start_and_wait()
+        if self._running is None:
+            raise OmplError(self._problem)
+
+    def __getstate__(self) -> Setup:
+        """What a process is started with: a copy has none yet."""
+        return self._setup
+
+    def __setstate__(self, setup: Setup) -> None:
         self._setup = setup
         self._until = self._late = 0.0
         self._number = self._answered = 0
@@ -75,9 +85,6 @@ class Worker:
         self._running: _Running | None = None
         self._starting: _Start | None = None
         self._problem = ""
-        self._start_and_wait()
-        if self._running is None:
-            raise OmplError(self._problem)
 
     def ensure(self) -> None:
         """Have a process, before the time of a query runs.

@@ -1,0 +1,70 @@
+"""Copies and pickles that are like what they were made of."""
+
+from __future__ import annotations
+
+import threading
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_T = TypeVar("_T")
+_State = tuple[dict[str, Any], tuple[bool, ...], tuple[str, ...], tuple[str, ...]]
+_LOCK = type(threading.Lock())
+
+
+def copies_alike(cls: type[_T]) -> type[_T]:
+    """Make copies and pickles of a class keep which of its arrays are read-only.
+
+    numpy forgets that, and to numba a writeable array is another type: every kernel that met a copy
+    would be compiled anew. Views of mappings stay views, and a copy has locks of its own.
+
+    Parameters
+    ----------
+    cls
+        A class whose instances have a `__dict__`. Arrays count that are attributes, or stand in
+        tuples, lists or mappings that are.
+
+    Returns
+    -------
+    type
+        The class itself.
+    """
+    vars_of: Any = cls
+    vars_of.__getstate__ = _state_of
+    vars_of.__setstate__ = _set_state
+    return cls
+
+
+def _state_of(thing: object) -> _State:
+    """Attributes; whether each array in them is writeable; names of views, and of locks."""
+    held = vars(thing)
+    views = tuple(name for name, value in held.items() if isinstance(value, MappingProxyType))
+    locks = tuple(name for name, value in held.items() if isinstance(value, _LOCK))
+    kept = {name: value for name, value in held.items() if name not in locks}
+    kept |= {name: dict(held[name]) for name in views}
+    writeable = tuple(bool(array.flags.writeable) for array in _arrays(kept))
+    return kept, writeable, views, locks
+
+
+def _set_state(thing: object, state: _State) -> None:
+    kept, writeable, views, locks = state
+    for array, may_write in zip(_arrays(kept), writeable, strict=True):
+        if not may_write:
+            array.flags.writeable = False
+    kept = kept | {name: MappingProxyType(kept[name]) for name in views}
+    vars(thing).update(kept | {name: threading.Lock() for name in locks})
+
+
+def _arrays(value: Any) -> Iterator[np.ndarray[Any, Any]]:
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, dict):
+        for item in value.values():
+            yield from _arrays(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _arrays(item)
