@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 ByteArray = NDArray[np.uint8]
+SignArray = NDArray[np.int8]
 IntArray = NDArray[np.int32]
 LongArray = NDArray[np.int64]
 KeyArray = NDArray[np.uint64]

@@ -12,11 +12,12 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import PlanError
+from hybridnav.poses import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import AnyArray, FloatArray, LongArray
+    from hybridnav._typing import AnyArray, FloatArray, LongArray, SignArray
 
 Metric = Literal["octile", "any-angle", "clearance-weighted", "dubins", "reeds-shepp"]
 
@@ -57,12 +58,65 @@ class Path:
     headings_rad: FloatArray | None = None
     """float64 (m,), heading at each point, counter-clockwise from the x axis; None where the state
     space has none."""
+    is_curved: bool = False
+    """Whether the robot drives an arc of a circle from each point to the next, as in the spaces
+    `dubins` and `reeds-shepp`; else a straight line."""
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False
         self.points.flags.writeable = False
         if self.headings_rad is not None:
             self.headings_rad.flags.writeable = False
+
+    @cached_property
+    def _motion(self) -> Motion:
+        return Motion(self.points, self.headings_rad, self.is_curved)
+
+    def poses(self, spacing_m: float = 0.05) -> FloatArray:
+        """Poses along the path for a controller: evenly spaced between the points where it bends.
+
+        Parameters
+        ----------
+        spacing_m
+            Metres driven from one pose to the next at most; every straight line or arc is divided
+            into as few equal parts as that takes.
+
+        Returns
+        -------
+        FloatArray
+            float64 (n, 3), `(x, y, yaw)`, metres and radians in [-pi, pi), map frame, from first
+            to last point. Without `headings_rad` the yaw is the direction of travel: at a bend
+            that of what follows, at the end that of what came before, 0 where nothing moves. With
+            them it is the robot's, as it turns along the way; a turn on the spot is two poses at
+            one point.
+
+        Raises
+        ------
+        InvalidValueError
+            When the spacing is not positive, or so small that there were more than ten million.
+        """
+        return self._motion.spread(spacing_m)[0]
+
+    def directions(self, spacing_m: float = 0.05) -> SignArray:
+        """Whether the robot goes ahead or backwards from each of the `poses`.
+
+        Parameters
+        ----------
+        spacing_m
+            As for `poses`.
+
+        Returns
+        -------
+        SignArray
+            int8 (n,), 1 for ahead, -1 for backwards, which is more than 90 degrees off the heading;
+            the last one is that of the step before.
+        """
+        return self._motion.spread(spacing_m)[1]
+
+    @property
+    def reversals(self) -> LongArray:
+        """int64, indices of the points where the robot changes between ahead and backwards."""
+        return np.flatnonzero(np.diff(self._motion.directions)) + 1
 
 
 @dataclass(frozen=True)

@@ -256,11 +256,13 @@ class OmplPlanner:
             pieces = [states[:1]]
             for first, second in itertools.pairwise(states.tolist()):
                 curve = shortest_curve(first, second, radius_m=radius_m, reverses=reverses)
-                pieces.append(curve.poses(self._grid.resolution_m)[1:])
+                step_m = min(self._grid.resolution_m, radius_m)  # so that no arc is half a circle
+                pieces.append(curve.poses(step_m)[1:])
             states = np.concatenate(pieces)
         headings = states[:, 2].copy() if self.ompl.has_heading else None
         points = states[:, :2].copy()
-        return Path(self._passed(points, cells), points, reply.length_m, headings)
+        passed, is_curved = self._passed(points, cells), radius_m is not None
+        return Path(passed, points, reply.length_m, headings, is_curved)
 
     def _passed(self, points: FloatArray, cells: LongArray) -> LongArray:
         """The cells that a path passes; those it was made from where its points, which follow a

@@ -1,0 +1,182 @@
+"""Poses at even distances along the points of a path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, FloatArray, LongArray, SignArray
+
+_MAX_POSES = 10_000_000
+_BEND = 1e-6
+"""Radians, and radians per metre, below which a path goes on as before: what is left when cell
+centres on a straight line are rounded far from the origin."""
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What a robot does between the points of a path, one row a step.
+
+    Parameters
+    ----------
+    points
+        float64 (n, 2), n >= 1, metres.
+    headings_rad
+        float64 (n,), None for a robot that faces the way it goes.
+    curved
+        Whether it drives an arc of a circle from each pose to the next, tangent to both headings;
+        else a straight line, on which it turns evenly.
+    """
+
+    points: FloatArray
+    headings_rad: FloatArray | None
+    curved: bool
+
+    @property
+    def _steps(self) -> FloatArray:
+        steps: FloatArray = np.diff(self.points, axis=0)
+        return steps
+
+    @property
+    def _travel(self) -> FloatArray:
+        """Direction of each step, of one of no length that of the step before, or behind."""
+        steps = self._steps
+        travel = np.arctan2(steps[:, 1], steps[:, 0])
+        return _filled(travel, np.hypot(steps[:, 0], steps[:, 1]) > 0)
+
+    @property
+    def _turns(self) -> FloatArray:
+        """Turn of the heading on each step, in [-pi, pi)."""
+        if self.headings_rad is None:
+            return np.zeros(len(self.points) - 1)
+        return wrapped(np.diff(self.headings_rad))
+
+    @property
+    def lengths_m(self) -> FloatArray:
+        """float64 (n - 1,), metres driven on each step."""
+        chords: FloatArray = np.hypot(*self._steps.T)
+        # np.sinc(x) is sin(pi x) / (pi x): the ratio of a chord to its arc.
+        return chords / np.sinc(self._turns / (2 * np.pi)) if self.curved else chords
+
+    @property
+    def directions(self) -> SignArray:
+        """int8 (n - 1,), -1 on steps that lead backwards, else 1; a turn on the spot goes with the
+        step before, or behind."""
+        ahead = np.ones(len(self.points) - 1)
+        if self.headings_rad is not None:
+            middle = self.headings_rad[:-1] + self._turns / 2
+            ahead = np.where(np.cos(self._travel - middle) < -_ROUNDING, -1.0, 1.0)
+            ahead = _filled(ahead, self.lengths_m > 0)
+        return ahead.astype(np.int8)
+
+    @property
+    def headings_at_points(self) -> FloatArray:
+        """float64 (n,), the headings, or the direction in which each point is left, the last one
+        reached; 0 where nothing moves."""
+        if self.headings_rad is not None:
+            return self.headings_rad
+        travel = self._travel
+        return np.append(travel, travel[-1]) if len(travel) else np.zeros(1)
+
+    def bends(self) -> LongArray:
+        """int64, indices of the points that even spacing must keep, both ends among them."""
+        lengths, turns = self.lengths_m, self._turns
+        moves = lengths > 0
+        rate = np.divide(turns, lengths, out=np.zeros_like(turns), where=moves)
+        bent = np.abs(np.diff(rate)) > _BEND
+        if not self.curved:
+            bent |= np.abs(wrapped(np.diff(self._travel))) > _BEND
+        else:
+            bent |= np.diff(self.directions) != 0
+        if self.headings_rad is not None:  # turns on the spot
+            bent |= ~moves[1:] | ~moves[:-1]
+        kept = np.flatnonzero(bent) + 1
+        return np.unique(np.concatenate([[0], kept, [len(self.points) - 1]]))
+
+    def spread(self, spacing_m: float) -> tuple[FloatArray, SignArray]:
+        """Poses at most so far apart, float64 (m, 3), and the direction in which each is left, int8
+        (m,), the last one reached.
+
+        Raises
+        ------
+        InvalidValueError
+            When the spacing is not positive, or there were more than ten million poses.
+        """
+        lengths = self.lengths_m
+        total_m = float(lengths.sum())
+        if not spacing_m > 0 or total_m / spacing_m > _MAX_POSES:
+            raise InvalidValueError(
+                f"spacing_m must be a length in metres above 0, got {spacing_m}, and give at most "
+                f"{_MAX_POSES} poses on {total_m:.4g} m: ask for a longer one"
+            )
+        if len(lengths) == 0:
+            return np.append(self.points[0], self.headings_at_points)[None], np.ones(1, np.int8)
+        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        bends = self.bends()
+        steps, parts = [], []
+        for first, last in zip(bends[:-1].tolist(), bends[1:].tolist(), strict=True):
+            count = max(1, int(np.ceil((along[last] - along[first]) / spacing_m - _ROUNDING)))
+            wanted = np.linspace(along[first], along[last], count, endpoint=False)
+            inside = along[first + 1 : last]
+            step = first + np.searchsorted(inside, wanted, side="right")
+            steps.append(step)
+            parts.append(_part(wanted - along[step], lengths[step]))
+        step = np.append(np.concatenate(steps), len(lengths) - 1)
+        part = np.append(np.concatenate(parts), 1.0)
+        return self._poses(step, part), self.directions[step]
+
+    def _poses(self, step: LongArray, part: FloatArray) -> FloatArray:
+        """Poses at some parts of some steps."""
+        place = self.points[step] + part[:, None] * self._steps[step]
+        last = part == 1.0
+        place[last] = self.points[step[last] + 1]
+        if self.headings_rad is None:
+            return np.column_stack([place, wrapped(self._travel[step])])
+        turns = self._turns[step]
+        yaw = self.headings_rad[step] + part * turns
+        if self.curved:
+            driven = self.lengths_m * self.directions
+            place = place + self._off_chord(driven[step], self.headings_rad[step], turns, part)
+        return np.column_stack([place, wrapped(yaw)])
+
+    @staticmethod
+    def _off_chord(
+        driven_m: FloatArray, heading: FloatArray, turns: FloatArray, part: FloatArray
+    ) -> FloatArray:
+        """How far an arc lies off its chord, (x, y), after a part of both."""
+
+        def ahead(part: FloatArray) -> FloatArray:
+            half = part * turns / 2
+            chord = part * driven_m * np.sinc(half / np.pi)
+            return np.column_stack([chord * np.cos(heading + half), chord * np.sin(heading + half)])
+
+        return ahead(part) - part[:, None] * ahead(np.ones_like(part))
+
+
+def wrapped(angles_rad: FloatArray) -> FloatArray:
+    """The same angles in [-pi, pi)."""
+    turned: FloatArray = (angles_rad + np.pi) % (2 * np.pi) - np.pi
+    return turned
+
+
+def _part(along_m: FloatArray, lengths_m: FloatArray) -> FloatArray:
+    part: FloatArray = np.divide(
+        along_m, lengths_m, out=np.zeros_like(along_m), where=lengths_m > 0
+    )
+    return np.clip(part, 0.0, 1.0)
+
+
+def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
+    """Values, where they are not known those of the next known entry before, else behind."""
+    if known.all() or not known.any():
+        return values
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    last[last < 0] = int(np.flatnonzero(known)[0])
+    filled: FloatArray = values[last]
+    return filled

@@ -1,0 +1,178 @@
+"""Poses along a path: even, complete, and turned the way the robot drives."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.refine.curves import shortest_curve
+from tests.strategies import drawn, occupancy_grid
+
+SPACING = st.floats(0.01, 3.0)
+LENGTH = st.floats(-5, 5).map(lambda x: round(x, 3))
+POINTS = st.lists(st.tuples(LENGTH, LENGTH), min_size=1, max_size=8)
+YAW = st.floats(-3.1, 3.1)
+POSE = st.tuples(LENGTH, LENGTH, YAW)
+
+
+def path_of(points: Any, headings: Any = None, **kind: Any) -> hn.Path:
+    points = np.array(points, dtype=np.float64).reshape(-1, 2)
+    length_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    headings = None if headings is None else np.array(headings, dtype=np.float64)
+    return hn.Path(np.zeros((1, 2), np.int64), points, length_m, headings, **kind)
+
+
+def curve_path(start: Any, goal: Any, radius_m: float, *, reverses: bool = True) -> hn.Path:
+    """As the planner makes one of a Reeds-Shepp or Dubins curve: poses a cell apart."""
+    curve = shortest_curve(start, goal, radius_m=radius_m, reverses=reverses)
+    poses = curve.poses(min(0.1, radius_m))
+    path = path_of(poses[:, :2], poses[:, 2], is_curved=True)
+    return hn.Path(path.cells, path.points, curve.length_m, path.headings_rad, is_curved=True)
+
+
+def gaps(poses: Any) -> Any:
+    return np.hypot(*np.diff(poses[:, :2], axis=0).T)
+
+
+def turned(angles: Any) -> Any:
+    return (np.asarray(angles) + np.pi) % (2 * np.pi) - np.pi
+
+
+@given(points=POINTS, spacing_m=SPACING)
+@settings(deadline=None)
+def test_poses_on_straight_lines(points: Any, spacing_m: float) -> None:
+    path = path_of(points)
+    poses = path.poses(spacing_m)
+    assert poses.dtype == np.float64
+    np.testing.assert_array_equal(poses[[0, -1], :2], path.points[[0, -1]])
+    assert gaps(poses).max(initial=0) <= spacing_m * (1 + 1e-9)
+    assert gaps(poses).sum() == pytest.approx(path.length_m, abs=1e-9)
+    assert (-np.pi <= poses[:, 2]).all()
+    assert (poses[:, 2] < np.pi).all()
+    # Every pose faces the next one, the last the way it came.
+    steps = np.diff(poses[:, :2], axis=0)
+    moves = gaps(poses) > 1e-7
+    faced = np.arctan2(steps[:, 1], steps[:, 0])[moves]
+    np.testing.assert_allclose(turned(faced - poses[:-1][moves, 2]), 0, atol=1e-6)
+    if moves.any():
+        assert abs(turned(faced[-1] - poses[-1, 2])) < 1e-6
+    assert (path.directions(spacing_m) == 1).all()
+    assert len(path.directions(spacing_m)) == len(poses)
+    assert path.reversals.size == 0
+    # All points where it bends are among the poses.
+    for at in range(1, len(points) - 1):
+        before, behind = (
+            path.points[at] - path.points[at - 1],
+            path.points[at + 1] - path.points[at],
+        )
+        if abs(before[0] * behind[1] - before[1] * behind[0]) > 1e-4:
+            assert gaps_to(poses, path.points[at]) == 0
+
+
+def gaps_to(poses: Any, point: Any) -> float:
+    return float(np.abs(poses[:, :2] - point).max(axis=1).min())
+
+
+def test_points_on_one_line_do_not_break_the_even_spacing() -> None:
+    # Cells along a row, a diagonal and a column, in a frame far away.
+    cells = [(0, col) for col in range(40)] + [(k, 39 + k) for k in range(1, 30)]
+    frame = hn.Frame(0.05, (5000.0, -3000.0), 0.3)
+    path = path_of(frame.points_of(cells))
+    poses = path.poses(0.7)
+    assert len(poses) == 1 + 3 + 3
+    assert gaps(poses)[:3] == pytest.approx([0.65] * 3)
+    assert gaps(poses)[3:] == pytest.approx([29 * 0.05 * math.sqrt(2) / 3] * 3)
+    assert poses[:3, 2] == pytest.approx([0.3] * 3)
+
+
+@given(start=POSE, goal=POSE, radius_m=st.floats(0.3, 2), reverses=st.booleans(), spacing_m=SPACING)
+@settings(deadline=None)
+def test_poses_on_curves(
+    start: Any,
+    goal: Any,
+    radius_m: float,
+    reverses: bool,  # noqa: FBT001
+    spacing_m: float,
+) -> None:
+    assume(math.dist(start[:2], goal[:2]) > 0.01)
+    path = curve_path(start, goal, radius_m, reverses=reverses)
+    poses, ahead = path.poses(spacing_m), path.directions(spacing_m)
+    assert path.headings_rad is not None
+    assert poses[-1, :2] == pytest.approx(path.points[-1], abs=1e-9)
+    assert turned(poses[-1, 2] - goal[2]) == pytest.approx(0, abs=1e-6)
+    assert turned(poses[0, 2] - start[2]) == pytest.approx(0, abs=1e-9)
+    # Driven: chords as long as arcs of the turning circle at the most.
+    turns = turned(np.diff(poses[:, 2]))
+    far = np.abs(turns) < 3
+    driven = gaps(poses) / np.sinc(turns / (2 * np.pi))
+    assert driven[far].max(initial=0) <= spacing_m * (1 + 1e-6)
+    if far.all():
+        assert driven.sum() == pytest.approx(path.length_m, rel=1e-6)
+    # Each step is tangent to the headings at both of its ends, ahead or backwards.
+    steps = np.diff(poses[:, :2], axis=0)
+    moves = (gaps(poses) > 1e-6) & far
+    travel = np.arctan2(steps[:, 1], steps[:, 0]) + np.where(ahead[:-1] < 0, np.pi, 0)
+    off = turned(travel - (poses[:-1, 2] + turns / 2))[moves]
+    np.testing.assert_allclose(off, 0, atol=1e-4)
+    if not reverses:
+        assert (ahead == 1).all()
+        assert path.reversals.size == 0
+
+
+def test_a_reversal_is_marked_where_it_is() -> None:
+    # Sideways by a little: a car goes ahead and backs up.
+    path = curve_path((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), 1.0)
+    assert len(path.reversals) >= 1
+    poses, ahead = path.poses(0.02), path.directions(0.02)
+    changes = np.flatnonzero(np.diff(ahead[:-1])) + 1
+    np.testing.assert_allclose(poses[changes, :2], path.points[path.reversals], atol=1e-9)
+    steps = np.diff(poses[:, :2], axis=0)
+    along = steps[:, 0] * np.cos(poses[:-1, 2]) + steps[:, 1] * np.sin(poses[:-1, 2])
+    np.testing.assert_array_equal(np.sign(along), ahead[:-1])
+
+
+def test_a_turn_on_the_spot_is_two_poses_at_one_point() -> None:
+    # Turn to the goal, drive, turn to its heading.
+    points = [(0, 0), (0, 0), (1, 0), (1, 0), (1, 1), (1, 1)]
+    headings = [2.0, 0.0, 0.0, math.pi / 2, math.pi / 2, -1.0]
+    path = path_of(points, headings)
+    poses = path.poses(0.25)
+    assert len(poses) == 6 + 2 * 3
+    assert poses[[0, 1], 2] == pytest.approx([2.0, 0.0])
+    assert gaps(poses) == pytest.approx([0, *[0.25] * 4, 0, *[0.25] * 4, 0])
+    assert poses[-2:, 2] == pytest.approx([math.pi / 2, -1.0])
+    assert (path.directions(0.25) == 1).all()
+    assert path.reversals.size == 0
+
+
+def test_a_robot_that_slides_turns_evenly_on_its_way() -> None:
+    path = path_of([(0, 0), (2, 0)], [3.0, -3.0])
+    poses = path.poses(0.5)
+    step = (2 * math.pi - 6) / 4
+    np.testing.assert_allclose(turned(np.diff(poses[:, 2])), step)
+    assert poses[:, 1].tolist() == [0.0] * 5
+
+
+@pytest.mark.parametrize("spacing_m", [0.0, -1.0, math.nan, 1e-9])
+def test_a_spacing_that_is_none_is_refused(spacing_m: float) -> None:
+    with pytest.raises(hn.InvalidValueError, match="spacing_m must be") as error:
+        path_of([(0, 0), (1, 0)]).poses(spacing_m)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("smooth", ["none", "line-of-sight"])
+def test_poses_of_a_plan(smooth: Any) -> None:
+    grid = occupancy_grid(drawn(".........", "..####...", "..#..#...", "..####...", "........."))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    result = hn.HybridPlanner(topology).plan((0.5, 2.5), (8.2, 2.4), smooth=smooth)
+    assert result.path is not None
+    poses = result.path.poses()
+    assert gaps(poses).sum() == pytest.approx(result.path.length_m)
+    assert gaps(poses).max() <= 0.05 * (1 + 1e-9)
+    np.testing.assert_array_equal(poses[[0, -1], :2], result.path.points[[0, -1]])
