@@ -16,6 +16,7 @@ import yaml
 from docs.extensions import notebook_pages
 
 import hybridnav as hn
+from hybridnav.grid.worlds import figure1_world
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -115,6 +116,58 @@ def test_executed_notebooks_are_kept_until_the_code_changes(
     code.write_text("answer = 43\n", encoding="utf-8")
     assert notebook_pages.execution_cache() != first
     assert not first.exists()
+
+
+@pytest.fixture(scope="module")
+def behaviour() -> dict[str, str]:
+    """Where the route of each preset comes from, seen in what a query does."""
+    grid = figure1_world().grid(robot_radius_m=0.0)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
+    seen = {}
+    for name in hn.preset_names():
+        preset = hn.load_preset(name)
+        if preset.planner.refine == "ompl":
+            continue  # as the portals that they plan on
+        result = hn.HybridPlanner(topology, preset=preset).plan((0.3, 0.3), (0.3, 2.7))
+        assert result.solved
+        if result.route is None:
+            seen[name] = "none"
+        else:
+            seen[name] = "chosen on places" if result.stats.expanded_places else "read off the path"
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("page", "words"),
+    [
+        (
+            "docs/index.md",
+            {
+                "chooses the route on the places first": "chosen on places",
+                "find a path first": "read off the path",
+                "searches the whole grid": "none",
+            },
+        ),
+        (
+            "CONTRIBUTING.md",
+            {
+                "| the places of the `TopologicalMap` |": "chosen on places",
+                "| portals between the fields of a second pyramid": "read off the path",
+                "| the cells of the whole grid |": "none",
+            },
+        ),
+    ],
+)
+def test_pages_describe_the_flow_of_data_preset_by_preset(
+    page: str, words: dict[str, str], behaviour: dict[str, str]
+) -> None:
+    lines = (ROOT / page).read_text(encoding="utf-8").splitlines()
+    described = {}
+    for mark, source in words.items():
+        (line,) = [line for line in lines if mark in line]
+        presets = re.findall(r"`([a-z-]+)`", line.partition(mark)[0])
+        described |= dict.fromkeys(presets, source)
+    assert {name: described.get(name) for name in behaviour} == behaviour
 
 
 def test_the_picture_of_the_layers_is_the_contract() -> None:

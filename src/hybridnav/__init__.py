@@ -1,4 +1,4 @@
-"""Robot routes planned on two maps at once: an occupancy grid and the topological map grown on it.
+"""Robot routes on two maps: an occupancy grid and the topological map grown out of it.
 
 Names load on first use: `import hybridnav` itself imports neither numba nor matplotlib.
 """

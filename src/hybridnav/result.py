@@ -214,7 +214,8 @@ class PlanResult:
 
     @cached_property
     def route(self) -> Route | None:
-        """The places and arcs; None too where the preset searches the whole map."""
+        """The places and arcs that were chosen before the path (`paper`), or are read off it (the
+        presets over portals); None too where the preset searches the whole map."""
         return self.route_source() if callable(self.route_source) else self.route_source
 
     def __getstate__(self) -> dict[str, Any]:

@@ -71,10 +71,12 @@ class PlannerSettings(_Section):
     """Section `planner`: coarse search, corridor, refinement."""
 
     coarse: Literal["max-distance", "portals", "none"] = "max-distance"
-    """How the coarse route is found: by that attribute of the arcs, or by distances between portals
-    of fields of its own; `none` makes the whole map the corridor."""
+    """What is planned on: the places, by that attribute of their arcs, which chooses the route; or
+    portals between fields grown for planning alone, so that the route is read off the path; or
+    `none`, the whole map at once, without a route."""
     corridor: Literal["route", "neighbours"] = "route"
-    """Fields the refiner may stand on: those of the route, or also their neighbours'."""
+    """Fields that `grid-astar` and `ompl` start from: those of the coarse way, or also their
+    neighbours. Of no effect with `gates`, `stored-paths` and `coarse: none`."""
     refine: Literal["grid-astar", "gates", "stored-paths", "ompl"] = "grid-astar"
     """How a path is found: cell by cell in the corridor; over portals, with exact costs between all
     border cells of the fields or by some stored paths alone; or by a sampling-based planner."""

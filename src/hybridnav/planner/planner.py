@@ -1,4 +1,4 @@
-"""The hybrid planner: coarse on the topological map, fine inside the fields it chose."""
+"""The hybrid planner: paths between points by a preset, and the routes that belong to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Coarse routes on the topological map, and routes over portals."""
+"""Routes over the places of the topological map, and paths over portals of other fields."""
 
 from hybridnav.route.coarse import CoarseRoute, MaxDistanceSearch
 from hybridnav.route.corridor import Corridor, corridor_of

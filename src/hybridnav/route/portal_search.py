@@ -1,4 +1,4 @@
-"""The portal planner: routes over portals of fields that are chosen for routing."""
+"""The portal planner: paths over portals of fields that are grown for planning alone."""
 
 from __future__ import annotations
 
