@@ -9,6 +9,7 @@ import yaml
 from PIL import Image
 from scipy import ndimage
 
+import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.grid.worlds import (
@@ -76,6 +77,21 @@ def test_committed_files_are_what_the_generator_makes(tmp_path):
     assert set(generated) <= set(committed)
     for path in generated:
         assert (tmp_path / path).read_bytes() == (MAPS / path).read_bytes(), path
+
+
+@pytest.mark.parametrize("name", ["office", "figure1"])
+def test_an_example_map_is_its_file_without_the_file(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made = hn.example_map(name, robot_radius_m=RADIUS_M)
+    loaded = hn.load_map(MAPS / name / f"{name}.yaml", robot_radius_m=RADIUS_M)
+    assert np.array_equal(made.classes, loaded.classes)
+    assert np.array_equal(made.probability, loaded.probability)
+    assert (made.frame, made.name) == (loaded.frame, loaded.name)
+
+
+def test_an_unknown_example_map_names_those_there_are():
+    with pytest.raises(InvalidValueError, match="'flat', only figure1 and office"):
+        hn.example_map("flat", robot_radius_m=0.0)
 
 
 def test_files_say_what_the_world_is(tmp_path):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         RoomsNotFoundError,
     )
     from hybridnav.grid import CellClass, Frame, OccupancyGrid, RoomLabels
-    from hybridnav.io import load_map, load_rooms, save_rooms
+    from hybridnav.io import example_map, load_map, load_rooms, save_rooms
     from hybridnav.planner import (
         Alternative,
         Alternatives,
@@ -73,6 +73,7 @@ _HOME_OF = {
     "Route": "result",
     "TopologicalMap": "topology",
     "Tour": "planner",
+    "example_map": "io",
     "find_rooms": "topology",
     "load_map": "io",
     "load_preset": "config",
@@ -115,6 +116,7 @@ __all__ = [
     "Route",
     "TopologicalMap",
     "Tour",
+    "example_map",
     "find_rooms",
     "load_map",
     "load_preset",
