@@ -162,7 +162,7 @@ def test_pages_describe_the_flow_of_data_preset_by_preset(
     page: str, words: dict[str, str], behaviour: dict[str, str]
 ) -> None:
     lines = (ROOT / page).read_text(encoding="utf-8").splitlines()
-    described = {}
+    described: dict[str, str] = {}
     for mark, source in words.items():
         (line,) = [line for line in lines if mark in line]
         presets = re.findall(r"`([a-z-]+)`", line.partition(mark)[0])

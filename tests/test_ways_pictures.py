@@ -10,6 +10,7 @@ from matplotlib.colors import to_rgb
 
 import hybridnav as hn
 from hybridnav.grid import RoomLabels
+from hybridnav.planner.alternatives import Alternatives
 from hybridnav.viz import plot_alternatives, plot_rooms, plot_tour
 from tests.strategies import drawn, occupancy_grid
 from tests.test_cli import cli  # noqa: F401 - the fixture
@@ -94,6 +95,29 @@ def test_a_tour_numbers_the_doors_that_its_words_tell_of(ring):
     assert np.hypot(*np.subtract(numbers[f"door-{passed[0]}"].get_position(), door.position)) < 0.5
 
 
+@pytest.mark.parametrize(("width_in", "size_m"), [(4.0, 0.2), (6.0, 0.5), (9.0, 0.5)])
+def test_names_lie_beside_the_way_where_there_is_room(width_in, size_m):
+    cells = np.zeros((21, 41), dtype=np.uint8)
+    cells[[0, -1]], cells[:, [0, 20, -1]], cells[9:12, 20] = 1, 1, 0
+    label_of = np.where(cells, -1, 0).astype(np.int32)
+    label_of[1:-1, 21:-1] = 1
+    rooms = RoomLabels(("west", "east"), label_of)
+    grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(size_m))
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=4 * size_m, rooms=rooms)
+    planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="grid-astar")
+    ends = np.array([[3.5, 10.5], [37.5, 10.5]]) * size_m  # along the middle of both rooms
+    ax = plot_tour(planner.topology, hn.plan_tour(planner, ends), width_in=width_in)
+    (line,) = (line for line in ax.lines if line.get_gid() == "path")
+    way = ax.transData.transform(line.get_xydata())
+    renderer = FigureCanvasAgg(ax.figure.figure).get_renderer()
+    names = texts(ax, r"room-\d+")
+    assert len(names) == 2
+    for text in names.values():
+        box = text.get_window_extent(renderer)
+        inside = (way >= [box.x0, box.y0]) & (way <= [box.x1, box.y1])
+        assert not inside.all(axis=1).any(), text.get_text()
+
+
 def test_rooms_number_all_their_doors_where_there_is_room(ring):
     numbers = texts(plot_rooms(ring.topology), r"door-\d+")
     assert sorted(numbers) == [f"door-{door.number}" for door in ring.topology.rooms.doors]
@@ -129,6 +153,24 @@ def test_twenty_routes_are_all_told_apart(ring):
     lines = routes_of(plot_alternatives(ring.topology, many))
     looks = {(line.get_color(), str(line._unscaled_dash_pattern)) for line in lines}
     assert len(looks) == 20
+
+
+def test_routes_that_share_all_their_way_show_each(ring):
+    (way, _) = hn.plan_alternatives(ring, "west", "east", 2, least_hole_m2=0.5)
+    same = Alternatives((way,) * 5, complete=True)
+    ax = plot_alternatives(ring.topology, same, width_in=4.0)
+    picture = FigureCanvasAgg(ax.figure.figure)
+    picture.draw()
+    pixels = np.asarray(picture.buffer_rgba())[..., :3].astype(int)
+    lines = {line.get_gid(): line for line in ax.lines}
+    along = ax.transData.transform(lines["route-1"].get_xydata())
+    low, high = along.min(axis=0) - 8, along.max(axis=0) + 8
+    height = len(pixels)  # the legend, which has all colours, lies outside
+    part = pixels[int(height - high[1]) : int(height - low[1]), int(low[0]) : int(high[0])]
+    for number in range(1, 6):
+        colour = np.array(to_rgb(lines[f"route-{number}"].get_color())) * 255
+        alike = (np.abs(part - colour) < 40).all(axis=-1).sum()
+        assert alike > np.hypot(*np.diff(along, axis=0).T).sum() / 4, number
 
 
 def test_alternatives_on_a_map_without_rooms_and_without_a_path():

@@ -86,13 +86,16 @@ class RoomWriter:
             self._write(centres[best], str(door.number), font, f"door-{door.number}", bold=True)
             self.taken.append(boxes[best])
 
-    def write_names(self, first: Collection[str] = ()) -> int:
+    def write_names(self, first: Collection[str] = (), *, lines: Sequence[FloatArray] = ()) -> int:
         """Write each name well inside its room, smaller where it must be.
 
         Parameters
         ----------
         first
             Names that are written before the others, which follow from the largest room down.
+        lines
+            Points of lines, float64 (n, 2) each, `(x, y)` in metres. A name hides a line only where
+            there is no spot beside it.
 
         Returns
         -------
@@ -104,25 +107,35 @@ class RoomWriter:
         areas = np.bincount(self._labels.label_of.ravel() + 1, minlength=len(names) + 1)[1:]
         order = sorted(range(len(names)), key=lambda n: (names[n] not in first, -areas[n], n))
         boxes = ndimage.find_objects(self._labels.label_of + 1, len(names))
+        along = _points_along(lines, self._grid.resolution_m)
         left_out = 0
         for label in order:
             window = boxes[label]
-            if window is not None and not self._wrote_name(label, window):
+            if window is not None and not self._wrote_name(label, window, along):
                 left_out += 1
         return left_out
 
-    def _wrote_name(self, label: int, window: tuple[slice, ...]) -> bool:
+    def _wrote_name(self, label: int, window: tuple[slice, ...], along: FloatArray) -> bool:
         name = self._labels.names[label]
         points = _depths(self._labels.label_of[window] == label, window, self._grid)
+        spot: tuple[FloatArray, float, FloatArray] | None = None
         for size, point in itertools.product(_NAME_SIZES, points):
             font = max(size * self._canvas.sizes.font, _LEAST_FONT)
             half = np.array([text_width(name, font) / 2, 0.55 * font])
             box = self._box(point, half)
-            if not self._n_hidden(box) and self._is_in_room(box, label):
-                self._write(point, name, font, f"room-{label}")
-                self.taken.append(box)
-                return True
-        return False
+            if self._n_hidden(box) or not self._is_in_room(box, label):
+                continue
+            hides_line = bool(((along >= box[0]) & (along <= box[1])).all(axis=1).any())
+            if spot is None or not hides_line:
+                spot = (point, font, box)
+            if not hides_line:
+                break
+        if spot is None:
+            return False
+        point, font, box = spot
+        self._write(point, name, font, f"room-{label}")
+        self.taken.append(box)
+        return True
 
     def _is_in_room(self, box: FloatArray, label: int) -> bool:
         """Whether a box lies in the picture and covers no other room; walls may be covered."""
@@ -164,6 +177,16 @@ class RoomWriter:
         )
         text.set_gid(gid)
         self._canvas.ax.add_artist(text)
+
+
+def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
+    """Points of lines, and points between them where they lie far apart; float64 (n, 2)."""
+    parts = [np.empty((0, 2))]
+    for line in lines:
+        lengths_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+        at = np.linspace(0.0, lengths_m[-1], int(lengths_m[-1] / spacing_m) + 2)
+        parts.append(np.stack([np.interp(at, lengths_m, axis) for axis in line.T], axis=1))
+    return np.concatenate(parts)
 
 
 def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -> list[FloatArray]:

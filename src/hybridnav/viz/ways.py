@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from hybridnav.viz.layout import Entry
 
 _TOUR_WIDTH, _STOP_POINTS = 1.6, 5.0
-_ROUTE_WIDTH, _WIDER, _CASING = 1.6, 1.3, 1.2
+_ROUTE_WIDTH, _WIDER, _CASING = 1.6, 1.9, 0.6
 """Longer routes are wider, below the shorter ones: where routes share their way each shows."""
 _Dashes = tuple[float, tuple[float, ...]]
 _DASHES: tuple[_Dashes | None, ...] = (
@@ -83,8 +83,7 @@ def plot_tour(
     told = f"{tour.length_m:.1f} m" if tour.solved else str(tour.status)
     paths = [result.path.points for result in tour.results if result.path is not None]
     canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
-    ends = [point for points in paths for point in points[[0, -1]]]
-    entries, _ = _draw_ground(canvas, topology, tour.legs, ends, 1.0)
+    entries, _ = _draw_ground(canvas, topology, tour.legs, paths, 1.0)
     for points in paths:
         line = Line2D(*points.T, color=style.PATH, linewidth=_TOUR_WIDTH, zorder=7)
         line.set_gid("path")
@@ -144,7 +143,8 @@ def plot_alternatives(
         guide = Guide(topology.rooms)
         legs = [leg for path in paths for leg in guide.legs(path)]
     ends = list(paths[0].points[[0, -1]]) if paths else []
-    ground, taken = _draw_ground(canvas, topology, legs, ends, style.PALE)
+    lines = [path.points for path in paths]
+    ground, taken = _draw_ground(canvas, topology, legs, lines, style.PALE)
     entries: list[Entry] = []
     styles = itertools.product(_DASHES, style.ROUTES)
     for number, (path, (dashes, colour)) in enumerate(zip(paths, styles, strict=False)):
@@ -154,7 +154,7 @@ def plot_alternatives(
         sample = Line2D([], [], color=colour, linestyle=dashes or "-", lw=2.2 * canvas.sizes.line)
         entries.append((sample, f"route {number + 1}, {path.length_m:.2f} m"))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), ends, strict=False)]
-    along = np.concatenate([path.points for path in paths]) if paths else np.empty((0, 2))
+    along = np.concatenate(lines) if lines else np.empty((0, 2))
     draw_markers(canvas, markers, along, avoid=taken)
     told = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
     words = [topology.grid.name, told] if title is None else [title]
@@ -186,11 +186,11 @@ def _draw_ground(
     canvas: Canvas,
     topology: TopologicalMap,
     legs: Sequence[Leg],
-    ends: Sequence[FloatArray],
+    lines: Sequence[FloatArray],
     strength: float,
 ) -> tuple[list[Entry], list[FloatArray]]:
-    """Draw rooms with names and doors, or places where there are no rooms; entries of the legend,
-    and the boxes of what is written."""
+    """Draw rooms with names and doors, or places where there are no rooms, below lines of points;
+    entries of the legend, and the boxes of what is written."""
     grid = topology.grid
     if topology.pyramid.rooms is None:
         places = Places(topology.level)
@@ -202,10 +202,11 @@ def _draw_ground(
     passed = list({leg.door.number: leg.door for leg in legs if leg.door is not None}.values())
     doors = _drawn_doors(rooms, passed)
     writer = RoomWriter(canvas, grid, rooms.labels)
-    writer.keep_free(ends, 0.6 * _STOP_POINTS)
+    writer.keep_free([end for line in lines for end in line[[0, -1]]], 0.6 * _STOP_POINTS)
     writer.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     writer.number_doors(passed, always=True)
-    left_out = writer.write_names({leg.room for leg in legs if leg.room is not None})
+    named_first = {leg.room for leg in legs if leg.room is not None}
+    left_out = writer.write_names(named_first, lines=lines)
     entries: list[Entry] = [room_entry(left_out, strength), (draw_doors(canvas, doors), "doors")]
     return entries + ground_entries(grid), writer.taken
 
