@@ -323,6 +323,18 @@ def test_the_loss_line_falls_at_each_loss():
     assert d.split("V")[-1].split("H")[0] == "260"
 
 
+@pytest.mark.parametrize("pairs", [200, 3000])
+def test_the_loss_chart_shows_how_many_pairs_lose_much(pairs):
+    losses = {"few": np.zeros(pairs), "more": np.zeros(pairs), "common": np.full(pairs, 0.001)}
+    losses["few"][:1], losses["more"][:3] = 0.2, 0.2
+    chart = loss_chart(losses, looks(losses), "Loss")
+    heights = re.findall(r'class="line c(\d)" d="M[\d.]+ ([\d.]+)', chart)
+    few, more, common = (float(y) for _, y in sorted(heights[:3]))  # the others are of the legend
+    assert few - more >= 15  # pixels, y down; the axis is at 260
+    assert more - common >= 15
+    assert 260 - few >= 15
+
+
 def test_methods_are_told_apart_without_colour():
     several = looks(f"method {i}" for i in range(35))
     assert len({(look.colour, look.dash) for look in several.values()}) == 35

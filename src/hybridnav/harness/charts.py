@@ -21,7 +21,6 @@ from hybridnav.harness.svg import (
     legend_size,
     number,
     percent,
-    round_step,
     rounded_share,
     shortened,
     text,
@@ -48,7 +47,7 @@ LIGHT_CSS = (
 
 
 def loss_chart(losses: Mapping[str, FloatArray], looks_of: Mapping[str, Look], title: str) -> str:
-    """Figure of the share of pairs that lose more than x, a line per method; x is logarithmic."""
+    """Figure of the share of pairs that lose more than x, a line per method; both logarithmic."""
     known = {name: _known(values) for name, values in losses.items()}
     drawn = {name: values for name, values in known.items() if len(values)}
     missing = [name for name in losses if name not in drawn]
@@ -57,9 +56,9 @@ def loss_chart(losses: Mapping[str, FloatArray], looks_of: Mapping[str, Look], t
     box = _LOSS_BOX
     largest = max(float(values[-1]) for values in drawn.values())
     x = Scale("log", LEAST_LOSS_DRAWN, max(1e-2, largest), box.left + _ZERO_PX, box.right - 6)
-    most = max(1e-2, *(_share_above(values, NO_LOSS) for values in drawn.values()))
-    step = round_step(most / 5)
-    y = Scale("linear", 0, min(1.0, step * math.ceil(most / step)), box.bottom, box.top)
+    # One pair of the most that a method has stands clear of the axis, where no pair is.
+    least = min(0.05, 0.5 / max(map(len, drawn.values())))
+    y = Scale("log", least, 1.0, box.bottom, box.top)
     zero = box.left + 14
     lines = [_survival(values, looks_of[name], x, y, zero) for name, values in drawn.items()]
     entries = [
@@ -81,7 +80,8 @@ def loss_chart(losses: Mapping[str, FloatArray], looks_of: Mapping[str, Look], t
     size = key_left + max(width, 120), max(box.bottom + 44, box.top + height + 4)
     told = (
         "Each line is the share of pairs whose loss is above the value below it; at 0, the share "
-        "with any loss. A line further down and left is better."
+        "with any loss. The share is logarithmic, so that the few worst pairs show; a line on the "
+        "axis stands for no pair. A line further down and left is better."
     )
     return figure(title, drawing(*size, title, frame, *lines, keys), told, missing)
 
