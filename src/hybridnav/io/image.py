@@ -13,6 +13,7 @@ from PIL import Image, UnidentifiedImageError
 from hybridnav.config.yaml_file import open_file, printable
 from hybridnav.errors import MapError, MapNotFoundError
 from hybridnav.grid import MAX_CELLS
+from hybridnav.io.png import DamagedPngError, check_png
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,7 +79,11 @@ def read_raster(path: PathLike, *, what: str) -> Raster:
         warnings.simplefilter("ignore")
         image = _open(stream, where)
         try:
+            if image.format == "PNG":
+                check_png(stream)
             return _decode(image)
+        except DamagedPngError as failure:
+            raise MapError(f"{where}: damaged PNG: {failure}; save or copy it again") from None
         except _UnsupportedPixelsError as failure:
             raise MapError(f"{where}: {failure}") from None
         except MemoryError:
