@@ -24,7 +24,14 @@ if TYPE_CHECKING:
         RoomsError,
         RoomsNotFoundError,
     )
-    from hybridnav.grid import CellClass, Frame, OccupancyGrid, RoomLabels
+    from hybridnav.grid import (
+        CellClass,
+        DroppedIslands,
+        Frame,
+        OccupancyGrid,
+        RoomLabels,
+        drop_islands,
+    )
     from hybridnav.io import example_map, load_map, load_rooms, save_rooms
     from hybridnav.planner import (
         Alternative,
@@ -47,6 +54,7 @@ _HOME_OF = {
     "Blocked": "planner",
     "CellClass": "grid",
     "Door": "topology",
+    "DroppedIslands": "grid",
     "DualGraphPyramid": "pyramid",
     "Frame": "grid",
     "HybridNavError": "errors",
@@ -73,6 +81,7 @@ _HOME_OF = {
     "Route": "result",
     "TopologicalMap": "topology",
     "Tour": "planner",
+    "drop_islands": "grid",
     "example_map": "io",
     "find_rooms": "topology",
     "load_map": "io",
@@ -90,6 +99,7 @@ __all__ = [
     "Blocked",
     "CellClass",
     "Door",
+    "DroppedIslands",
     "DualGraphPyramid",
     "Frame",
     "HybridNavError",
@@ -116,6 +126,7 @@ __all__ = [
     "Route",
     "TopologicalMap",
     "Tour",
+    "drop_islands",
     "example_map",
     "find_rooms",
     "load_map",

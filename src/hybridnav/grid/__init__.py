@@ -1,7 +1,19 @@
-"""Occupancy grids: probabilities, frame, clearance, rooms on cells, generated worlds."""
+"""Occupancy grids: probabilities, frame, clearance, islands, rooms on cells, generated worlds."""
 
 from hybridnav.grid.frame import Frame
-from hybridnav.grid.occupancy import MAX_CELLS, CellClass, OccupancyGrid
+from hybridnav.grid.islands import DroppedIslands, drop_islands
+from hybridnav.grid.occupancy import DEFAULT_MAX_CELLS, MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.grid.rooms import MAX_ROOMS, NO_ROOM, RoomLabels
 
-__all__ = ["MAX_CELLS", "MAX_ROOMS", "NO_ROOM", "CellClass", "Frame", "OccupancyGrid", "RoomLabels"]
+__all__ = [
+    "DEFAULT_MAX_CELLS",
+    "MAX_CELLS",
+    "MAX_ROOMS",
+    "NO_ROOM",
+    "CellClass",
+    "DroppedIslands",
+    "Frame",
+    "OccupancyGrid",
+    "RoomLabels",
+    "drop_islands",
+]

@@ -19,9 +19,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._typing import BoolArray, ByteArray
+    from hybridnav.grid.islands import DroppedIslands
 
 MAX_CELLS = 178_956_970
 """Cells a grid may have at most: Pillow's own limit for an image, and well inside int32."""
+
+DEFAULT_MAX_CELLS = 20_000_000
+"""Cells of a map that are read unless more are asked for: 4,472 x 4,472, or 224 m a side at 5 cm.
+Reading so many takes about 5 s and a gigabyte."""
 
 
 class CellClass(IntEnum):
@@ -82,12 +87,14 @@ class OccupancyGrid:
         What to call the map in messages and pictures.
     radius_is_default
         Whether nobody gave the radius: set where it is None, and kept by `dataclasses.replace`.
+    least_island_m2
+        Square metres that an island must have to be kept; see `drop_islands`. 0 keeps all.
 
     Raises
     ------
     InvalidValueError
         When the array is not two-dimensional, empty, too large or holds values outside [0, 1], or
-        a threshold or the radius is out of range.
+        a threshold, the radius or the least area is out of range.
     """
 
     probability: NDArray[np.float32] = field(repr=False)
@@ -98,10 +105,14 @@ class OccupancyGrid:
     corner_cutting: bool = False
     name: str = "map"
     radius_is_default: bool = False
+    least_island_m2: float = 0.0
     measured: ByteArray = field(init=False, repr=False)
     """Class of each cell by the thresholds alone, uint8 `CellClass`."""
     classes: ByteArray = field(init=False, repr=False)
-    """Class of each cell after inflation, uint8 `CellClass`: what graphs and planners see."""
+    """Class of each cell after inflation and without dropped islands, uint8 `CellClass`: what
+    graphs and planners see."""
+    dropped: DroppedIslands | None = field(init=False, repr=False, default=None)
+    """What `least_island_m2` left out; None when that is 0."""
 
     def __post_init__(self) -> None:
         probability = np.array(self.probability, dtype=np.float32, order="C")
@@ -109,7 +120,12 @@ class OccupancyGrid:
         given = self.__dict__["robot_radius_m"]
         kept = self.radius_is_default and given == DEFAULT_ROBOT_RADIUS_M
         object.__setattr__(self, "radius_is_default", given is None or kept)
-        for name in ("free_threshold", "occupied_threshold", "robot_radius_m"):
+        for name in (
+            "free_threshold",
+            "occupied_threshold",
+            "robot_radius_m",
+            "least_island_m2",
+        ):
             object.__setattr__(self, name, float(getattr(self, name)))
         low, high = self.free_threshold, self.occupied_threshold
         if not 0 <= low < high <= 1:
@@ -121,6 +137,11 @@ class OccupancyGrid:
             raise InvalidValueError(
                 f"robot radius must be a finite length in metres >= 0, got {self.robot_radius_m}"
             )
+        if not (math.isfinite(self.least_island_m2) and self.least_island_m2 >= 0):
+            raise InvalidValueError(
+                "the least area of an island must be a finite number of m² >= 0, "
+                f"got {self.least_island_m2}"
+            )
         measured = np.full(probability.shape, CellClass.UNEXPLORED, dtype=np.uint8)
         measured[probability <= np.float32(low)] = CellClass.FREE
         measured[probability >= np.float32(high)] = CellClass.OCCUPIED
@@ -129,6 +150,15 @@ class OccupancyGrid:
             radius_cells = self.robot_radius_m / self.frame.resolution_m
             blocked = within_radius(measured == CellClass.OCCUPIED, radius_cells=radius_cells)
             classes = np.where(blocked, np.uint8(CellClass.OCCUPIED), measured)
+        if self.least_island_m2 > 0:
+            from hybridnav.grid.islands import without_islands  # noqa: PLC0415 - it needs this module
+
+            classes, dropped = without_islands(
+                classes,
+                least_area_m2=self.least_island_m2,
+                cell_area_m2=self.frame.resolution_m**2,
+            )
+            object.__setattr__(self, "dropped", dropped)
         for name, array in (
             ("probability", probability),
             ("measured", measured),
@@ -162,14 +192,17 @@ class OccupancyGrid:
         return cells
 
     def class_counts(self) -> dict[str, int]:
-        """Cells per class; `blocked` are those that only inflation took."""
+        """Cells per class; `blocked` are those that only inflation took; `closed`, where islands
+        are dropped, those of islands."""
         counts = np.bincount(self.classes.ravel(), minlength=3)
         occupied = int((self.measured == CellClass.OCCUPIED).sum())
+        closed = {} if self.dropped is None else {"closed": self.dropped.closed_cells}
         return {
             "free": int(counts[CellClass.FREE]),
             "unexplored": int(counts[CellClass.UNEXPLORED]),
             "occupied": occupied,
-            "blocked": int(counts[CellClass.OCCUPIED]) - occupied,
+            "blocked": int(counts[CellClass.OCCUPIED]) - occupied - sum(closed.values()),
+            **closed,
         }
 
 

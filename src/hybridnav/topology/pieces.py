@@ -105,7 +105,7 @@ def contracted_pieces(grid: OccupancyGrid) -> IntArray:
         int32 (rows, cols), a piece for each free cell, -1 elsewhere.
     """
     apex = DualGraphPyramid.build(
-        replace(grid, robot_radius_m=0.0),
+        replace(grid, robot_radius_m=0.0, least_island_m2=0.0),
         merge_distance_m=max(_FINE_M, 2 * grid.resolution_m),
         resistance=Resistance(_clearance(grid), _PERSISTENCE),
     )[-1]

@@ -150,9 +150,13 @@ def ground_entries(grid: OccupancyGrid) -> list[Entry]:
     """Legend entries for the cells that are in no place."""
     occupied = (grid.measured == CellClass.OCCUPIED).any()
     entries: list[Entry] = [(Patch(fc=style.OCCUPIED), "occupied")] if occupied else []
+    blocked = []
     if occupied and grid.robot_radius_m > 0:
-        label = f"within {grid.robot_radius_m:g} m of occupied"
-        entries.append((Patch(fc=style.BLOCKED), label))
+        blocked.append(f"within {grid.robot_radius_m:g} m of occupied")
+    if grid.dropped is not None and grid.dropped.closed_cells:
+        blocked.append(f"island below {grid.least_island_m2:g} m²")
+    if blocked:
+        entries.append((Patch(fc=style.BLOCKED), ", or ".join(blocked)))
     return entries
 
 

@@ -1,0 +1,133 @@
+"""Islands: small sets of free or unexplored cells, such as raw scans are full of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.grid.occupancy import CellClass, OccupancyGrid
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+
+_ROUNDING = 1e-9
+"""Relative slack on an area, so that 1 m² is 400 cells of 0.05 m and not 400.00001."""
+
+
+@dataclass(frozen=True)
+class DroppedIslands:
+    """How many islands a grid leaves out, and how many cells they have.
+
+    Parameters
+    ----------
+    free, free_cells
+        Free islands, and their cells: unexplored now, or closed.
+    unexplored, unexplored_cells
+        Unexplored islands, and their cells: closed now.
+    closed_cells
+        Cells of both kinds that are closed now: no place, like an obstacle, but not inflated.
+    """
+
+    free: int = 0
+    free_cells: int = 0
+    unexplored: int = 0
+    unexplored_cells: int = 0
+    closed_cells: int = 0
+
+
+def drop_islands(grid: OccupancyGrid, least_area_m2: float) -> OccupancyGrid:
+    """Leave out the islands of a grid that are smaller than an area.
+
+    An island is a 4-connected set of cells of one class. A free island below the area becomes
+    unexplored. An unexplored one below it, after that, is closed: it counts as occupied in
+    `classes`, is no place, and is not inflated. It stays where it joins two free areas, so that
+    what is connected for a robot that may enter unexplored cells stays connected. No cell becomes
+    free, no occupied cell anything else, and free sets of that area or more keep every cell: their
+    paths are the same as before.
+
+    Parameters
+    ----------
+    grid
+        The map; unchanged.
+    least_area_m2
+        Square metres that an island must have to be kept, finite; 0 keeps all of them. What the
+        robot's radius takes does not count.
+
+    Returns
+    -------
+    OccupancyGrid
+        The same map with `least_island_m2` set; `dropped` counts what was left out.
+
+    Raises
+    ------
+    InvalidValueError
+        When the area is negative or not finite.
+    """
+    return replace(grid, least_island_m2=least_area_m2)
+
+
+def without_islands(
+    classes: ByteArray, *, least_area_m2: float, cell_area_m2: float
+) -> tuple[ByteArray, DroppedIslands]:
+    """Drop the islands of an array of classes; see `drop_islands`.
+
+    Parameters
+    ----------
+    classes
+        uint8 `CellClass`, shape `(rows, cols)`.
+    least_area_m2, cell_area_m2
+        Square metres that an island must have, >= 0, and that a cell has.
+
+    Returns
+    -------
+    ByteArray
+        A new array of the same shape.
+    DroppedIslands
+        What was dropped.
+    """
+    least_cells = math.ceil(least_area_m2 / cell_area_m2 * (1 - _ROUNDING))
+    free_of, areas = _islands(classes == CellClass.FREE)
+    small = areas < least_cells
+    small[0] = False
+    specks = small[free_of]
+    kept = np.where(specks, np.uint8(CellClass.UNEXPLORED), classes)
+    free_of[specks] = 0
+
+    island_of, areas = _islands(kept == CellClass.UNEXPLORED)
+    closed = (areas < least_cells) & (_free_neighbours(island_of, free_of) <= 1)
+    closed[0] = False
+    shut = closed[island_of]
+    kept[shut] = CellClass.OCCUPIED
+    unexplored = shut & (classes == CellClass.UNEXPLORED)
+    return kept, DroppedIslands(
+        free=int(np.count_nonzero(small)),
+        free_cells=int(np.count_nonzero(specks)),
+        unexplored=len(np.unique(island_of[unexplored])),
+        unexplored_cells=int(np.count_nonzero(unexplored)),
+        closed_cells=int(np.count_nonzero(shut)),
+    )
+
+
+def _islands(cells: BoolArray) -> tuple[IntArray, LongArray]:
+    """4-connected sets of some cells, numbered from 1, 0 elsewhere; and the cells of each."""
+    from scipy import ndimage  # noqa: PLC0415 - half a second that most grids do not need
+
+    label_of, count = ndimage.label(cells)
+    areas = np.bincount(label_of.ravel(), minlength=count + 1)
+    return label_of.astype(np.int32, copy=False), areas.astype(np.int64, copy=False)
+
+
+def _free_neighbours(island_of: IntArray, free_of: IntArray) -> LongArray:
+    """How many free sets are 4-adjacent to each island, int64 (n_islands + 1,)."""
+    pairs = []
+    for axis in (0, 1):
+        island, free = np.moveaxis(island_of, axis, 0), np.moveaxis(free_of, axis, 0)
+        for one, other in ((island[:-1], free[1:]), (island[1:], free[:-1])):
+            beside = (one > 0) & (other > 0)
+            pairs.append(np.stack([one[beside], other[beside]], axis=1))
+    islands = np.unique(np.concatenate(pairs), axis=0)[:, 0]
+    counts = np.bincount(islands, minlength=int(island_of.max(initial=0)) + 1)
+    return counts.astype(np.int64, copy=False)
