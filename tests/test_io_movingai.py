@@ -85,7 +85,7 @@ def test_thresholds_are_recorded_and_change_no_class(write):
         ("type octile\nheight 0\nwidth 4\nmap\n", "height"),
         ("type octile\nheight 3\nwidth 99999999999999999999\nmap\n", "width"),
         ("type octile\nheight 900000\nwidth 900000\nmap\n", "at most"),
-        ("type octile\nheight 10000\nwidth 10000\nmap\n....", "line 5: 4 characters"),
+        ("type octile\nheight 4000\nwidth 4000\nmap\n....", "line 5: 4 characters"),
         (HEADER + "....\n....\n", "only 2 rows, expected 3"),
         (HEADER + BODY + "....\n", "at least 4 rows, expected 3"),
         (HEADER + "....\n...\n....\n", "line 6: 3 characters, expected 4"),

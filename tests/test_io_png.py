@@ -21,6 +21,10 @@ ADAM7 = (
 """First row and column of each pass of an interlaced PNG, and the steps."""
 
 
+def _any_size(cols, rows):
+    """Accept every size."""
+
+
 def _pixels(mode):
     rng = np.random.default_rng(5)
     if mode == "I;16":
@@ -62,7 +66,7 @@ def read(tmp_path):
     def read(content):
         path.write_bytes(content)
         try:
-            return read_raster(path, what="image")
+            return read_raster(path, what="image", check_size=_any_size)
         except MapError as error:
             text = str(error)
         assert text.isprintable()
@@ -143,4 +147,4 @@ def test_the_message_says_what_is_damaged(tmp_path, content, words):
     path = tmp_path / "m.png"
     path.write_bytes(content)
     with pytest.raises(MapError, match=words):
-        read_raster(path, what="image")
+        read_raster(path, what="image", check_size=_any_size)

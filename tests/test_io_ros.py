@@ -136,8 +136,8 @@ def test_what_is_not_opaque_was_never_measured(write, mode):
         Image.fromarray(np.array(pixels, dtype=np.uint8), "LA").convert("RGBA"),
     ):
         path = write(image, mode=mode)
-        for overrides in ({}, {"free_threshold": 0.98, "occupied_threshold": 0.99}):
-            grid = load_map(path, **overrides)
+        for low, high in ((None, None), (0.98, 0.99)):
+            grid = load_map(path, free_threshold=low, occupied_threshold=high)
             np.testing.assert_array_equal(grid.classes, [[FREE, UNEXPLORED, OCCUPIED, UNEXPLORED]])
             np.testing.assert_array_equal(np.isnan(grid.probability), [[0, 1, 0, 1]])
 
@@ -200,9 +200,9 @@ def test_overrides_replace_the_thresholds_of_the_file(write):
     grid = load_map(path, free_threshold=0.5, occupied_threshold=0.9)
     np.testing.assert_array_equal(grid.classes, [[OCCUPIED, FREE, FREE]])
     assert (grid.free_threshold, grid.occupied_threshold) == (0.5, 0.9)
-    for overrides in ({"free_threshold": 0.7}, {"occupied_threshold": 0.1}):
+    for low, high in ((0.7, None), (None, 0.1)):
         with pytest.raises(InvalidValueError, match="thresh"):
-            load_map(path, **overrides)
+            load_map(path, free_threshold=low, occupied_threshold=high)
     with pytest.raises(InvalidValueError, match="radius"):
         load_map(path, robot_radius_m=math.nan)
 

@@ -7,7 +7,8 @@ import os
 import sys
 import time
 from contextlib import contextmanager, nullcontext
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from hybridnav.cli.errors import UsageError
 from hybridnav.config import load_preset
 from hybridnav.config.preset import is_preset_name
 from hybridnav.config.yaml_file import printable
+from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
     from hybridnav.config import Preset
 
+_SMOOTH = ("none", "line-of-sight")
 _PICTURES = (".pdf", ".png", ".svg")
 
 
@@ -73,7 +76,12 @@ def read_preset(source: str) -> Preset:
 
 
 def read_settings(
-    preset: str, overrides: list[str] | None, radius_m: float | None, seed: int | None
+    preset: str,
+    overrides: list[str] | None,
+    radius_m: float | None,
+    seed: int | None,
+    *,
+    smooth: str | None = None,
 ) -> Preset:
     """A preset with the settings of the command line, which win over it.
 
@@ -85,6 +93,10 @@ def read_settings(
         settings.append(f"pyramid.robot_radius_m={radius_m!r}")
     if seed is not None:
         settings.append(f"pyramid.seed={seed}")
+    if smooth is not None:
+        if smooth not in _SMOOTH:
+            raise UsageError(f"--smooth must be one of {', '.join(_SMOOTH)}, got {smooth!r:.80}")
+        settings.append(f"planner.smooth={smooth}")
     try:
         return load_preset(plain, overrides=settings)
     except hn.PresetError as error:
@@ -107,10 +119,54 @@ def check_picture(path: Path | None) -> None:
         raise UsageError(f"--plot must name a file, {str(path)!r} is a folder")
 
 
-def load_grid(path: Path, preset: Preset, seconds: dict[str, float]) -> hn.OccupancyGrid:
-    """Load a map, inflated as a preset says."""
+@dataclass(frozen=True)
+class Reading:
+    """How a command reads its map."""
+
+    free_threshold: float | None = None
+    occupied_threshold: float | None = None
+    least_island_m2: float = 0.0
+    max_cells: int = DEFAULT_MAX_CELLS
+
+
+def load_grid(
+    path: Path, preset: Preset, seconds: dict[str, float], reading: Reading
+) -> hn.OccupancyGrid:
+    """Load a map, inflated as a preset states, without the islands that were not asked for."""
     with stage(f"reading {path}", seconds, "load"):
-        return hn.load_map(path, robot_radius_m=preset.pyramid.robot_radius_m)
+        grid = hn.load_map(
+            path,
+            robot_radius_m=preset.pyramid.robot_radius_m,
+            free_threshold=reading.free_threshold,
+            occupied_threshold=reading.occupied_threshold,
+            max_cells=reading.max_cells,
+        )
+        if reading.least_island_m2 == 0:
+            return grid
+        whole, grid = grid, hn.drop_islands(grid, reading.least_island_m2)
+    if whole.enterable().any() and not grid.enterable().any():
+        raise UsageError(
+            f"--least-island {reading.least_island_m2:g} leaves no free cell on "
+            f"{printable(grid.name)}: give a smaller area"
+        )
+    return grid
+
+
+def islands_line(grid: hn.OccupancyGrid) -> list[str]:
+    """The line of a summary on islands, none where they were not to be dropped."""
+    dropped = grid.dropped
+    if dropped is None:
+        return []
+    free = f"{dropped.free:,} free ({dropped.free_cells:,} cells)"
+    unexplored = f"{dropped.unexplored:,} unexplored ({dropped.unexplored_cells:,} cells)"
+    return [f"islands    below {grid.least_island_m2:g} m² dropped: {free}, {unexplored}"]
+
+
+def islands_figures(grid: hn.OccupancyGrid) -> dict[str, Any]:
+    """What JSON holds on islands: null where they were not to be dropped."""
+    if grid.dropped is None:
+        return {"dropped_islands": None}
+    return {"dropped_islands": {"least_area_m2": grid.least_island_m2, **asdict(grid.dropped)}}
 
 
 def check_radius(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) -> None:

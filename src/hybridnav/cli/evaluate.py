@@ -10,6 +10,8 @@ import typer
 
 from hybridnav.cli.common import answer, complain, read_settings
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
+from hybridnav.cli.options import MaxCellsOption
+from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -90,6 +92,7 @@ def evaluate(
     robot_radius_m: RadiusOption = None,
     merge_distance_m: DistanceOption = None,
     corner_cutting: CornersOption = False,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     timeout_s: TimeoutOption = 600.0,
 ) -> None:
     """Measure consistency, loss and efficiency of methods on maps, pair by pair.
@@ -114,6 +117,7 @@ def evaluate(
         robot_radius_m=robot_radius_m,
         merge_distance_m=merge_distance_m,
         corner_cutting=corner_cutting,
+        max_cells=max_cells,
         workers=workers,
         scheduler=scheduler,
         timeout_s=timeout_s,

@@ -28,6 +28,45 @@ PlotOption = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw a picture: .png, .pdf or .svg.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+SmoothOption = Annotated[
+    str | None,
+    typer.Option(
+        "--smooth",
+        metavar="HOW",
+        help="Shorten the path: none or line-of-sight; else the preset's.",
+    ),
+]
+FreeOption = Annotated[
+    float | None,
+    typer.Option(
+        "--free-threshold",
+        metavar="P",
+        help="Occupancy up to which a cell is free; else the map's.",
+    ),
+]
+OccupiedOption = Annotated[
+    float | None,
+    typer.Option(
+        "--occupied-threshold",
+        metavar="P",
+        help="Occupancy from which on a cell is occupied; else the map's.",
+    ),
+]
+LeastIslandOption = Annotated[
+    float,
+    typer.Option(
+        "--least-island",
+        metavar="A",
+        min=0,
+        help="Leave out islands of free or unexplored cells below A square metres.",
+    ),
+]
+MaxCellsOption = Annotated[
+    int,
+    typer.Option(
+        "--max-cells", metavar="N", min=1, help="The most cells that a map may have to be read."
+    ),
+]
 RoomsOption = Annotated[
     Path | None,
     typer.Option(

@@ -10,11 +10,14 @@ import typer
 
 import hybridnav as hn
 from hybridnav.cli.common import (
+    Reading,
     answer,
     check_picture,
     check_radius,
     extent,
     grow_topology,
+    islands_figures,
+    islands_line,
     load_grid,
     outside,
     read_settings,
@@ -23,17 +26,23 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import (
+    FreeOption,
     JsonOption,
+    LeastIslandOption,
     MapArgument,
+    MaxCellsOption,
+    OccupiedOption,
     PlotOption,
     PresetOption,
     RadiusOption,
     RoomsOption,
     SeedOption,
     SetOption,
+    SmoothOption,
 )
 from hybridnav.cli.tour import Errand, parsed_stop, run_errand
 from hybridnav.config.yaml_file import printable
+from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -123,6 +132,11 @@ def plan(
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,
+    smooth: SmoothOption = None,
+    free_threshold: FreeOption = None,
+    occupied_threshold: OccupiedOption = None,
+    least_island_m2: LeastIslandOption = 0.0,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     compare: CompareOption = False,
     plot: PlotOption = None,
     as_json: JsonOption = False,
@@ -132,7 +146,8 @@ def plan(
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     check_picture(plot)
-    settings = read_settings(preset, overrides, robot_radius_m, seed)
+    settings = read_settings(preset, overrides, robot_radius_m, seed, smooth=smooth)
+    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
@@ -155,6 +170,7 @@ def plan(
             settings,
             plot,
             as_json,
+            reading,
             alternatives,
             least_hole_m2,
         )
@@ -163,19 +179,20 @@ def plan(
         return
     start, goal = ends
     seconds: dict[str, float] = {}
-    grid = load_grid(map_file, settings, seconds)
+    grid = load_grid(map_file, settings, seconds, reading)
     check_radius(grid, allow_unexplored=settings.planner.allow_unexplored)
     status = outside(grid, ends) if plot is None else None
     if status is not None:
         refused = hn.PlanResult(status, settings=_told(settings))
-        figures = _figures(map_file, refused, seconds) | _whole_grid(refused, None, asked=compare)
+        figures = _figures(map_file, refused, seconds) | islands_figures(grid)
+        figures |= _whole_grid(refused, None, asked=compare)
         _answer(grid, ends, figures, as_json=as_json)
         raise typer.Exit(EXIT_NOT_SOLVED)
     topology = grow_topology(grid, settings, seconds)
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=settings)
     result = planner.plan(start, goal)
-    figures = _figures(map_file, result, seconds)
+    figures = _figures(map_file, result, seconds) | islands_figures(grid)
     if compare:
         figures |= _compare(topology, settings, (start, goal), result)
     _answer(grid, (start, goal), figures, as_json=as_json)
@@ -283,6 +300,7 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
         f"query      {printable(grid.name)}, {start} to {goal}, {radius}",
         f"status     {figures['status']}",
     ]
+    lines += islands_line(grid)
     if "outside" in figures["status"]:
         lines.append(f"extent     {extent(grid)}")
     if figures["length_m"] is not None and figures["lower_bound_m"] is None:

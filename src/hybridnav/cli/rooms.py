@@ -10,18 +10,31 @@ import typer
 
 import hybridnav as hn
 from hybridnav.cli.common import (
+    Reading,
     answer,
     check_picture,
     check_radius,
     complain,
+    islands_line,
     load_grid,
     read_settings,
     stage,
     timings,
 )
 from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import MapArgument, PlotOption, PresetOption, RadiusOption, RoomsOption
+from hybridnav.cli.options import (
+    FreeOption,
+    LeastIslandOption,
+    MapArgument,
+    MaxCellsOption,
+    OccupiedOption,
+    PlotOption,
+    PresetOption,
+    RadiusOption,
+    RoomsOption,
+)
 from hybridnav.config.yaml_file import printable
+from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.rooms import NO_ROOM, Segmentation
 
 OutOption = Annotated[
@@ -60,6 +73,10 @@ def rooms(
     rooms_file: RoomsOption = None,
     preset: PresetOption = "balanced",
     robot_radius_m: RadiusOption = None,
+    free_threshold: FreeOption = None,
+    occupied_threshold: OccupiedOption = None,
+    least_island_m2: LeastIslandOption = 0.0,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     force: ForceOption = False,
     plot: PlotOption = None,
 ) -> None:
@@ -78,7 +95,8 @@ def rooms(
         raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
     settings = read_settings(preset, None, robot_radius_m, None)
     seconds: dict[str, float] = {}
-    grid = load_grid(map_file, settings, seconds)
+    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
+    grid = load_grid(map_file, settings, seconds, reading)
     check_radius(grid)
     with stage("finding rooms", seconds, "rooms"):
         labels = (
@@ -102,7 +120,9 @@ def rooms(
     topology = hn.TopologicalMap(pyramid)
     if out is not None:
         hn.save_rooms(out, _enterable(labels, topology), grid)
-    answer(_listing(topology) + f"\nseconds    {timings(seconds)}\n")
+    answer(
+        "\n".join([_listing(topology), *islands_line(grid)]) + f"\nseconds    {timings(seconds)}\n"
+    )
     if plot is not None:
         from hybridnav.viz import plot_rooms, save_figure  # noqa: PLC0415 - matplotlib on demand
 

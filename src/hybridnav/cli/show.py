@@ -8,17 +8,23 @@ import numpy as np
 import typer
 
 from hybridnav.cli.common import (
+    Reading,
     answer,
     check_picture,
     extent,
     grow_topology,
+    islands_line,
     load_grid,
     read_settings,
     timings,
 )
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
+    FreeOption,
+    LeastIslandOption,
     MapArgument,
+    MaxCellsOption,
+    OccupiedOption,
     PlotOption,
     PresetOption,
     RadiusOption,
@@ -26,7 +32,7 @@ from hybridnav.cli.options import (
     SetOption,
 )
 from hybridnav.config.yaml_file import printable
-from hybridnav.grid import CellClass
+from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
 
 if TYPE_CHECKING:
     import hybridnav as hn
@@ -46,13 +52,18 @@ def show(
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,
+    free_threshold: FreeOption = None,
+    occupied_threshold: OccupiedOption = None,
+    least_island_m2: LeastIslandOption = 0.0,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     plot: PlotOption = None,
 ) -> None:
     """Show the classes of MAP's cells and the levels of its pyramid."""
     check_picture(plot)
     settings = read_settings(preset, overrides, robot_radius_m, seed)
     seconds: dict[str, float] = {}
-    grid = load_grid(map_file, settings, seconds)
+    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
+    grid = load_grid(map_file, settings, seconds, reading)
     pyramid = grow_topology(grid, settings, seconds).pyramid
     if not -len(pyramid) <= level < len(pyramid):
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
@@ -71,13 +82,16 @@ def _describe_map(pyramid: hn.DualGraphPyramid) -> str:
     rows, cols = grid.shape
     size = f"{cols} x {rows} cells of {grid.resolution_m:g} m"
     size_m = f"{cols * grid.resolution_m:.2f} x {rows * grid.resolution_m:.2f} m"
-    counts = ", ".join(f"{n:,} {name}" for name, n in grid.class_counts().items())
+    cells = grid.class_counts()
+    closed = f", {cells.pop('closed'):,} closed with islands" if "closed" in cells else ""
+    counts = ", ".join(f"{n:,} {name}" for name, n in cells.items())
     built = f"linkage {pyramid.linkage}, seed {pyramid.seed}"
     return "\n".join(
         [
             f"map        {printable(grid.name)}, {size}, {size_m}",
             f"extent     {extent(grid)}",
-            f"cells      {counts} by a robot radius of {grid.robot_radius_m:g} m",
+            f"cells      {counts} by a robot radius of {grid.robot_radius_m:g} m{closed}",
+            *islands_line(grid),
             f"pyramid    U_d {pyramid.merge_distance_m:g} m, {built}",
         ]
     )

@@ -12,11 +12,14 @@ import numpy as np
 
 import hybridnav as hn
 from hybridnav.cli.common import (
+    Reading,
     answer,
     check_radius,
     complain,
     extent,
     grow_topology,
+    islands_figures,
+    islands_line,
     load_grid,
     outside,
     stage,
@@ -45,6 +48,7 @@ class Errand:
     settings: hn.Preset
     plot: Path | None
     as_json: bool
+    reading: Reading
     alternatives: int = 1
     least_hole_m2: float = 1.0
 
@@ -52,7 +56,7 @@ class Errand:
 def run_errand(errand: Errand) -> bool:
     """Plan a way between rooms and points, and tell it; gives whether there is one."""
     seconds: dict[str, float] = {}
-    grid = load_grid(errand.map_file, errand.settings, seconds)
+    grid = load_grid(errand.map_file, errand.settings, seconds, errand.reading)
     check_radius(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
     status = outside(grid, errand.stops) if errand.plot is None else None
     if status is not None:
@@ -88,6 +92,7 @@ def run_errand(errand: Errand) -> bool:
 
 
 def _answer(errand: Errand, grid: hn.OccupancyGrid, figures: dict[str, Any]) -> None:
+    figures = figures | islands_figures(grid)
     whole = json.dumps(figures, allow_nan=False) + "\n"
     answer(whole if errand.as_json else _summary(grid, figures))
 
@@ -179,6 +184,7 @@ def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
         f"query      {printable(grid.name)}, {figures['query']}, {radius}",
         f"status     {figures['status']}",
     ]
+    lines += islands_line(grid)
     if "outside" in figures["status"]:
         lines.append(f"extent     {extent(grid)}")
     if figures["length_m"] is not None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import MapError
+from hybridnav.grid import MAX_CELLS
 from hybridnav.harness.analysis import Outcome, Study, load_study, nanquantile, query_key
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.paths import decode_path
@@ -195,7 +196,9 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
     if "file" not in about:
         return None
     try:
-        grid = read_map(MapSpec(about["file"], about["robot_radius_m"], about["corner_cutting"]))
+        # As large as it may be: the run has read it.
+        spec = MapSpec(about["file"], about["robot_radius_m"], about["corner_cutting"], MAX_CELLS)
+        grid = read_map(spec)
     except MapError:  # it is no longer there
         return None
     if map_digest(grid) != about["map_sha"]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.harness.methods import REFERENCE, MethodSpec, baseline_spec, preset_spec
 from hybridnav.harness.pairs import (
     SAMPLER_VERSION,
@@ -62,6 +63,8 @@ class RunSettings:
     merge_distance_m: float | None = None
     """None: the preset's for ROS maps (4 m for baselines), 40 m for MovingAI's."""
     corner_cutting: bool = False
+    max_cells: int = DEFAULT_MAX_CELLS
+    """The most cells that a map may have; see `load_map`."""
     workers: int = 1
     scheduler: str | None = None
     """Address of a dask.distributed scheduler, instead of processes of this machine."""
@@ -155,7 +158,7 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
         merge_distance_m = MOVINGAI_MERGE_DISTANCE_M
     if merge_distance_m is not None and not merge_distance_m > 0:
         raise InvalidValueError(f"the merge distance must be positive, got {merge_distance_m} m")
-    spec = MapSpec(str(Path(name).resolve()), radius_m, settings.corner_cutting)
+    spec = MapSpec(str(Path(name).resolve()), radius_m, settings.corner_cutting, settings.max_cells)
     grid = read_map(spec)
     digest = map_digest(grid)
     pairs = _pairs_of(settings, grid)

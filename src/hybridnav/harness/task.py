@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import HybridNavError, InvalidValueError, MapWarning
-from hybridnav.grid import CellClass
+from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
 from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
@@ -36,6 +36,7 @@ class MapSpec:
     path: str
     robot_radius_m: float
     corner_cutting: bool = False
+    max_cells: int = DEFAULT_MAX_CELLS
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ def read_map(spec: MapSpec) -> OccupancyGrid:
     """The grid of a map file; the last two are kept."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MapWarning)
-        grid = load_map(spec.path, robot_radius_m=spec.robot_radius_m)
+        grid = load_map(spec.path, robot_radius_m=spec.robot_radius_m, max_cells=spec.max_cells)
     return replace(grid, corner_cutting=True) if spec.corner_cutting else grid
 
 

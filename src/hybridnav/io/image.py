@@ -16,7 +16,10 @@ from hybridnav.grid import MAX_CELLS
 from hybridnav.io.png import DamagedPngError, check_png
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
+    from PIL import ImageFile
 
     from hybridnav._typing import BoolArray, PathLike
 
@@ -48,7 +51,7 @@ class Raster:
     opaque: BoolArray | None
 
 
-def read_raster(path: PathLike, *, what: str) -> Raster:
+def read_raster(path: PathLike, *, what: str, check_size: Callable[[int, int], None]) -> Raster:
     """Read an image of one to four channels.
 
     Parameters
@@ -57,6 +60,8 @@ def read_raster(path: PathLike, *, what: str) -> Raster:
         The image file; of an animation the first frame.
     what
         What the image is to its reader, as messages begin with it.
+    check_size
+        Called with columns and rows before any pixel is read: raises when there are too many.
 
     Returns
     -------
@@ -78,6 +83,8 @@ def read_raster(path: PathLike, *, what: str) -> Raster:
         # What Pillow warns of (size, stray metadata) is either checked here or of no consequence.
         warnings.simplefilter("ignore")
         image = _open(stream, where)
+        _check_extent(image, stream, where)
+        check_size(*image.size)
         try:
             if image.format == "PNG":
                 check_png(stream)
@@ -96,7 +103,7 @@ class _UnsupportedPixelsError(Exception):
     pass
 
 
-def _open(stream: BinaryIO, where: str) -> Image.Image:
+def _open(stream: BinaryIO, where: str) -> ImageFile.ImageFile:
     try:
         image = Image.open(stream, formats=_FORMATS)
     except Image.DecompressionBombError as failure:
@@ -106,6 +113,11 @@ def _open(stream: BinaryIO, where: str) -> Image.Image:
         raise MapError(f"{where}: {problem}") from None
     except Exception as failure:  # noqa: BLE001 - Pillow's header parsers raise anything
         raise MapError(f"{where}: damaged header ({_brief(failure)})") from None
+    return image
+
+
+def _check_extent(image: ImageFile.ImageFile, stream: BinaryIO, where: str) -> None:
+    """Refuse a file that cannot hold the pixels of its header."""
     width, height = image.size
     if width * height > MAX_CELLS:
         raise MapError(f"{where}: {width} x {height} pixels, a grid holds at most {MAX_CELLS}")
@@ -118,7 +130,6 @@ def _open(stream: BinaryIO, where: str) -> Image.Image:
         raise MapError(f"{where}: truncated, the file does not hold all {height} rows")
     if image.format == "PPM":
         _check_comments(stream, where)
-    return image
 
 
 def _check_comments(stream: BinaryIO, where: str) -> None:

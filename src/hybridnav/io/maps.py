@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from hybridnav.config.yaml_file import printable
 from hybridnav.errors import MapError
+from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.io.movingai import load_movingai_map
 from hybridnav.io.ros import load_ros_map
 
@@ -24,6 +25,7 @@ def load_map(
     robot_radius_m: float | None = None,
     free_threshold: float | None = None,
     occupied_threshold: float | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
 ) -> OccupancyGrid:
     """Load an occupancy grid from a file.
 
@@ -36,6 +38,10 @@ def load_map(
         occupied cell. 0 for a robot that is a point; None is the default, 0.25 m.
     free_threshold, occupied_threshold
         U1 and U2: occupancy up to U1 is free, from U2 on occupied. By default what the file says.
+    max_cells
+        The most cells that the map may have, to be known from the header before memory is taken:
+        a small file may hold a huge map. A cell takes about 50 bytes while the map is read, and up
+        to 300 for planning.
 
     Returns
     -------
@@ -47,9 +53,10 @@ def load_map(
     MapNotFoundError
         When the file, or the image that it names, is not there.
     MapError
-        When a file cannot be read; one line that says what is wrong and where.
+        When a file cannot be read, or holds more than `max_cells`; one line that says what is wrong
+        and where.
     InvalidValueError
-        When the radius or a threshold is out of range.
+        When the radius, a threshold or the limit is out of range.
 
     Warns
     -----
@@ -70,4 +77,5 @@ def load_map(
         robot_radius_m=robot_radius_m,
         free_threshold=free_threshold,
         occupied_threshold=occupied_threshold,
+        max_cells=max_cells,
     )

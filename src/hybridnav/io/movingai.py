@@ -11,7 +11,8 @@ import numpy as np
 
 from hybridnav.config.yaml_file import open_file, printable
 from hybridnav.errors import MapError, MapNotFoundError
-from hybridnav.grid import MAX_CELLS, OccupancyGrid
+from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
+from hybridnav.io.size import check_max_cells, check_size
 
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, PathLike
@@ -59,6 +60,7 @@ def load_movingai_map(
     robot_radius_m: float | None = None,
     free_threshold: float | None = None,
     occupied_threshold: float | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
 ) -> OccupancyGrid:
     """Load an octile map: cells of 1 m, the lower-left corner at (0, 0).
 
@@ -71,6 +73,8 @@ def load_movingai_map(
         a cell, as that is, blocks no further cells.
     free_threshold, occupied_threshold
         U1 and U2 of the grid; every cell has the occupancy 0 or 1, so none changes the classes.
+    max_cells
+        The most cells that the map may have; see `load_map`.
 
     Returns
     -------
@@ -82,13 +86,15 @@ def load_movingai_map(
     MapNotFoundError
         When the file is not there.
     MapError
-        When it is no such map; the text names the line.
+        When it is no such map, or holds too many cells; the text names the line.
     InvalidValueError
-        When the radius or a threshold is out of range.
+        When the radius, a threshold or the limit is out of range.
     """
+    check_max_cells(max_cells)
     where = f"map {printable(path)}"
     with open_file(path, what="map", error=MapError, missing=MapNotFoundError) as stream:
         rows, cols, line = _read_header(stream, where)
+        check_size(cols, rows, max_cells=max_cells, where=where)
         # Two bytes may end a line; a few more than fit are read, to notice what does not belong.
         body = stream.read(rows * (cols + 2) + _MAX_LINE)
     occupied = _occupied(body, (rows, cols), line + 1, where)
@@ -112,8 +118,6 @@ def _read_header(stream: BinaryIO, where: str) -> tuple[int, int, int]:
             if fields.get(b"type") != b"octile":
                 raise MapError(f"{where}: the header lacks 'type octile'")
             rows, cols = (_extent(fields, key, where) for key in (b"height", b"width"))
-            if rows * cols > MAX_CELLS:
-                raise MapError(f"{where}: {rows} x {cols} cells, a grid holds at most {MAX_CELLS}")
             return rows, cols, number
         if len(words) == 2:  # noqa: PLR2004
             fields[words[0]] = words[1]

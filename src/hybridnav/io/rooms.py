@@ -164,14 +164,18 @@ def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGr
 def _label_image(data: Any, path: Path, where: str, grid: OccupancyGrid, n_rooms: int) -> IntArray:
     if not isinstance(data, str) or not data:
         raise RoomsError(f"{where}: data must be the path of an image, got {reprlib.repr(data)}")
+
+    def check_size(cols: int, rows: int) -> None:
+        if (rows, cols) != grid.shape:
+            raise RoomsError(
+                f"{where}: image of {cols} x {rows} pixels, the map has {grid.shape[::-1]} cells"
+            )
+
     try:
-        raster = read_raster(path.parent / data, what=f"{where}: image")
+        raster = read_raster(path.parent / data, what=f"{where}: image", check_size=check_size)
     except MapNotFoundError as error:
         raise RoomsNotFoundError(str(error)) from None
     level = raster.level[::-1]
-    if level.shape != grid.shape:
-        size = "{1} x {0}".format(*level.shape)
-        raise RoomsError(f"{where}: image of {size} pixels, the map has {grid.shape[::-1]} cells")
     return np.where(level < n_rooms, level.astype(np.int32), np.int32(NO_ROOM))
 
 

@@ -6,6 +6,7 @@ import math
 import reprlib
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,9 @@ import numpy as np
 
 from hybridnav.config.yaml_file import printable, read_yaml
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning
-from hybridnav.grid import Frame, OccupancyGrid
+from hybridnav.grid import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.io.image import Raster, read_raster
+from hybridnav.io.size import check_max_cells, check_size
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,6 +37,7 @@ def load_ros_map(
     robot_radius_m: float | None = None,
     free_threshold: float | None = None,
     occupied_threshold: float | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
 ) -> OccupancyGrid:
     """Load a map of ROS's map_server.
 
@@ -51,6 +54,8 @@ def load_ros_map(
         is the default, 0.25 m.
     free_threshold, occupied_threshold
         U1 and U2 instead of the file's `free_thresh` and `occupied_thresh`.
+    max_cells
+        The most cells that the map may have; see `load_map`.
 
     Returns
     -------
@@ -62,17 +67,27 @@ def load_ros_map(
     MapNotFoundError
         When the YAML file or the image that it names is not there.
     MapError
-        When one of them cannot be read; the text names the file and the key.
+        When one of them cannot be read, or holds too many cells; the text names the file and the
+        key.
     InvalidValueError
-        When the radius or a threshold that was given is out of range.
+        When the radius, a threshold or the limit that was given is out of range.
 
     Warns
     -----
     MapWarning
         When the thresholds call grey 205, the usual mark of unknown cells, free.
     """
+    check_max_cells(max_cells)
     description = _read_description(Path(path), free_threshold, occupied_threshold)
-    raster = read_raster(description.image, what=f"{description.where}: image")
+    raster = read_raster(
+        description.image,
+        what=f"{description.where}: image",
+        check_size=partial(
+            check_size,
+            max_cells=max_cells,
+            where=f"{description.where}: image {printable(description.image)}",
+        ),
+    )
     probability = _probability(raster, description)
     grid = OccupancyGrid(
         probability,

@@ -1,0 +1,53 @@
+"""How large a map may be, said before its cells are read."""
+
+from __future__ import annotations
+
+from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.grid import MAX_CELLS
+
+_READING_BYTES = 50
+"""A cell, while a map is read and inflated; measured 42 on 16 million cells."""
+_PLANNING_BYTES = 300
+"""A cell, at most, with pyramid and portals; measured 285 on 4 million free cells."""
+_GB = 1e9
+
+
+def check_max_cells(max_cells: int) -> None:
+    """Refuse a limit that is no positive number of cells.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not positive.
+    """
+    if max_cells < 1:
+        raise InvalidValueError(f"max_cells must be a positive number of cells, got {max_cells}")
+
+
+def check_size(cols: int, rows: int, *, max_cells: int, where: str) -> None:
+    """Refuse a map with more cells than a grid holds, or than are asked for.
+
+    Parameters
+    ----------
+    cols, rows
+        As the header of the file states them.
+    max_cells
+        The limit.
+    where
+        The file, as the message begins with it.
+
+    Raises
+    ------
+    MapError
+        When there are more; states the cells, the memory that they take, and the option.
+    """
+    cells = cols * rows
+    if cells > MAX_CELLS:
+        raise MapError(f"{where}: {cols} x {rows} cells, a grid holds at most {MAX_CELLS}")
+    if cells > max_cells:
+        raise MapError(
+            f"{where}: {cols} x {rows} = {cells:,} cells, more than the limit of {max_cells:,}; "
+            f"reading them takes about {_READING_BYTES * cells / _GB:.1f} GB of memory, planning "
+            f"up to {_PLANNING_BYTES * cells / _GB:.1f} GB; raise the limit with "
+            f"--max-cells {cells}, in Python max_cells"
+        )
