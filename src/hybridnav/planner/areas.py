@@ -1,0 +1,159 @@
+"""Areas in metres, and the cells that they close."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import Frame
+
+_SHAPES = ("Polygon", "MultiPolygon", "LineString", "LinearRing", "MultiLineString")
+_FEWEST_POINTS = 3
+_SLACK_CELLS = 1e-6
+"""Depth to which rounding alone may take an area into a cell: 50 nm of a cell of 5 cm, where
+coordinates 1,000 km from the frame's origin are known to 0.1 nm."""
+_FARTHEST_CELLS = 1e12
+"""Coordinates beyond this many cells from the map are taken for a mistake."""
+_CHUNK = 1 << 16
+"""Squares compared with an area in one call; together with the answer it bounds the memory."""
+_QUARTERS = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
+
+
+def checked_area(area: BaseGeometry | ArrayLike) -> BaseGeometry:
+    """Return an area as a geometry that is valid, finite and of a kind that can be closed.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not.
+    """
+    shape = area if isinstance(area, BaseGeometry) else _polygon(area)
+    if shape.geom_type not in _SHAPES:
+        raise InvalidValueError(f"an area must be one of {', '.join(_SHAPES)}, got {shown(area)}")
+    if shape.is_empty:
+        raise InvalidValueError(f"an area needs points, got {shown(area)}")
+    if not np.isfinite(shapely.get_coordinates(shape)).all():
+        raise InvalidValueError(f"an area needs finite coordinates, got {shown(area)}")
+    if not shape.is_valid:
+        reason = shapely.is_valid_reason(shape)
+        raise InvalidValueError(f"an area must be simple, got {shown(area)}: {reason}")
+    return shape
+
+
+def _polygon(corners: ArrayLike) -> BaseGeometry:
+    try:
+        points = np.asarray(corners, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] != 2:  # noqa: PLR2004
+        raise InvalidValueError(
+            f"a polygon must be a geometry or points (x, y) of shape (n, 2), got {shown(corners)}"
+        )
+    if len(points) < _FEWEST_POINTS:
+        raise InvalidValueError(
+            f"a polygon needs at least three points, got {shown(corners)}; "
+            "for a line give a LineString"
+        )
+    if not np.isfinite(points).all():
+        raise InvalidValueError(f"an area needs finite coordinates, got {shown(corners)}")
+    return shapely.Polygon(points)
+
+
+def in_cells(area: BaseGeometry, frame: Frame) -> list[BaseGeometry]:
+    """Return the parts of an area, x along the columns and y along the rows, one unit a cell."""
+    cosine, sine = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
+
+    def turned(points: FloatArray) -> FloatArray:
+        x, y = ((points - np.array(frame.origin_m)) / frame.resolution_m).T
+        return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=1)
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        position = turned(shapely.get_coordinates(area))
+    if not (np.abs(position) <= _FARTHEST_CELLS).all():
+        raise InvalidValueError(
+            f"an area must lie within {_FARTHEST_CELLS:g} cells of the map, got {shown(area)}"
+        )
+    return list(shapely.get_parts(shapely.transform(area, turned)))
+
+
+def runs_near(part: BaseGeometry, shape: tuple[int, int], radius_cells: float) -> LongArray:
+    """Find the flat cells that an area closes, as runs `[start, stop)`, shape (n, 2).
+
+    Squares of cells are quartered as long as the area closes some of their cells and may not close
+    all: work goes with the outline of the area, not with its inside. Distances are exact, where a
+    shapely buffer would cut its arcs short.
+    """
+    left, bottom, right, top = shapely.bounds(part).tolist()
+    margin = radius_cells + 1
+    low = np.floor(np.clip([bottom - margin, left - margin], 0, shape)).astype(np.int64)
+    high = np.ceil(np.clip([top + margin, right + margin], 0, shape)).astype(np.int64)
+    shapely.prepare(part)
+    # An area closes cells that it enters deeper than rounding may take it. What is as thin as that
+    # might slip between cells: for it their squares are half open and leave no gap.
+    thin = radius_cells == 0 and shapely.is_empty(shapely.buffer(part, -2 * _SLACK_CELLS))
+    slack = np.array([-_SLACK_CELLS if thin else _SLACK_CELLS, -_SLACK_CELLS])
+    runs = [np.empty((0, 2), dtype=np.int64)]
+    extent = int((high - low).max()) if (high > low).all() else 0
+    stack = [(low[None], 1 << (extent - 1).bit_length())] if extent else []
+    while stack:
+        first, size = stack.pop()
+        last = np.minimum(first + size, high)
+        box = first + slack[0], last + slack[1]
+        near = _near(part, *box, radius_cells)
+        whole = near.copy()
+        if size > 1:
+            whole[near] = _near_throughout(part, box[0][near], box[1][near], radius_cells)
+        runs.append(_rows_of(first[whole], last[whole], shape[1]))
+        quarters = (first[near & ~whole, None] + size // 2 * _QUARTERS).reshape(-1, 2)
+        quarters = quarters[(quarters < high).all(axis=1)]
+        stack += [(quarters[at : at + _CHUNK], size // 2) for at in range(0, len(quarters), _CHUNK)]
+    return np.concatenate(runs)
+
+
+def _near(part: BaseGeometry, low: FloatArray, high: FloatArray, radius_cells: float) -> BoolArray:
+    """Whether boxes come as near to an area as a radius.
+
+    `intersects`, `covers` and `dwithin` are the predicates that a prepared geometry answers from
+    its index; `relate` would tell inside from rim, but the slack on the boxes does that already.
+    """
+    boxes = shapely.box(low[:, 1], low[:, 0], high[:, 1], high[:, 0])
+    if radius_cells == 0:
+        return shapely.intersects(part, boxes)
+    return shapely.dwithin(part, boxes, radius_cells)
+
+
+def _near_throughout(
+    part: BaseGeometry, low: FloatArray, high: FloatArray, radius_cells: float
+) -> BoolArray:
+    """Whether all points of boxes are surely as near to an area as a radius."""
+    inside = shapely.covers(part, shapely.box(low[:, 1], low[:, 0], high[:, 1], high[:, 0]))
+    reach = radius_cells - np.hypot(*(high - low).T) / 2
+    middles = shapely.points((low + high)[:, ::-1] / 2)
+    found: BoolArray = inside | (
+        (reach >= 0) & shapely.dwithin(part, middles, np.maximum(reach, 0))
+    )
+    return found
+
+
+def _rows_of(first: LongArray, last: LongArray, cols: int) -> LongArray:
+    """Rows of rectangles of cells as runs of flat cells."""
+    heights = last[:, 0] - first[:, 0]
+    which = np.repeat(np.arange(len(first)), heights)
+    down = np.arange(len(which)) - (np.cumsum(heights) - heights)[which]
+    start = (first[which, 0] + down) * cols
+    return np.stack([start + first[which, 1], start + last[which, 1]], axis=1)
+
+
+def shown(value: object) -> str:
+    """Return a value in one short line, as messages quote it."""
+    return " ".join(f"{value!r:.80}".split())

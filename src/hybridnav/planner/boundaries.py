@@ -1,0 +1,79 @@
+"""Boundaries of arcs, and the cells that close them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+
+if TYPE_CHECKING:
+    from hybridnav._typing import LongArray
+    from hybridnav.topology import TopologicalMap
+
+
+def cells_on_boundaries(topology: TopologicalMap, arcs: LongArray) -> list[LongArray]:
+    """Find the flat cells that close each of some arcs.
+
+    A diagonal between two places across a boundary has a cell pair of that boundary among the four
+    cells round its middle, and needs all four: closing one cell of each pair stops it too.
+    """
+    level, cols = topology.level, topology.grid.shape[1]
+    loops = arcs[level.is_self_loop[arcs]]
+    if len(loops):
+        raise InvalidValueError(
+            f"arc {topology.arc_ids[loops[0]]} is a self-loop, closing it would part no places; "
+            "close the place or cells instead"
+        )
+    closed = []
+    for arc in arcs.tolist():
+        pairs = level.boundary(arc) @ np.array([cols, 1])
+        if topology.grid.corner_cutting:
+            # A diagonal past the end of a boundary needs no cell but its own two ends.
+            closed.append(np.unique(pairs))
+            continue
+        ends = level.arcs[arc]
+        beside = np.isin(level.arcs, ends).any(axis=1) & ~level.is_self_loop
+        beside[arcs] = False
+        others = [
+            level.boundary(other) @ np.array([cols, 1]) for other in np.flatnonzero(beside).tolist()
+        ]
+        choices = _choices(pairs, others)
+        costs = [_cost_of(topology, ends.tolist(), choice, others) for choice in choices]
+        closed.append(choices[costs.index(min(costs))])
+    return closed
+
+
+def _choices(pairs: LongArray, others: list[LongArray]) -> list[LongArray]:
+    """Either side of a boundary, and from each pair the cell that is less to other boundaries."""
+    # The share of each other boundary that a cell closes, summed: a door of one cell counts 1.
+    cells = np.concatenate([pairs[:0].ravel(), *(other.ravel() for other in others)])
+    shares = np.concatenate([[], *(np.full(other.size, 1 / len(other)) for other in others)])
+    known, place = np.unique(np.concatenate([pairs.ravel(), cells]), return_inverse=True)
+    share = np.bincount(place[pairs.size :], weights=shares, minlength=len(known))
+    heavier = np.subtract(*share[place[: pairs.size].reshape(pairs.shape)].T) > 0
+    spared = np.where(heavier, pairs[:, 1], pairs[:, 0])
+    return [np.unique(side) for side in (pairs[:, 0], pairs[:, 1], spared)]
+
+
+def _cost_of(
+    topology: TopologicalMap, places: list[int], closed: LongArray, others: list[LongArray]
+) -> tuple[int, int, int]:
+    """Other arcs closed as well; free cells, and all cells, closed or cut off from their place."""
+    from scipy import ndimage  # noqa: PLC0415 - half a second that areas and cells do not need
+
+    level = topology.level
+    arcs = sum(bool(np.isin(other, closed).any(axis=1).all()) for other in others)
+    lost = {CellClass.FREE: 0, CellClass.UNEXPLORED: 0}
+    for place in places:
+        field = level.receptive_field(place)
+        corner = field.min(axis=0)
+        is_open = np.zeros(field.max(axis=0) - corner + 1, dtype=np.bool_)
+        flat = field @ np.array([topology.grid.shape[1], 1])
+        is_open[tuple((field - corner).T)] = ~np.isin(flat, closed)
+        pieces, _ = ndimage.label(is_open)
+        largest = np.bincount(pieces.ravel())[1:].max(initial=0)
+        lost[CellClass(level.classes[place])] += len(field) - int(largest)
+    return arcs, lost[CellClass.FREE], sum(lost.values())
