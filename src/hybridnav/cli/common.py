@@ -10,8 +10,6 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import hybridnav as hn
 from hybridnav.cli.errors import UsageError
 from hybridnav.config import load_preset
@@ -219,14 +217,6 @@ def outside(
         if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
             return hn.PlanStatus.GOAL_OUTSIDE if number else hn.PlanStatus.START_OUTSIDE
     return None
-
-
-def extent(grid: hn.OccupancyGrid) -> str:
-    """The part of the map frame that a map covers; with yaw, its bounding box."""
-    rows, cols = grid.shape
-    corners = grid.frame.points_of_grid(np.array([[0, 0], [0, cols], [rows, 0], [rows, cols]]))
-    low, high = (np.round(c, 2) + 0.0 for c in (corners.min(axis=0), corners.max(axis=0)))  # no -0
-    return f"x {low[0]:.2f} to {high[0]:.2f} m, y {low[1]:.2f} to {high[1]:.2f} m"
 
 
 def timings(seconds: dict[str, float]) -> str:

@@ -14,7 +14,6 @@ from hybridnav.cli.common import (
     answer,
     check_picture,
     check_radius,
-    extent,
     grow_topology,
     islands_figures,
     islands_line,
@@ -43,6 +42,7 @@ from hybridnav.cli.options import (
 from hybridnav.cli.tour import Errand, parsed_stop, run_errand
 from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.grid.occupancy import extent
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,7 +11,6 @@ from hybridnav.cli.common import (
     Reading,
     answer,
     check_picture,
-    extent,
     grow_topology,
     islands_line,
     load_grid,
@@ -33,6 +32,7 @@ from hybridnav.cli.options import (
 )
 from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
+from hybridnav.grid.occupancy import extent
 
 if TYPE_CHECKING:
     import hybridnav as hn

@@ -16,7 +16,6 @@ from hybridnav.cli.common import (
     answer,
     check_radius,
     complain,
-    extent,
     grow_topology,
     islands_figures,
     islands_line,
@@ -27,6 +26,7 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.errors import UsageError
 from hybridnav.config.yaml_file import printable
+from hybridnav.grid.occupancy import extent
 
 if TYPE_CHECKING:
     from hybridnav.planner.named import At

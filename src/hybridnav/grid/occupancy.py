@@ -206,6 +206,14 @@ class OccupancyGrid:
         }
 
 
+def extent(grid: OccupancyGrid) -> str:
+    """Describe the part of the map frame that a map covers; with yaw, its bounding box."""
+    rows, cols = grid.shape
+    corners = grid.frame.points_of_grid(np.array([[0, 0], [0, cols], [rows, 0], [rows, cols]]))
+    low, high = (np.round(c, 2) + 0.0 for c in (corners.min(axis=0), corners.max(axis=0)))  # no -0
+    return f"x {low[0]:.2f} to {high[0]:.2f} m, y {low[1]:.2f} to {high[1]:.2f} m"
+
+
 def _check_probability(probability: NDArray[np.float32]) -> None:
     if probability.ndim != 2 or probability.size == 0:  # noqa: PLR2004
         raise InvalidValueError(

@@ -13,6 +13,7 @@ import numpy as np
 from hybridnav.config.yaml_file import Limits, printable, read_yaml
 from hybridnav.errors import InvalidValueError, MapNotFoundError, RoomsError, RoomsNotFoundError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
+from hybridnav.grid.occupancy import extent
 from hybridnav.grid.rooms import check_names
 from hybridnav.io.image import read_raster
 from hybridnav.io.rooms_paint import painted
@@ -188,7 +189,7 @@ def _checked(rings: list[FloatArray], at: str, grid: OccupancyGrid) -> list[Floa
         raise RoomsError(f"{at}: the polygon has no area")
     corners, rim = np.concatenate(rings), np.array(grid.shape[::-1]) + _OUTSIDE_CELLS
     if (corners < -_OUTSIDE_CELLS).any() or (corners > rim).any():
-        raise RoomsError(f"{at}: the polygon leaves the map, which spans {_extent(grid)}")
+        raise RoomsError(f"{at}: the polygon leaves the map, which spans {extent(grid)}")
     return rings
 
 
@@ -212,7 +213,7 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
         row, col = grid.frame.cell_of(*point)
         if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
             raise RoomsError(
-                f"{read.of(room)}: the seed lies outside the map, which spans {_extent(grid)}"
+                f"{read.of(room)}: the seed lies outside the map, which spans {extent(grid)}"
             )
         if grid.classes[row, col] != CellClass.FREE:
             raise RoomsError(f"{read.of(room)}: the seed lies in no free cell")
@@ -257,7 +258,7 @@ def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -
         if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
             raise RoomsError(
                 f"{where}: point {name!r}: ({point[0]:.10g}, {point[1]:.10g}) lies outside the "
-                f"map, which spans {_extent(grid)}"
+                f"map, which spans {extent(grid)}"
             )
         if grid.measured[row, col] == CellClass.OCCUPIED:
             raise RoomsError(
@@ -272,12 +273,6 @@ def in_cells(points: FloatArray, grid: OccupancyGrid) -> FloatArray:
     cosine, sine = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
     x = cosine * offset[:, 0] + sine * offset[:, 1]
     return np.stack([x, cosine * offset[:, 1] - sine * offset[:, 0]], axis=1)
-
-
-def _extent(grid: OccupancyGrid) -> str:
-    corners = grid.frame.points_of_grid(np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * grid.shape)
-    (left, bottom), (right, top) = corners.min(axis=0), corners.max(axis=0)
-    return f"x {left:.2f} to {right:.2f} m, y {bottom:.2f} to {top:.2f} m"
 
 
 def _check_keys(values: dict[Any, Any], known: tuple[str, ...], at: str) -> None:
