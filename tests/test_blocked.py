@@ -19,6 +19,7 @@ import hybridnav as hn
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.grid.worlds import office_world
 from hybridnav.planner.blocked import Blocked, as_blocked
+from hybridnav.pyramid import LevelArc
 from tests.oracle.grid import components, move_graph
 from tests.strategies import drawn, occupancy_grid, scenes
 
@@ -34,6 +35,7 @@ ROOMS = drawn(
     "...............",
     ".......#.......",
 )
+DOOR = hn.Door(3, LevelArc(2, 0), ("kitchen", None), (1.0, 2.0), 0.9)
 PLAIN = settings(max_examples=100, deadline=None, derandomize=True)
 
 
@@ -100,7 +102,11 @@ class Case:
     def closed(self) -> Any:
         """What is tested."""
         topology = empty_map(self.frame, self.shape, self.radius_cells)
-        return mask_of(Blocked(polygons=[self.area]), topology)
+        try:
+            return mask_of(Blocked(polygons=[self.area]), topology)
+        except hn.InvalidValueError as error:
+            assert "must meet the map" in str(error)  # noqa: PT017 - many areas lie off the map
+            return np.zeros(self.shape, dtype=np.bool_)
 
     def reaches(self, cell: tuple[int, int], grown: float) -> bool:
         """Whether the area comes as near to a grown square as the radius, by plain distance."""
@@ -234,11 +240,17 @@ def test_holes_stay_open_and_points_make_a_polygon() -> None:
     assert listed.sum() == 25
 
 
-def test_what_lies_outside_the_map_closes_nothing() -> None:
+@pytest.mark.parametrize("box", [(20, 20, 30, 30), (-9, 0, -1, 7), (0, 8, 7, 9)])
+def test_an_area_outside_the_map_is_refused(box: tuple[float, float, float, float]) -> None:
     topology = empty_map(Frame(), (7, 7), radius_cells=1.0)
-    outside = [shapely.box(20, 20, 30, 30), shapely.box(-9, 0, -1, 7), shapely.box(0, 8, 7, 9)]
-    assert not len(Blocked(polygons=outside).cells_of(topology))
-    assert not len(Blocked().cells_of(topology))
+    expected = "must meet the map, which spans x 0.00 to 7.00 m, y 0.00 to 7.00 m, got <POLYGON"
+    with pytest.raises(hn.InvalidValueError, match=expected):
+        Blocked(polygons=[shapely.box(3, 3, 4, 4), shapely.box(*box)]).cells_of(topology)
+
+
+def test_nothing_may_be_closed_for_lists_may_be_empty() -> None:
+    assert not len(Blocked().cells_of(empty_map(Frame(), (7, 7))))
+    assert not len(Blocked(doors=[], rooms=[]).cells_of(empty_map(Frame(), (7, 7))))
 
 
 def test_an_area_over_a_large_map_is_no_work() -> None:
@@ -472,7 +484,7 @@ def test_where_corners_may_be_cut_no_diagonal_slips_past_a_closed_arc() -> None:
 def test_a_self_loop_is_refused() -> None:
     island = map_of(drawn(".....", ".....", "..#..", ".....", "....."), merge_distance_m=50.0)
     (loop,) = np.flatnonzero(island.level.is_self_loop).tolist()
-    with pytest.raises(hn.InvalidValueError, match=f"arc {loop} is a self-loop"):
+    with pytest.raises(hn.InvalidValueError, match=f"arc {loop} of level .* is a self-loop"):
         Blocked(arcs=[loop]).cells_of(island)
 
 
@@ -501,11 +513,14 @@ def test_a_map_without_arcs_says_so() -> None:
 @pytest.mark.parametrize(
     ("blocked", "message"),
     [
-        ({"arcs": 3}, "arcs must be a sequence of integer ids, got 3"),
+        ({"arcs": 3}, "arcs must be a sequence of integer ids or LevelArc objects, got 3"),
         ({"arcs": [1.5]}, "arcs must be a sequence of integer ids"),
         ({"arcs": [True]}, "arcs must be"),
         ({"arcs": "12"}, "arcs must be"),
+        ({"arcs": [True, 2]}, "arcs must be"),
+        ({"arcs": [DOOR]}, r"arcs must be .* \(doors go under doors\), got \[Door\(number=3"),
         ({"places": [[1], [2, 3]]}, "places must be"),
+        ({"places": [LevelArc(0, 1)]}, "places must be a sequence of integer ids, got"),
         ({"places": [2**70]}, "places must be"),
         ({"cells": (1, 2)}, r"cells must be integers \(row, col\) of shape \(n, 2\), got \(1, 2\)"),
         ({"cells": [(1, 2, 3)]}, "cells must be"),
@@ -524,8 +539,16 @@ def test_a_map_without_arcs_says_so() -> None:
         ({"polygons": [shapely.LineString([(1, 1), (1, 1)])]}, "simple"),
         ({"polygons": [shapely.Polygon()]}, "needs points"),
         ({"polygons": [shapely.Point(1, 1)]}, "must be one of Polygon"),
-        ({"doors": [1]}, "blocked takes arcs, places, cells, polygons, got doors"),
-        ([1, 2], "must be a Blocked, a shapely geometry or a mapping"),
+        ({"doors": 3}, "doors must be a sequence of integer ids or Door objects, got 3"),
+        ({"doors": DOOR}, "doors must be"),
+        ({"doors": ["39"]}, "doors must be"),
+        ({"doors": [1.0, DOOR]}, "doors must be"),
+        ({"rooms": "kitchen"}, "rooms must be a sequence of names, got 'kitchen'"),
+        ({"rooms": [3]}, "rooms must be a sequence of names"),
+        ({"rooms": 3}, "rooms must be a sequence of names"),
+        ({"door": [1]}, "takes arcs, places, cells, polygons, doors, rooms, got door"),
+        ("door:39", "must be a Blocked, a Door"),
+        ([1, 2], "must be a Blocked, a Door, a shapely geometry or a mapping"),
     ],
 )
 def test_what_cannot_be_closed_is_refused_in_one_line(blocked: Any, message: str) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, overload
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.planner.closed import ClosedCells
 from hybridnav.planner.named import At, stop_points
 from hybridnav.result import Path
 from hybridnav.route.alternatives import alternative_search
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import LongArray
+    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.topology import TopologicalMap
     from hybridnav.topology.homotopy import Word
@@ -60,7 +62,7 @@ class Alternatives(Sequence[Alternative]):
         return len(self.found)
 
 
-def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
+def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
     planner: HybridPlanner,
     start: ArrayLike | str,
     goal: ArrayLike | str,
@@ -68,6 +70,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     *,
     least_hole_m2: float = 1.0,
     at: At = "point",
+    blocked: Closable | None = None,
 ) -> Alternatives:
     """Plan paths of different homotopy classes: by another door, on the other side of an obstacle.
 
@@ -91,6 +94,9 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     at
         Where in a named room; at the cells that make the shortest way short, other ways would have
         to start and end too.
+    blocked
+        What is closed for this query, as in `HybridPlanner.plan`. It makes no hole: ways on both
+        sides of a closed area are of one class where nothing else lies between them.
 
     Returns
     -------
@@ -102,8 +108,9 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
     Raises
     ------
     InvalidValueError
-        When the count is no whole number or out of range, the area is, an end is not valid, the
-        planner refines with OMPL, or its grid allows corner cutting.
+        When the count is no whole number or out of range, the area is, an end is not valid, what
+        is blocked is not on the map, the planner refines with OMPL, or its grid allows corner
+        cutting.
     """
     wanted = _checked(count)
     if planner.preset.planner.refine == "ompl":
@@ -111,21 +118,24 @@ def plan_alternatives(  # noqa: PLR0913 - the last two have defaults
             "alternatives are paths of the grid: ask a preset without OMPL for them, "
             f"not {planner.preset.name}"
         )
-    ends = stop_points(planner, [start, goal], at=at)
+    closed = None if blocked is None else ClosedCells(planner.closed_cells(blocked))
+    ends = stop_points(planner, [start, goal], at=at, blocked=closed)
     topology = planner.topology
     allowed = planner.preset.planner.allow_unexplored
     search = alternative_search(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)
-    own = planner.plan(*ends, smooth="none").path
+    own = planner.plan(*ends, smooth="none", blocked=closed).path
     if own is None:
         return Alternatives((), complete=True)
     first, last = (tuple(own.cells[i].tolist()) for i in (0, -1))
-    found = search.paths(first, last, wanted)
+    flat = None if closed is None else closed.flat
+    found = search.paths(first, last, wanted, closed=flat)
     alternatives = {}
     if path_length_in_cells(own.cells) <= found.shortest_cells * (1 + 1e-12):
         alternatives[search.classes.word_of_path(own.cells)] = own
     elif not found.paths:  # it gave up before it came to the goal
         enterable = topology.grid.enterable(allow_unexplored=allowed)
-        cells = GridSearch(enterable, corner_cutting=False).search(first, last).cells
+        grid_search = GridSearch(enterable, corner_cutting=False)
+        cells = grid_search.search(first, last, blocked=flat).cells
         if cells is not None:  # always: the planner found a path
             word = search.classes.word_of_path(cells)
             alternatives[word] = _path(topology, cells, found.shortest_cells)

@@ -10,12 +10,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.occupancy import extent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.grid import Frame
+    from hybridnav.grid import Frame, OccupancyGrid
 
 _SHAPES = ("Polygon", "MultiPolygon", "LineString", "LinearRing", "MultiLineString")
 _FEWEST_POINTS = 3
@@ -69,7 +70,25 @@ def _polygon(corners: ArrayLike) -> BaseGeometry:
     return shapely.Polygon(points)
 
 
-def in_cells(area: BaseGeometry, frame: Frame) -> list[BaseGeometry]:
+def runs_of(area: BaseGeometry, grid: OccupancyGrid) -> LongArray:
+    """Find the flat cells that an area closes on a map, as runs `[start, stop)`, shape (n, 2).
+
+    Raises
+    ------
+    InvalidValueError
+        When it closes none.
+    """
+    radius_cells = grid.robot_radius_m / grid.resolution_m
+    parts = _in_cells(area, grid.frame)
+    runs = np.concatenate([_runs_near(part, grid.shape, radius_cells) for part in parts])
+    if not len(runs):
+        raise InvalidValueError(
+            f"an area must meet the map, which spans {extent(grid)}, got {shown(area)}"
+        )
+    return runs
+
+
+def _in_cells(area: BaseGeometry, frame: Frame) -> list[BaseGeometry]:
     """Return the parts of an area, x along the columns and y along the rows, one unit a cell."""
     cosine, sine = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
 
@@ -86,7 +105,7 @@ def in_cells(area: BaseGeometry, frame: Frame) -> list[BaseGeometry]:
     return list(shapely.get_parts(shapely.transform(area, turned)))
 
 
-def runs_near(part: BaseGeometry, shape: tuple[int, int], radius_cells: float) -> LongArray:
+def _runs_near(part: BaseGeometry, shape: tuple[int, int], radius_cells: float) -> LongArray:
     """Find the flat cells that an area closes, as runs `[start, stop)`, shape (n, 2).
 
     Squares of cells are quartered as long as the area closes some of their cells and may not close

@@ -12,22 +12,36 @@ from hybridnav.result import PlanBatch, PlanStatus
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
     from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner, Smooth
+    from hybridnav.route import PortalAnswers
 
 
 def plan_many(
     planner: HybridPlanner,
     cell_planner: CellPlanner | None,
-    starts: FloatArray,
-    goals: FloatArray,
+    ends: tuple[FloatArray, FloatArray],
     smooth: Smooth,
+    closed: ClosedCells | None,
 ) -> PlanBatch:
-    """What `planner.plan` answers to each pair of points, float64 (n, 2) each, or poses (n, 3), in
-    arrays.
+    """Return what `planner.plan` answers to each pair of points, in arrays.
 
-    `cell_planner` answers what it can alone; None leaves all to `planner`.
+    Parameters
+    ----------
+    planner
+        Plans what is left.
+    cell_planner
+        Answers what it can alone; None leaves all to `planner`.
+    ends
+        Starts and goals, float64 (n, 2) each, or poses (n, 3).
+    smooth
+        `"none"` or `"line-of-sight"`.
+    closed
+        What is closed; None for nothing.
     """
+    starts, goals = ends
     n = len(starts)
     status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)
@@ -39,16 +53,20 @@ def plan_many(
         first, last = grid.frame.cells_of(starts), grid.frame.cells_of(goals)
         asked = np.flatnonzero(_are_free(planner, first) & _are_free(planner, last))
         found = cell_planner.plan_many(first[asked], last[asked])
-        done = asked[found.is_done]
+        kept = found.is_done
+        if closed is not None:
+            shut = _met(closed, found, (first[asked], last[asked]), grid)
+            kept = kept & ~shut
+        done = asked[kept]
         left[done] = False
-        cost[done] = found.length_cells[found.is_done] * grid.resolution_m
-        bound[done] = found.lower_bound_cells[found.is_done] * grid.resolution_m
+        cost[done] = found.length_cells[kept] * grid.resolution_m
+        bound[done] = found.lower_bound_cells[kept] * grid.resolution_m
         bound[done] = np.minimum(bound[done], cost[done])
         status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
-        for i, k in zip(done.tolist(), np.flatnonzero(found.is_done).tolist(), strict=True):
+        for i, k in zip(done.tolist(), np.flatnonzero(kept).tolist(), strict=True):
             paths[i] = found.points[found.path_start[k] : found.path_start[k + 1]]
     for i in np.flatnonzero(left).tolist():
-        result = planner.plan(starts[i], goals[i], smooth=smooth)
+        result = planner.plan(starts[i], goals[i], smooth=smooth, blocked=closed)
         status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
         if result.path is not None:
             paths[i] = result.path.points
@@ -62,6 +80,21 @@ def plan_many(
         points=np.concatenate([np.empty((0, 2)), *paths]),
         headings_rad=np.concatenate([np.empty(0), *headings]) if starts.shape[1] > 2 else None,  # noqa: PLR2004
     )
+
+
+def _met(
+    closed: ClosedCells,
+    found: PortalAnswers,
+    ends: tuple[LongArray, LongArray],
+    grid: OccupancyGrid,
+) -> BoolArray:
+    """Which answers meet what is closed, with an end or on the way; bool (n,)."""
+    across = np.array([grid.shape[1], 1])
+    met: BoolArray = closed.holds(ends[0] @ across) | closed.holds(ends[1] @ across)
+    for k in np.flatnonzero(found.is_done & ~met).tolist():
+        points = found.points[found.path_start[k] : found.path_start[k + 1]]
+        met[k] = len(points) > 0 and closed.meets(grid.frame.cells_of(points), grid)
+    return met
 
 
 def _are_free(planner: HybridPlanner, cells: LongArray) -> BoolArray:

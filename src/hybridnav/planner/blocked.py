@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -11,65 +11,91 @@ from shapely.geometry.base import BaseGeometry
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.areas import checked_area, in_cells, runs_near, shown
+from hybridnav.planner.areas import checked_area, runs_of, shown
 from hybridnav.planner.boundaries import cells_on_boundaries
+from hybridnav.pyramid import LevelArc
+from hybridnav.topology import Door
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import AnyArray, LongArray
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology import Rooms, TopologicalMap
 
 
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class Blocked:
-    """What is closed for one query: arcs, places, cells, and areas in metres.
+    """What is closed for one query: doors, rooms, arcs, places, cells, and areas in metres.
 
-    Cells, arcs and places are taken as they are. Areas are obstacles: the robot keeps its radius
-    (`grid.robot_radius_m`) off them, as it does off occupied cells.
+    Areas are obstacles: the robot keeps its radius (`grid.robot_radius_m`) off them, as it does off
+    occupied cells. All else closes cells as they are: the middle of the robot does not enter them.
+    Whatever is given must be on the map: an unknown number or name, and an area that closes no cell
+    of the map, are refused. `first | second` closes what either closes.
 
     Parameters
     ----------
     arcs
-        Ids of arcs. No move crosses the boundary of a closed arc: of each two cells that face each
-        other across it one is closed. Which ones is chosen to keep other arcs open (a second door
-        between the same places), then to cost few free cells, closed or cut off from the rest of
-        their place; only a cell that two doors share may close both. Moves past a point where four
-        places meet lie on no boundary. A self-loop joins a place to itself and cannot be closed.
+        Ids of arcs of the places, or a `LevelArc` for an arc of any level. No move crosses the
+        boundary of a closed arc: of each two cells that face each other across it one is closed.
+        Which ones is chosen to keep other arcs open (a second door between the same places), then
+        to cost few free cells, closed or cut off from the rest of their place; only a cell that two
+        doors share may close both. Moves past a point where four places meet lie on no boundary. A
+        self-loop joins a place to itself and cannot be closed.
     places
         Ids of places; all the cells of their receptive fields are closed.
     cells
         `(row, col)`, shape (n, 2).
     polygons
         Each a shapely `Polygon`, `MultiPolygon`, `LineString` or `MultiLineString`, or the corners
-        of a polygon as `(x, y)`, shape (n, 2); metres, map frame. Holes stay open, and so does what
-        lies outside the map. A cell is closed when the inside of its square lies nearer than the
-        robot's radius to the area, or, with a radius of 0, meets it. A line has no inside: with a
-        radius of 0 a line along a side between two cells closes the one with the higher index (as
-        `Frame.cells_of` does), so that no path passes a line wherever it is drawn.
+        of a polygon as `(x, y)`, shape (n, 2); metres, map frame. Holes stay open. A cell is closed
+        when the inside of its square lies nearer than the robot's radius to the area, or, with a
+        radius of 0, meets it. A line has no inside: with a radius of 0 a line along a side between
+        two cells closes the one with the higher index (as `Frame.cells_of` does), so that no path
+        passes a line wherever it is drawn.
+    doors
+        Numbers of doors, or `Door` objects of this map: no move crosses their boundaries, which
+        close as those of arcs do. Other doors between the same rooms stay open.
+    rooms
+        Names of rooms; all their cells are closed.
 
     Raises
     ------
     InvalidValueError
-        When ids are not integers, cells are not integers of shape (n, 2), or an area has fewer than
-        three points, is not finite, intersects itself or is of another kind.
+        When ids are not integers, cells are not integers of shape (n, 2), names are not text, or an
+        area has fewer than three points, is not finite, intersects itself or is of another kind.
     """
 
-    arcs: Sequence[int] = ()
+    arcs: Sequence[int | LevelArc] = ()
     places: Sequence[int] = ()
     cells: ArrayLike = ()
     polygons: Sequence[BaseGeometry | ArrayLike] = ()
+    doors: Sequence[int | Door] = ()
+    rooms: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "arcs", _checked_ids("arcs", self.arcs))
-        object.__setattr__(self, "places", _checked_ids("places", self.places))
-        object.__setattr__(self, "cells", _checked_cells(self.cells))
-        if isinstance(self.polygons, BaseGeometry | str) or not hasattr(self.polygons, "__iter__"):
-            raise InvalidValueError(
-                f"polygons must be a sequence of areas, got {shown(self.polygons)}"
-            )
-        object.__setattr__(self, "polygons", tuple(map(checked_area, self.polygons)))
+        checked = {
+            "arcs": _checked_ids("arcs", self.arcs, LevelArc),
+            "places": _checked_ids("places", self.places),
+            "cells": _checked_cells(self.cells),
+            "polygons": _checked_areas(self.polygons),
+            "doors": _checked_ids("doors", self.doors, Door),
+            "rooms": _checked_names(self.rooms),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    def __or__(self, other: Blocked) -> Blocked:
+        """Close what either closes."""
+        if not isinstance(other, Blocked):
+            return NotImplemented
+        both = {
+            one.name: (*getattr(self, one.name), *getattr(other, one.name))
+            for one in fields(self)
+            if one.name != "cells"
+        }
+        cells = np.concatenate([np.asarray(self.cells), np.asarray(other.cells)])
+        return Blocked(**both, cells=cells)
 
     def cells_of(self, topology: TopologicalMap) -> LongArray:
         """Find the cells that may not be entered; occupied ones may be among them.
@@ -87,31 +113,68 @@ class Blocked:
         Raises
         ------
         InvalidValueError
-            When the map has no such arc, place or cell, an arc is a self-loop, or an area lies
-            absurdly far off the map.
+            When the map has no such door, room, arc, place or cell, a door is one of another map,
+            an arc is a self-loop, or an area closes no cell of the map.
         """
         grid = topology.grid
-        places = _found("place", self.places, topology.place_ids)
-        arcs = _found("arc", self.arcs, topology.arc_ids)
         cells = _inside(np.asarray(self.cells), grid.shape)
-        fields = [topology.level.receptive_field(place) for place in places.tolist()]
-        flat = [rowcol[:, 0] * grid.shape[1] + rowcol[:, 1] for rowcol in (cells, *fields)]
-        single = np.concatenate([*flat, *cells_on_boundaries(topology, arcs)])
+        single = np.concatenate(
+            [
+                cells[:, 0] * grid.shape[1] + cells[:, 1],
+                *self._in_places(topology),
+                *self._in_rooms(topology),
+                *self._on_boundaries(topology),
+            ]
+        )
         runs = [np.stack([single, single + 1], axis=1)]
-        radius_cells = grid.robot_radius_m / grid.resolution_m
-        for area in cast("Sequence[BaseGeometry]", self.polygons):
-            parts = in_cells(area, grid.frame)
-            runs += [runs_near(part, grid.shape, radius_cells) for part in parts]
+        runs += [runs_of(area, grid) for area in cast("Sequence[BaseGeometry]", self.polygons)]
         return _cells_in_runs(np.concatenate(runs))
 
+    def _in_places(self, topology: TopologicalMap) -> list[LongArray]:
+        places = _found("place", self.places, topology.place_ids)
+        across = np.array([topology.grid.shape[1], 1])
+        return [topology.level.receptive_field(place) @ across for place in places.tolist()]
 
-def as_blocked(value: Blocked | BaseGeometry | Mapping[str, Any]) -> Blocked:
+    def _in_rooms(self, topology: TopologicalMap) -> list[LongArray]:
+        if not self.rooms:
+            return []
+        labels = topology.rooms.labels
+        closed = [labels.index(name) for name in self.rooms]
+        return [np.flatnonzero(np.isin(labels.label_of, closed))]
+
+    def _on_boundaries(self, topology: TopologicalMap) -> list[LongArray]:
+        """Cells of arcs and doors, level by level, so that none is spared that is closed too."""
+        places = topology.pyramid.place_level if self.arcs or self.doors else 0
+        ids = [arc for arc in self.arcs if not isinstance(arc, LevelArc)]
+        closed = [LevelArc(places, arc) for arc in _found("arc", ids, topology.arc_ids).tolist()]
+        for arc in self.arcs:
+            if isinstance(arc, LevelArc):
+                _check_arc(arc, topology)
+                closed.append(arc)
+        for door in self.doors:
+            closed += _arcs_of(_door_on(topology.rooms, door))
+        return [
+            cells
+            for level in sorted({arc.level for arc in closed})
+            for cells in cells_on_boundaries(
+                topology.pyramid[level],
+                np.unique([arc.index for arc in closed if arc.level == level]),
+            )
+        ]
+
+
+Closable = Blocked | Door | BaseGeometry | Mapping[str, Any]
+"""What a planner accepts as `blocked`: a `Blocked`, one door, one area, or a mapping from the names
+of the fields of a `Blocked`."""
+
+
+def as_blocked(value: Closable) -> Blocked:
     """Read what is closed from any form that a caller may give it in.
 
     Parameters
     ----------
     value
-        A `Blocked`, one shapely geometry, or a mapping from the names of its fields.
+        A `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its fields.
 
     Raises
     ------
@@ -120,12 +183,15 @@ def as_blocked(value: Blocked | BaseGeometry | Mapping[str, Any]) -> Blocked:
     """
     if isinstance(value, Blocked):
         return value
+    if isinstance(value, Door):
+        return Blocked(doors=(value,))
     if isinstance(value, BaseGeometry):
         return Blocked(polygons=(value,))
-    names = tuple(Blocked.__dataclass_fields__)
+    names = tuple(one.name for one in fields(Blocked))
     if not isinstance(value, Mapping):
         raise InvalidValueError(
-            f"blocked must be a Blocked, a shapely geometry or a mapping, got {shown(value)}"
+            "blocked must be a Blocked, a Door, a shapely geometry or a mapping, "
+            f"got {shown(value)}"
         )
     if unknown := [name for name in value if name not in names]:
         raise InvalidValueError(
@@ -134,16 +200,72 @@ def as_blocked(value: Blocked | BaseGeometry | Mapping[str, Any]) -> Blocked:
     return Blocked(**value)
 
 
-def _checked_ids(name: str, ids: Sequence[int]) -> tuple[int, ...]:
+def _arcs_of(door: Door) -> tuple[LevelArc, ...]:
+    """The arcs that make a door."""
+    return (door.arc,)
+
+
+def _door_on(rooms: Rooms, door: int | Door) -> Door:
+    """The door of a map that a number or a door means."""
+    if not isinstance(door, Door):
+        return rooms.door(door)
+    own = rooms.door(door.number)
+    if own != door:
+        raise InvalidValueError(
+            f"door {door.number} is one of another map, between {_sides(door)} and not "
+            f"{_sides(own)}: give a door of this map, or its number"
+        )
+    return own
+
+
+def _sides(door: Door) -> str:
+    x, y = door.position
+    one, other = (name or "unnamed space" for name in door.rooms)
+    return f"{one} and {other} at ({x:.2f}, {y:.2f})"
+
+
+def _check_arc(arc: LevelArc, topology: TopologicalMap) -> None:
+    levels = len(topology.pyramid)
+    if not 0 <= arc.level < levels:
+        raise InvalidValueError(f"there is no level {arc.level}, levels are 0 to {levels - 1}")
+    count = topology.pyramid[arc.level].n_arcs
+    if not 0 <= arc.index < count:
+        raise InvalidValueError(
+            f"there is no arc {arc.index} at level {arc.level} of this map, it has {count}"
+        )
+
+
+def _checked_ids(name: str, ids: Any, typed: type | None = None) -> tuple[Any, ...]:
+    """Whole numbers, and what is of a type that may stand in for them."""
+    is_listed = not isinstance(ids, str) and hasattr(ids, "__iter__")
+    given = list(ids) if is_listed else [None]
+    objects = [one for one in given if typed is not None and isinstance(one, typed)]
+    numbers = [one for one in given if typed is None or not isinstance(one, typed)]
     try:
-        array = np.asarray(list(ids))
+        array = np.asarray(numbers)
     except (TypeError, ValueError):
         array = np.empty((0, 0))
-    if array.shape == (0,):
-        return ()
-    if array.ndim != 1 or array.dtype.kind not in "iu":
-        raise InvalidValueError(f"{name} must be a sequence of integer ids, got {shown(ids)}")
-    return tuple(array.tolist())
+    are_whole = array.ndim == 1 and array.dtype.kind in "iu"
+    if numbers and (not are_whole or any(isinstance(one, bool) for one in numbers)):
+        expected = "integer ids" if typed is None else f"integer ids or {typed.__name__} objects"
+        if any(isinstance(one, Door) for one in numbers):
+            expected += " (doors go under doors)"
+        raise InvalidValueError(f"{name} must be a sequence of {expected}, got {shown(ids)}")
+    return (*(array.tolist() if numbers else ()), *objects)
+
+
+def _checked_names(names: Any) -> tuple[str, ...]:
+    is_listed = not isinstance(names, str) and hasattr(names, "__iter__")
+    given = tuple(names) if is_listed else (None,)
+    if not all(isinstance(name, str) for name in given):
+        raise InvalidValueError(f"rooms must be a sequence of names, got {shown(names)}")
+    return tuple(map(str, given))
+
+
+def _checked_areas(areas: Any) -> tuple[BaseGeometry, ...]:
+    if isinstance(areas, BaseGeometry | str) or not hasattr(areas, "__iter__"):
+        raise InvalidValueError(f"polygons must be a sequence of areas, got {shown(areas)}")
+    return tuple(map(checked_area, areas))
 
 
 def _checked_cells(cells: ArrayLike) -> AnyArray:

@@ -11,26 +11,44 @@ from hybridnav.grid import CellClass
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.pyramid import Level
 
 
-def cells_on_boundaries(topology: TopologicalMap, arcs: LongArray) -> list[LongArray]:
+def cells_on_boundaries(level: Level, arcs: LongArray) -> list[LongArray]:
     """Find the flat cells that close each of some arcs.
 
     A diagonal between two places across a boundary has a cell pair of that boundary among the four
     cells round its middle, and needs all four: closing one cell of each pair stops it too.
+
+    Parameters
+    ----------
+    level
+        The level of the arcs, places or rooms.
+    arcs
+        int64 (n,), dense indices, each once.
+
+    Returns
+    -------
+    list of LongArray
+        The cells of each arc.
+
+    Raises
+    ------
+    InvalidValueError
+        When one is a self-loop.
     """
-    level, cols = topology.level, topology.grid.shape[1]
+    grid = level.grid
+    cols = grid.shape[1]
     loops = arcs[level.is_self_loop[arcs]]
     if len(loops):
         raise InvalidValueError(
-            f"arc {topology.arc_ids[loops[0]]} is a self-loop, closing it would part no places; "
+            f"arc {loops[0]} of level {level.index} is a self-loop, closing it would part nothing; "
             "close the place or cells instead"
         )
     closed = []
     for arc in arcs.tolist():
         pairs = level.boundary(arc) @ np.array([cols, 1])
-        if topology.grid.corner_cutting:
+        if grid.corner_cutting:
             # A diagonal past the end of a boundary needs no cell but its own two ends.
             closed.append(np.unique(pairs))
             continue
@@ -41,7 +59,7 @@ def cells_on_boundaries(topology: TopologicalMap, arcs: LongArray) -> list[LongA
             level.boundary(other) @ np.array([cols, 1]) for other in np.flatnonzero(beside).tolist()
         ]
         choices = _choices(pairs, others)
-        costs = [_cost_of(topology, ends.tolist(), choice, others) for choice in choices]
+        costs = [_cost_of(level, ends.tolist(), choice, others) for choice in choices]
         closed.append(choices[costs.index(min(costs))])
     return closed
 
@@ -59,21 +77,20 @@ def _choices(pairs: LongArray, others: list[LongArray]) -> list[LongArray]:
 
 
 def _cost_of(
-    topology: TopologicalMap, places: list[int], closed: LongArray, others: list[LongArray]
+    level: Level, vertices: list[int], closed: LongArray, others: list[LongArray]
 ) -> tuple[int, int, int]:
-    """Other arcs closed as well; free cells, and all cells, closed or cut off from their place."""
+    """Other arcs closed as well; free cells, and all cells, closed or cut off from their field."""
     from scipy import ndimage  # noqa: PLC0415 - half a second that areas and cells do not need
 
-    level = topology.level
     arcs = sum(bool(np.isin(other, closed).any(axis=1).all()) for other in others)
     lost = {CellClass.FREE: 0, CellClass.UNEXPLORED: 0}
-    for place in places:
-        field = level.receptive_field(place)
+    for vertex in vertices:
+        field = level.receptive_field(vertex)
         corner = field.min(axis=0)
         is_open = np.zeros(field.max(axis=0) - corner + 1, dtype=np.bool_)
-        flat = field @ np.array([topology.grid.shape[1], 1])
+        flat = field @ np.array([level.grid.shape[1], 1])
         is_open[tuple((field - corner).T)] = ~np.isin(flat, closed)
         pieces, _ = ndimage.label(is_open)
         largest = np.bincount(pieces.ravel())[1:].max(initial=0)
-        lost[CellClass(level.classes[place])] += len(field) - int(largest)
+        lost[CellClass(level.classes[vertex])] += len(field) - int(largest)
     return arcs, lost[CellClass.FREE], sum(lost.values())

@@ -16,14 +16,14 @@ from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.stops import cheapest_stops
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
 
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.planner.blocked import Blocked
+    from hybridnav.planner.blocked import Closable
+    from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.topology import TopologicalMap
 
@@ -40,7 +40,7 @@ def stop_points(
     stops: Sequence[ArrayLike | str],
     *,
     at: At = "anywhere",
-    blocked: Blocked | BaseGeometry | Mapping[str, Any] | None = None,
+    blocked: Closable | ClosedCells | None = None,
 ) -> list[ArrayLike]:
     """Find a point for each stop of a way, so that the way through all of them is shortest.
 

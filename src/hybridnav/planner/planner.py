@@ -15,6 +15,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
+from hybridnav.planner.closed import ClosedCells
 from hybridnav.planner.ends import read_point, read_points, read_pose
 from hybridnav.planner.radius import check_radius
 from hybridnav.refine import GridRefiner, LineOfSight
@@ -23,13 +24,12 @@ from hybridnav.route import Walks
 from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
 
     from hybridnav._typing import FloatArray, LongArray, PathLike
-    from hybridnav.planner.blocked import Blocked
+    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_plans import CellPlanner
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
@@ -100,7 +100,7 @@ class HybridPlanner:
         goal: ArrayLike | str,
         *,
         smooth: Smooth | None = None,
-        blocked: Blocked | BaseGeometry | Mapping[str, Any] | None = None,
+        blocked: Closable | ClosedCells | None = None,
         at: At = "anywhere",
     ) -> PlanResult:
         """Plan a path between two points, or rooms.
@@ -117,8 +117,9 @@ class HybridPlanner:
             `"line-of-sight"` shortens the path to an any-angle one; None as the preset says. Of no
             effect with OMPL, whose paths are any-angle ones.
         blocked
-            What is closed for this query: a `Blocked`, a shapely geometry in metres, or a mapping
-            with keys of `Blocked`. Where it lies in the way the whole map is searched.
+            What is closed for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
+            mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. Where
+            it lies in the way the whole map is searched.
         at
             Where in a named room: `"anywhere"`, the cells that make the way shortest, or at its
             `"point"`.
@@ -142,7 +143,7 @@ class HybridPlanner:
         poses = self._pose("start", start), self._pose("goal", goal)
         ends = poses[0][:2], poses[1][:2]
         finish = self._finish_asked_for(smooth)
-        closed = None if blocked is None else self.closed_cells(blocked)
+        closed = None if blocked is None else ClosedCells(self.closed_cells(blocked))
         first, last = self._cell_of(ends[0]), self._cell_of(ends[1])
         if first is None:
             return self._answer(PlanStatus.START_OUTSIDE)
@@ -152,22 +153,25 @@ class HybridPlanner:
         if status is not None:
             return self._answer(status)
         if closed is not None:
-            cols = self.topology.grid.shape[1]
-            for cell, refused in (
-                (first, PlanStatus.START_BLOCKED),
-                (last, PlanStatus.GOAL_BLOCKED),
-            ):
-                if _is_in(closed, cell[0] * cols + cell[1]):
-                    return self._answer(refused)
+            shut = closed.holds(np.array([first, last]) @ [self.topology.grid.shape[1], 1])
+            if shut.any():
+                refused = PlanStatus.START_BLOCKED if shut[0] else PlanStatus.GOAL_BLOCKED
+                return self._answer(refused)
         plan = self._cells.plan(first, last)
         if closed is not None and plan.cells is not None:
             plan = self._round(closed, plan, first, last)
+        flat = None if closed is None else closed.flat
         if self._ompl is not None and plan.cells is not None:
-            return self._by_ompl(self._ompl, plan, poses, closed, began)
-        return self._result(plan, ends, finish, closed)
+            return self._by_ompl(self._ompl, plan, poses, flat, began)
+        return self._result(plan, ends, finish, flat)
 
     def plan_many(
-        self, starts: ArrayLike, goals: ArrayLike, *, smooth: Smooth | None = None
+        self,
+        starts: ArrayLike,
+        goals: ArrayLike,
+        *,
+        smooth: Smooth | None = None,
+        blocked: Closable | None = None,
     ) -> PlanBatch:
         """Plan paths between many pairs of points: the answers of `plan`, in arrays.
 
@@ -176,13 +180,14 @@ class HybridPlanner:
         starts, goals
             `(x, y)` in metres, map frame, shape (n, 2) each; with OMPL in a space with headings
             `(x, y, yaw)`, shape (n, 3).
-        smooth
+        smooth, blocked
             As in `plan`.
 
         Raises
         ------
         InvalidValueError
-            When the shapes differ or a coordinate is not finite.
+            When the shapes differ, a coordinate is not finite, or what is blocked is not on the
+            map.
         """
         with_heading = self._ompl is not None and self._ompl.ompl.has_heading
         first = read_points("starts", starts, needs_heading=with_heading)
@@ -191,24 +196,24 @@ class HybridPlanner:
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
         finish = self._finish_asked_for(smooth)
         cells = self._cells if self._ompl is None else None
-        return plan_many(self, cells, first, last, finish)
+        closed = None if blocked is None else ClosedCells(self.closed_cells(blocked))
+        return plan_many(self, cells, (first, last), finish, closed)
 
     def close(self) -> None:
         """End the process that a preset with OMPL plans in; the next query waits for another."""
         if self._ompl is not None:
             self._ompl.close()
 
-    def _round(self, closed: LongArray, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
+    def _round(self, closed: ClosedCells, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
         """The plan itself where nothing closed is in its way, else the best path round it all.
 
         Closing cells makes no path shorter, so a bound stays one.
         """
-        grid = self.topology.grid
         assert plan.cells is not None  # noqa: S101 - the caller has looked
-        if not _meets(plan.cells, closed, grid.shape[1], corner_cutting=grid.corner_cutting):
+        if not closed.meets(plan.cells, self.topology.grid):
             return plan
         began = time.perf_counter()
-        found = self._refiner.search.search(first, last, blocked=closed)
+        found = self._refiner.search.search(first, last, blocked=closed.flat)
         seconds = {**plan.seconds, "around": time.perf_counter() - began}
         expanded = plan.expanded + found.expanded
         if found.cells is None:
@@ -345,8 +350,10 @@ class HybridPlanner:
         passed = [int(ids[1][arc]) if arc >= 0 else -1 for arc in arcs]
         return Route(tuple(ids[0][places].tolist()), tuple(passed))
 
-    def closed_cells(self, blocked: Blocked | BaseGeometry | Mapping[str, Any]) -> LongArray:
-        """Flat cells that may not be entered when this is closed, int64, sorted."""
+    def closed_cells(self, blocked: Closable | ClosedCells) -> LongArray:
+        """Return the flat cells that may not be entered when this is closed, int64, sorted."""
+        if isinstance(blocked, ClosedCells):
+            return blocked.flat
         # Loads shapely, which most queries can do without.
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 
@@ -401,19 +408,3 @@ def _stats_of(plan: CellPlan) -> PlanStats:
         corridor_cells=plan.corridor_cells,
         seconds=plan.seconds,
     )
-
-
-def _is_in(sorted_cells: LongArray, cell: int) -> bool:
-    at = int(np.searchsorted(sorted_cells, cell))
-    return at < len(sorted_cells) and int(sorted_cells[at]) == cell
-
-
-def _meets(cells: LongArray, closed: LongArray, cols: int, *, corner_cutting: bool) -> bool:
-    """Whether a path stands on a closed cell, or passes one on a diagonal where that counts."""
-    flat = cells[:, 0] * cols + cells[:, 1]
-    if corner_cutting:
-        return bool(np.isin(flat, closed).any())
-    sides = np.concatenate(
-        [cells[:-1, 0] * cols + cells[1:, 1], cells[1:, 0] * cols + cells[:-1, 1]]
-    )
-    return bool(np.isin(np.concatenate([flat, sides]), closed).any())

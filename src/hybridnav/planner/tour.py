@@ -5,22 +5,22 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.planner.closed import ClosedCells
 from hybridnav.planner.itinerary import Guide, Leg, in_words
 from hybridnav.planner.named import At, stop_points
 from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
 
-    from hybridnav.planner.blocked import Blocked
+    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planner import HybridPlanner, Smooth
     from hybridnav.result import Metric, PlanResult
 
@@ -78,7 +78,7 @@ def plan_tour(
     *,
     at: At = "anywhere",
     smooth: Smooth | None = None,
-    blocked: Blocked | BaseGeometry | Mapping[str, Any] | None = None,
+    blocked: Closable | None = None,
 ) -> Tour:
     """Plan a way that visits stops in the order given.
 
@@ -103,10 +103,11 @@ def plan_tour(
     """
     if len(stops) < 2:  # noqa: PLR2004
         raise InvalidValueError(f"a way needs at least two stops, got {len(stops)}")
-    points = stop_points(planner, stops, at=at, blocked=blocked)
+    closed = None if blocked is None else ClosedCells(planner.closed_cells(blocked))
+    points = stop_points(planner, stops, at=at, blocked=closed)
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):
-        results.append(planner.plan(*pair, smooth=smooth, blocked=blocked))
+        results.append(planner.plan(*pair, smooth=smooth, blocked=closed))
         if not results[-1].solved:
             break
     topology = planner.topology

@@ -2,8 +2,16 @@
 
 from hybridnav.pyramid.decimation import Linkage
 from hybridnav.pyramid.dual import DualGraph, FaceKind
-from hybridnav.pyramid.level import Level
+from hybridnav.pyramid.level import Level, LevelArc
 from hybridnav.pyramid.pyramid import DualGraphPyramid
 from hybridnav.pyramid.resistance import Resistance
 
-__all__ = ["DualGraph", "DualGraphPyramid", "FaceKind", "Level", "Linkage", "Resistance"]
+__all__ = [
+    "DualGraph",
+    "DualGraphPyramid",
+    "FaceKind",
+    "Level",
+    "LevelArc",
+    "Linkage",
+    "Resistance",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -31,6 +32,16 @@ if TYPE_CHECKING:
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import Record
     from hybridnav.pyramid.simple import SimpleGraph
+
+
+@dataclass(frozen=True, order=True)
+class LevelArc:
+    """An arc together with its level: a bare index means another arc at every level."""
+
+    level: int
+    """Index of the level in its pyramid."""
+    index: int
+    """Dense index of the arc at that level."""
 
 
 @copies_alike

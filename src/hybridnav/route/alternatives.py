@@ -127,7 +127,9 @@ class AlternativeSearch:
         self._enterable = np.ascontiguousarray(self.classes.enterable_cells)
         self._dead_ends: DeadEnds | None = None
 
-    def paths(self, start: Cell, goal: Cell, count: int) -> ClassPaths:
+    def paths(
+        self, start: Cell, goal: Cell, count: int, *, closed: LongArray | None = None
+    ) -> ClassPaths:
         """Find paths of different classes.
 
         Parameters
@@ -136,17 +138,25 @@ class AlternativeSearch:
             Cells (row, col) that may be entered.
         count
             Paths at most.
+        closed
+            int64 (m,), flat cells that may not be entered; None for none. Start and goal are not
+            among them. They make no holes: words are those of the open map.
         """
         cols = self._enterable.shape[1]
+        enterable = self._enterable
+        if closed is not None:
+            enterable = enterable.copy()
+            enterable.ravel()[closed] = False
         first, last = start[0] * cols + start[1], goal[0] * cols + goal[1]
-        label = np.where(self._enterable, np.int32(0), np.int32(-1)).ravel()
-        left = field_distances(self._enterable.astype(np.uint8), label, np.array([last]))
+        label = np.where(enterable, np.int32(0), np.int32(-1)).ravel()
+        left = field_distances(enterable.astype(np.uint8), label, np.array([last]))
         shortest = float(length_in_cells(left[[first]])[0]) if left[first] >= 0 else math.inf
         apart = self._apart if shortest == math.inf else min(self._apart, int(shortest / 2))
         states = _class_kernels.States.of_room(MOST_STATES)
         tree = _class_kernels.Tree.of_room(MOST_STATES)
+        dead_ends = self._dead_ends_of(enterable, max(1, apart))
         goals, reason = _class_kernels.find_classes(
-            legal_moves(self._remaining(start, goal, max(1, apart)), False).ravel(),
+            legal_moves(dead_ends.left(start, goal), False).ravel(),
             cols,
             (first, last),
             left,
@@ -166,12 +176,15 @@ class AlternativeSearch:
             found.append(ClassPath(cells, word, length))
         return ClassPaths(tuple(found), reason != _class_kernels.LIMITED, shortest)
 
-    def _remaining(self, start: Cell, goal: Cell, apart: int) -> BoolArray:
-        """The cells that a path may enter which is a shortest of its class and does not wind."""
+    def _dead_ends_of(self, enterable: BoolArray, apart: int) -> DeadEnds:
+        """Where no path goes that is a shortest of its class and does not wind; kept while nothing
+        is closed."""
+        if enterable is not self._enterable:
+            return DeadEnds(enterable, apart)
         dead_ends = self._dead_ends
         if dead_ends is None or dead_ends.reach != apart:
-            self._dead_ends = dead_ends = DeadEnds(self._enterable, apart)
-        return dead_ends.left(start, goal)
+            self._dead_ends = dead_ends = DeadEnds(enterable, apart)
+        return dead_ends
 
 
 _MOST_KEPT = 4

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass
 from hybridnav.grid.clearance import clearance_cells
+from hybridnav.pyramid.level import LevelArc
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
@@ -23,8 +25,8 @@ class Door:
 
     number: int
     """From 1, in the order of arcs; what people are told."""
-    arc: int
-    """Dense index of the arc at the room level."""
+    arc: LevelArc
+    """The arc of the room level."""
     rooms: tuple[str | None, str | None]
     """Names of the rooms on both sides, in the order of the arc's ends; None for no room."""
     position: tuple[float, float]
@@ -133,7 +135,7 @@ class Rooms:
         return tuple(
             Door(
                 number,
-                arc,
+                LevelArc(self.level.index, arc),
                 (self.name_of(int(labels[arc, 0])), self.name_of(int(labels[arc, 1]))),
                 (float(positions[arc, 0]), float(positions[arc, 1])),
                 float(self.widths_m[arc]),
@@ -143,8 +145,25 @@ class Rooms:
 
     @cached_property
     def door_of_arc(self) -> dict[int, Door]:
-        """The door of each arc of the room level that is one."""
-        return {door.arc: door for door in self.doors}
+        """The door of each arc of the room level that is one, by the arc's dense index."""
+        return {door.arc.index: door for door in self.doors}
+
+    def door(self, number: int) -> Door:
+        """Return the door that has a number.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such door.
+        """
+        for door in self.doors:
+            if door.number == number:
+                return door
+        numbers = [door.number for door in self.doors]
+        known = f"doors are {min(numbers)} to {max(numbers)}" if numbers else "it has none"
+        raise InvalidValueError(
+            f"there is no door {number} on this map, {known}; hybridnav rooms MAP lists them"
+        )
 
     def point_of(self, name: str) -> tuple[float, float]:
         """The point that stands for a room: its named point, else where most clearance is.
