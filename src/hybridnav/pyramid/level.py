@@ -12,6 +12,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels
+from hybridnav.pyramid.cracks import cell_pairs, ends_of, middles_of, sides_of
 from hybridnav.pyramid.dual import DualGraph
 from hybridnav.pyramid.record import SURVIVES
 from hybridnav.search import _kernels as search_kernels
@@ -154,7 +155,7 @@ class Level:
     @cached_property
     def base_pairs(self) -> LongArray:
         """int64 (n_arcs, 2, 2), the two cells (row, col) of the base edge of each arc."""
-        return _frozen(_cell_pairs(self.base_edges, self._grid.shape[1]))
+        return _frozen(cell_pairs(self.base_edges, self._grid.shape[1]))
 
     @cached_property
     def arcs(self) -> IntArray:
@@ -284,7 +285,7 @@ class Level:
             self._grid.classes, self._labels[0], self._labels[1]
         )
         edges, arc = self.boundary_table
-        first, second = _ends(edges, self._grid.shape[1])
+        first, second = ends_of(edges, self._grid.shape[1])
         across = distance[first] + distance[second] + STRAIGHT
         least = np.full(self.n_arcs, np.iinfo(np.int64).max)
         np.minimum.at(least, arc, across)
@@ -314,7 +315,7 @@ class Level:
             raise InvalidValueError(f"arc must be from 0 to {self.n_arcs - 1}, got {arc}")
         edges, of_arc = self.boundary_table
         low, high = np.searchsorted(of_arc, [arc, arc + 1])
-        pairs = _cell_pairs(edges[low:high], self._grid.shape[1])
+        pairs = cell_pairs(edges[low:high], self._grid.shape[1])
         row, col = pairs[:, 0, 0], pairs[:, 0, 1]
         turned = self.field_of[row, col] != self.arcs[arc, 0]
         pairs[turned] = pairs[turned, ::-1]
@@ -328,14 +329,8 @@ class Level:
         nearest the mean of all sides of the boundary, so that it lies on the boundary.
         """
         edges, arc = self.boundary_table
-        sides = _cell_pairs(edges, self._grid.shape[1]).mean(axis=1) + 0.5
-        sizes = np.bincount(arc, minlength=self.n_arcs)
-        sums = [np.bincount(arc, weights=w, minlength=self.n_arcs) for w in sides.T]
-        mean = np.stack(sums, axis=1) / sizes[:, None]
-        squared = ((sides - mean[arc]) ** 2).sum(axis=1)
-        order = np.lexsort((squared, arc))
-        nearest = order[np.searchsorted(arc, np.arange(self.n_arcs))]
-        return _frozen(self._grid.frame.points_of_grid(sides[nearest]))
+        middles = middles_of(sides_of(edges, self._grid.shape[1]), arc, self.n_arcs)
+        return _frozen(self._grid.frame.points_of_grid(middles))
 
     @cached_property
     def boundary_table(self) -> tuple[LongArray, LongArray]:
@@ -365,13 +360,3 @@ class Level:
 def _frozen(array: _Array) -> _Array:
     array.flags.writeable = False
     return array
-
-
-def _ends(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
-    first = base_edges >> 1
-    return first, first + np.where(base_edges & 1, cols, 1)
-
-
-def _cell_pairs(base_edges: LongArray, cols: int) -> LongArray:
-    flat = np.stack(_ends(base_edges, cols), axis=1)
-    return np.stack(divmod(flat, cols), axis=-1)

@@ -1,0 +1,55 @@
+"""Cracks, the sides between two cells, as base edges: 2 * flat cell, + 1 where it leads north."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, LongArray
+
+
+def ends_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
+    """Return the two flat cells of each base edge, the lower one first."""
+    first = base_edges >> 1
+    return first, first + np.where(base_edges & 1, cols, 1)
+
+
+def cell_pairs(base_edges: LongArray, cols: int) -> LongArray:
+    """Return the two cells of each base edge, int64 (n, 2, 2), (row, col)."""
+    flat = np.stack(ends_of(base_edges, cols), axis=1)
+    return np.stack(divmod(flat, cols), axis=-1)
+
+
+def sides_of(base_edges: LongArray, cols: int) -> FloatArray:
+    """Return the middle of the side that each base edge crosses, float64 (n, 2), in cells: the
+    centre of cell (0, 0) is (0.5, 0.5)."""
+    return cell_pairs(base_edges, cols).mean(axis=1) + 0.5
+
+
+def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray:
+    """Return the point in the middle of each boundary.
+
+    Parameters
+    ----------
+    sides
+        float64 (n, 2), middles of sides.
+    boundary
+        int64 (n,), the boundary of each side; every one from 0 to count - 1 has a side.
+    count
+        Number of boundaries.
+
+    Returns
+    -------
+    FloatArray
+        float64 (count, 2), the side that is nearest the mean of all sides of its boundary, so that
+        it lies on the boundary; ties go to the side that comes first.
+    """
+    sizes = np.bincount(boundary, minlength=count)
+    sums = [np.bincount(boundary, weights=w, minlength=count) for w in sides.T]
+    mean = np.stack(sums, axis=1) / sizes[:, None]
+    squared = ((sides - mean[boundary]) ** 2).sum(axis=1)
+    order = np.lexsort((squared, boundary))
+    starts = np.cumsum(sizes) - sizes
+    return sides[order[starts]]
