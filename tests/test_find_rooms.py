@@ -232,3 +232,44 @@ def test_no_room_is_nobodys_partner():
     assert agreed.partners.tolist() == [-1, 4]
     assert agreed.recall.tolist() == [0.0, 1.0]
     assert agreed.n_found == 1
+
+
+def framed(margin, *, door):
+    """A building of two rooms in the middle of an image whose margin is free, in cells of 10 cm."""
+    inner = np.zeros((32, 62), dtype=np.uint8)
+    inner[1:31, 1:30] = inner[1:31, 31:61] = inner[12:22, 30] = 1
+    if door:
+        inner[0, 10:20] = 1
+    return occupancy_grid(np.pad(inner, margin, constant_values=1), resolution_m=0.1)
+
+
+@pytest.mark.parametrize("margin", [1, 5, 30])
+def test_what_lies_round_the_building_is_no_room(margin):
+    rooms = hn.find_rooms(framed(margin, door=False), least_area_m2=0.5)
+    assert len(rooms.names) == 2
+    assert (rooms.label_of[0] == -1).all()
+    assert (rooms.label_of[margin + 5, margin + 5 : margin + 55] >= 0).all()
+
+
+def test_a_yard_that_the_building_opens_to_stays_a_room():
+    assert (hn.find_rooms(framed(30, door=True)).label_of[0] >= 0).any()
+
+
+def test_a_hall_that_the_border_cuts_off_stays_a_room():
+    classes = np.ones((60, 60), dtype=np.uint8)
+    classes[20:40, 20:40] = 0
+    classes[25:30, 25:30] = 1  # a lift in the core of it
+    rooms = hn.find_rooms(occupancy_grid(classes, resolution_m=0.1))
+    assert (rooms.label_of[0] >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "outside"),
+    [("bwi_gdc/3/3.yaml", True), ("nav2/maps/depot.yaml", False)],
+)
+@pytest.mark.full
+@pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")
+def test_the_frame_of_a_real_image_is_no_room(data, name, outside):
+    rooms = hn.find_rooms(hn.load_map(data / name))
+    rim = np.concatenate([rooms.label_of[0], rooms.label_of[-1]])
+    assert (rim >= 0).any() != outside

@@ -23,13 +23,16 @@ from hybridnav.topology.pieces import (
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from hybridnav._typing import IntArray
+    from hybridnav._typing import BoolArray, IntArray
     from hybridnav.grid import OccupancyGrid
 
 Cell = tuple[int, int]
 
 _UNEXPLORED_RIM = 0.8
 """Share of the cells round free space that must be unexplored for them to count as walls."""
+_LEAST_INSIDE = 0.1
+"""Area cut off inside free space that reaches all sides of the map, as a share of it, from which
+on that is the outside."""
 _LARGEST_LEAST_M2 = 1e9
 """Least areas beyond it are taken for a mistake."""
 _SPLINTER_M2 = 0.5
@@ -60,7 +63,8 @@ def find_rooms(
         are then merged in the same way, where their union is nearly convex and hardly walled.
     least_area_m2
         In square metres of free cells, positive, at most 1e9. Smaller pieces go to the neighbour
-        with the longest open border; what has none is no room.
+        with the longest open border; what has none is no room. Neither is free space outside of
+        the building: round other free space that it cannot reach, along most of the map's border.
 
     Returns
     -------
@@ -81,8 +85,10 @@ def find_rooms(
             "least area must be a positive number of square metres, at most "
             f"{_LARGEST_LEAST_M2:g}, got {least_area_m2}"
         )
+    outside = _outside(grid)
     grid = _walled(grid)
-    pieces = Pieces(_pieces(grid, method, least_area_m2), grid.resolution_m)
+    cut = np.where(outside, np.int32(NO_ROOM), _pieces(grid, method, least_area_m2))
+    pieces = Pieces(cut, grid.resolution_m)
     pieces.merge_small(min(least_area_m2, _SPLINTER_M2))
     pieces.merge_convex(
         least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
@@ -145,6 +151,28 @@ def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
         inside, np.where(entered, np.int32(0), np.int32(-1)), int(reach)
     )
     return np.where(wall, into_walls, inside)
+
+
+def _outside(grid: OccupancyGrid) -> BoolArray:
+    """Free cells outside of what the map shows, which no room may have.
+
+    They are connected along sides, nothing bounds them outwards: they reach all four sides of the
+    map and fill at least half of its border. And free space that they cannot reach lies inside
+    them: at least a tenth of their own area. So a strip round a building whose image has a margin
+    is outside, and what lies round a race track; a hall that the map's border cuts off is not.
+    """
+    free = grid.measured == CellClass.FREE
+    part_of, n_parts = ndimage.label(free)
+    sides = [part_of[0], part_of[-1], part_of[:, 0], part_of[:, -1]]
+    on_side = [np.bincount(side, minlength=n_parts + 1) for side in sides]
+    n_border = sum(len(side) for side in sides)
+    around = np.all(np.stack(on_side) > 0, axis=0) & (2 * sum(on_side) >= n_border)
+    around[0] = False
+    areas = np.bincount(part_of.ravel(), minlength=n_parts + 1)
+    inside = areas[1:][~np.any(np.stack(on_side) > 0, axis=0)[1:]].sum()
+    around &= inside >= _LEAST_INSIDE * areas
+    found: BoolArray = around[part_of]
+    return found
 
 
 def _walled(grid: OccupancyGrid) -> OccupancyGrid:
