@@ -277,6 +277,18 @@ def test_flat_polygons_in_pixels_win_over_the_image(grid, tmp_path):
         (two(more="points:\n- name: dock\n  point: [0.5, 1]\n"), ["'dock'", "in an obstacle"]),
         (two(second=f"polygon: {LAB}\n  point: [5.5, 1]"), ["'lab'", "in an obstacle"]),
         (two(second="polygon: [[6, 1], [9, 1], [9, 1]]"), ["'lab'", "no area"]),
+        (two(more="doors: 7\n"), ["doors", "expected a list"]),
+        (two(more="doors:\n- point: [1, 1]\n"), ["doors", "a number and a point"]),
+        (two(more="doors:\n- {number: 0, point: [1, 1]}\n"), ["whole number from 1", "got 0"]),
+        (two(more="doors:\n- {number: 1.5, point: [1, 1]}\n"), ["whole number", "1.5"]),
+        (two(more="doors:\n- {number: true, point: [1, 1]}\n"), ["whole number", "True"]),
+        (two(more="doors:\n- {number: 3, point: [.inf, 1]}\n"), ["door 3", "number"]),
+        (two(more="doors:\n- {number: 3}\n"), ["door 3", "[x, y]"]),
+        (two(more="doors:\n- {number: 3, width: 1}\n"), ["door 3", "unknown key 'width'"]),
+        (
+            two(more="doors:\n- {number: 3, point: [1, 1]}\n- {number: 3, point: [2, 1]}\n"),
+            ["door 3", "given twice"],
+        ),
         ("rooms:\n- polygon: []\n", ["room 1", "name"]),
         ("rooms: 7\n", ["expected a list"]),
         ("roms: []\n", ["lacks rooms"]),
@@ -297,10 +309,10 @@ def test_a_file_that_is_wrong_says_so_in_one_line(grid, write, text, words):
         assert word in message
 
 
-def test_a_room_that_the_radius_fills_is_named(write):
+def test_a_room_that_the_radius_fills_is_read_for_smaller_robots(grid, write):
     fat = hn.OccupancyGrid((FLAT == 0).astype(np.float32), robot_radius_m=2.0)
-    with pytest.raises(hn.RoomsError, match=r"'kitchen'.*radius of 2 m"):
-        hn.load_rooms(write(two()), fat)
+    path = write(two())
+    assert (hn.load_rooms(path, fat).label_of == hn.load_rooms(path, grid).label_of).all()
 
 
 def test_a_point_beside_a_wall_is_kept_for_robots_of_any_radius(write):
@@ -320,9 +332,6 @@ def test_rooms_that_could_not_be_read_again_are_not_written(grid, tmp_path):
     full = RoomLabels(("a",), np.zeros(FLAT.shape, dtype=np.int32), {"b": (0.5, 0.5)})
     with pytest.raises(hn.RoomsError, match=r"'b'.*in an obstacle"):
         hn.save_rooms(tmp_path / "rooms.yaml", full, grid)
-    fat = hn.OccupancyGrid((FLAT == 0).astype(np.float32), robot_radius_m=3.0)
-    with pytest.raises(hn.RoomsError, match=r"'a'.*radius of 3 m"):
-        hn.save_rooms(tmp_path / "rooms.yaml", RoomLabels(("a",), full.label_of), fat)
 
 
 def test_a_disc_that_is_full_leaves_the_file_that_was_there(grid, write, tmp_path):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-import numpy as np
 import typer
 
 import hybridnav as hn
@@ -14,7 +14,6 @@ from hybridnav.cli.common import (
     answer,
     check_picture,
     check_radius,
-    complain,
     islands_line,
     load_grid,
     read_settings,
@@ -24,6 +23,7 @@ from hybridnav.cli.common import (
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
     FreeOption,
+    JsonOption,
     LeastIslandOption,
     MapArgument,
     MaxCellsOption,
@@ -35,7 +35,11 @@ from hybridnav.cli.options import (
 )
 from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.grid.rooms import NO_ROOM, Segmentation
+from hybridnav.grid.rooms import Segmentation
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray
+    from hybridnav.topology import Door, Rooms
 
 OutOption = Annotated[
     Path | None,
@@ -55,14 +59,11 @@ LeastAreaOption = Annotated[
     typer.Option(
         "--least-area",
         metavar="A",
-        help="Square metres of free cells that a room has.",
+        help="Least area of a room, in square metres of free cells as measured.",
         show_default="1.0",
     ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
-
-_TOLD = 5
-"""Names that a warning lists at most."""
 
 
 def rooms(
@@ -78,6 +79,7 @@ def rooms(
     least_island_m2: LeastIslandOption = 0.0,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     force: ForceOption = False,
+    as_json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
     """Find the rooms of MAP, or read them from a file, and list them with their doors."""
@@ -108,6 +110,15 @@ def rooms(
             if rooms_file is None
             else hn.load_rooms(rooms_file, grid)
         )
+    # Loads numba, which help and wrong usage can do without.
+    from hybridnav.topology.rooms import room_areas_m2  # noqa: PLC0415
+
+    areas_m2 = room_areas_m2(labels, grid)
+    if out is not None:
+        # What is listed and drawn is what others read; areas stay those that were asked for.
+        with stage("writing rooms", seconds, "write"):
+            hn.save_rooms(out, labels, grid)
+            labels = hn.load_rooms(out, grid)
     with stage("building the pyramid", seconds, "pyramid"):
         built = settings.pyramid
         pyramid = hn.DualGraphPyramid.build(
@@ -118,10 +129,12 @@ def rooms(
             rooms=labels,
         )
     topology = hn.TopologicalMap(pyramid)
-    if out is not None:
-        hn.save_rooms(out, _enterable(labels, topology), grid)
+    figures = _figures(topology.rooms, areas_m2) | {"map": str(map_file), "seconds": seconds}
     answer(
-        "\n".join([_listing(topology), *islands_line(grid)]) + f"\nseconds    {timings(seconds)}\n"
+        json.dumps(figures, allow_nan=False) + "\n"
+        if as_json
+        else "\n".join([_listing(topology.rooms, areas_m2), *islands_line(grid)])
+        + f"\nseconds    {timings(seconds)}\n"
     )
     if plot is not None:
         from hybridnav.viz import plot_rooms, save_figure  # noqa: PLC0415 - matplotlib on demand
@@ -129,33 +142,56 @@ def rooms(
         save_figure(plot_rooms(topology), plot)
 
 
-def _enterable(labels: hn.RoomLabels, topology: hn.TopologicalMap) -> hn.RoomLabels:
-    """The rooms that the robot can be in: a file with others could not be read for it."""
-    fits = topology.rooms.areas_m2 > 0
-    if fits.all():
-        return labels
-    names = np.array(labels.names, dtype=object)
-    left_out = names[~fits]
-    told = ", ".join(left_out[:_TOLD]) + (", ..." if len(left_out) > _TOLD else "")
-    complain(
-        f"not written, as a robot radius of {topology.grid.robot_radius_m:g} m leaves no free "
-        f"cell: {len(left_out)} rooms, {told}"
-    )
-    renumbered = np.append(np.where(fits, np.cumsum(fits) - 1, NO_ROOM), NO_ROOM)
-    points = {name: at for name, at in labels.points.items() if name not in set(left_out)}
-    return hn.RoomLabels(tuple(names[fits].tolist()), renumbered[labels.label_of], points)
+def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
+    """Rooms and doors as plain values; gaps are doors here."""
+    return {
+        "robot_radius_m": rooms.grid.robot_radius_m,
+        "rooms": [
+            {"name": name, "area_m2": round(area_m2, 6), "point_m": _at(rooms, name), "fits": fits}
+            for name, area_m2, fits in zip(
+                rooms.names, areas_m2.tolist(), rooms.fits.tolist(), strict=True
+            )
+        ],
+        "doors": [
+            {
+                "number": door.number,
+                "rooms": list(door.rooms),
+                "position_m": [round(number, 6) for number in door.position],
+                "width_m": round(door.width_m, 6),
+                "passable": door.passable,
+            }
+            for door in rooms.doors
+        ],
+    }
 
 
-def _listing(topology: hn.TopologicalMap) -> str:
-    """One line a room: its free area and the doors to its neighbours."""
-    view = topology.rooms
-    doors: dict[str, list[str]] = {name: [] for name in view.names}
-    for door in view.doors:
+def _at(rooms: Rooms, name: str) -> list[float]:
+    return [round(number, 6) for number in rooms.point_of(name)]
+
+
+def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
+    """One line a room: its free area, the point that stands for it, the doors to its neighbours."""
+    doors: dict[str, list[str]] = {name: [] for name in rooms.names}
+    for door in rooms.doors:
         for name, other in (door.rooms, door.rooms[::-1]):
-            if name is not None:
-                doors[name].append(f"{other or '-'} ({door.number}: {door.width_m:.2f} m)")
-    width = max((len(name) for name in view.names), default=0)
-    lines = [f"rooms      {len(view.names)}, {len(view.doors)} doors; free area, doors to"]
-    for name, area_m2 in zip(view.names, view.areas_m2.tolist(), strict=True):
-        lines.append(f"{name:<{width}} {area_m2:>9.2f} m²  {', '.join(doors[name])}".rstrip())
+            if name is not None and not door.is_gap:
+                doors[name].append(_door(door, other))
+    width = max((len(name) for name in rooms.names), default=0)
+    of_rooms, of_doors, gaps = rooms.counted()
+    left_out = f"; {gaps} not listed" if gaps else ""
+    lines = [
+        f"rooms      {of_rooms.replace(' rooms', '', 1)}; {of_doors}{left_out}",
+        "columns    room, area as measured, its point, doors to (number: width)",
+    ]
+    for name, area_m2, fits in zip(
+        rooms.names, areas_m2.tolist(), rooms.fits.tolist(), strict=True
+    ):
+        point = "({:.2f}, {:.2f})".format(*_at(rooms, name))
+        told = ([] if fits else [f"no robot of {rooms.grid.robot_radius_m:g} m fits"]) + doors[name]
+        lines.append(f"{name:<{width}} {area_m2:>9.2f} m²  {point:<16} {', '.join(told)}".rstrip())
     return "\n".join(lines)
+
+
+def _door(door: Door, other: str | None) -> str:
+    narrow = "" if door.passable else ", too narrow"
+    return f"{other or '-'} ({door.number}: {door.width_m:.2f} m{narrow})"

@@ -22,6 +22,8 @@ MAX_ROOMS = 10_000
 """Rooms a map may have at most."""
 MAX_NAME = 80
 """Characters of a name at most."""
+MAX_NUMBER = 1_000_000_000
+"""Number of a door at most."""
 
 NO_ROOM = -1
 """Label of cells without a room."""
@@ -46,17 +48,21 @@ class RoomLabels:
     points
         Named points, `(x, y)` in metres, map frame. One with the name of a room is the point that
         stands for the room.
+    doors
+        Numbers of doors that are known, each with a point of its boundary, `(x, y)` in metres: a
+        door keeps its number when rooms are written, read, or planned on for another robot.
 
     Raises
     ------
     InvalidValueError
         When a name is given twice, empty, too long or not one printable line, a label has no name,
-        or a point is not finite.
+        a point is not finite, or the number of a door is not a positive whole one.
     """
 
     names: tuple[str, ...]
     label_of: IntArray = field(repr=False)
     points: Mapping[str, Point] = field(default_factory=dict)
+    doors: Mapping[int, Point] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         names = tuple(self.names)
@@ -72,11 +78,13 @@ class RoomLabels:
                 f"got {label_of.min()} to {label_of.max()}"
             )
         label_of.flags.writeable = False
-        points = {name: _point(name, at) for name, at in self.points.items()}
+        points = {name: _point(f"point {name!r:.90}", at) for name, at in self.points.items()}
+        doors = {check_number(n): _point(f"door {n!r:.90}", at) for n, at in self.doors.items()}
         for name, value in (
             ("names", names),
             ("label_of", label_of),
             ("points", MappingProxyType(points)),
+            ("doors", MappingProxyType(doors)),
         ):
             object.__setattr__(self, name, value)
 
@@ -120,13 +128,22 @@ def did_you_mean(name: str, known: tuple[str, ...]) -> str:
     return f": there are {shown}"
 
 
-def _point(name: str, at: Point) -> Point:
+def check_number(number: int) -> int:
+    """Return the number of a door, refuse what is none."""
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 < number <= MAX_NUMBER:
+        raise InvalidValueError(
+            f"a door needs a whole number from 1 to {MAX_NUMBER}, got {number!r:.80}"
+        )
+    return number
+
+
+def _point(what: str, at: Point) -> Point:
     try:
         x, y = float(at[0]), float(at[1])
     except (TypeError, ValueError, IndexError, OverflowError):
         x = y = math.nan
     if not (math.isfinite(x) and math.isfinite(y)):
         raise InvalidValueError(
-            f"point {name!r:.90}: expected two finite coordinates (x, y) in metres, got {at!r:.80}"
+            f"{what}: expected two finite coordinates (x, y) in metres, got {at!r:.80}"
         )
     return x, y

@@ -14,14 +14,14 @@ from hybridnav.config.yaml_file import Limits, printable, read_yaml
 from hybridnav.errors import InvalidValueError, MapNotFoundError, RoomsError, RoomsNotFoundError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.grid.occupancy import extent
-from hybridnav.grid.rooms import check_names
+from hybridnav.grid.rooms import check_names, check_number
 from hybridnav.io.image import read_raster
-from hybridnav.io.rooms_paint import painted
+from hybridnav.io.rooms_paint import painted, without_slivers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray, PathLike
+    from hybridnav._typing import FloatArray, IntArray, PathLike
     from hybridnav.grid import OccupancyGrid
     from hybridnav.grid.rooms import Point
 
@@ -44,6 +44,7 @@ class _Read:
     outlines: dict[int, list[FloatArray]] = field(default_factory=dict)
     seeds: dict[int, tuple[float, float]] = field(default_factory=dict)
     points: dict[str, tuple[float, float]] = field(default_factory=dict)
+    doors: dict[int, tuple[float, float]] = field(default_factory=dict)
     label_of: IntArray | None = None
 
     def of(self, room: int) -> str:
@@ -60,7 +61,9 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         `polygon` (a ring of [x, y] in metres, map frame), `polygons` (rings: parts and holes) or a
         `seed` [x, y], which names the room that segmentation finds there; and a `point` [x, y] that
         stands for the room, if wanted. Rings are filled by the even-odd rule, also where one
-        crosses itself. Beside it `points:` is a list of named points. Or `locations:` is a list of
+        crosses itself. Beside it `points:` is a list of named points, and `doors:` one of the
+        numbers of doors, each with a `point` of its boundary: the door nearest to it, within a
+        metre, keeps the number. Or `locations:` is a list of
         names, with an image `data:` whose pixel values index it, the size of the map's, or flat
         `polygons:` in pixels of that image; these win where both are given.
     grid
@@ -77,8 +80,8 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         When the file or the image is not there.
     RoomsError
         When one of them cannot be read, or a room has no name or one that is taken, leaves the map,
-        overlaps another, has no free cell, or none that the robot's radius leaves, or a named point
-        lies outside the map or in an obstacle; one line.
+        overlaps another or has no free cell, a named point lies outside the map or in an obstacle,
+        or the number of a door is none or is given twice; one line.
     """
     values = read_yaml(
         path, what="rooms", error=RoomsError, missing=RoomsNotFoundError, limits=LIMITS
@@ -97,9 +100,11 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
             label_of = painted(read.outlines, read.names, where, grid)
         if read.seeds:
             label_of = _seeded(read, label_of, grid)
+        if "rooms" in values:
+            label_of = without_slivers(label_of, grid)
         check_rooms(read.names, label_of, where, grid)
         check_points(read.points, where, grid)
-        return RoomLabels(tuple(read.names), label_of, read.points)
+        return RoomLabels(tuple(read.names), label_of, read.points, read.doors)
     except InvalidValueError as error:
         raise RoomsError(f"{where}: {error}") from None
 
@@ -107,7 +112,7 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
 def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
     """The form with rooms."""
     read = _Read(where)
-    _check_keys(values, ("rooms", "points", "map"), where)
+    _check_keys(values, ("rooms", "points", "doors", "map"), where)
     for number, entry in enumerate(_list_of(values["rooms"], f"{where}: rooms")):
         at = f"{where}: room {number + 1}"
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
@@ -136,7 +141,28 @@ def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
             raise RoomsError(f"{where}: point {entry['name']!r}: the name is given twice")
         taken.add(entry["name"])
         read.points[entry["name"]] = _xy(entry.get("point"), f"{where}: point {entry['name']!r}")
+    read.doors = _doors(values.get("doors", []), where)
     return read
+
+
+def _doors(entries: Any, where: str) -> dict[int, tuple[float, float]]:
+    """Numbers of doors, each with a point of its boundary."""
+    doors: dict[int, tuple[float, float]] = {}
+    for entry in _list_of(entries, f"{where}: doors"):
+        if not isinstance(entry, dict) or "number" not in entry:
+            raise RoomsError(
+                f"{where}: doors: expected a number and a point, got {reprlib.repr(entry)}"
+            )
+        try:
+            number = check_number(entry["number"])
+        except InvalidValueError as error:
+            raise RoomsError(f"{where}: doors: {error}") from None
+        at = f"{where}: door {number}"
+        _check_keys(entry, ("number", "point"), at)
+        if number in doors:
+            raise RoomsError(f"{at}: the number is given twice, every door needs its own")
+        doors[number] = _xy(entry.get("point"), f"{at}: point")
+    return doors
 
 
 def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGrid) -> _Read:
@@ -230,21 +256,10 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
 
 
 def check_rooms(names: Sequence[str], label_of: IntArray, where: str, grid: OccupancyGrid) -> None:
-    """Refuse rooms without a free cell."""
-
-    def counted(free: BoolArray) -> LongArray:
-        return np.bincount(label_of[free & (label_of >= 0)], minlength=len(names))
-
-    measured = counted(grid.measured == CellClass.FREE)
-    left = counted(grid.classes == CellClass.FREE)
-    for room, name in enumerate(names):
-        if measured[room] == 0:
-            raise RoomsError(f"{where}: room {name!r}: holds no free cell of the map")
-        if left[room] == 0:
-            raise RoomsError(
-                f"{where}: room {name!r}: a robot radius of {grid.robot_radius_m:g} m leaves it "
-                "no free cell"
-            )
+    """Refuse rooms without a free cell, as measured: robots come in all sizes."""
+    free = label_of[(grid.measured == CellClass.FREE) & (label_of >= 0)]
+    for room in np.flatnonzero(np.bincount(free, minlength=len(names)) == 0).tolist():
+        raise RoomsError(f"{where}: room {names[room]!r}: holds no free cell of the map")
 
 
 def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from scipy import ndimage
 from hybridnav.config.yaml_file import printable
 from hybridnav.errors import RoomsError
 from hybridnav.io.rooms import LIMITS, check_points, check_rooms, in_cells
-from hybridnav.io.rooms_paint import painted
+from hybridnav.io.rooms_paint import painted, without_slivers
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -36,7 +37,8 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
 
     Outlines are simplified together, so that neighbours keep their common border: by 15 cm, up to
     60 cm where the file would else have more than 20,000 corners, and not at all where a room would
-    lose much by it.
+    lose much by it. The doors of these outlines are written with the numbers that they have for
+    `rooms`, so that lists and pictures of the file, and plans with it, tell them by the same ones.
 
     Parameters
     ----------
@@ -50,14 +52,18 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     Raises
     ------
     RoomsError
-        When the file cannot be written, or could not be read again: a room has no free cell, or
-        none for the grid's robot radius, a named point lies outside the map or in an obstacle, or
-        there are too many rooms.
+        When the file cannot be written, or could not be read again: a room has no free cell, a
+        named point lies outside the map or in an obstacle, or there are too many rooms.
     """
     where = f"rooms {printable(path)}"
     check_rooms(rooms.names, rooms.label_of, where, grid)
     check_points(rooms.points, where, grid)
-    text, n_values = _written(rooms, _rings_to_write(rooms, where, grid), grid)
+    # Loads scipy and numba.
+    from hybridnav.topology.doors import renumbered  # noqa: PLC0415
+
+    rings_of, label_of = _rings_to_write(rooms, where, grid)
+    doors = renumbered(rooms, label_of, grid)
+    text, n_values = _written(replace(rooms, doors=doors), rings_of, grid)
     size = len(text.encode())
     if n_values > LIMITS.max_values or size > LIMITS.max_bytes:
         raise RoomsError(
@@ -86,8 +92,11 @@ def _replace(path: Path, text: str) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _rings_to_write(rooms: RoomLabels, where: str, grid: OccupancyGrid) -> list[list[FloatArray]]:
-    """Rings of each room in metres, float64 (n, 2), that read as the rooms they were."""
+def _rings_to_write(
+    rooms: RoomLabels, where: str, grid: OccupancyGrid
+) -> tuple[list[list[FloatArray]], IntArray]:
+    """Rings of each room in metres, float64 (n, 2), that read as the rooms they were; and the
+    labels that they read as."""
     boxes = ndimage.find_objects(rooms.label_of + 1, len(rooms.names))
     shapes = [_outline(rooms.label_of, label, *box) for label, box in enumerate(boxes)]
     simple = [_rings(s, grid) for s in _simplified(shapes, _TOLERANCE_M / grid.resolution_m)]
@@ -96,13 +105,13 @@ def _rings_to_write(rooms: RoomLabels, where: str, grid: OccupancyGrid) -> list[
         again = painted(outlines, rooms.names, where, grid)
         check_rooms(rooms.names, again, where, grid)
     except RoomsError:
-        return [_rings(shape, grid) for shape in shapes]
+        return [_rings(shape, grid) for shape in shapes], without_slivers(rooms.label_of, grid)
     inside = rooms.label_of >= 0
     is_kept = rooms.label_of[inside] == again[inside]
     kept = np.bincount(rooms.label_of[inside], is_kept, len(rooms.names))
     if (kept < _KEPT * np.bincount(rooms.label_of[inside])).any():
-        return [_rings(shape, grid) for shape in shapes]
-    return simple
+        return [_rings(shape, grid) for shape in shapes], without_slivers(rooms.label_of, grid)
+    return simple, without_slivers(again, grid)
 
 
 def _written(
@@ -127,10 +136,15 @@ def _written(
         lines.append("points:")
         for name, at in others.items():
             lines += [f"- {_name(name)}", f"  point: {_corner(*at)}"]
+    if rooms.doors:
+        lines.append("doors:  # their numbers; a point of each")
+        for number, at in rooms.doors.items():
+            lines.append(f"- {{number: {number}, point: {_corner(*at)}}}")
     # A list counts as one value beside its own; a corner is a list of two.
     n_corners = sum(len(ring) for rings in rings_of for ring in rings)
     n_lists = sum(1 + len(rings) for rings in rings_of)
-    n_values = 5 + 4 * len(rooms.names) + n_lists + 3 * n_corners + 7 * len(rooms.points)
+    n_values = 7 + 4 * len(rooms.names) + n_lists + 3 * n_corners
+    n_values += 7 * len(rooms.points) + 7 * len(rooms.doors)
     return "\n".join(lines) + "\n", n_values
 
 

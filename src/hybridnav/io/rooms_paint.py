@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import ndimage
 
 from hybridnav.errors import RoomsError
-from hybridnav.grid import NO_ROOM
+from hybridnav.grid import NO_ROOM, CellClass
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -19,6 +20,8 @@ _LEAST_OVERLAP = 0.01
 """Share of the smaller room that two outlines may have in common: lines drawn by hand."""
 _MOST_COVERED = 0.5
 """Share of a room that may lie in all others together: painting costs twice the map at most."""
+_LEAST_NAMELESS_M2 = 1.0
+"""Least area of a space of its own that lies in no room; the default of rooms that are found."""
 _MOST_CROSSINGS = 5_000_000
 """Rows that all sides of a file cross together: a second and 400 MB. Rooms of a real floor cross
 some ten thousand."""
@@ -83,6 +86,47 @@ def painted(
             raise RoomsError(f"{where}: room {names[room]!r}: most of it lies in other rooms")
         flat[cells[~is_taken]] = room
     return label_of
+
+
+def without_slivers(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
+    """Give the slivers that outlines leave over to the rooms beside them.
+
+    Outlines have few corners where the free cells' rim has many, and people leave strips between
+    rooms: each would be nameless space with doors of its own.
+
+    Parameters
+    ----------
+    label_of
+        int32 (rows, cols), -1 for no room.
+    grid
+        The map.
+
+    Returns
+    -------
+    IntArray
+        Labels in which connected cells of no room, measured as free and together below one square
+        metre, have the room with which they have the longest border.
+    """
+    nameless = (grid.measured == CellClass.FREE) & (label_of == NO_ROOM)
+    part_of, n_parts = ndimage.label(nameless)
+    cells = np.bincount(part_of.ravel(), minlength=n_parts + 1)
+    small = cells * grid.resolution_m**2 < _LEAST_NAMELESS_M2
+    small[0] = False
+    taken = np.where((grid.measured == CellClass.FREE), label_of, np.int32(NO_ROOM))
+    pairs = []
+    for one, other in (
+        (np.s_[:, :-1], np.s_[:, 1:]),
+        (np.s_[:, 1:], np.s_[:, :-1]),
+        (np.s_[:-1], np.s_[1:]),
+        (np.s_[1:], np.s_[:-1]),
+    ):
+        beside = small[part_of[one]] & (taken[other] != NO_ROOM)
+        pairs.append(np.stack([part_of[one][beside], taken[other][beside]], axis=1))
+    found, length = np.unique(np.concatenate(pairs), axis=0, return_counts=True)
+    room_of = np.full(n_parts + 1, NO_ROOM, dtype=np.int32)
+    order = np.lexsort((-found[:, 1], length))  # the last one written counts
+    room_of[found[order, 0]] = found[order, 1]
+    return np.where(nameless, room_of[part_of], label_of)
 
 
 def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArray:

@@ -152,7 +152,7 @@ class Blocked:
                 _check_arc(arc, topology)
                 closed.append(arc)
         for door in self.doors:
-            closed += _arcs_of(_door_on(topology.rooms, door))
+            closed += _door_on(topology.rooms, door).arcs
         return [
             cells
             for level in sorted({arc.level for arc in closed})
@@ -198,11 +198,6 @@ def as_blocked(value: Closable) -> Blocked:
             f"blocked takes {', '.join(names)}, got {', '.join(map(str, unknown)):.80}"
         )
     return Blocked(**value)
-
-
-def _arcs_of(door: Door) -> tuple[LevelArc, ...]:
-    """The arcs that make a door."""
-    return (door.arc,)
 
 
 def _door_on(rooms: Rooms, door: int | Door) -> Door:

@@ -25,7 +25,8 @@ def cell_pairs(base_edges: LongArray, cols: int) -> LongArray:
 def sides_of(base_edges: LongArray, cols: int) -> FloatArray:
     """Return the middle of the side that each base edge crosses, float64 (n, 2), in cells: the
     centre of cell (0, 0) is (0.5, 0.5)."""
-    return cell_pairs(base_edges, cols).mean(axis=1) + 0.5
+    middles: FloatArray = cell_pairs(base_edges, cols).mean(axis=1) + 0.5
+    return middles
 
 
 def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray:
@@ -52,4 +53,5 @@ def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray
     squared = ((sides - mean[boundary]) ** 2).sum(axis=1)
     order = np.lexsort((squared, boundary))
     starts = np.cumsum(sizes) - sizes
-    return sides[order[starts]]
+    middles: FloatArray = sides[order[starts]]
+    return middles

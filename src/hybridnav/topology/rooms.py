@@ -10,8 +10,8 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass
-from hybridnav.grid.clearance import clearance_cells
 from hybridnav.pyramid.level import LevelArc
+from hybridnav.topology.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
@@ -21,19 +21,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Door:
-    """A boundary that can be crossed between two rooms: one arc of the room level."""
+    """A connected boundary between two rooms on the map as measured, the same for every robot."""
 
     number: int
-    """From 1, in the order of arcs; what people are told."""
-    arc: LevelArc
-    """The arc of the room level."""
+    """From 1; what people are told. A file of rooms keeps it."""
     rooms: tuple[str | None, str | None]
-    """Names of the rooms on both sides, in the order of the arc's ends; None for no room."""
+    """Names of the rooms on both sides; None for what lies in no room."""
     position: tuple[float, float]
     """A point on the boundary, in its middle; `(x, y)` in metres, map frame."""
     width_m: float
     """Diameter of the largest disc round a point of the boundary that no occupied cell enters:
     between two door posts, the distance between them."""
+    arcs: tuple[LevelArc, ...]
+    """Its arcs at the room level: none where the map's robot radius closes it,
+    several where inflated obstacles divide it."""
+
+    @property
+    def passable(self) -> bool:
+        """Whether a robot of the map's radius passes."""
+        return bool(self.arcs)
+
+    @property
+    def is_gap(self) -> bool:
+        """Whether it is narrower than 0.3 m: lists and pictures count gaps and leave them out."""
+        return self.width_m < LEAST_DOOR_M
 
 
 class Rooms:
@@ -97,81 +108,105 @@ class Rooms:
 
     @cached_property
     def areas_m2(self) -> FloatArray:
-        """float64 (n_rooms,), free area of each room in square metres."""
-        named = self.is_free & (self.label_of_vertex >= 0)
-        cells = np.bincount(
-            self.label_of_vertex[named], self.level.areas[named], minlength=len(self.names)
-        )
-        areas: FloatArray = cells * np.float64(self.grid.resolution_m**2)
-        return areas
+        """float64 (n_rooms,), area of the free cells of each room as measured, whatever the robot's
+        radius, in square metres."""
+        return room_areas_m2(self.labels, self.grid)
+
+    @cached_property
+    def fits(self) -> BoolArray:
+        """bool (n_rooms,), rooms in which the map's robot radius leaves a free cell."""
+        named = self.label_of_vertex[self.is_free & (self.label_of_vertex >= 0)]
+        found: BoolArray = np.bincount(named, minlength=len(self.names)) > 0
+        return found
 
     @cached_property
     def clearance_m(self) -> FloatArray:
         """float64 (rows, cols), distance from the centre of each cell to the next occupied cell's
         nearest side, in metres; infinite where none is occupied."""
-        cells = clearance_cells(self.grid.measured == CellClass.OCCUPIED)
-        return np.maximum(cells - 0.5, 0.0) * self.grid.resolution_m
+        return measured_clearance_m(self.grid)
 
     @cached_property
-    def widths_m(self) -> FloatArray:
-        """float64 (n_arcs,), width of each arc of the room level, as of a `Door`."""
-        edges, arc = self.level.boundary_table
-        cols = self.grid.shape[1]
-        first = edges >> 1
-        second = first + np.where(edges & 1, cols, 1)
-        clear = self.clearance_m.ravel()
-        widest = np.zeros(self.level.n_arcs)
-        np.maximum.at(widest, arc, np.minimum(clear[first], clear[second]))
-        length_m = np.bincount(arc, minlength=self.level.n_arcs) * self.grid.resolution_m
-        # Without a single occupied cell a boundary is as wide as it is long.
-        return np.where(np.isfinite(widest), 2 * widest, length_m)
+    def _boundaries(self) -> RoomBoundaries:
+        return RoomBoundaries.of(self.labels, self.grid, self.clearance_m)
 
     @cached_property
     def doors(self) -> tuple[Door, ...]:
-        """All boundaries between free parts of different rooms, in the order of arcs."""
+        """All boundaries between free cells of different rooms, by number; also those that no robot
+        of the map's radius passes, and gaps."""
+        found = self._boundaries
+        arcs: list[list[int]] = [[] for _ in range(found.n_boundaries)]
         labels = self.label_of_vertex[self.level.arcs]
         between = (labels[:, 0] != labels[:, 1]) & self.is_free[self.level.arcs].all(axis=1)
-        positions = self.level.boundary_middles
+        kept = np.flatnonzero(between)
+        on = found.boundary_of[np.searchsorted(found.edges, self.level.base_edges[kept])]
+        for arc, boundary in zip(kept.tolist(), on.tolist(), strict=True):
+            arcs[boundary].append(arc)
+        numbers = found.numbers(self.labels.doors, {})
         return tuple(
             Door(
-                number,
-                LevelArc(self.level.index, arc),
-                (self.name_of(int(labels[arc, 0])), self.name_of(int(labels[arc, 1]))),
-                (float(positions[arc, 0]), float(positions[arc, 1])),
-                float(self.widths_m[arc]),
+                int(numbers[at]),
+                (self.name_of(int(found.labels[at, 0])), self.name_of(int(found.labels[at, 1]))),
+                (float(found.middles[at, 0]), float(found.middles[at, 1])),
+                float(found.widths_m[at]),
+                tuple(LevelArc(self.level.index, arc) for arc in arcs[at]),
             )
-            for number, arc in enumerate(np.flatnonzero(between).tolist(), start=1)
+            for at in np.argsort(numbers).tolist()
         )
 
-    @cached_property
-    def door_of_arc(self) -> dict[int, Door]:
-        """The door of each arc of the room level that is one, by the arc's dense index."""
-        return {door.arc.index: door for door in self.doors}
-
     def door(self, number: int) -> Door:
-        """Return the door that has a number.
+        """The door with a number.
 
         Raises
         ------
         InvalidValueError
-            When there is no such door.
+            When no door has it; the line names the numbers that there are.
         """
-        for door in self.doors:
-            if door.number == number:
-                return door
-        numbers = [door.number for door in self.doors]
-        known = f"doors are {min(numbers)} to {max(numbers)}" if numbers else "it has none"
-        raise InvalidValueError(
-            f"there is no door {number} on this map, {known}; hybridnav rooms MAP lists them"
+        found = self._door_of_number.get(number)
+        if found is None:
+            told = "the map has no doors"
+            if self.doors:
+                first, last = self.doors[0].number, self.doors[-1].number
+                told = f"there are {len(self.doors)}, from {first} to {last}"
+            raise InvalidValueError(f"no door has the number {number!r:.80}: {told}")
+        return found
+
+    @cached_property
+    def _door_of_number(self) -> dict[int, Door]:
+        return {door.number: door for door in self.doors}
+
+    @cached_property
+    def door_of_arc(self) -> dict[int, Door]:
+        """The door of each arc of the room level that lies on one, by the arc's dense index."""
+        return {arc.index: door for door in self.doors for arc in door.arcs}
+
+    def counted(self) -> tuple[str, str, str]:
+        """Describe how many rooms and doors there are, and how many of them this robot cannot use.
+
+        Returns
+        -------
+        tuple of str
+            Such as "22 rooms, 1 of them too small for 0.25 m", "71 doors, 12 of them too narrow for
+            0.25 m", and "43 gaps below 0.3 m", which are not among the doors; empty without any.
+        """
+        doors = [door for door in self.doors if not door.is_gap]
+        small = len(self.names) - int(np.count_nonzero(self.fits))
+        narrow = sum(not door.passable for door in doors)
+        n_gaps = len(self.doors) - len(doors)
+        radius = f"for {self.grid.robot_radius_m:g} m"
+        return (
+            f"{len(self.names)} rooms" + (f", {small} of them too small {radius}" if small else ""),
+            f"{len(doors)} doors" + (f", {narrow} of them too narrow {radius}" if narrow else ""),
+            f"{n_gaps} gaps below {LEAST_DOOR_M:g} m" if n_gaps else "",
         )
 
     def point_of(self, name: str) -> tuple[float, float]:
-        """The point that stands for a room: its named point, else where most clearance is.
+        """The point that stands for a room: its named point, else where most clearance is, in the
+        largest part that the robot's radius leaves free; where it leaves none, in the whole room.
 
         Parameters
         ----------
         name
-            A room with free cells, or a named point.
+            A room, or a named point.
 
         Returns
         -------
@@ -185,8 +220,23 @@ class Rooms:
         """
         if name in self.labels.points:
             return self.labels.points[name]
-        largest = int(self.vertices_of(name)[0])
-        cells = self.level.receptive_field(largest)
+        parts = self.vertices_of(name)
+        cells = self.level.receptive_field(int(parts[0])) if len(parts) else self._measured(name)
         clear = self.clearance_m[tuple(cells.T)]
         x, y = self.grid.frame.points_of(cells[int(np.argmax(clear))])
         return float(x), float(y)
+
+    def _measured(self, name: str) -> LongArray:
+        """Cells (row, col) of a room that were measured as free."""
+        inside = self.labels.label_of == self.labels.index(name)
+        cells: LongArray = np.argwhere(inside & (self.grid.measured == CellClass.FREE))
+        return cells
+
+
+def room_areas_m2(labels: RoomLabels, grid: OccupancyGrid) -> FloatArray:
+    """Return the area of the free cells of each room as measured, float64 (n_rooms,), in square
+    metres."""
+    free = labels.label_of[grid.measured == CellClass.FREE]
+    cells = np.bincount(free[free >= 0], minlength=len(labels.names))
+    areas: FloatArray = cells * np.float64(grid.resolution_m**2)
+    return areas

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from hybridnav.topology import Door
     from hybridnav.viz.layout import Entry
 
-LEAST_DOOR_M = 0.3
-"""Narrower doors are not drawn: a scan's noise makes many."""
 DOOR_POINTS = 1.2
 """Half the side of a door's dot."""
 
@@ -46,6 +44,9 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
 
     A name that does not fit its room, or would hide another, is written smaller or left out; the
     legend counts those left out. Doors have their numbers where there is room for them.
+
+    Doors that are too narrow for the map's robot radius are hollow dots. Gaps, doors narrower than
+    0.3 m, are left out; the legend counts them, and no number changes by it.
 
     Parameters
     ----------
@@ -77,17 +78,18 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     draw_room_cells(canvas, labels, grid)
     words = [grid.name, f"{len(labels.names)} rooms"]
-    writer, left_out = RoomWriter(canvas, grid, labels), 0
+    writer, left_out, gaps = RoomWriter(canvas, grid, labels), 0, ""
     doors: list[Door] = []
     if view is not None:
-        words.append(f"{len(view.doors)} doors")
-        doors = [door for door in view.doors if door.width_m >= LEAST_DOOR_M]
+        *counted, gaps = view.counted()
+        words = [grid.name, *counted]
+        doors = [door for door in view.doors if not door.is_gap]
         writer.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     if names:
         left_out = writer.write_names()
     entries: list[Entry] = [room_entry(left_out)]
     if view is not None:
-        entries.append((draw_doors(canvas, doors), "doors"))
+        entries += draw_doors(canvas, doors, f"{gaps} left out" if gaps else "")
         writer.number_doors(sorted(doors, key=lambda door: -door.width_m))
     entries += ground_entries(grid)
     add_title(canvas, words if title is None else [title])
@@ -140,21 +142,40 @@ def _colours(label_of: IntArray, n_rooms: int, strength: float) -> ByteArray:
     )
 
 
-def draw_doors(canvas: Canvas, doors: Sequence[Door]) -> Line2D:
-    """Draw doors as dots; gives one for the legend."""
-    at = [door.position for door in doors]
-    dots, sample = (
-        Line2D(
-            [x for x, _ in points],
-            [y for _, y in points],
-            color=style.PATH,
-            marker="o",
-            markersize=2 * DOOR_POINTS * canvas.sizes.line,
-            linestyle="none",
-            zorder=8,
+def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> list[Entry]:
+    """Draw doors as dots, hollow ones where the robot does not pass; return the legend's entries.
+
+    Parameters
+    ----------
+    canvas
+        Where to draw.
+    doors
+        The doors.
+    left_out
+        What is left out, for the legend.
+    """
+    entries: list[Entry] = []
+    for gid, passable, told in (
+        ("doors", True, f"doors ({left_out})" if left_out else "doors"),
+        ("narrow-doors", False, "doors too narrow for the robot"),
+    ):
+        at = [door.position for door in doors if door.passable == passable]
+        dots, sample = (
+            Line2D(
+                [x for x, _ in points],
+                [y for _, y in points],
+                color=style.PATH,
+                marker="o",
+                markerfacecolor=style.PATH if passable else style.FREE,
+                markeredgewidth=0.8 * canvas.sizes.line,
+                markersize=2 * DOOR_POINTS * canvas.sizes.line,
+                linestyle="none",
+                zorder=8,
+            )
+            for points in (at, [])
         )
-        for points in (at, [])
-    )
-    dots.set_gid("doors")
-    canvas.ax.add_line(dots)
-    return sample
+        dots.set_gid(gid)
+        if passable or at:
+            canvas.ax.add_line(dots)
+            entries.append((sample, told))
+    return entries

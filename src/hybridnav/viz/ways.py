@@ -19,7 +19,6 @@ from hybridnav.viz.places import Places
 from hybridnav.viz.room_labels import RoomWriter
 from hybridnav.viz.rooms import (
     DOOR_POINTS,
-    LEAST_DOOR_M,
     draw_doors,
     draw_room_cells,
     room_entry,
@@ -207,14 +206,14 @@ def _draw_ground(
     writer.number_doors(passed, always=True)
     named_first = {leg.room for leg in legs if leg.room is not None}
     left_out = writer.write_names(named_first, lines=lines)
-    entries: list[Entry] = [room_entry(left_out, strength), (draw_doors(canvas, doors), "doors")]
+    entries: list[Entry] = [room_entry(left_out, strength), *draw_doors(canvas, doors)]
     return entries + ground_entries(grid), writer.taken
 
 
 def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
     """Doors wide enough to draw, and all that the way passes."""
     numbers = {door.number for door in passed}
-    return [d for d in rooms.doors if d.width_m >= LEAST_DOOR_M or d.number in numbers]
+    return [d for d in rooms.doors if not d.is_gap or d.number in numbers]
 
 
 def _finished(canvas: Canvas, words: Sequence[str], entries: Sequence[Entry]) -> Axes:
