@@ -184,9 +184,10 @@ def grow_topology(
     *,
     rooms_file: Path | None = None,
     find_rooms: bool = False,
+    stops: Sequence[str | tuple[float, ...]] = (),
 ) -> hn.TopologicalMap:
     """Build the pyramid of a map as a preset says: with the rooms of a file; without one, if asked
-    for, with those that are found."""
+    for, with those that are found. Stops with names that these lack are refused before."""
     settings = preset.pyramid
     rooms = None
     if rooms_file is not None:
@@ -195,6 +196,10 @@ def grow_topology(
     elif find_rooms:
         with stage("finding rooms", seconds, "rooms"):
             rooms = hn.find_rooms(grid)
+    if rooms is not None:
+        from hybridnav.planner.named import check_stops  # noqa: PLC0415 - loads numba
+
+        check_stops(rooms, grid, stops)
     with stage("building the pyramid", seconds, "pyramid"):
         pyramid = hn.DualGraphPyramid.build(
             grid,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner
@@ -74,6 +74,8 @@ def stop_points(
         raise InvalidValueError(f"at must be 'anywhere' or 'point', got {at!r:.80}")
     topology = planner.topology
     grid = topology.grid
+    if any(isinstance(stop, str) for stop in stops):
+        check_stops(topology.rooms.labels, grid, stops)
     enterable = grid.enterable(allow_unexplored=planner.preset.planner.allow_unexplored)
     if blocked is not None:
         enterable = enterable.copy()
@@ -83,6 +85,38 @@ def stop_points(
     if planner.needs_headings:
         return _facing_the_way(topology, enterable, stops, points)
     return points
+
+
+def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLike | str]) -> None:
+    """Refuse names that nothing has, and rooms that the robot does not fit in.
+
+    Parameters
+    ----------
+    rooms
+        The rooms, as read or found: no pyramid is needed.
+    grid
+        The map, inflated by the robot's radius.
+    stops
+        Points, and names of rooms or of named points.
+
+    Raises
+    ------
+    InvalidValueError
+        With the name, and the nearest ones that are known.
+    """
+    for stop in stops:
+        if not isinstance(stop, str) or (stop in rooms.points and stop not in rooms.names):
+            continue
+        if stop not in rooms.names:
+            known = (*rooms.names, *rooms.points)
+            raise InvalidValueError(
+                f"no room or point is called {stop!r:.90}{did_you_mean(stop, known)}"
+            )
+        if not (grid.classes[rooms.label_of == rooms.index(stop)] == CellClass.FREE).any():
+            raise InvalidValueError(
+                f"room {stop!r} has no free cell for this robot radius, {grid.robot_radius_m:g} m: "
+                "give a smaller one, or another room"
+            )
 
 
 def _chosen(
@@ -167,16 +201,8 @@ def _point_of(topology: TopologicalMap, stop: ArrayLike | str, at: At) -> ArrayL
     if not isinstance(stop, str):
         return stop
     rooms = topology.rooms
-    labels = rooms.labels
-    if stop not in labels.names:
-        if stop in labels.points:
-            return labels.points[stop]
-        known = (*labels.names, *labels.points)
-        raise InvalidValueError(
-            f"no room or point is called {stop!r:.90}{did_you_mean(stop, known)}"
-        )
-    if len(rooms.vertices_of(stop)) == 0:
-        raise InvalidValueError(f"room {stop!r} has no free cell for this robot radius")
+    if stop not in rooms.names:
+        return rooms.labels.points[stop]
     return rooms.point_of(stop) if at == "point" else None
 
 

@@ -1,0 +1,32 @@
+"""Names that nothing has are refused before anything costly is done for them."""
+
+import pytest
+
+import hybridnav as hn
+from tests.test_cli import cli  # noqa: F401 - the fixture
+from tests.test_doors import flat, map_file  # noqa: F401 - the fixture
+
+
+def test_names_are_checked_before_anything_is_built(cli, map_file, monkeypatch):  # noqa: F811
+    def built(*_, **__):
+        raise AssertionError
+
+    monkeypatch.setattr(hn.DualGraphPyramid, "build", built)
+    query = ("plan", map_file, "--robot-radius", "0", "--from", "kitchn", "--to", "lab")
+    assert cli(*query).refuses(2, "'kitchn'", "did you mean kitchen")
+    (map_file.parent / "rooms.yaml").unlink()
+    done = cli(*query)
+    assert done.code == 2
+    assert "no room or point is called 'kitchn'" in done.err
+
+
+def test_python_checks_names_before_what_is_blocked():
+    grid, labels = flat()
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels)))
+    nowhere = {"cells": [[-1, -1]]}
+    for ask in (
+        lambda: planner.plan("kitchn", "lab", blocked=nowhere),
+        lambda: hn.plan_tour(planner, ["lab", "kitchn"], blocked=nowhere),
+    ):
+        with pytest.raises(hn.InvalidValueError, match="'kitchn': did you mean kitchen"):
+            ask()
