@@ -397,3 +397,10 @@ def test_words_and_route_are_those_of_the_path_that_ompl_found() -> None:
     assert (narrow.width_m, wide.width_m) == pytest.approx((0.5, 2.1))
     assert 3.2 < at < 5.6
     assert door == wide
+
+
+def test_a_heading_of_half_a_turn_is_a_heading_like_others(rooms: hn.TopologicalMap) -> None:
+    made = long_robot(rooms, "se2", "planner: RRTConnect, budget_s: 2")
+    result = made.plan((3.0, 3.0, math.pi), (17.0, 9.0, -math.pi))
+    assert result.solved
+    assert not result.refinement.by_grid  # type: ignore[union-attr]

@@ -86,7 +86,8 @@ class StateSpace:
         else:
             state.setX(float(values[0]))
             state.setY(float(values[1]))
-            state.setYaw(math.remainder(float(values[2]), math.tau))
+            yaw = math.remainder(float(values[2]), math.tau)
+            state.setYaw(-math.pi if yaw >= math.pi else yaw)  # pi itself is out of OMPL's bounds
 
     def points(self, states: Iterable[Any]) -> FloatArray:
         """Values of states, float64 (n, 3); copied, for OMPL frees states with their path."""
