@@ -77,3 +77,31 @@ def _ground(grid: OccupancyGrid, cells: Any) -> Any:
     corners = grid.frame.points_of_grid(low[:, None] + around)
     # Rounding must not leave gaps between neighbours.
     return shapely.union_all(shapely.polygons(corners), grid_size=1e-9)
+
+
+def drive_phases(start: Any, goal: Any, n: int, *, backwards: bool = False) -> list[list[Any]]:
+    """What a robot does that turns on the spot, drives straight, and turns again.
+
+    Returns
+    -------
+    list
+        The phases in order; of each the ways to do it, as poses (n, 3). A turn goes either way
+        round.
+    """
+    way = np.subtract(goal, start)[:2]
+    if not way.any():
+        return [_turns(start, goal[2], n)]
+    heading = math.atan2(way[1], way[0]) + math.pi * backwards
+    first, last = np.append(start[:2], heading), np.append(goal[:2], heading)
+    return [_turns(start, heading, n), [turning_poses(first, last, n)], _turns(last, goal[2], n)]
+
+
+def _turns(pose: Any, heading: float, n: int) -> list[Any]:
+    """Poses of a turn on the spot, the short way and the other way round."""
+    short = math.remainder(heading - pose[2], math.tau)
+    ways = []
+    for turn in (short, short - math.copysign(math.tau, short)):
+        poses = np.tile(np.asarray(pose, dtype=float), (n, 1))
+        poses[:, 2] += np.linspace(0, turn, n)
+        ways.append(poses)
+    return ways

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from hybridnav.refine._curve_kernels import LARGEST_HEADING, shortest_word
+from hybridnav.refine._spin_kernels import body_spins, free_turn
 from hybridnav.refine._sweep_kernels import (
     OPEN,
     arc_runs,
@@ -112,6 +113,13 @@ def body_stands(marks, place, body, x, y, yaw):
 
 
 @njit(cache=True, nogil=True)
+def _short_turn(yaw0, yaw1):
+    """Radians from heading to heading the short way, [-pi, pi]."""
+    turn = yaw1 - yaw0
+    return turn - 2 * math.pi * np.rint(turn / (2 * math.pi))
+
+
+@njit(cache=True, nogil=True)
 def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
     """Whether a body may go straight from one place to another while it turns the short way."""
     row, col = _position(place, x0, y0)
@@ -120,8 +128,9 @@ def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
         return False
     if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
         return False
-    turn = yaw1 - yaw0
-    turn -= 2 * math.pi * np.rint(turn / (2 * math.pi))
+    turn = _short_turn(yaw0, yaw1)
+    if row == b_row and col == b_col:
+        return body_spins(body, row, col, yaw0 - place[6], turn)
     return body_sweeps(
         body,
         row,
@@ -132,6 +141,42 @@ def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
         turn,
         0.0,
     )
+
+
+@njit(cache=True, nogil=True)
+def turn_on_the_spot(marks, place, body, x, y, yaw0, yaw1):
+    """Turn in radians by which a body may go from heading to heading on the spot; nan for none."""
+    row, col = _position(place, x, y)
+    if not in_map(marks, row, col) or not stands(marks, row, col):
+        return np.nan
+    if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
+        return np.nan
+    return free_turn(body, row, col, yaw0 - place[6], _short_turn(yaw0, yaw1))
+
+
+@njit(cache=True, nogil=True)
+def body_drives_straight(marks, place, body, x0, y0, yaw0, x1, y1, yaw1, backwards):
+    """Whether a body may turn to the direction of travel, drive straight, and turn again.
+
+    Between equal points it only turns. Turns go either way round.
+    """
+    row, col = _position(place, x0, y0)
+    b_row, b_col = _position(place, x1, y1)
+    if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
+        return False
+    if not runs(marks, row, col, b_row, b_col):
+        return False
+    heading, last = yaw0 - place[6], yaw1 - place[6]
+    if x0 == x1 and y0 == y1:
+        return not math.isnan(free_turn(body, row, col, heading, _short_turn(heading, last)))
+    travel = math.atan2(y1 - y0, x1 - x0) - place[6]
+    if backwards:
+        travel += math.pi
+    if not body_sweeps(body, row, col, travel, b_row - row, b_col - col, 0.0, 0.0):
+        return False
+    if math.isnan(free_turn(body, row, col, heading, _short_turn(heading, travel))):
+        return False
+    return not math.isnan(free_turn(body, b_row, b_col, travel, _short_turn(travel, last)))
 
 
 @njit(cache=True, nogil=True)

@@ -30,8 +30,8 @@ BLOCKED, OPEN, STAND = 0, 1, 2
 STAYS, SHIFTS, TURNS = 0, 1, 2
 """What a body does between two of its states."""
 _DIGITS = 2.0**24
-_ROUNDING = 1 / _DIGITS
-_WIDEST = 1.0
+ROUNDING = 1 / _DIGITS
+WIDEST = 1.0
 """Margin in cells above which a motion is halved at once."""
 _HALF_DIAGONAL = 0.7075
 """Of a cell, with some slack for distances that are stored as float32."""
@@ -95,7 +95,7 @@ def moved(row, col, heading, d_row, d_col, turn, radius, share):
 
 
 @njit(cache=True, nogil=True)
-def _following(part, level):
+def following(part, level):
     """Part after one that is free, as large as it can be; level 0 where that was the last.
 
     A motion has 2^level parts on each level, and a part that is not free is halved.
@@ -108,7 +108,7 @@ def _following(part, level):
 
 
 @njit(cache=True, nogil=True)
-def _place(corners, row, col, heading, placed):
+def place(corners, row, col, heading, placed):
     """Rounded positions of the corners of a body."""
     cosine, sine = math.cos(heading), math.sin(heading)
     for i in range(corners.shape[0]):
@@ -182,14 +182,13 @@ def _hull(before, after, first, last):
 
 
 @njit(cache=True, nogil=True)
-def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
-    """Whether the hull of a convex polygon in two places meets no occupied cell, with a margin.
+def rows_seen(rows, before, after, first, last, margin, moves, columns):
+    """Note the columns of the hull of a convex polygon in two places, with a margin; its rows.
 
     Its corners are those from `first` to `last`. Each row of cells sees one run of columns of the
     hull. Where the polygon does not turn, their ends are those of its edges and of the lines that
     its corners move on; where it does, an edge of the hull may join two different corners.
     """
-    rows, cols = ahead.shape
     low, high = np.inf, -np.inf
     for i in range(first, last):
         low = min(low, before[i, 0], after[i, 0])
@@ -214,6 +213,14 @@ def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
             j_row, j_col = after[i, 0], after[i, 1]
             _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
         i = j
+    return low_row, end_row
+
+
+@njit(cache=True, nogil=True)
+def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
+    """Whether the hull of a convex polygon in two places meets no occupied cell, with a margin."""
+    rows, cols = ahead.shape
+    low_row, end_row = rows_seen(rows, before, after, first, last, margin, moves, columns)
     for row in range(low_row, end_row):
         k = row - low_row
         col = max(math.floor(columns[k, 0] - margin), 0)
@@ -227,7 +234,7 @@ def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
 
 
 @njit(cache=True, nogil=True)
-def _is_free(ahead, offsets, before, after, margin, moves, columns):
+def is_free(ahead, offsets, before, after, margin, moves, columns):
     """Whether the hulls of all convex parts of a body meet no occupied cell."""
     for k in range(offsets.size - 1):
         first, last = offsets[k], offsets[k + 1]
@@ -237,13 +244,13 @@ def _is_free(ahead, offsets, before, after, margin, moves, columns):
 
 
 @njit(cache=True, nogil=True)
-def _room(rows, reach, length):
-    """Where `_part_is_free` notes the columns of a body that moves so far."""
+def room(rows, reach, length):
+    """Where `rows_seen` notes the columns of a body that moves so far."""
     return np.empty((int(min(float(rows), 2 * reach + length)) + 6, 2))
 
 
 @njit(cache=True, nogil=True)
-def _near(clearance, row, col):
+def near(clearance, row, col):
     """Bounds on the distance to the nearest occupied square and to its centre from a position."""
     r = min(max(math.floor(row), 0), clearance.shape[0] - 1)
     c = min(max(math.floor(col), 0), clearance.shape[1] - 1)
@@ -257,15 +264,15 @@ def body_fits(body, row, col, heading):
     ahead, clearance, corners, offsets, radii = body
     if offsets.size == 1:
         return True
-    at_least, at_most = _near(clearance, row, col)
+    at_least, at_most = near(clearance, row, col)
     if at_least >= radii[1]:
         return True
     if at_most < radii[0]:
         return False
     placed = np.empty(corners.shape)
-    _place(corners, row, col, heading, placed)
-    columns = _room(ahead.shape[0], radii[1], 0.0)
-    return _is_free(ahead, offsets, placed, placed, 0.0, STAYS, columns)
+    place(corners, row, col, heading, placed)
+    columns = room(ahead.shape[0], radii[1], 0.0)
+    return is_free(ahead, offsets, placed, placed, 0.0, STAYS, columns)
 
 
 @njit(cache=True, nogil=True)
@@ -277,7 +284,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     reach = radii[1]
     length = abs(radius * turn) if radius != 0.0 else math.hypot(d_row, d_col)
     before, after, middle = np.empty(corners.shape), np.empty(corners.shape), corners.copy()
-    columns = _room(ahead.shape[0], reach, length)
+    columns = room(ahead.shape[0], reach, length)
     moves = SHIFTS if turn == 0.0 else TURNS
     part, level = 0, 0
     while True:
@@ -286,30 +293,30 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
         mid_row, mid_col, mid_heading = moved(
             row, col, heading, d_row, d_col, turn, radius, (part + 0.5) * share
         )
-        at_least, at_most = _near(clearance, mid_row, mid_col)
+        at_least, at_most = near(clearance, mid_row, mid_col)
         free = at_least >= reach + 0.5 * length * share
         margin = (abs(radius) + reach) * angle * angle / 8
-        if not free and margin <= _WIDEST:
+        if not free and margin <= WIDEST:
             at_row, at_col, at = moved(row, col, heading, d_row, d_col, turn, radius, part * share)
-            _place(corners, at_row, at_col, at, before)
+            place(corners, at_row, at_col, at, before)
             at_row, at_col, at = moved(
                 row, col, heading, d_row, d_col, turn, radius, (part + 1) * share
             )
-            _place(corners, at_row, at_col, at, after)
-            last = margin <= _ROUNDING
-            free = _is_free(ahead, offsets, before, after, 0.0 if last else margin, moves, columns)
+            place(corners, at_row, at_col, at, after)
+            last = margin <= ROUNDING
+            free = is_free(ahead, offsets, before, after, 0.0 if last else margin, moves, columns)
             if not free and last:
                 return False
         if free:
-            part, level = _following(part, level)
+            part, level = following(part, level)
             if level == 0:
                 return True
             continue
         if at_most < radii[0]:
             return False
         if at_least < reach:
-            _place(corners, mid_row, mid_col, mid_heading, middle)
-            if not _is_free(ahead, offsets, middle, middle, 0.0, STAYS, columns):
+            place(corners, mid_row, mid_col, mid_heading, middle)
+            if not is_free(ahead, offsets, middle, middle, 0.0, STAYS, columns):
                 return False
         part <<= 1
         level += 1
@@ -344,14 +351,14 @@ def arc_runs(marks, row, col, heading, turn, radius):
         a_row, a_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, part * share)
         b_row, b_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, (part + 1) * share)
         margin = abs(radius) * angle * angle / 8
-        if margin <= _ROUNDING:
+        if margin <= ROUNDING:
             if not runs(marks, rounded(a_row), rounded(a_col), rounded(b_row), rounded(b_col)):
                 return False
             free = True
         else:
-            free = margin <= _WIDEST and _sliver_stands(marks, a_row, a_col, b_row, b_col, margin)
+            free = margin <= WIDEST and _sliver_stands(marks, a_row, a_col, b_row, b_col, margin)
         if free:
-            part, level = _following(part, level)
+            part, level = following(part, level)
             if level == 0:
                 return True
             continue

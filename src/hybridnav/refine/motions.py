@@ -39,7 +39,8 @@ class MotionCheck:
     radius, and the footprint must not meet the inside of a cell that is occupied without inflation
     (`OccupancyGrid.measured`). As with the disc, unexplored and closed cells and the ground outside
     the map stop the base alone. A motion is valid only where every state on it is: motions without
-    a turn are decided exactly, others but for what a hundredth of a cell more would hit.
+    a turn and turns on the spot are decided exactly, others but for what a hundredth of a cell more
+    would hit.
 
     Parameters
     ----------
@@ -124,7 +125,8 @@ class MotionCheck:
     ) -> bool:
         """Whether the robot may go straight from pose to pose while it turns evenly, the short way.
 
-        The interpolation of OMPL's `SE2StateSpace`.
+        The interpolation of OMPL's `SE2StateSpace`: a holonomic robot, which goes in any direction
+        whatever its heading.
 
         Parameters
         ----------
@@ -137,6 +139,55 @@ class MotionCheck:
             self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1
         )
         return valid
+
+    def drive_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
+        self,
+        x0: float,
+        y0: float,
+        yaw0: float,
+        x1: float,
+        y1: float,
+        yaw1: float,
+        *,
+        backwards: bool = False,
+    ) -> bool:
+        """Whether a robot with differential drive may go from pose to pose.
+
+        It turns on the spot to the direction of travel, drives straight, and turns to its last
+        heading; each turn goes as `spin` does. Between equal points it only turns.
+
+        Parameters
+        ----------
+        x0, y0, yaw0, x1, y1, yaw1
+            Poses, metres and radians, map frame.
+        backwards
+            Whether it drives backwards: its heading is then opposite to the direction of travel.
+        """
+        valid: bool = kernels.body_drives_straight(
+            self._marks, self._place, self._body, x0, y0, yaw0, x1, y1, yaw1, backwards
+        )
+        return valid
+
+    def spin(self, x: float, y: float, yaw0: float, yaw1: float) -> float:
+        """Turn on the spot by which the robot gets from one heading to another.
+
+        Parameters
+        ----------
+        x, y
+            Metres, map frame.
+        yaw0, yaw1
+            Headings in radians.
+
+        Returns
+        -------
+        float
+            Radians, counter-clockwise above 0: the short way where that is free, else the other way
+            round; NaN where neither is.
+        """
+        turn: float = kernels.turn_on_the_spot(
+            self._marks, self._place, self._body, x, y, yaw0, yaw1
+        )
+        return turn
 
     def curve_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self,
