@@ -70,6 +70,15 @@ def test_the_parameters_are_those_that_ompl_declares(planner: str) -> None:
         ("seed: 0", ["seed"]),
         ("objective: clearance, planner: PRMstar", ["clearance"]),
         ("space: dubins, turning_radius_m: 1, planner: PRMstar", ["dubins", "one way", "PRM"]),
+        (
+            "space: differential, planner: RRTstar",
+            ["one way", "BITstar, RRT, RRTConnect", "reverses"],
+        ),
+        ("space: differential, planner: PRM", ["one way", "reverses: true"]),
+        ("space: se2, reverses: true", ["reverses", "differential"]),
+        ("space: differential, smooth: true", ["smooth", "r2 or se2"]),
+        ("space: differential, parameters: {intermediate_states: true}", ["intermediate_states"]),
+        ("space: differential, turning_radius_m: 1", ["turning_radius_m"]),
         ("speed: 3", ["speed", "unknown key", "budget_s"]),
     ],
 )

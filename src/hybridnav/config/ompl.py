@@ -83,7 +83,10 @@ REAL = {
 _LIMITS = {"goal_bias": (0.0, 1.0), "prune_threshold": (0.0, 1.0), "rewire_factor": (1.0, 100.0)}
 _MOST = 1_000_000
 
-Space = Literal["r2", "se2", "dubins", "reeds-shepp"]
+DIRECTED = frozenset({"BITstar", "RRT", "RRTConnect"})
+"""Planners that ask for each motion the way it is driven, whatever the state space says of itself;
+the others take what is valid one way for valid the other."""
+Space = Literal["r2", "se2", "differential", "dubins", "reeds-shepp"]
 Confinement = Literal["chain", "mask", "prm"]
 
 
@@ -134,8 +137,10 @@ class OmplSettings(BaseModel):
     parameters: dict[str, bool | int | float] = Field(default_factory=dict)
     """Its parameters by OMPL's names; OMPL's own values for those that are not given."""
     space: Space = "r2"
-    """State space: a disc that moves in any direction, a footprint that may turn on the spot, or
-    one that drives curves, forwards (`dubins`) or both ways (`reeds-shepp`)."""
+    """State space: a disc that moves in any direction (`r2`); a footprint that moves in any
+    direction, sideways too, while it turns (`se2`, a holonomic robot); one that turns on the spot,
+    drives straight ahead, and turns again (`differential`); or one that drives curves, forwards
+    (`dubins`) or both ways (`reeds-shepp`)."""
     footprint: Annotated[
         tuple[tuple[_Coordinate, _Coordinate], ...] | None, BeforeValidator(_corners)
     ] = Field(default=None, min_length=3, max_length=1000)
@@ -143,6 +148,8 @@ class OmplSettings(BaseModel):
     polygon or its WKT. Null for the disc that the map was inflated for."""
     turning_radius_m: Annotated[_Float, Field(gt=0, le=1e4)] | None = None
     """Of `dubins` and `reeds-shepp`."""
+    reverses: bool = False
+    """Of `differential`: whether the robot may drive backwards too, where it cannot drive ahead."""
     budget_s: Annotated[_Float, Field(ge=0.01, le=3600)] = 1.0
     """Seconds that a query may take; kept to within 10 %."""
     iterations: Annotated[_Int, Field(ge=1, le=1_000_000_000)] | None = None
@@ -207,18 +214,42 @@ class OmplSettings(BaseModel):
         if self.objective == "clearance" and (curved or self.planner in ROADMAPS):
             raise PydanticCustomError(
                 "objective",
-                "objective: clearance goes with space: r2 or se2, and not with PRM or PRMstar",
+                "objective: clearance goes with space: r2, se2 or differential, and not with "
+                "PRM or PRMstar",
             )
         if self.space == "dubins" and self.planner in ROADMAPS:
             # Their roadmap is undirected: a motion checked one way would be driven the other.
             raise PydanticCustomError(
                 "roadmap", "space: dubins, whose curves run one way, goes not with PRM or PRMstar"
             )
-        if self.smooth and curved:
+        if self.smooth and self.space not in {"r2", "se2"}:
             raise PydanticCustomError("smooth", "smooth: true goes with space: r2 or se2")
         if self.footprint is not None and self.space == "r2":
             raise PydanticCustomError(
-                "footprint", "a footprint needs a space with headings: se2, dubins or reeds-shepp"
+                "footprint",
+                "a footprint needs a space with headings: se2, differential, dubins or reeds-shepp",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _planner_bears_differential(self) -> Self:
+        if self.space != "differential":
+            if self.reverses:
+                raise PydanticCustomError(
+                    "reverses", "reverses: true goes with space: differential"
+                )
+            return self
+        if not self.reverses and self.planner not in DIRECTED:
+            raise PydanticCustomError(
+                "planner",
+                "space: differential, whose motions run one way, goes with planner {directed}; "
+                "with {planner} it needs reverses: true",
+                {"directed": ", ".join(sorted(DIRECTED)), "planner": self.planner},
+            )
+        if self.parameters.get("intermediate_states"):
+            # OMPL puts them on the straight interpolation, which the robot does not drive.
+            raise PydanticCustomError(
+                "parameter", "intermediate_states: true goes not with space: differential"
             )
         return self
 

@@ -17,6 +17,7 @@ from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_plans import MaxDistance, OverPortals
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
+from hybridnav.refine.differential import driven
 from hybridnav.refine.ompl import Clearance, Query, Setup, Worker
 from hybridnav.result import Path, PlanStatus, Refinement
 
@@ -198,6 +199,8 @@ class OmplPlanner:
             self._refused((pose, pose))
             if self.ompl.has_heading:
                 self._check.turn_valid(*pose, *pose)
+            if self.ompl.space == "differential":
+                self._check.drive_valid(*pose, *pose)
 
     @property
     def _metric(self) -> Metric:
@@ -288,14 +291,26 @@ class OmplPlanner:
         length_m = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
         if not self.ompl.has_heading:
             return Path(self._passed(points, cells), points, length_m)
-        # Turn on the spot at every bend, drive ahead between.
-        ahead = np.repeat(np.arctan2(steps[:, 1], steps[:, 0]), 2)
-        headings = np.concatenate([[ends[0][2]], ahead, [ends[1][2]]])
-        points = np.repeat(points, 2, axis=0)
-        poses = np.column_stack([points, headings])
-        if not self._check.confined(closed=closed).path_valid(poses):
+        poses = self._poses_along(points, ends, closed)
+        if not len(poses):
             return None
+        points, headings = poses[:, :2].copy(), poses[:, 2].copy()
         return Path(self._passed(points, cells), points, length_m, headings)
+
+    def _poses_along(
+        self, points: FloatArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
+    ) -> FloatArray:
+        """Poses of a robot that turns on the spot at every bend of a polyline and drives ahead
+        between, float64 (n, 3); without rows where it cannot."""
+        check = self._check.confined(closed=closed)
+        steps = np.diff(points, axis=0)
+        ahead = np.arctan2(steps[:, 1], steps[:, 0])
+        if self.ompl.space == "differential":
+            poses = np.column_stack([points, [ends[0][2], *ahead]])
+            return driven(check, np.vstack([poses, ends[1]]), reverses=self.ompl.reverses)
+        headings = np.concatenate([[ends[0][2]], np.repeat(ahead, 2), [ends[1][2]]])
+        poses = np.column_stack([np.repeat(points, 2, axis=0), headings])
+        return poses if check.path_valid(poses) else np.empty((0, 3))
 
     def _weighted_cost(self, path: Path | None) -> float | None:
         if path is None or self._clearance is None:

@@ -95,7 +95,9 @@ def _legs(
         else:
             answering.partial(np.concatenate(joined))
             return None
-    return np.concatenate(joined)
+    # Turns to the headings at which the legs meet are left out.
+    points = whole.driven(np.concatenate(joined))
+    return points if len(points) else None
 
 
 def _stops(answering: Answering, cells: LongArray) -> list[int]:
@@ -136,11 +138,15 @@ def _leg(
     if flat and len(cells) <= _SHORT_CELLS:
         return None
     space = answering.space(corridor, *_bounds(corridor, cells))
+    turns_and_drives = answering.settings.space == "differential"
+    if turns_and_drives and len(direct := space.driven(straight)):
+        return direct
     objective = answering.objective.of(space)
+    most = _TRIES * len(cells) if flat or turns_and_drives else None
     found = solve(
         Problem(space, *ends, objective),
         answering.settings,
-        answering.budget.stopper(share, most=_TRIES * len(cells) if flat else None),
+        answering.budget.stopper(share, most=most),
         search=answering.search,
     )
     if not found.is_exact or not flat:
@@ -209,7 +215,8 @@ def _window(
     found = solve(problem, answering.settings, answering.budget.stopper(_WINDOW))
     if not found.is_exact or cost_of(found.points) >= cost:
         return points
-    return np.concatenate([points[:first], found.points, points[last + 1 :]])
+    joined = whole.driven(np.concatenate([points[:first], found.points, points[last + 1 :]]))
+    return joined if len(joined) else points
 
 
 def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:

@@ -37,7 +37,8 @@ class Objective:
         self._whole = whole
         self._clearance = clearance
         # PRM waits for ever for objectives in Python: it finds the least of length and turns.
-        self._is_own = settings.space == "se2" and settings.planner not in ROADMAPS
+        turns = settings.space in {"se2", "differential"}
+        self._is_own = turns and settings.planner not in ROADMAPS
 
     def of(self, space: StateSpace) -> Any:
         """The objective in OMPL's terms, for one state space of the query."""

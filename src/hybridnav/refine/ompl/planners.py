@@ -46,7 +46,7 @@ class Found:
     """What a planner found."""
 
     points: FloatArray
-    """float64 (n, 3); without rows where it found nothing."""
+    """float64 (n, 3), as `StateSpace.driven` has them; without rows where it found nothing."""
     is_exact: bool
     """Whether the path ends at the goal."""
 
@@ -103,6 +103,9 @@ def make(settings: OmplSettings, information: Any) -> Any:
     """
     planner = getattr(geometric, settings.planner)(information)
     setters = PARAMETERS[settings.planner]
+    if settings.space == "differential" and "range" in setters:
+        # A state part of the way has a heading part of the way, in which a long robot rarely fits.
+        planner.setRange(information.getStateSpace().getMaximumExtent())
     # Just-in-time sampling is refused while BIT* takes k nearest neighbours.
     ordered = sorted(settings.parameters.items(), key=lambda item: item[0] != "use_k_nearest")
     for name, value in ordered:
@@ -196,7 +199,9 @@ def _found(problem: Problem, definition: Any) -> Found:
     path = definition.getSolutionPath() if definition.hasSolution() else None
     if path is None:
         return Found(np.empty((0, 3)), is_exact=False)
-    points = problem.space.points(path.getStates())
+    points = problem.space.driven(problem.space.points(path.getStates()))
+    if not len(points):
+        return Found(points, is_exact=False)
     # OMPL's own flag is wrong for roadmaps that grew after a first answer.
     off = points[-1] - problem.goal
     turned = 0.0 if problem.space.dimension == 2 else math.remainder(off[2], math.tau)  # noqa: PLR2004

@@ -77,6 +77,10 @@ def _warm_up(base: Base) -> None:
     radius_m = base.setup.settings.turning_radius_m
     if base.setup.settings.has_heading:
         check.turn_valid(x, y, 0.0, x, y, 1.0)
+        check.path_valid(np.array([[x, y, 0.0]]))
+    if base.setup.settings.space == "differential":
+        check.drive_valid(x, y, 0.0, x, y, 1.0)
+        check.spin(x, y, 0.0, 1.0)
     if radius_m is not None:
         check.dubins_valid(x, y, 0.0, x, y, 1.0, radius_m)
 

@@ -123,6 +123,6 @@ class Simplifier:
         return path
 
     def _checked(self, path: Any, points: FloatArray) -> FloatArray:
-        found = self._space.points(path.getStates())
+        found = self._space.driven(self._space.points(path.getStates()))
         cost_of = self._objective.cost
         return found if cost_of(found) < cost_of(points) and self._space.is_valid(found) else points

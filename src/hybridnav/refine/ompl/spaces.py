@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ompl import base
 
+from hybridnav.refine.differential import driven
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav.config import OmplSettings
     from hybridnav.refine.motions import MotionCheck
 
-_STATES = {"r2": 2, "se2": 3, "dubins": 3, "reeds-shepp": 3}
+_STATES = {"r2": 2, "se2": 3, "differential": 3, "dubins": 3, "reeds-shepp": 3}
 FINE = 1e-4
 """Part of the extent that OMPL takes as its validity resolution; its own motion check is never
 asked, so it only has to be small."""
@@ -55,7 +57,9 @@ class StateSpace:
             bounds.setLow(axis, float(low[axis]))
             bounds.setHigh(axis, float(max(high[axis], low[axis] + 1e-9)))
         self._check = check
-        self.is_straight = settings.space in {"r2", "se2"}
+        self.is_straight = settings.space in {"r2", "se2", "differential"}
+        self._spells = settings.space == "differential"
+        self._reverses = settings.reverses
         self.dimension = _STATES[settings.space]
         self.space = _space_of(settings)
         self.space.setBounds(bounds)
@@ -97,10 +101,22 @@ class StateSpace:
             rows = [(state.getX(), state.getY(), state.getYaw()) for state in states]
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
+    def driven(self, points: FloatArray) -> FloatArray:
+        """The states of a path; for `differential` those between which the robot only turns or
+        only drives, float64 (n, 3), none where it cannot. Parts of motions between such states are
+        valid where the motions are, as PathSimplifier takes for granted."""
+        if not self._spells or not len(points):
+            return points
+        return driven(self._check, points, reverses=self._reverses)
+
     def is_valid(self, points: FloatArray) -> bool:
         """Whether every state and motion of a path is valid, joints between motions included."""
+        if not len(points):
+            return False
         if self.dimension == 2:  # noqa: PLR2004
             return self._check.path_valid(points[:, :2])
+        if self._spells:
+            return self._check.path_valid(points)
         states = [self.state(point) for point in points]
         valid, runs = self.information.isValid, self.information.checkMotion
         return all(map(valid, states)) and all(runs(*pair) for pair in itertools.pairwise(states))
@@ -117,7 +133,7 @@ class StateSpace:
 def _space_of(settings: OmplSettings) -> Any:
     if settings.space == "r2":
         return base.RealVectorStateSpace(2)
-    if settings.space == "se2":
+    if settings.space in {"se2", "differential"}:
         return base.SE2StateSpace()
     if settings.space == "dubins":
         return base.DubinsStateSpace(settings.turning_radius_m)
@@ -177,11 +193,18 @@ class _Turning(base.MotionValidator):  # type: ignore[misc]
         )  # fmt: skip
 
 
+def _either_way(check: MotionCheck) -> Callable[..., bool]:
+    valid = check.drive_valid
+    return lambda *poses: valid(*poses) or valid(*poses, backwards=True)
+
+
 def _motions_of(settings: OmplSettings, check: MotionCheck, information: Any) -> Any:
     if settings.space == "r2":
         return _Straight(information, check)
     if settings.space == "se2":
         return _Turning(information, check.turn_valid)
+    if settings.space == "differential":
+        return _Turning(information, _either_way(check) if settings.reverses else check.drive_valid)
     assert settings.turning_radius_m is not None  # noqa: S101 - the settings are checked
     curve = check.dubins_valid if settings.space == "dubins" else check.reeds_shepp_valid
     return _Turning(information, partial(curve, radius_m=settings.turning_radius_m))
