@@ -3,7 +3,7 @@
     python -m benchmarks.ompl --data FOLDER -o DIR [--pairs 20] [--map GLOB] [--part PART ...]
 
 Parts: `table` (eight maps, three planners, three budgets), `confinements` (the three ways of
-keeping a search in the corridor, on three maps), `footprint` (500 plans of a long robot through
+keeping a search in the corridor, on three maps), `footprint` (600 plans of a long robot through
 doors, checked by shapely), `soak` (2,000 plans in one process), `pictures` (the search of a
 corridor beside that of the whole map, on the project's own office). All by default. DIR gets
 `records.jsonl`, to which a run that was stopped adds what is missing, `ompl.md`, which is printed
@@ -98,7 +98,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--map", action="append", default=[], metavar="GLOB")
     parser.add_argument("--part", action="append", choices=PARTS)
-    parser.add_argument("--runs", type=int, default=500, help="plans of the footprint part")
+    parser.add_argument("--runs", type=int, default=600, help="plans of the footprint part")
     parser.add_argument("--plans", type=int, default=2000, help="plans of the soak")
     arguments = parser.parse_args()
     if arguments.data is None:
