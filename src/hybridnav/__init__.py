@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hybridnav.config import Preset, load_preset, preset_names
     from hybridnav.errors import (
+        CacheWarning,
         HybridNavError,
         InvalidValueError,
         MapError,
@@ -52,6 +53,7 @@ _HOME_OF = {
     "Alternative": "planner",
     "Alternatives": "planner",
     "Blocked": "planner",
+    "CacheWarning": "errors",
     "CellClass": "grid",
     "Door": "topology",
     "DroppedIslands": "grid",
@@ -97,6 +99,7 @@ __all__ = [
     "Alternative",
     "Alternatives",
     "Blocked",
+    "CacheWarning",
     "CellClass",
     "Door",
     "DroppedIslands",

@@ -43,3 +43,7 @@ class PlanError(HybridNavError, RuntimeError):
 
 class MapWarning(UserWarning):
     """A map loads, but probably does not mean what its file says."""
+
+
+class CacheWarning(UserWarning):
+    """Compiled code cannot be kept, so that every start compiles it anew."""

@@ -1,0 +1,62 @@
+"""The one place where kernels are compiled, and where it is decided what becomes of the result."""
+
+from __future__ import annotations
+
+import multiprocessing
+import warnings
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numba
+
+from hybridnav.errors import CacheWarning
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def njit(**options: Any) -> Callable[[Any], Any]:
+    """Compile a function as `numba.njit` does, without a cache where none can be written.
+
+    numba keeps what it compiled beside the module or in the user's home, and refuses the function
+    where it can write to neither: an installation that is read-only, for a user without a home.
+
+    Parameters
+    ----------
+    options
+        Those of `numba.njit`.
+
+    Returns
+    -------
+    Callable
+        The decorator.
+
+    Warns
+    -----
+    CacheWarning
+        Once in a program, when a cache was asked for and there is no folder for it.
+    """
+
+    def decorate(function: Any) -> Any:
+        try:
+            return numba.njit(**options)(function)
+        except RuntimeError as error:
+            if "no locator available" not in str(error):
+                raise
+        _tell()
+        return numba.njit(**{**options, "cache": False})(function)
+
+    return decorate
+
+
+@cache
+def _tell() -> None:
+    """Warn, once and not in each process of a pool."""
+    if multiprocessing.parent_process() is None:
+        warnings.warn(
+            "no folder can be written in which numba could keep compiled code, so every start "
+            "compiles anew, for up to some minutes; to keep it set the environment variable "
+            "NUMBA_CACHE_DIR to a folder that can be written",
+            CacheWarning,
+            stacklevel=4,
+        )
