@@ -7,9 +7,9 @@ generation, 2 * generation + 1 for one that is closed, anything less for one not
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import grow, octile_cost
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 
 ALIVE = 0
 CONTRACTED = 1

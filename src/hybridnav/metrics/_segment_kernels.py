@@ -12,7 +12,8 @@ import heapq
 import math
 
 import numpy as np
-from numba import njit
+
+from hybridnav._jit import njit
 
 CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
 """What a segment does: stays in the free space, leaves the map, enters a cell that is not free,

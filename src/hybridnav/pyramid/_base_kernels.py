@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 
 _SURVIVES = 255
 

@@ -9,9 +9,9 @@ twice the level at which the edge goes, plus one where it is removed and not con
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 
 
 @guarded

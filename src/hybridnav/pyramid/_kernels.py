@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from hybridnav._jit import njit
 
 FIRST_MAY_SURVIVE = 1
 SECOND_MAY_SURVIVE = 2

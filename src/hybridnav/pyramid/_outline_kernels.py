@@ -8,9 +8,9 @@ and what it goes round lies on its left.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 
 
 @njit(cache=True, nogil=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.pyramid._kernels import make_key
 
 _LEAST_ATTRIBUTE = 8191

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from hybridnav._jit import njit
 
 _FULL = 2 * math.pi
 _ROUNDING = 1e-9

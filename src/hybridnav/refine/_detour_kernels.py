@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.refine._segment_kernels import is_legal
 from hybridnav.refine._taut_kernels import FREE, tighten
 

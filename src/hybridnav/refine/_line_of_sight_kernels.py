@@ -6,8 +6,8 @@ Positions are those of `_taut_kernels`.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.refine._detour_kernels import improve
 from hybridnav.refine._taut_kernels import FREE, grown, tighten
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.refine._curve_kernels import LARGEST_HEADING, shortest_word
 from hybridnav.refine._spin_kernels import body_spins, free_turn
 from hybridnav.refine._sweep_kernels import (

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from hybridnav._jit import njit
 from hybridnav.refine._taut_kernels import turn_of
 
 

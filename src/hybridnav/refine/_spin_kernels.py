@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.refine._sweep_kernels import (
     ROUNDING,
     STAYS,

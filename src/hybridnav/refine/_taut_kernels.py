@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from hybridnav._jit import njit
 
 FREE = 128
 """Bit of a mark: the cell may be entered."""

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 

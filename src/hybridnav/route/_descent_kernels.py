@@ -7,8 +7,8 @@ more than the loop.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.route._portal_kernels import FAR, cost_to_gate
 from hybridnav.search._kernels import grow
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.topology._gate_kernels import LEAP
 

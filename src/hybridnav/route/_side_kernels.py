@@ -7,8 +7,8 @@ of each kernel: reading them in a loop costs more than the loop.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.route._portal_kernels import FAR, UNREACHED, costs_to_gates, position_of
 from hybridnav.search._kernels import octile_cost
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 
 # A record of A*: generation, cost modulo 2^19, direction of arrival (see `astar`).

@@ -5,9 +5,9 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
-from numba import njit
 
 from hybridnav._guard import guarded
+from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 

@@ -7,8 +7,8 @@ are numbered from 0, `n` stands for "no such neighbour".
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 
 _ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)

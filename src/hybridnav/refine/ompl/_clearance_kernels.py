@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from hybridnav._jit import njit
 
 _STEP = 0.5
 """Cells between samples at most."""
