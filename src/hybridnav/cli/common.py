@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import tempfile
 import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
@@ -115,6 +116,18 @@ def check_picture(path: Path | None) -> None:
         raise UsageError(f"--plot: there is no folder {str(path.parent)!r}")
     if is_folder:
         raise UsageError(f"--plot must name a file, {str(path)!r} is a folder")
+    check_writable(path, "--plot")
+
+
+def check_writable(path: Path, option: str) -> None:
+    """Refuse a file that could not be written, by trying; nothing is left, nothing changed."""
+    try:
+        if path.exists():
+            path.open("ab").close()
+        else:
+            tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise UsageError(f"{option}: cannot write {str(path)!r}: {error.strerror}") from None
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,7 @@ from hybridnav.cli.tour import Errand, parsed_stop, run_errand
 from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.occupancy import extent
+from hybridnav.grid.rooms import read_point
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -56,11 +57,8 @@ _OPTIMAL = 1e-9
 
 
 def _point(text: str) -> Point:
-    try:
-        point = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        point = ()
-    if len(point) not in {2, 3}:
+    point = read_point(text)
+    if point is None:
         raise typer.BadParameter(f"expected X,Y in metres, or X,Y,YAW, got {text!r}")
     if not all(map(math.isfinite, point)):
         raise typer.BadParameter(f"expected finite numbers of metres and radians, got {text!r}")
@@ -146,6 +144,8 @@ def plan(
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     check_picture(plot)
+    where = _checked_at(at or ("anywhere" if alternatives == 1 else "point"))
+    _check_least_hole(least_hole_m2)
     settings = read_settings(preset, overrides, robot_radius_m, seed, smooth=smooth)
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
@@ -166,7 +166,7 @@ def plan(
             map_file,
             rooms_file,
             stops,
-            _checked_at(at or ("anywhere" if alternatives == 1 else "point")),
+            where,
             settings,
             plot,
             as_json,
@@ -237,6 +237,11 @@ def _checked_at(at: str) -> At:
     if at == "point":
         return "point"
     raise UsageError(f"--at must be anywhere or point, got {at!r:.80}")
+
+
+def _check_least_hole(area_m2: float) -> None:
+    if not math.isfinite(area_m2):
+        raise UsageError(f"--least-hole must be a finite number of m² >= 0, got {area_m2}")
 
 
 def _compare(

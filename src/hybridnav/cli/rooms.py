@@ -14,6 +14,7 @@ from hybridnav.cli.common import (
     answer,
     check_picture,
     check_radius,
+    check_writable,
     islands_line,
     load_grid,
     read_settings,
@@ -86,6 +87,8 @@ def rooms(
     check_picture(plot)
     if out is not None and out.exists() and not force:
         raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
+    if out is not None:
+        check_writable(out, "--out")
     if rooms_file is not None:
         for option, given in (("--method", method), ("--least-area", least_area_m2)):
             if given is not None:

@@ -27,6 +27,7 @@ from hybridnav.cli.common import (
 from hybridnav.cli.errors import UsageError
 from hybridnav.config.yaml_file import printable
 from hybridnav.grid.occupancy import extent
+from hybridnav.grid.rooms import read_point
 
 if TYPE_CHECKING:
     from hybridnav.planner.named import At
@@ -109,11 +110,8 @@ def beside(map_file: Path) -> Path | None:
 
 def parsed_stop(text: str) -> Stop:
     """A point where the text is two numbers, or three with a heading, else a name."""
-    try:
-        point = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        return text
-    if len(point) not in {2, 3}:
+    point = read_point(text)
+    if point is None:
         return text
     if not np.isfinite(point).all():
         raise UsageError(f"expected a name, or finite numbers X,Y or X,Y,YAW, got {text!r:.90}")

@@ -101,21 +101,25 @@ def _corners(value: Any) -> Any:
     """Corners of a footprint given as a shapely polygon or in Nav2's form, a string of a list."""
     exterior = getattr(value, "exterior", None)
     if exterior is not None:
+        if len(value.interiors):
+            raise PydanticCustomError("footprint", "a footprint must have no holes")
         return [list(map(float, corner)) for corner in exterior.coords[:-1]]
     if isinstance(value, str) and value.strip().startswith("["):
         try:
             return json.loads(value)
-        except ValueError:
+        except (ValueError, RecursionError):
             raise PydanticCustomError(
                 "footprint", "expected corners as [[x, y], ...] in metres"
             ) from None
     if isinstance(value, str):
-        from shapely import GEOSException, wkt  # noqa: PLC0415 - half a second, rarely needed
+        from shapely import Polygon, wkt  # noqa: PLC0415 - half a second, rarely needed
 
         try:
-            return _corners(wkt.loads(value))
-        except (GEOSException, RecursionError):
-            pass
+            shape = wkt.loads(value)
+        except Exception:  # noqa: BLE001 - arcs raise what no page of shapely's names
+            shape = None
+        if isinstance(shape, Polygon):
+            return _corners(shape)
         raise PydanticCustomError(
             "footprint", "expected corners as [[x, y], ...] in metres, or POLYGON ((x y, ...))"
         )
@@ -224,11 +228,14 @@ class OmplSettings(BaseModel):
             )
         if self.smooth and self.space not in {"r2", "se2"}:
             raise PydanticCustomError("smooth", "smooth: true goes with space: r2 or se2")
-        if self.footprint is not None and self.space == "r2":
-            raise PydanticCustomError(
-                "footprint",
-                "a footprint needs a space with headings: se2, differential, dubins or reeds-shepp",
-            )
+        if self.footprint is not None:
+            if self.space == "r2":
+                raise PydanticCustomError(
+                    "footprint",
+                    "a footprint needs a space with headings: se2, differential, dubins or "
+                    "reeds-shepp",
+                )
+            _check_base(self.footprint)
         return self
 
     @model_validator(mode="after")
@@ -257,6 +264,20 @@ class OmplSettings(BaseModel):
     def has_heading(self) -> bool:
         """Whether states have a heading."""
         return self.space != "r2"
+
+
+def _check_base(footprint: tuple[tuple[float, float], ...]) -> None:
+    """Refuse a footprint that the robot's base, the origin, lies outside of: it would be planned
+    for a body that drives beside its own path. On the outline the base may lie."""
+    from shapely import Point, Polygon  # noqa: PLC0415 - half a second, rarely needed
+
+    outline = Polygon(footprint)
+    if outline.is_valid and not outline.covers(Point(0.0, 0.0)):
+        raise PydanticCustomError(
+            "footprint",
+            "a footprint must hold the robot's base, (0, 0) of its frame; "
+            "give corners relative to the base",
+        )
 
 
 def _check_parameter(name: str, value: Any) -> None:

@@ -20,7 +20,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from hybridnav.config.ompl import OmplSettings  # noqa: TC001 - pydantic reads it
-from hybridnav.config.yaml_file import printable, read_yaml
+from hybridnav.config.yaml_file import parse_value, printable, read_yaml
 from hybridnav.errors import PresetError, PresetNotFoundError
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         branch[part] = branch.get(part) or {}
         branch = branch[part]
     try:
-        branch[name] = yaml.safe_load(text)
+        branch[name] = parse_value(text)
     except (yaml.YAMLError, ValueError, RecursionError):
         raise PresetError(
             f"setting {printable(key)}: the value is not YAML: {text[:_MAX_SHOWN]!r}"

@@ -154,7 +154,42 @@ def printable(path: PathLike) -> str:
     return text if text.isprintable() else repr(text)
 
 
-class _LimitedLoader(yaml.SafeLoader):
+def parse_value(text: str) -> Any:
+    """The value of a text of YAML that the user typed; numbers as in files.
+
+    Parameters
+    ----------
+    text
+        One document.
+
+    Raises
+    ------
+    yaml.YAMLError, ValueError, RecursionError
+        When it is none.
+    """
+    loader = _PlainLoader(text)
+    try:
+        return loader.get_single_data()
+    finally:
+        loader.dispose()
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Safe loader to which 12:30:45 is a text, as it is to ROS; to PyYAML it is 45,045."""
+
+    def construct_number(self, node: Any) -> Any:
+        if ":" in str(node.value):
+            return node.value
+        whole = node.tag == "tag:yaml.org,2002:int"
+        construct = self.construct_yaml_int if whole else self.construct_yaml_float
+        return construct(node)
+
+
+for _tag in ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float"):
+    _PlainLoader.add_constructor(_tag, _PlainLoader.construct_number)
+
+
+class _LimitedLoader(_PlainLoader):
     """Safe loader that refuses, while composing, what a file of settings has no use for.
 
     The pure Python loader on purpose: libyaml's composes in C, where these limits cannot reach.

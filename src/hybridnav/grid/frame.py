@@ -16,6 +16,12 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
 
 _FAR = 1e150
+LEAST_RESOLUTION_M, MOST_RESOLUTION_M = 1e-4, 1e3
+"""Sides that a cell may have: 0.1 mm is finer than any range sensor, in a cell of 1 km no robot
+finds its way; what lies beyond is a mistake of units."""
+FARTHEST_M = 1e9
+"""Metres from the origin of the map frame within which a grid must lie: any place on Earth, in any
+frame, and still the centre of the smallest cell is known to a hundredth of its side."""
 _MANY = 2.0**40
 """More cells than any map has."""
 
@@ -37,7 +43,8 @@ class Frame:
     Raises
     ------
     InvalidValueError
-        When a value is not finite or the resolution is not positive.
+        When a value is not finite, the resolution is not within 0.1 mm and 1 km, or the origin
+        farther than a million kilometres.
     """
 
     resolution_m: float = 1.0
@@ -52,13 +59,19 @@ class Frame:
         object.__setattr__(self, "resolution_m", float(self.resolution_m))
         object.__setattr__(self, "origin_m", (float(x), float(y)))
         object.__setattr__(self, "yaw_rad", float(self.yaw_rad))
-        if not (math.isfinite(self.resolution_m) and self.resolution_m > 0):
+        if not LEAST_RESOLUTION_M <= self.resolution_m <= MOST_RESOLUTION_M:
             raise InvalidValueError(
-                f"resolution must be a positive number of metres, got {self.resolution_m}"
+                f"resolution must be a positive number of metres from {LEAST_RESOLUTION_M:g} to "
+                f"{MOST_RESOLUTION_M:g}, got {self.resolution_m:g}"
             )
         if not all(map(math.isfinite, (*self.origin_m, self.yaw_rad))):
             raise InvalidValueError(
                 f"origin and yaw must be finite, got {self.origin_m} and {self.yaw_rad}"
+            )
+        if not all(abs(value) <= FARTHEST_M for value in (*self.origin_m, self.yaw_rad)):
+            raise InvalidValueError(
+                f"origin must lie within {FARTHEST_M:g} m, and yaw within as many radians, "
+                f"got {self.origin_m} and {self.yaw_rad:g}"
             )
         x, y = (min(max(along, -_FAR), _FAR) for along in self.origin_m)
         turned = math.cos(self.yaw_rad), math.sin(self.yaw_rad), x, y

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -88,7 +87,7 @@ def without_islands(
     DroppedIslands
         What was dropped.
     """
-    least_cells = math.ceil(least_area_m2 / cell_area_m2 * (1 - _ROUNDING))
+    least_cells = least_area_m2 / cell_area_m2 * (1 - _ROUNDING)
     free_of, areas = _islands(classes == CellClass.FREE)
     small = areas < least_cells
     small[0] = False

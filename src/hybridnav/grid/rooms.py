@@ -55,8 +55,9 @@ class RoomLabels:
     Raises
     ------
     InvalidValueError
-        When a name is given twice, empty, too long or not one printable line, a label has no name,
-        a point is not finite, or the number of a door is not a positive whole one.
+        When a name is given twice, empty, too long, not one printable line or reads as a point
+        (`1,2`), a label has no name, a point is not finite, or the number of a door is not a
+        positive whole one.
     """
 
     names: tuple[str, ...]
@@ -78,6 +79,7 @@ class RoomLabels:
                 f"got {label_of.min()} to {label_of.max()}"
             )
         label_of.flags.writeable = False
+        check_names(tuple(self.points))
         points = {name: _point(f"point {name!r:.90}", at) for name, at in self.points.items()}
         doors = {check_number(n): _point(f"door {n!r:.90}", at) for n, at in self.doors.items()}
         for name, value in (
@@ -101,14 +103,27 @@ class RoomLabels:
         raise InvalidValueError(f"no room is called {name!r:.90}{did_you_mean(name, self.names)}")
 
 
+def read_point(text: str) -> tuple[float, ...] | None:
+    """The numbers of a text like `1,2` or `1,2,0.5`, None where it is none: then it is a name."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        return None
+    return numbers if len(numbers) in {2, 3} else None
+
+
 def check_names(names: tuple[str, ...]) -> None:
-    """Refuse names that are empty, too long, not one printable line, or given twice."""
+    """Refuse names that are empty, too long, not one printable line, a point's, or given twice."""
     seen: set[str] = set()
     for name in names:
         if not isinstance(name, str) or not name.strip() or not name.isprintable():
             raise InvalidValueError(f"a room needs a name of one printable line, got {name!r:.90}")
         if len(name) > MAX_NAME:
             raise InvalidValueError(f"a name has at most {MAX_NAME} characters, got {name!r:.90}")
+        if read_point(name) is not None:
+            raise InvalidValueError(
+                f"a name must not read as a point, got {name!r}: a plan could not go there"
+            )
         if name in seen:
             raise InvalidValueError(f"room {name!r}: the name is given twice")
         seen.add(name)

@@ -174,13 +174,14 @@ def _threshold(values: dict[str, Any], key: str, where: str) -> float:
 
 def _frame(values: dict[str, Any], where: str) -> Frame:
     resolution = _number(values["resolution"], "resolution", where)
-    if resolution <= 0:
-        raise MapError(f"{where}: resolution must be a positive length, got {resolution:g}")
     origin = values["origin"]
     if not isinstance(origin, list) or len(origin) != 3:  # noqa: PLR2004
         raise MapError(f"{where}: origin must be [x, y, yaw], got {reprlib.repr(origin)}")
     x, y, yaw = (_number(value, "origin", where) for value in origin)
-    return Frame(resolution, (x, y), yaw)
+    try:
+        return Frame(resolution, (x, y), yaw)
+    except InvalidValueError as error:
+        raise MapError(f"{where}: {error}") from None
 
 
 def _mode(value: Any, where: str) -> str:
@@ -194,7 +195,7 @@ def _mode(value: Any, where: str) -> str:
 
 def _negate(value: Any, where: str) -> bool:
     negate = _BOOLEANS.get(value.lower()) if isinstance(value, str) else value
-    if not isinstance(negate, int):
+    if not isinstance(negate, int) or negate not in {0, 1}:
         raise MapError(f"{where}: negate must be 0 or 1, got {reprlib.repr(value)}")
     return bool(negate)
 

@@ -103,9 +103,9 @@ class HomotopyClasses:
         allow_unexplored: bool = False,
         least_hole_m2: float = 1.0,
     ) -> None:
-        if not least_hole_m2 >= 0:
+        if not 0 <= least_hole_m2 < np.inf:
             raise InvalidValueError(
-                f"least hole must be a number of square metres >= 0, got {least_hole_m2}"
+                f"least hole must be a finite number of square metres >= 0, got {least_hole_m2}"
             )
         level = topology.level
         self._level = level
