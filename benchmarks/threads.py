@@ -1,0 +1,91 @@
+"""What a second thread on one planner is worth: queries per second of two threads over one.
+
+    python -m benchmarks.threads [--map FILE] [--seconds S]
+
+Two cores that do nothing else answer nearly twice as many; the load of the machine is printed
+beside. Presets with OMPL answer one query after the other and are left out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import hybridnav as hn
+from benchmarks.chain import OFFICE, RADIUS_M
+from hybridnav.harness.pairs import sample_pairs
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray
+
+ROUNDS = 5
+
+
+def per_second(
+    planner: hn.HybridPlanner,
+    ends: list[tuple[FloatArray, FloatArray]],
+    n_threads: int,
+    time_s: float,
+) -> float:
+    """Queries answered per second by so many threads, each with all pairs in its own order."""
+    counts = [0] * n_threads
+    start = threading.Barrier(n_threads + 1)
+
+    def work(number: int) -> None:
+        at = number * len(ends) // n_threads
+        start.wait()
+        until = time.perf_counter() + time_s
+        while time.perf_counter() < until:
+            planner.plan(*ends[at % len(ends)])
+            counts[number] += 1
+            at += 1
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(n_threads)]
+    for thread in threads:
+        thread.start()
+    start.wait()
+    began = time.perf_counter()
+    for thread in threads:
+        thread.join()
+    return sum(counts) / (time.perf_counter() - began)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--map", type=Path, default=OFFICE)
+    parser.add_argument("--seconds", type=float, default=1.0)
+    options = parser.parse_args()
+    topology = hn.TopologicalMap(
+        hn.DualGraphPyramid.build(hn.load_map(options.map, robot_radius_m=RADIUS_M))
+    )
+    pairs = sample_pairs(topology.grid, 100, seed=0)
+    frame = topology.grid.frame
+    ends = [(frame.points_of(pair.start), frame.points_of(pair.goal)) for pair in pairs]
+    sys.stdout.write(f"{options.map.stem}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}\n")
+    print("| preset | queries/s, one thread | two threads | ratio |")
+    print("|---|---|---|---|")
+    for preset in hn.preset_names():
+        if preset.startswith("ompl-"):
+            continue
+        planner = hn.HybridPlanner(topology, preset=preset)
+        per_second(planner, ends, 2, options.seconds)
+        # In turns, so that what else the machine does meets both.
+        rates = [
+            [per_second(planner, ends, n_threads, options.seconds) for n_threads in (1, 2)]
+            for _ in range(ROUNDS)
+        ]
+        one, two = (statistics.median(column) for column in zip(*rates, strict=True))
+        ratio = statistics.median(rate[1] / rate[0] for rate in rates)
+        print(f"| {preset} | {one:.0f} | {two:.0f} | {ratio:.2f} |")
+    sys.stdout.write(f"load {os.getloadavg()[0]:.1f} at the end\n")
+
+
+if __name__ == "__main__":
+    main()
