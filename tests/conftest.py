@@ -1,6 +1,8 @@
 """Fixtures for every test."""
 
 import os
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,3 +20,11 @@ def data() -> Path:
     if not folder:
         pytest.skip("HYBRIDNAV_DATA is not set")
     return Path(folder)
+
+
+@pytest.fixture(autouse=True)
+def _own_interrupts() -> Iterator[None]:
+    """Leave Ctrl-C to pytest where a test ran the command, which handles it for its process."""
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -1,9 +1,15 @@
 """The command line `hybridnav`."""
 
+import os
+import signal
 import sys
+import threading
+
+from hybridnav._files import remove_unfinished
 
 _EXIT_INTERRUPTED = 130
 """As a shell reports a program that Ctrl-C (SIGINT, 2) ended: 128 + 2."""
+_SHOW_CURSOR = b"\r\x1b[K\x1b[?25h"
 
 
 def main() -> None:
@@ -11,10 +17,37 @@ def main() -> None:
 
     0: solved; 1: not solved; 2: wrong usage; 3: unreadable input; 130: interrupted.
     """
+    _handle_interrupts(_end_at_once)
     try:
         from hybridnav.cli.app import run  # noqa: PLC0415 - Ctrl-C may come during the imports
 
         code = run(sys.argv[1:])
     except KeyboardInterrupt:
         code = _EXIT_INTERRUPTED
+    # The answer is out: an interrupt while Python comes to its end does not change it.
+    _handle_interrupts(signal.SIG_IGN)
     sys.exit(code)
+
+
+def _handle_interrupts(handler: object) -> None:
+    """Set what Ctrl-C does, unless whoever started the command has it ignored."""
+    is_main = threading.current_thread() is threading.main_thread()
+    if is_main and signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, handler)  # type: ignore[arg-type]
+
+
+def _end_at_once(*_: object) -> None:
+    """End the process and its children.
+
+    An exception in its place is lost in callbacks, turned into others during imports, and printed
+    where nobody catches it.
+    """
+    try:
+        remove_unfinished()
+        if sys.stderr is not None and sys.stderr.isatty():
+            os.write(sys.stderr.fileno(), _SHOW_CURSOR)  # the spinner hides it
+        loaded = sys.modules.get("multiprocessing")
+        for child in loaded.active_children() if loaded is not None else ():
+            child.kill()
+    finally:
+        os._exit(_EXIT_INTERRUPTED)

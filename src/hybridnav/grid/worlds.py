@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from hybridnav._files import replace_file
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.frame import Frame
 from hybridnav.grid.occupancy import MAX_CELLS
@@ -170,7 +171,7 @@ def write_world(world: World, folder: PathLike, name: str) -> Path:
     target.mkdir(parents=True, exist_ok=True)
     height, width = world.pixels.shape
     header = f"P5\n{width} {height}\n255\n".encode("ascii")
-    (target / f"{name}.pgm").write_bytes(header + world.pixels.tobytes())
+    replace_file(target / f"{name}.pgm", header + world.pixels.tobytes())
     frame = world.frame
     # Positional, for YAML reads 1e-05 as a string.
     resolution, x, y, yaw, occupied, free = (
@@ -193,7 +194,7 @@ def write_world(world: World, folder: PathLike, name: str) -> Path:
         f"free_thresh: {free}",
     )
     path = target / f"{name}.yaml"
-    path.write_bytes("".join(f"{line}\n" for line in lines).encode("ascii"))
+    replace_file(path, "".join(f"{line}\n" for line in lines).encode("ascii"))
     return path
 
 

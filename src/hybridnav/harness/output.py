@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._files import replace_file
 from hybridnav.errors import MapError
 from hybridnav.grid import MAX_CELLS
 from hybridnav.harness.analysis import Outcome, Study, load_study, nanquantile, query_key
@@ -63,12 +64,12 @@ def write_outputs(
     study = load_study(folder, root=root)
     overall = rows_of_study(study)
     by_map = {name: rows_of_map(study, name) for name in study.maps}
-    (folder / "summary.csv").write_text(to_csv(overall), encoding="utf-8")
+    replace_file(folder / "summary.csv", to_csv(overall).encode())
     every = [row for rows in by_map.values() for row in rows]
-    (folder / "maps.csv").write_text(to_csv(every), encoding="utf-8")
-    (folder / "summary.md").write_text(markdown(overall, study), encoding="utf-8")
+    replace_file(folder / "maps.csv", to_csv(every).encode())
+    replace_file(folder / "summary.md", markdown(overall, study).encode())
     report = _report(study, title, overall, by_map)
-    (folder / "report.html").write_text(render_report(report), encoding="utf-8")
+    replace_file(folder / "report.html", render_report(report).encode())
     return study
 
 

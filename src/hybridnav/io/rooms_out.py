@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +11,7 @@ import shapely
 import yaml
 from scipy import ndimage
 
+from hybridnav._files import replace_file
 from hybridnav.config.yaml_file import printable
 from hybridnav.errors import RoomsError
 from hybridnav.io.rooms import LIMITS, check_points, check_rooms, in_cells
@@ -71,25 +70,9 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
             f"at most {LIMITS.max_values} and {LIMITS.max_bytes} are read"
         )
     try:
-        _replace(Path(path), text)
+        replace_file(Path(path), text.encode())
     except OSError as error:
         raise RoomsError(f"{where}: cannot write: {error.strerror}") from None
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write a file whole or not at all: names given by hand outlive a full disc."""
-    if path.exists() and not path.is_file():  # a pipe or a terminal has nothing to lose
-        path.write_text(text, encoding="utf-8")
-        return
-    path = path.resolve()  # a link stays a link
-    beside = path.with_name(f".{path.name[:200]}.{os.getpid()}")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        if path.exists():
-            shutil.copymode(path, beside)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def _rings_to_write(

@@ -11,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
+from hybridnav._files import replace_file
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -65,6 +66,6 @@ def save_figure(picture: Axes | Figure, path: PathLike, *, dpi: float = 200) -> 
             data, format=suffix[1:], dpi=dpi, bbox_inches=box, metadata=_METADATA[suffix]
         )
     try:
-        file.write_bytes(data.getvalue())
+        replace_file(file, data.getvalue())
     except OSError as error:
         raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
