@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         RoomLabels,
         drop_islands,
     )
-    from hybridnav.io import example_map, load_map, load_rooms, save_rooms
+    from hybridnav.io import example_map, load_blocked, load_map, load_rooms, save_rooms
     from hybridnav.planner import (
         Alternative,
         Alternatives,
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
         plan_alternatives,
         plan_tour,
     )
-    from hybridnav.pyramid import DualGraphPyramid, Level
+    from hybridnav.pyramid import DualGraphPyramid, Level, LevelArc
     from hybridnav.result import Path, PlanBatch, PlanResult, PlanStatus, Route
     from hybridnav.topology import Door, Rooms, TopologicalMap, find_rooms
 
@@ -63,6 +63,7 @@ _HOME_OF = {
     "HybridPlanner": "planner",
     "InvalidValueError": "errors",
     "Level": "pyramid",
+    "LevelArc": "pyramid",
     "MapError": "errors",
     "MapNotFoundError": "errors",
     "MapWarning": "errors",
@@ -86,6 +87,7 @@ _HOME_OF = {
     "drop_islands": "grid",
     "example_map": "io",
     "find_rooms": "topology",
+    "load_blocked": "io",
     "load_map": "io",
     "load_preset": "config",
     "load_rooms": "io",
@@ -109,6 +111,7 @@ __all__ = [
     "HybridPlanner",
     "InvalidValueError",
     "Level",
+    "LevelArc",
     "MapError",
     "MapNotFoundError",
     "MapWarning",
@@ -132,6 +135,7 @@ __all__ = [
     "drop_islands",
     "example_map",
     "find_rooms",
+    "load_blocked",
     "load_map",
     "load_preset",
     "load_rooms",

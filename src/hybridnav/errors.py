@@ -10,11 +10,12 @@ class InvalidValueError(HybridNavError, ValueError):
 
 
 class MapError(HybridNavError, ValueError):
-    """A map file, or the image it names, cannot be read as an occupancy grid."""
+    """A map file, or the image it names, cannot be read as an occupancy grid; or a file of what is
+    closed on a map cannot be read, or does not fit the map."""
 
 
 class MapNotFoundError(MapError, FileNotFoundError):
-    """A map file, or the image it names, is not there."""
+    """A map file, the image it names, or a file of what is closed, is not there."""
 
 
 class RoomsError(MapError):

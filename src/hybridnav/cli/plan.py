@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybridnav as hn
+from hybridnav.cli.blocked import BlockedOption, parsed_closing, told_closing
 from hybridnav.cli.common import (
     Reading,
     answer,
@@ -126,6 +127,7 @@ def plan(
     rooms_file: RoomsOption = None,
     alternatives: AlternativesOption = 1,
     least_hole_m2: LeastHoleOption = 1.0,
+    blocked: BlockedOption = None,
     preset: PresetOption = "balanced",
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
@@ -148,6 +150,7 @@ def plan(
     _check_least_hole(least_hole_m2)
     settings = read_settings(preset, overrides, robot_radius_m, seed, smooth=smooth)
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
+    closing = parsed_closing(blocked)
     ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
@@ -157,10 +160,11 @@ def plan(
         via
         or alternatives > 1
         or rooms_file is not None
+        or closing.needs_rooms
         or any(isinstance(end, str) for end in ends)
     ):
         if compare:
-            raise UsageError("--compare goes with --start and --goal alone")
+            raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
         stops = [ends[0], *map(parsed_stop, via or ()), ends[1]]
         errand = Errand(
             map_file,
@@ -173,6 +177,7 @@ def plan(
             reading,
             alternatives,
             least_hole_m2,
+            closing,
         )
         if not run_errand(errand):
             raise typer.Exit(EXIT_NOT_SOLVED)
@@ -181,6 +186,7 @@ def plan(
     seconds: dict[str, float] = {}
     grid = load_grid(map_file, settings, seconds, reading)
     check_radius(grid, allow_unexplored=settings.planner.allow_unexplored)
+    closed = closing.read(grid)
     status = outside(grid, ends) if plot is None else None
     if status is not None:
         refused = hn.PlanResult(status, settings=_told(settings))
@@ -191,10 +197,10 @@ def plan(
     topology = grow_topology(grid, settings, seconds)
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=settings)
-    result = planner.plan(start, goal)
-    figures = _figures(map_file, result, seconds) | islands_figures(grid)
+    result = planner.plan(start, goal, blocked=closed)
+    figures = _figures(map_file, result, seconds) | islands_figures(grid) | closing.to_dict()
     if compare:
-        figures |= _compare(topology, settings, (start, goal), result)
+        figures |= _compare(topology, settings, (start, goal), result, closed)
     _answer(grid, (start, goal), figures, as_json=as_json)
     if plot is not None:
         _draw(topology, result, (start, goal), figures.get("optimum_m"), plot)
@@ -249,6 +255,7 @@ def _compare(
     settings: hn.Preset,
     ends: tuple[Point, Point],
     result: hn.PlanResult,
+    closed: hn.Blocked | None,
 ) -> dict[str, Any]:
     """Plan on the whole grid too and set the result against it."""
     whole = settings.planner.model_copy(
@@ -261,7 +268,8 @@ def _compare(
         }
     )
     baseline = settings.model_copy(update={"name": "grid-astar", "planner": whole})
-    grid_result = hn.HybridPlanner(topology, preset=baseline).plan(ends[0][:2], ends[1][:2])
+    planner = hn.HybridPlanner(topology, preset=baseline)
+    grid_result = planner.plan(ends[0][:2], ends[1][:2], blocked=closed)
     return _whole_grid(grid_result, result)
 
 
@@ -303,6 +311,7 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
     radius = f"robot radius {grid.robot_radius_m:g} m"
     lines = [
         f"query      {printable(grid.name)}, {start} to {goal}, {radius}",
+        *told_closing(figures),
         f"status     {figures['status']}",
     ]
     lines += islands_line(grid)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import hybridnav as hn
+from hybridnav.cli.blocked import Closing, told_closing
 from hybridnav.cli.common import (
     Reading,
     answer,
@@ -52,6 +53,7 @@ class Errand:
     reading: Reading
     alternatives: int = 1
     least_hole_m2: float = 1.0
+    closing: Closing = field(default_factory=Closing)
 
 
 def run_errand(errand: Errand) -> bool:
@@ -59,6 +61,7 @@ def run_errand(errand: Errand) -> bool:
     seconds: dict[str, float] = {}
     grid = load_grid(errand.map_file, errand.settings, seconds, errand.reading)
     check_radius(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
+    closed = errand.closing.read(grid)
     status = outside(grid, errand.stops) if errand.plot is None else None
     if status is not None:
         figures = _figures(errand, hn.Tour((hn.PlanResult(status),), ()))
@@ -77,11 +80,11 @@ def run_errand(errand: Errand) -> bool:
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=errand.settings)
     with stage("planning", seconds, "plan"):
-        tour = hn.plan_tour(planner, errand.stops, at=errand.at)
+        tour = hn.plan_tour(planner, errand.stops, at=errand.at, blocked=closed)
     figures, found = _figures(errand, tour), None
     if errand.alternatives > 1:
         with stage("finding alternatives", seconds, "alternatives"):
-            found = _found(errand, planner)
+            found = _found(errand, planner, closed)
             figures |= _alternatives(topology, found)
     _answer(errand, grid, figures | {"seconds": seconds})
     if errand.plot is not None:
@@ -137,10 +140,11 @@ def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
         "legs": [leg.to_dict() for leg in tour.legs],
         "words": tour.in_words(),
         "points_m": points if tour.solved else None,
+        **errand.closing.to_dict(),
     }
 
 
-def _found(errand: Errand, planner: hn.HybridPlanner) -> hn.Alternatives:
+def _found(errand: Errand, planner: hn.HybridPlanner, closed: hn.Blocked | None) -> hn.Alternatives:
     """Routes of different classes between the two stops."""
     return hn.plan_alternatives(
         planner,
@@ -149,6 +153,7 @@ def _found(errand: Errand, planner: hn.HybridPlanner) -> hn.Alternatives:
         errand.alternatives,
         least_hole_m2=errand.least_hole_m2,
         at=errand.at,
+        blocked=closed,
     )
 
 
@@ -181,6 +186,7 @@ def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
     radius = f"robot radius {grid.robot_radius_m:g} m"
     lines = [
         f"query      {printable(grid.name)}, {figures['query']}, {radius}",
+        *told_closing(figures),
         f"status     {figures['status']}",
     ]
     lines += islands_line(grid)

@@ -79,17 +79,35 @@ def runs_of(area: BaseGeometry, grid: OccupancyGrid) -> LongArray:
         When it closes none.
     """
     radius_cells = grid.robot_radius_m / grid.resolution_m
-    parts = _in_cells(area, grid.frame)
+    parts = parts_on(area, grid)
     runs = np.concatenate([_runs_near(part, grid.shape, radius_cells) for part in parts])
     if not len(runs):
-        raise InvalidValueError(
-            f"an area must meet the map, which spans {extent(grid)}, got {shown(area)}"
-        )
+        raise _beside(area, grid)
     return runs
 
 
+def parts_on(area: BaseGeometry, grid: OccupancyGrid) -> list[BaseGeometry]:
+    """Return the parts of an area, x along the columns and y along the rows, one unit a cell.
+
+    Raises
+    ------
+    InvalidValueError
+        When none comes as near to the map as the robot's radius.
+    """
+    parts = _in_cells(area, grid.frame)
+    whole = shapely.box(0, 0, grid.shape[1], grid.shape[0])
+    if not shapely.dwithin(parts, whole, grid.robot_radius_m / grid.resolution_m).any():
+        raise _beside(area, grid)
+    return parts
+
+
+def _beside(area: BaseGeometry, grid: OccupancyGrid) -> InvalidValueError:
+    return InvalidValueError(
+        f"an area must meet the map, which spans {extent(grid)}, got {shown(area)}"
+    )
+
+
 def _in_cells(area: BaseGeometry, frame: Frame) -> list[BaseGeometry]:
-    """Return the parts of an area, x along the columns and y along the rows, one unit a cell."""
     cosine, sine = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
 
     def turned(points: FloatArray) -> FloatArray:

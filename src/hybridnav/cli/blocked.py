@@ -1,0 +1,97 @@
+"""The option `--blocked`: doors, rooms and files of what is closed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hybridnav.cli.errors import UsageError
+from hybridnav.config.yaml_file import printable
+
+if TYPE_CHECKING:
+    import hybridnav as hn
+
+BlockedOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--blocked",
+        metavar="WHAT",
+        help="Close door:N, room:NAME, or the areas of a GeoJSON file or mask image; may be "
+        "repeated.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Closing:
+    """What a command line closes."""
+
+    given: tuple[str, ...] = ()
+    """As it was given, printable."""
+    doors: tuple[int, ...] = ()
+    rooms: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+
+    @property
+    def needs_rooms(self) -> bool:
+        """Whether it can be understood on a map with rooms alone."""
+        return bool(self.doors or self.rooms)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is closed as plain values for JSON, nothing where nothing is."""
+        return {"blocked": list(self.given)} if self.given else {}
+
+    def read(self, grid: hn.OccupancyGrid) -> hn.Blocked | None:
+        """Read the files, and put all together; None where nothing is closed."""
+        if not self.given:
+            return None
+        # They load shapely.
+        from hybridnav.io import load_blocked  # noqa: PLC0415
+        from hybridnav.planner import Blocked  # noqa: PLC0415
+
+        closed = Blocked(doors=self.doors, rooms=self.rooms)
+        for path in self.files:
+            closed |= load_blocked(path, grid)
+        return closed
+
+
+def told_closing(figures: dict[str, Any]) -> list[str]:
+    """Return the line of a summary about what is closed, if anything is."""
+    closed = figures.get("blocked")
+    return [f"blocked    {', '.join(closed)}"] if closed else []
+
+
+def parsed_closing(texts: list[str] | None) -> Closing:
+    """Read the values of the option.
+
+    Raises
+    ------
+    UsageError
+        When a door has no number, or a room or a file no name.
+    """
+    doors, rooms, files = [], [], []
+    for text in texts or ():
+        kind, colon, name = text.partition(":")
+        if not text or (colon and kind in {"door", "room"} and not name.strip()):
+            raise UsageError(f"--blocked must be door:N, room:NAME or a file, got {text!r:.90}")
+        if colon and kind == "door":
+            doors.append(_number(name))
+        elif colon and kind == "room":
+            rooms.append(name)
+        else:
+            files.append(Path(text))
+    given = tuple(map(printable, texts or ()))
+    return Closing(given, tuple(doors), tuple(rooms), tuple(files))
+
+
+def _number(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise UsageError(
+            f"--blocked door: expected the number of a door, as hybridnav rooms MAP --plot draws "
+            f"it, got {text!r:.90}"
+        ) from None
