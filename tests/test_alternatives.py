@@ -293,7 +293,7 @@ def test_the_command_line_lists_alternatives(cli, map_file):  # noqa: F811
     nearest = cli(*query, "--alternatives", "3", "--at", "anywhere")
     assert f"route 1    4.00 m (octile), class -, {way}" in nearest.out
     answer = cli(*query, "--alternatives", "3", "--json").answer
-    assert [len(route["points_m"]) > 1 for route in answer["alternatives"]] == [True]
+    assert [len(route["points"]) > 1 for route in answer["alternatives"]] == [True]
     assert cli(*query, "--alternatives", "0").code == 2
     assert cli(*query, "--alternatives", "2", "--via", "hall").refuses(2, "--via")
 
@@ -320,7 +320,7 @@ def test_the_command_line_leads_through_either_door(cli, two_doors_file):  # noq
     assert len(lines) == 2
     assert lines[0].startswith(f"route 1    {lengths[0]:.2f} m (octile), class ")
     routes = cli(*query, "--json").answer["alternatives"]
-    ways = [[y for x, y in route["points_m"] if 6 < x < 8] for route in routes]
+    ways = [[y for x, y in route["points"] if 6 < x < 8] for route in routes]
     assert [set(way) for way in ways] == [{2.5}, {6.5}]
     assert routes[0]["word"] != routes[1]["word"]
     small = cli(*query, "--least-hole", "7").out

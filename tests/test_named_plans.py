@@ -295,7 +295,9 @@ def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):  # n
     )
     assert done.answer["status"] == "solved"
     assert done.answer["stops"] == ["sink", "lab", [1.25, 1.25]]
-    assert len(done.answer["points_m"]) == 2
+    points = done.answer["points"]
+    assert (points[0], points[-1]) == (done.answer["start"], done.answer["goal"])
+    assert len(points) == len(done.answer["headings_rad"])
     assert done.answer["words"][-1].endswith("to (1.25, 1.25) in hall")
     assert sum(leg["length_m"] for leg in done.answer["legs"]) == pytest.approx(
         done.answer["length_m"]

@@ -415,21 +415,29 @@ def test_a_result_is_json(
     result = hn.HybridPlanner(map_of(SEALED, **build), preset=preset).plan((0.5, 0.5), goal)
     # Neither NaN nor Infinity: they are no JSON, and strict readers refuse them.
     read = json.loads(json.dumps(result.to_dict(), allow_nan=False))
-    keys = {"status", "metric", "length_m", "places", "arcs", "points_m", "expanded", "seconds"}
+    keys = {"status", "metric", "length_m", "places", "arcs", "points", "expanded", "seconds"}
     assert keys <= set(read)
     assert read["status"] == str(result.status)
     assert read["metric"] == "octile"
+    assert (read["start"], read["goal"]) == ([0.5, 0.5], list(goal))
+    assert (
+        read["settings"]["pyramid"]["robot_radius_m"]
+        == result.settings["pyramid"]["robot_radius_m"]
+    )
     if result.path is None:
-        assert read["length_m"] is read["places"] is read["arcs"] is read["points_m"] is None
+        assert read["headings_rad"] is None
+        assert read["length_m"] is read["places"] is read["arcs"] is read["points"] is None
         return
     assert read["length_m"] == result.path.length_m
-    assert read["points_m"] == pytest.approx(result.path.points, abs=1e-6)
+    assert read["points"] == pytest.approx(result.path.points, abs=1e-6)
     if preset == "grid-astar":
         assert read["places"] is read["arcs"] is result.route is None
     else:
         assert result.route is not None
         assert read["places"] == list(result.route.places)
         assert read["arcs"] == list(result.route.arcs)
+    assert read["headings_rad"] == pytest.approx(result.path.headings_at_points, abs=1e-6)
+    assert (read["cost"], read["lower_bound"]) == (result.cost, result.lower_bound)
     assert read["expanded"] == result.stats.expanded > 0
     assert set(read["seconds"]) == seconds
 

@@ -72,6 +72,12 @@ class Path:
     def _motion(self) -> Motion:
         return Motion(self.points, self.headings_rad, self.is_curved)
 
+    @property
+    def headings_at_points(self) -> FloatArray:
+        """float64 (m,), `headings_rad`, or the direction of travel from each point on; at the last
+        one that of its arrival, and 0 where nothing moves."""
+        return self._motion.headings_at_points
+
     def poses(self, spacing_m: float = 0.05) -> FloatArray:
         """Poses along the path for a controller: evenly spaced between the points where it bends.
 
@@ -211,6 +217,11 @@ class PlanResult:
     """Cost in a metric that is not the length; None where it is."""
     refinement: Refinement | None = None
     """With OMPL: how the path came about."""
+    start: tuple[float, ...] | None = None
+    """Where it was planned from, `(x, y)` or `(x, y, yaw)`, metres and radians, map frame; in a
+    room the point that was chosen."""
+    goal: tuple[float, ...] | None = None
+    """Where to."""
 
     @cached_property
     def route(self) -> Route | None:
@@ -255,18 +266,26 @@ class PlanResult:
         return self
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for strict JSON: an infinite setting, as U_d may be, is None."""
+        """Plain values for strict JSON, by the names that they have here.
+
+        What is infinite or does not exist is None. Where the path has no headings, `headings_rad`
+        holds the direction of travel at each point.
+        """
         return {
             "status": str(self.status),
             "metric": self.metric,
+            "start": None if self.start is None else list(self.start),
+            "goal": None if self.goal is None else list(self.goal),
             "length_m": self.path.length_m if self.path else None,
             "cost": self.cost if self.solved else None,
-            "lower_bound_m": self.lower_bound if self.solved else None,
+            "lower_bound": self.lower_bound if self.solved else None,
             "gap": self.gap if self.solved else None,
             "places": list(self.route.places) if self.route else None,
             "arcs": list(self.route.arcs) if self.route else None,
-            "points_m": np.round(self.path.points, 6).tolist() if self.path else None,
-            "headings_rad": _headings(self.path),
+            "points": np.round(self.path.points, 6).tolist() if self.path else None,
+            "headings_rad": np.round(self.path.headings_at_points, 6).tolist()
+            if self.path
+            else None,
             "steps": list(self.refinement.steps) if self.refinement else None,
             "expanded": self.stats.expanded,
             "expanded_places": self.stats.expanded_places,
@@ -275,13 +294,6 @@ class PlanResult:
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "settings": _finite(self.settings),
         }
-
-
-def _headings(path: Path | None) -> list[float] | None:
-    if path is None or path.headings_rad is None:
-        return None
-    rounded: list[float] = np.round(path.headings_rad, 6).tolist()
-    return rounded
 
 
 def _finite(value: Any) -> Any:

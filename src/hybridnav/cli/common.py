@@ -237,6 +237,19 @@ def outside(
     return None
 
 
+def refused_result(
+    status: hn.PlanStatus, settings: Preset, stops: Sequence[str | tuple[float, ...]]
+) -> hn.PlanResult:
+    """The result of a planner that here is not made."""
+    start, goal = (None if isinstance(stop, str) else tuple(stop) for stop in (stops[0], stops[-1]))
+    record = {
+        "preset": settings.name,
+        "planner": settings.planner.model_dump(),
+        "pyramid": settings.pyramid.model_dump(),
+    }
+    return hn.PlanResult(status, settings=record, start=start, goal=goal)
+
+
 def timings(seconds: dict[str, float]) -> str:
     """Seconds per stage on one line, and their sum."""
     stages = ", ".join(f"{stage} {s:.3f}" for stage, s in seconds.items())

@@ -21,6 +21,7 @@ from hybridnav.cli.common import (
     load_grid,
     outside,
     read_settings,
+    refused_result,
     stage,
     timings,
 )
@@ -189,7 +190,7 @@ def plan(
     closed = closing.read(grid)
     status = outside(grid, ends) if plot is None else None
     if status is not None:
-        refused = hn.PlanResult(status, settings=_told(settings))
+        refused = refused_result(status, settings, ends)
         figures = _figures(map_file, refused, seconds) | islands_figures(grid)
         figures |= _whole_grid(refused, None, asked=compare)
         _answer(grid, ends, figures, as_json=as_json)
@@ -206,15 +207,6 @@ def plan(
         _draw(topology, result, (start, goal), figures.get("optimum_m"), plot)
     if not result.solved:
         raise typer.Exit(EXIT_NOT_SOLVED)
-
-
-def _told(settings: hn.Preset) -> dict[str, Any]:
-    """Settings as a planner tells them, which here is not made."""
-    return {
-        "preset": settings.name,
-        "planner": settings.planner.model_dump(),
-        "pyramid": settings.pyramid.model_dump(),
-    }
 
 
 def _figures(map_file: Path, result: hn.PlanResult, seconds: dict[str, float]) -> dict[str, Any]:
@@ -317,13 +309,13 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
     lines += islands_line(grid)
     if "outside" in figures["status"]:
         lines.append(f"extent     {extent(grid)}")
-    if figures["length_m"] is not None and figures["lower_bound_m"] is None:
-        short_m = math.dist(figures["points_m"][-1], ends[1][:2])
+    if figures["length_m"] is not None and figures["lower_bound"] is None:
+        short_m = math.dist(figures["points"][-1], ends[1][:2])
         told = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"
         lines.append(f"path       {told}")
     elif figures["length_m"] is not None:
         lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
-        lines.append(f"bound      {_bound(figures['lower_bound_m'], figures['gap'])}")
+        lines.append(f"bound      {_bound(figures['lower_bound'], figures['gap'])}")
     if figures["steps"] is not None:
         lines.append(f"steps      {'; '.join(figures['steps'])}")
     if figures["places"] is not None:

@@ -22,6 +22,7 @@ from hybridnav.cli.common import (
     islands_line,
     load_grid,
     outside,
+    refused_result,
     stage,
     timings,
 )
@@ -64,7 +65,8 @@ def run_errand(errand: Errand) -> bool:
     closed = errand.closing.read(grid)
     status = outside(grid, errand.stops) if errand.plot is None else None
     if status is not None:
-        figures = _figures(errand, hn.Tour((hn.PlanResult(status),), ()))
+        refused = refused_result(status, errand.settings, errand.stops)
+        figures = _figures(errand, hn.Tour((refused,), ()))
         if errand.alternatives > 1:
             figures |= {"alternatives": [], "alternatives_complete": True}
         _answer(errand, grid, figures | {"seconds": seconds})
@@ -126,20 +128,10 @@ def _told(stop: Stop) -> str:
 
 
 def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
-    paths = [result.path for result in tour.results if result.path is not None]
-    points = [np.round(path.points, 6).tolist() for path in paths]
-    return {
+    return tour.to_dict() | {
         "map": str(errand.map_file),
         "stops": [stop if isinstance(stop, str) else list(stop) for stop in errand.stops],
         "query": " via ".join(map(_told, errand.stops[:-1])) + " to " + _told(errand.stops[-1]),
-        "status": str(tour.status),
-        "metric": tour.metric,
-        "length_m": tour.length_m if tour.solved else None,
-        "cost": tour.cost if tour.solved else None,
-        "lower_bound_m": tour.lower_bound if tour.solved else None,
-        "legs": [leg.to_dict() for leg in tour.legs],
-        "words": tour.in_words(),
-        "points_m": points if tour.solved else None,
         **errand.closing.to_dict(),
     }
 
@@ -176,7 +168,7 @@ def _alternatives(topology: hn.TopologicalMap, found: hn.Alternatives) -> dict[s
                 "length_m": alternative.path.length_m,
                 "word": list(alternative.word),
                 "rooms": passed,
-                "points_m": np.round(alternative.path.points, 6).tolist(),
+                "points": np.round(alternative.path.points, 6).tolist(),
             }
         )
     return {"alternatives": routes, "alternatives_complete": found.complete}
@@ -214,7 +206,7 @@ def _measured(figures: dict[str, Any]) -> list[str]:
         lines = [f"length     {length_m:.2f} m ({metric})"]
     else:
         lines = [f"length     {length_m:.2f} m", f"cost       {figures['cost']:.2f} ({metric})"]
-    bound, gap = figures["lower_bound_m"], 0.0
+    bound, gap = figures["lower_bound"], 0.0
     if bound > 0:
         gap = figures["cost"] / bound - 1
     told = "this way is optimal between its stops"

@@ -141,9 +141,20 @@ class HybridPlanner:
 
             start, goal = stop_points(self, [start, goal], at=at, blocked=blocked)
         poses = self._pose("start", start), self._pose("goal", goal)
-        ends = poses[0][:2], poses[1][:2]
         finish = self._finish_asked_for(smooth)
         closed = None if blocked is None else ClosedCells(self.closed_cells(blocked))
+        result = self._between(poses, finish, closed, began)
+        return replace(result, start=tuple(poses[0].tolist()), goal=tuple(poses[1].tolist()))
+
+    def _between(
+        self,
+        poses: tuple[FloatArray, FloatArray],
+        finish: Smooth,
+        closed: ClosedCells | None,
+        began: float,
+    ) -> PlanResult:
+        """Plan between two points, or poses."""
+        ends = poses[0][:2], poses[1][:2]
         first, last = self._cell_of(ends[0]), self._cell_of(ends[1])
         if first is None:
             return self._answer(PlanStatus.START_OUTSIDE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planner import HybridPlanner, Smooth
     from hybridnav.result import Metric, PlanResult
+
+_COUNTS = ("expanded", "expanded_places", "expanded_gates", "corridor_cells")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,16 @@ class Tour:
         return sum(result.path.length_m for result in self.results if result.path is not None)
 
     @property
+    def start(self) -> tuple[float, ...] | None:
+        """Where it starts, as `PlanResult.start`."""
+        return self.results[0].start
+
+    @property
+    def goal(self) -> tuple[float, ...] | None:
+        """Where the last plan leads."""
+        return self.results[-1].goal
+
+    @property
     def metric(self) -> Metric:
         """The metric of the plans."""
         return self.results[0].metric
@@ -67,9 +79,79 @@ class Tour:
         """A proved bound on the cost of a way between the points of the stops, in their order."""
         return sum(result.lower_bound for result in self.results)
 
+    @property
+    def gap(self) -> float:
+        """Proved distance from the optimum between the stops, cost / lower bound - 1; NaN unless it
+        is solved."""
+        if not self.solved:
+            return math.nan
+        return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for strict JSON: those of `PlanResult.to_dict` for the whole way, `legs`,
+        and the `words` for a person.
+
+        Points and headings, places and arcs are those of all plans, one after the other, the place
+        of a stop once; where the robot turns at a stop its point is there twice. Counts and seconds
+        are sums.
+        """
+        parts = [result.to_dict() for result in self.results]
+        points, headings = _joined_points(parts)
+        places = [parts[0]["places"], *((part["places"] or [])[1:] for part in parts[1:])]
+        return parts[0] | {
+            "status": str(self.status),
+            "goal": parts[-1]["goal"],
+            "length_m": self.length_m if self.solved else None,
+            "cost": self.cost if self.solved else None,
+            "lower_bound": self.lower_bound if self.solved else None,
+            "gap": self.gap if self.solved else None,
+            "places": self._whole(parts, "places", places),
+            "arcs": self._whole(parts, "arcs", [part["arcs"] for part in parts]),
+            "points": points if self.solved else None,
+            "headings_rad": headings if self.solved else None,
+            "steps": self._whole(parts, "steps", [part["steps"] for part in parts]),
+            **{name: sum(part[name] for part in parts) for name in _COUNTS},
+            "seconds": _summed([part["seconds"] for part in parts]),
+            "legs": [leg.to_dict() for leg in self.legs],
+            "words": self.in_words(),
+        }
+
+    def _whole(
+        self, parts: list[dict[str, Any]], name: str, lists: list[list[Any]]
+    ) -> list[Any] | None:
+        """Lists of all parts in one, None where a part has none."""
+        if not self.solved or any(part[name] is None for part in parts):
+            return None
+        return [item for part in lists for item in part]
+
     def in_words(self) -> list[str]:
         """The way in sentences for a person; no lines where there are no legs."""
         return in_words(self.legs) if self.legs else []
+
+
+def _joined_points(
+    parts: list[dict[str, Any]],
+) -> tuple[list[list[float]], list[float]]:
+    """Points and headings of all parts; a point that one ends and the next begins with once, unless
+    the robot turns there."""
+    points: list[list[float]] = []
+    headings: list[float] = []
+    for part in parts:
+        begun, faced = part["points"] or [], part["headings_rad"] or []
+        if points and begun and points[-1] == begun[0]:
+            points.pop()
+            left = headings.pop()
+            if left != faced[0]:
+                points.append(begun[0])
+                headings.append(left)
+        points += begun
+        headings += faced
+    return points, headings
+
+
+def _summed(parts: list[dict[str, float]]) -> dict[str, float]:
+    stages = dict.fromkeys(stage for part in parts for stage in part)
+    return {stage: round(sum(part.get(stage, 0.0) for part in parts), 6) for stage in stages}
 
 
 def plan_tour(
