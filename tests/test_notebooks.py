@@ -1,18 +1,34 @@
-"""Every notebook runs from a clean kernel, and finds the maps wherever it is started."""
+"""Every notebook runs from a clean kernel, far from the checkout and on other maps."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import Any
 
 import nbformat
+import numpy as np
 import pytest
 from nbclient import NotebookClient
+
+from hybridnav.grid import Frame
+from hybridnav.grid.worlds import World, office_world, write_world
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 NEEDS_OMPL = ROOT / "notebooks" / "05_ompl_in_the_corridor.ipynb"
 TIMEOUT_S = 300
+ELSEWHERE: dict[str, dict[str, Any]] = {
+    "01_map_to_route": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "ROBOT_RADIUS_M": 0.2},
+    "02_inside_the_pyramid": {"MERGE_DISTANCE_M": 6.0, "LARGE_M": 20.0},
+    "03_rooms_and_alternatives": {"NAMES": {}, "FROM": (12.0, 2.0), "TO": (24.0, 23.0)}
+    | {"STOPS": [(24.0, 23.0), (12.0, 2.0)], "ACROSS": ((12.0, 2.0), (24.0, 23.0))},
+    "04_thruns_criteria": {"PAIRS": 20, "MERGE_DISTANCES_M": (3.0, 6.0), "ROBOT_RADIUS_M": 0.2},
+    "05_ompl_in_the_corridor": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "LENGTH_M": 1.2},
+    "06_certificates": {"NEAR": ((12.0, 2.0), (12.0, 7.5)), "FAR": ((12.0, 2.0), (24.0, 23.0))}
+    | {"DOORS": ((15.5, 6.2), (9.9, 6.2))},
+}
+"""Settings with which each notebook runs on another map."""
 WITHOUT_OMPL = """
 import importlib.util
 found = importlib.util.find_spec
@@ -26,13 +42,13 @@ def clean_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
 
 
-def executed(notebook: Any, start: str = "notebooks") -> list[Any]:
-    """Run a notebook and give its outputs."""
+def executed(notebook: Any, start: Path = ROOT / "notebooks") -> list[Any]:
+    """Run a notebook in a folder and return its outputs."""
     client = NotebookClient(
         notebook,
         timeout=TIMEOUT_S,
         kernel_name="python3",
-        resources={"metadata": {"path": str(ROOT / start)}},
+        resources={"metadata": {"path": str(start)}},
     )
     client.execute()
     return [output for cell in notebook.cells for output in cell.get("outputs", [])]
@@ -46,20 +62,49 @@ def pictures(outputs: list[Any]) -> int:
     return sum("image/png" in output.get("data", {}) for output in outputs)
 
 
+def settings(notebook: Any) -> Any:
+    """The cell that holds all that a notebook depends on."""
+    (cell,) = (cell for cell in notebook.cells if cell.source.startswith("MAP = None"))
+    return cell
+
+
+def with_settings(notebook: Any, **values: Any) -> Any:
+    """The notebook with other settings in its cell for them."""
+    cell = settings(notebook)
+    cell.source += "".join(f"\n{name} = {value!r}" for name, value in values.items())
+    return notebook
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_runs(path: Path) -> None:
-    outputs = executed(nbformat.read(path, as_version=4))
+def test_a_copy_of_a_notebook_runs_far_from_the_checkout(path: Path, tmp_path: Path) -> None:
+    copy = shutil.copy(path, tmp_path)
+    outputs = executed(nbformat.read(copy, as_version=4), start=tmp_path)
     assert pictures(outputs) > 3
     assert "Warning" not in written(outputs)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_finds_the_maps_from_the_root_of_the_checkout(path: Path) -> None:
+def test_a_notebook_has_its_map_in_one_place(path: Path) -> None:
     notebook = nbformat.read(path, as_version=4)
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    found = next(number for number, cell in enumerate(code) if "maps = next(" in cell.source)
-    notebook.cells = [*code[: found + 1], nbformat.v4.new_code_cell("print(maps)")]
-    assert written(executed(notebook, start=".")).strip().endswith(str(ROOT / "maps"))
+    cells = [cell.source for cell in notebook.cells]
+    place = cells.index(settings(notebook).source)
+    assert "## Your map here" in cells[place - 1]
+    assert sum("hn.load_map(" in cell for cell in cells) == 1
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_holds_on_another_map(path: Path, tmp_path: Path) -> None:
+    """Other noise, another place in the map frame, cells of another size."""
+    office = office_world(seed=7)
+    halved = np.min([office.pixels[row::2, col::2] for row in (0, 1) for col in (0, 1)], axis=0)
+    frame = Frame(2 * office.frame.resolution_m, office.frame.origin_m)
+    write_world(World(halved, frame, "other"), tmp_path, "other")
+    outputs = executed(
+        with_settings(nbformat.read(path, as_version=4), MAP="other.yaml", **ELSEWHERE[path.stem]),
+        start=tmp_path,
+    )
+    assert pictures(outputs) > 3
 
 
 def test_without_ompl_one_sentence_says_so_and_the_rest_runs(tmp_path: Path) -> None:
