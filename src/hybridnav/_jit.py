@@ -54,7 +54,7 @@ def _tell() -> None:
     """Warn, once and not in each process of a pool."""
     if multiprocessing.parent_process() is None:
         warnings.warn(
-            "no folder can be written in which numba could keep compiled code, so every start "
+            f"{CacheWarning.opening} in which numba could keep compiled code, so every start "
             "compiles anew, for up to some minutes; to keep it set the environment variable "
             "NUMBA_CACHE_DIR to a folder that can be written",
             CacheWarning,

@@ -48,3 +48,6 @@ class MapWarning(UserWarning):
 
 class CacheWarning(UserWarning):
     """Compiled code cannot be kept, so that every start compiles it anew."""
+
+    opening = "no folder can be written"
+    """First words of the text, by which processes of a program that has warned are kept quiet."""

@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridnav.errors import OmplError
+from hybridnav.errors import CacheWarning, OmplError
 from hybridnav.refine.ompl.messages import SEARCH_S, ended, without_answer
 
 if TYPE_CHECKING:
@@ -249,9 +249,10 @@ class _Running:
 def _launch(descriptor: int) -> subprocess.Popen[bytes]:
     # By its own command: a spawned process of multiprocessing would run the caller's main module.
     # Without the working directory, whose files may have the names of modules.
+    quiet = ("-W", f"ignore:{CacheWarning.opening}")  # this process has warned
     paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
     return subprocess.Popen(  # noqa: S603 - this interpreter and a module of our own
-        [sys.executable, "-P", "-m", "hybridnav.refine.ompl.server", str(descriptor)],
+        [sys.executable, "-P", *quiet, "-m", "hybridnav.refine.ompl.server", str(descriptor)],
         pass_fds=[descriptor],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
