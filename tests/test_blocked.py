@@ -35,7 +35,7 @@ ROOMS = drawn(
     "...............",
     ".......#.......",
 )
-DOOR = hn.Door(3, LevelArc(2, 0), ("kitchen", None), (1.0, 2.0), 0.9)
+DOOR = hn.Door(3, ("kitchen", None), (1.0, 2.0), 0.9, (LevelArc(2, 0),))
 PLAIN = settings(max_examples=100, deadline=None, derandomize=True)
 
 

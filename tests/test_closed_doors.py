@@ -62,17 +62,13 @@ def office() -> hn.HybridPlanner:
     return hn.HybridPlanner(hn.TopologicalMap(pyramid))
 
 
-def arcs_of(door: hn.Door) -> tuple[LevelArc, ...]:
-    return (door.arc,)
-
-
 def crossings(topology: hn.TopologicalMap, door: hn.Door) -> set[frozenset[int]]:
     """Moves across a door as pairs of flat cells: over a side of its boundary, or diagonally past
     one from the one part to the other."""
     level, cols = topology.rooms.level, topology.grid.shape[1]
     field = level.field_of.ravel()
     found = set()
-    for arc in arcs_of(door):
+    for arc in door.arcs:
         for one, other in (level.boundary(arc.index) @ np.array([cols, 1])).tolist():
             found.add(frozenset((one, other)))
             step = 1 if abs(one - other) == cols else cols
@@ -114,7 +110,7 @@ def forms_of(door: hn.Door) -> list[Any]:
         {"doors": (np.int64(door.number),)},
         {"doors": [door]},
         door,
-        {"arcs": arcs_of(door)},
+        {"arcs": door.arcs},
         Blocked(doors=[door]) | Blocked(doors=[door.number]),
     ]
 
@@ -374,7 +370,7 @@ def test_two_closures_close_what_either_closes() -> None:
         Blocked(rooms=["hall"]),
         Blocked(cells=[(9, 3)]),
         Blocked(polygons=[line]),
-        Blocked(places=[0], arcs=[2, topology.rooms.doors[1].arc]),
+        Blocked(places=[0], arcs=[2, *topology.rooms.doors[1].arcs]),
     ]
     whole = parts[0] | parts[1] | parts[2] | parts[3] | parts[4]
     each = [part.cells_of(topology) for part in parts]

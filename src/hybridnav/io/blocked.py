@@ -74,11 +74,16 @@ def _mask(path: PathLike, grid: OccupancyGrid) -> Blocked:
     where = f"blocked {printable(path)}"
     if Path(path).suffix.lower() in {".yaml", ".yml"}:
         raise MapError(f"{where}: expected GeoJSON ({', '.join(_GEOJSON)}) or an image, got YAML")
-    raster = read_raster(path, what="blocked")
+
+    def check_size(cols: int, rows: int) -> None:
+        if (rows, cols) != grid.shape:
+            expected = "{1} x {0}".format(*grid.shape)
+            raise MapError(
+                f"{where}: a mask of {cols} x {rows} pixels, expected {expected}, those of the map"
+            )
+
+    raster = read_raster(path, what="blocked", check_size=check_size)
     level = raster.level[::-1]
-    if level.shape != grid.shape:
-        size, expected = ("{1} x {0}".format(*shape) for shape in (level.shape, grid.shape))
-        raise MapError(f"{where}: a mask of {size} pixels, expected {expected}, those of the map")
     darkness = (raster.white - np.arange(raster.white + 1)) / raster.white
     closes = darkness.astype(np.float32) >= np.float32(grid.occupied_threshold)
     closed = closes[level]

@@ -205,7 +205,7 @@ def _door_on(rooms: Rooms, door: int | Door) -> Door:
     if not isinstance(door, Door):
         return rooms.door(door)
     own = rooms.door(door.number)
-    if own != door:
+    if (own.rooms, own.position) != (door.rooms, door.position):  # its arcs depend on the robot
         raise InvalidValueError(
             f"door {door.number} is one of another map, between {_sides(door)} and not "
             f"{_sides(own)}: give a door of this map, or its number"
