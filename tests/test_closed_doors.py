@@ -383,8 +383,8 @@ def test_two_closures_close_what_either_closes() -> None:
 @pytest.mark.parametrize(
     ("closed", "message"),
     [
-        ({"doors": [5]}, "there is no door 5 on this map, doors are 1 to 4"),
-        ({"doors": [0]}, "there is no door 0"),
+        ({"doors": [5]}, "no door has the number 5: there are 4, from 1 to 4"),
+        ({"doors": [0]}, "no door has the number 0"),
         ({"rooms": ["kichen"]}, "no room is called 'kichen': did you mean kitchen"),
         ({"rooms": ["hall", ""]}, "no room is called ''"),
         ({"arcs": [LevelArc(99, 0)]}, "there is no level 99, levels are 0 to"),

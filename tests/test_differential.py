@@ -45,7 +45,7 @@ class Yard:
             corners = radii_m[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
             corners += rng.uniform(-1.5, 1.5, 2) * CELL_M
         occupied = rng.random((rows, cols)) < rng.choice([0.01, 0.03, 0.08])
-        self.grid = OccupancyGrid(occupied.astype(np.float32), frame=self.frame)
+        self.grid = OccupancyGrid(occupied.astype(np.float32), frame=self.frame, robot_radius_m=0)
         self.check = MotionCheck(self.grid, footprint=Footprint(corners))
         self.oracle = ShapelyRobot(self.grid, corners)
 
@@ -140,7 +140,7 @@ def posts(*cells: tuple[int, int]) -> OccupancyGrid:
     occupied = np.zeros((100, 100), dtype=np.float32)
     for cell in cells:
         occupied[cell] = 1
-    return OccupancyGrid(occupied, frame=Frame(CELL_M))
+    return OccupancyGrid(occupied, frame=Frame(CELL_M), robot_radius_m=0)
 
 
 def test_a_slight_turn_may_pass_a_post_nearer_than_its_hull() -> None:
@@ -162,7 +162,9 @@ def test_a_post_between_two_free_headings_stops_the_turn() -> None:
 def test_a_robot_beside_a_wall_turns_the_long_way_round() -> None:
     occupied = np.zeros((100, 100), dtype=np.float32)
     occupied[60:] = 1
-    check = MotionCheck(OccupancyGrid(occupied, frame=Frame(CELL_M)), footprint=TRAILING)
+    check = MotionCheck(
+        OccupancyGrid(occupied, frame=Frame(CELL_M), robot_radius_m=0), footprint=TRAILING
+    )
     near_wall = (2.5, 2.5)
     turn = check.spin(*near_wall, 0.1, math.pi - 0.1)
     assert turn == pytest.approx(math.pi - 0.2 - math.tau)
@@ -177,7 +179,9 @@ def test_a_long_robot_drives_where_it_cannot_turn() -> None:
     occupied = np.zeros((200, 200), dtype=np.float32)
     occupied[:, 60:140] = 1
     occupied[92:108, 60:140] = 0
-    check = MotionCheck(OccupancyGrid(occupied, frame=Frame(CELL_M)), footprint=TRUCK)
+    check = MotionCheck(
+        OccupancyGrid(occupied, frame=Frame(CELL_M), robot_radius_m=0), footprint=TRUCK
+    )
     assert check.drive_valid(1.5, 5.0, 2.0, 8.5, 5.0, 2.0)
     assert check.drive_valid(1.5, 5.0, 2.0, 8.5, 5.0, 2.0, backwards=True)
     assert check.drive_valid(1.5, 5.0, 2.0, 5.0, 5.0, 0.0)

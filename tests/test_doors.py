@@ -110,7 +110,7 @@ def test_doors_are_the_boundaries_as_measured_whatever_the_robot(
     found = []
     for door in rooms.doors:
         cracks = [
-            {tuple(sorted(map(tuple, pair))) for pair in rooms.level.boundary(arc).tolist()}
+            {tuple(sorted(map(tuple, pair))) for pair in rooms.level.boundary(arc.index).tolist()}
             for arc in door.arcs
         ]
         at = np.asarray(door.position)

@@ -95,12 +95,12 @@ def test_an_unknown_example_map_names_those_there_are():
 
 
 def test_files_say_what_the_world_is(tmp_path):
-    world = World(office().pixels, Frame(1e-5, (-3.0, 2.5), 0.3), "turned", 0.25, 0.7)
+    world = World(office().pixels, Frame(1e-4, (-3.0, 2.5), 0.3), "turned", 0.25, 0.7)
     path = write_world(world, tmp_path / "new" / "folder", "turned")
     assert yaml.safe_load(path.read_text()) == {
         "image": "turned.pgm",
         "mode": "trinary",
-        "resolution": 1e-5,
+        "resolution": 1e-4,
         "origin": [-3.0, 2.5, 0.3],
         "negate": 0,
         "occupied_thresh": 0.7,

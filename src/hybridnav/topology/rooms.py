@@ -167,7 +167,9 @@ class Rooms:
             if self.doors:
                 first, last = self.doors[0].number, self.doors[-1].number
                 told = f"there are {len(self.doors)}, from {first} to {last}"
-            raise InvalidValueError(f"no door has the number {number!r:.80}: {told}")
+            raise InvalidValueError(
+                f"no door has the number {number!r:.80}: {told}; hybridnav rooms MAP lists them"
+            )
         return found
 
     @cached_property
