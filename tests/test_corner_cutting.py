@@ -107,3 +107,26 @@ def test_no_baseline_denies_a_path_that_exists(topology: hn.TopologicalMap, seed
             found = method.solve(tuple(start), tuple(goal))
             if not found.gave_up:
                 assert found.is_path == (part[tuple(start)] == part[tuple(goal)])
+
+
+def test_no_move_crosses_shut_doors_where_corners_may_be_cut() -> None:
+    # The robot's radius may take both cells beside a diagonal, which then passes on no arc.
+    label_of = np.repeat(np.array([[0] * 5 + [1] * 5], dtype=np.int32), 10, axis=0)
+    rooms = hn.RoomLabels(("left", "right"), label_of)
+    opened = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        grid = hn.OccupancyGrid(
+            (rng.random((10, 10)) < 0.15).astype(np.float32),
+            frame=hn.Frame(1.0),
+            robot_radius_m=1.0,
+            corner_cutting=True,
+        )
+        topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+        blocked = hn.Blocked(doors=list(topology.rooms.doors))
+        remaining = grid.enterable()
+        opened += bool(remaining[:, 4].any() and remaining[:, 5].any())
+        remaining.ravel()[blocked.cells_of(topology)] = False
+        left, right = remaining[:, 4], np.pad(remaining[:, 5], 1)
+        assert not (left & (right[:-2] | right[1:-1] | right[2:])).any(), seed
+    assert opened > 30

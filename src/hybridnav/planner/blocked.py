@@ -55,7 +55,9 @@ class Blocked:
         passes a line wherever it is drawn.
     doors
         Numbers of doors, or `Door` objects of this map: no move crosses their boundaries, which
-        close as those of arcs do. Other doors between the same rooms stay open.
+        close as those of arcs do. Other doors between the same rooms stay open. Where corners may
+        be cut, all cells on both sides close. A diagonal between two cells that were measured as
+        occupied crosses no door.
     rooms
         Names of rooms; all their cells are closed.
 
@@ -151,9 +153,14 @@ class Blocked:
             if isinstance(arc, LevelArc):
                 _check_arc(arc, topology)
                 closed.append(arc)
-        for door in self.doors:
-            closed += _door_on(topology.rooms, door).arcs
-        return [
+        doors = [_door_on(topology.rooms, door) for door in self.doors]
+        whole = []
+        if topology.grid.corner_cutting:
+            # Where inflation took both cells beside a diagonal, it crosses the door on no arc.
+            whole = [topology.rooms.cells_beside(door.number) for door in doors]
+        else:
+            closed += [arc for door in doors for arc in door.arcs]
+        return whole + [
             cells
             for level in sorted({arc.level for arc in closed})
             for cells in cells_on_boundaries(

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass
+from hybridnav.pyramid.cracks import ends_of
 from hybridnav.pyramid.level import LevelArc
 from hybridnav.topology.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
 
@@ -38,7 +39,8 @@ class Door:
 
     @property
     def passable(self) -> bool:
-        """Whether a robot of the map's radius passes."""
+        """Whether a robot of the map's radius passes over a side of its boundary. Where corners may
+        be cut, a diagonal may pass a door that has no arc."""
         return bool(self.arcs)
 
     @property
@@ -130,6 +132,11 @@ class Rooms:
         return RoomBoundaries.of(self.labels, self.grid, self.clearance_m)
 
     @cached_property
+    def _numbers(self) -> LongArray:
+        """int64 (n_boundaries,), the number of each boundary."""
+        return self._boundaries.numbers(self.labels.doors, {})
+
+    @cached_property
     def doors(self) -> tuple[Door, ...]:
         """All boundaries between free cells of different rooms, by number; also those that no robot
         of the map's radius passes, and gaps."""
@@ -141,7 +148,7 @@ class Rooms:
         on = found.boundary_of[np.searchsorted(found.edges, self.level.base_edges[kept])]
         for arc, boundary in zip(kept.tolist(), on.tolist(), strict=True):
             arcs[boundary].append(arc)
-        numbers = found.numbers(self.labels.doors, {})
+        numbers = self._numbers
         return tuple(
             Door(
                 int(numbers[at]),
@@ -180,6 +187,30 @@ class Rooms:
     def door_of_arc(self) -> dict[int, Door]:
         """The door of each arc of the room level that lies on one, by the arc's dense index."""
         return {arc.index: door for door in self.doors for arc in door.arcs}
+
+    def cells_beside(self, number: int) -> LongArray:
+        """Return the cells on both sides of a door's boundary, on the map as measured.
+
+        Parameters
+        ----------
+        number
+            The number of a door.
+
+        Returns
+        -------
+        LongArray
+            int64 (n,), flat cells `row * cols + col`, sorted, each once. The robot's radius may
+            have taken some of them away.
+
+        Raises
+        ------
+        InvalidValueError
+            When no door has the number.
+        """
+        found = self._boundaries
+        of_door = self._numbers == self.door(number).number
+        edges = found.edges[of_door[found.boundary_of]]
+        return np.unique(ends_of(edges, self.grid.shape[1]))
 
     def counted(self) -> tuple[str, str, str]:
         """Describe how many rooms and doors there are, and how many of them this robot cannot use.
