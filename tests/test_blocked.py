@@ -269,7 +269,7 @@ def test_an_area_over_a_large_map_is_no_work() -> None:
 def test_everything_closed_is_one_sorted_set(cells: list[tuple[int, int]], data: Any) -> None:
     low, high = sorted(data.draw(st.tuples(st.integers(0, 9), st.integers(0, 9))))
     area = [shapely.box(low, low, high, high)] * 2 if low < high else []
-    dtype = data.draw(st.sampled_from([np.uint8, np.int32, np.int64]))
+    dtype = data.draw(st.sampled_from([np.uint8, np.int32, np.int64, np.uint64]))
     given_cells = np.array(cells, dtype=dtype).reshape(-1, 2)
     mask = mask_of(Blocked(cells=given_cells, polygons=area), empty_map(Frame(), (9, 9)))
     expected = np.zeros((9, 9), dtype=np.bool_)
@@ -503,6 +503,15 @@ def test_a_self_loop_is_refused() -> None:
 def test_what_the_map_does_not_have_is_refused(blocked: dict[str, Any], message: str) -> None:
     with pytest.raises(hn.InvalidValueError, match=message):
         as_blocked(blocked).cells_of(rooms())
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.uint8, np.int64, np.uint64])
+def test_cells_of_any_integer_type_join_other_closures(dtype: Any) -> None:
+    cells = Blocked(cells=np.array([[1, 2]], dtype=dtype))
+    both = cells | Blocked(arcs=[0]) | cells
+    assert np.asarray(both.cells).tolist() == [[1, 2], [1, 2]]
+    alone = [one.cells_of(rooms()) for one in (cells, Blocked(arcs=[0]))]
+    assert both.cells_of(rooms()).tolist() == np.union1d(*alone).tolist()
 
 
 def test_a_map_without_arcs_says_so() -> None:

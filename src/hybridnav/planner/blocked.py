@@ -19,7 +19,7 @@ from hybridnav.topology import Door
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import AnyArray, LongArray
+    from hybridnav._typing import LongArray
     from hybridnav.topology import Rooms, TopologicalMap
 
 
@@ -270,7 +270,7 @@ def _checked_areas(areas: Any) -> tuple[BaseGeometry, ...]:
     return tuple(map(checked_area, areas))
 
 
-def _checked_cells(cells: ArrayLike) -> AnyArray:
+def _checked_cells(cells: ArrayLike) -> LongArray:
     try:
         array = np.array(cells)
     except ValueError:
@@ -281,8 +281,9 @@ def _checked_cells(cells: ArrayLike) -> AnyArray:
         raise InvalidValueError(
             f"cells must be integers (row, col) of shape (n, 2), got {shown(cells)}"
         )
-    array.flags.writeable = False
-    return array
+    kept: LongArray = array.astype(np.int64)
+    kept.flags.writeable = False
+    return kept
 
 
 def _found(what: str, ids: Sequence[int], known: LongArray) -> LongArray:
@@ -297,14 +298,14 @@ def _found(what: str, ids: Sequence[int], known: LongArray) -> LongArray:
     return np.flatnonzero(np.isin(known, wanted))
 
 
-def _inside(cells: AnyArray, shape: tuple[int, int]) -> LongArray:
+def _inside(cells: LongArray, shape: tuple[int, int]) -> LongArray:
     outside = ((cells < 0) | (cells >= np.array(shape))).any(axis=1)
     if outside.any():
         row, col = cells[np.argmax(outside)].tolist()
         raise InvalidValueError(
             f"cells must lie on the map of {shape[0]} x {shape[1]} cells, got ({row}, {col})"
         )
-    return cells.astype(np.int64)
+    return cells
 
 
 def _cells_in_runs(runs: LongArray) -> LongArray:
