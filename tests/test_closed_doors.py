@@ -324,7 +324,7 @@ def test_no_plan_crosses_a_shut_door_wherever_rooms_are(
         result = planner.plan(*ends, blocked={"doors": [door.number]})
         opened = planner.plan(*ends)
         best = optimum(topology, ends, without=shut)
-        closed = planner.closed_cells(door)
+        closed = Blocked(doors=[door]).cells_of(topology)
         assert set(closed.tolist()) <= set().union(*shut)
         remaining = grid.enterable()
         remaining.ravel()[closed] = False

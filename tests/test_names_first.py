@@ -30,3 +30,22 @@ def test_python_checks_names_before_what_is_blocked():
     ):
         with pytest.raises(hn.InvalidValueError, match="'kitchn': did you mean kitchen"):
             ask()
+
+
+def test_what_is_closed_is_found_once_for_named_ends(monkeypatch):
+    grid, labels = flat()
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels)))
+    found = []
+    find = hn.Blocked.cells_of
+
+    def counted(blocked, topology):
+        found.append(blocked)
+        return find(blocked, topology)
+
+    monkeypatch.setattr(hn.Blocked, "cells_of", counted)
+    blocked = {"rooms": ["lab"]}
+    assert planner.plan("kitchen", "lab", blocked=blocked).status == "goal blocked"
+    assert len(found) == 1
+    assert not hn.plan_tour(planner, ["kitchen", "lab", "kitchen"], blocked=blocked).solved
+    assert len(hn.plan_alternatives(planner, "kitchen", "lab", 2, blocked=blocked)) == 0
+    assert len(found) == 3

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, overload
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.closed import ClosedCells
-from hybridnav.planner.named import At, stop_points
+from hybridnav.planner.named import At, check_names, stop_points
 from hybridnav.result import Path
 from hybridnav.route.alternatives import alternative_search
 from hybridnav.search.grid_search import GridSearch
@@ -118,8 +117,9 @@ def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
             "alternatives are paths of the grid: ask a preset without OMPL for them, "
             f"not {planner.preset.name}"
         )
-    closed = None if blocked is None else ClosedCells(planner.closed_cells(blocked))
-    ends = stop_points(planner, [start, goal], at=at, blocked=closed)
+    check_names(planner.topology, [start, goal])
+    closed = planner.closed(blocked)
+    ends = stop_points(planner, [start, goal], at=at, closed=closed)
     topology = planner.topology
     allowed = planner.preset.planner.allow_unexplored
     search = alternative_search(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)

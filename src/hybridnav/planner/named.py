@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid, RoomLabels
-    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.topology import TopologicalMap
@@ -40,7 +39,7 @@ def stop_points(
     stops: Sequence[ArrayLike | str],
     *,
     at: At = "anywhere",
-    blocked: Closable | ClosedCells | None = None,
+    closed: ClosedCells | None = None,
 ) -> list[ArrayLike]:
     """Find a point for each stop of a way, so that the way through all of them is shortest.
 
@@ -49,12 +48,12 @@ def stop_points(
     planner
         Says what may be entered.
     stops
-        Two or more points `(x, y)` in metres, names of rooms or of named points. Where the
-        planner needs headings points are `(x, y, yaw)`, radians.
+        Two or more points `(x, y)` in metres, names of rooms or of named points that passed
+        `check_names`. Where the planner needs headings points are `(x, y, yaw)`, radians.
     at
         Where in a room: anywhere, or at the room's point.
-    blocked
-        What is closed for this query.
+    closed
+        Cells that are closed for this query.
 
     Returns
     -------
@@ -68,23 +67,33 @@ def stop_points(
     Raises
     ------
     InvalidValueError
-        When a name is not known, a room has no cell that may be entered, or `at` is another word.
+        When `at` is another word.
     """
     if at not in get_args(At):
         raise InvalidValueError(f"at must be 'anywhere' or 'point', got {at!r:.80}")
     topology = planner.topology
     grid = topology.grid
-    if any(isinstance(stop, str) for stop in stops):
-        check_stops(topology.rooms.labels, grid, stops)
     enterable = grid.enterable(allow_unexplored=planner.preset.planner.allow_unexplored)
-    if blocked is not None:
+    if closed is not None:
         enterable = enterable.copy()
-        enterable.ravel()[planner.closed_cells(blocked)] = False
+        enterable.ravel()[closed.flat] = False
     fixed: list[Any] = [_point_of(topology, stop, at) for stop in stops]
     points = _chosen(topology, enterable, stops, fixed, _radius_m(planner))
     if planner.needs_headings:
         return _facing_the_way(topology, enterable, stops, points)
     return points
+
+
+def check_names(topology: TopologicalMap, stops: Sequence[ArrayLike | str]) -> None:
+    """Refuse stops with names that a map cannot use, before anything is computed for the others.
+
+    Raises
+    ------
+    InvalidValueError
+        When a name is not known, a room has no free cell, or the map has no rooms.
+    """
+    if any(isinstance(stop, str) for stop in stops):
+        check_stops(topology.rooms.labels, topology.grid, stops)
 
 
 def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLike | str]) -> None:
@@ -253,8 +262,8 @@ def _to_sides(occupied: BoolArray) -> FloatArray:
 
 
 def _cell_at(topology: TopologicalMap, enterable: BoolArray, point: ArrayLike) -> LongArray:
-    """The cell that holds a point, none where it cannot be entered: what then is wrong, planning
-    from it says."""
+    """The cell that holds a point, none where it cannot be entered: the status of the plan then
+    names the reason."""
     try:
         row, col = topology.grid.frame.cells_of(np.asarray(point)[:2]).tolist()
     except (InvalidValueError, TypeError, ValueError, IndexError):

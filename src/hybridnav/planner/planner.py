@@ -50,8 +50,8 @@ _BAD_GOAL = {
 
 
 class HybridPlanner:
-    """Plans paths between points of one map by a preset; threads may share it, with OMPL one query
-    waits for the other.
+    """Plan paths between points of one map by a preset. Threads may share a planner; queries with
+    OMPL run one after the other.
 
     Parameters
     ----------
@@ -137,13 +137,13 @@ class HybridPlanner:
         """
         began = time.perf_counter()
         if isinstance(start, str) or isinstance(goal, str):
-            from hybridnav.planner.named import stop_points  # noqa: PLC0415 - most queries are points
+            from hybridnav.planner.named import check_names, stop_points  # noqa: PLC0415 - on demand
 
-            start, goal = stop_points(self, [start, goal], at=at, blocked=blocked)
+            check_names(self.topology, [start, goal])
+            blocked = self.closed(blocked)
+            start, goal = stop_points(self, [start, goal], at=at, closed=blocked)
         poses = self._pose("start", start), self._pose("goal", goal)
-        finish = self._finish_asked_for(smooth)
-        closed = None if blocked is None else ClosedCells(self.closed_cells(blocked))
-        result = self._between(poses, finish, closed, began)
+        result = self._between(poses, self._finish_asked_for(smooth), self.closed(blocked), began)
         return replace(result, start=tuple(poses[0].tolist()), goal=tuple(poses[1].tolist()))
 
     def _between(
@@ -200,15 +200,13 @@ class HybridPlanner:
             When the shapes differ, a coordinate is not finite, or what is blocked is not on the
             map.
         """
-        with_heading = self._ompl is not None and self._ompl.ompl.has_heading
-        first = read_points("starts", starts, needs_heading=with_heading)
-        last = read_points("goals", goals, needs_heading=with_heading)
+        first = read_points("starts", starts, needs_heading=self.needs_headings)
+        last = read_points("goals", goals, needs_heading=self.needs_headings)
         if len(first) != len(last):
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
         finish = self._finish_asked_for(smooth)
         cells = self._cells if self._ompl is None else None
-        closed = None if blocked is None else ClosedCells(self.closed_cells(blocked))
-        return plan_many(self, cells, (first, last), finish, closed)
+        return plan_many(self, cells, (first, last), finish, self.closed(blocked))
 
     def close(self) -> None:
         """End the process that a preset with OMPL plans in; the next query waits for another."""
@@ -361,14 +359,14 @@ class HybridPlanner:
         passed = [int(ids[1][arc]) if arc >= 0 else -1 for arc in arcs]
         return Route(tuple(ids[0][places].tolist()), tuple(passed))
 
-    def closed_cells(self, blocked: Closable | ClosedCells) -> LongArray:
-        """Return the flat cells that may not be entered when this is closed, int64, sorted."""
-        if isinstance(blocked, ClosedCells):
-            return blocked.flat
+    def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
+        """Return the cells that may not be entered when this is closed, None where nothing is."""
+        if blocked is None or isinstance(blocked, ClosedCells):
+            return blocked
         # Loads shapely, which most queries can do without.
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 
-        return as_blocked(blocked).cells_of(self.topology)
+        return ClosedCells(as_blocked(blocked).cells_of(self.topology))
 
     def _refusal(self, start: Cell, goal: Cell) -> PlanStatus | None:
         """Status of a query that cannot be planned for where its ends lie."""

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.closed import ClosedCells
 from hybridnav.planner.itinerary import Guide, Leg, in_words
-from hybridnav.planner.named import At, stop_points
+from hybridnav.planner.named import At, check_names, stop_points
 from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
@@ -185,8 +184,9 @@ def plan_tour(
     """
     if len(stops) < 2:  # noqa: PLR2004
         raise InvalidValueError(f"a way needs at least two stops, got {len(stops)}")
-    closed = None if blocked is None else ClosedCells(planner.closed_cells(blocked))
-    points = stop_points(planner, stops, at=at, blocked=closed)
+    check_names(planner.topology, stops)
+    closed = planner.closed(blocked)
+    points = stop_points(planner, stops, at=at, closed=closed)
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):
         results.append(planner.plan(*pair, smooth=smooth, blocked=closed))
