@@ -20,6 +20,29 @@ def test_names_are_checked_before_anything_is_built(cli, map_file, monkeypatch):
     assert "no room or point is called 'kitchn'" in done.err
 
 
+@pytest.mark.parametrize(
+    ("closed", "never", "message"),
+    [
+        ("room:kitchn", (hn.DualGraphPyramid, "build"), "did you mean kitchen"),
+        ("door:99", (hn, "HybridPlanner"), "99"),
+    ],
+)
+def test_what_is_closed_is_checked_before_it_costs(  # noqa: PLR0913, PLR0917
+    cli,  # noqa: F811
+    map_file,  # noqa: F811
+    monkeypatch,
+    closed,
+    never,
+    message,
+):
+    def built(*_, **__):
+        raise AssertionError
+
+    monkeypatch.setattr(*never, built)
+    query = ("plan", map_file, "--robot-radius", "0", "--from", "kitchen", "--to", "lab")
+    assert cli(*query, "--blocked", closed).refuses(2, message)
+
+
 def test_python_checks_names_before_what_is_blocked():
     grid, labels = flat()
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels)))

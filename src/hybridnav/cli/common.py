@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+    from hybridnav.cli.blocked import Closing
     from hybridnav.config import Preset
 
 _SMOOTH = ("none", "line-of-sight")
@@ -198,9 +199,11 @@ def grow_topology(
     rooms_file: Path | None = None,
     find_rooms: bool = False,
     stops: Sequence[str | tuple[float, ...]] = (),
+    closing: Closing | None = None,
 ) -> hn.TopologicalMap:
-    """Build the pyramid of a map as a preset says: with the rooms of a file; without one, if asked
-    for, with those that are found. Stops with names that these lack are refused before."""
+    """Build the pyramid of a map with the settings of a preset, and the rooms of a file or, if
+    asked for, those that are found. Refuse names of stops and closed rooms that these lack before,
+    and numbers of closed doors after."""
     settings = preset.pyramid
     rooms = None
     if rooms_file is not None:
@@ -213,6 +216,8 @@ def grow_topology(
         from hybridnav.planner.named import check_stops  # noqa: PLC0415 - loads numba
 
         check_stops(rooms, grid, stops)
+        for name in closing.rooms if closing is not None else ():
+            rooms.index(name)
     with stage("building the pyramid", seconds, "pyramid"):
         pyramid = hn.DualGraphPyramid.build(
             grid,
@@ -221,7 +226,10 @@ def grow_topology(
             seed=settings.seed,
             rooms=rooms,
         )
-    return hn.TopologicalMap(pyramid)
+    topology = hn.TopologicalMap(pyramid)
+    for number in closing.doors if closing is not None else ():
+        topology.rooms.door(number)
+    return topology
 
 
 def outside(

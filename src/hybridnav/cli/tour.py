@@ -78,6 +78,7 @@ def run_errand(errand: Errand) -> bool:
         rooms_file=errand.rooms_file or beside(errand.map_file),
         find_rooms=True,
         stops=errand.stops,
+        closing=errand.closing,
     )
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=errand.settings)
