@@ -260,7 +260,7 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
     shut = f"door:{direct.number}"
     opened = cli(*query, *NAMED, "--json").answer
     assert [leg["room"] for leg in opened["legs"]] == ["kitchen", "lab"]
-    assert "blocked" not in opened
+    assert opened["blocked"] is None
     ways = {}
     for closed in (shut, tmp_path / "mask.png", tmp_path / "line.geojson"):
         answer = cli(*query, *NAMED, "--blocked", closed, "--json").answer
@@ -281,6 +281,25 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
     routes = cli(*query, *NAMED, "--blocked", shut, "--alternatives", "3", "--json").answer
     assert len(routes["alternatives"]) == 1
     assert routes["alternatives"][0]["length_m"] == pytest.approx(round_m)
+
+
+@pytest.mark.parametrize("ends", [POINTS, ("--from", "1.5,5.5", "--to", "7.5,5.5")])
+def test_json_has_the_same_keys_however_ends_are_given(
+    cli: Any,  # noqa: F811
+    query: Any,
+    tmp_path: Any,
+    ends: Any,
+) -> None:
+    closed = ("--blocked", tmp_path / "line.geojson")
+    far = [text.replace("7.5,5.5", "99,99") for text in ends]
+    for rooms in ((), ("--rooms", tmp_path / "rooms.yaml")):
+        assert cli(*query, *ends, *rooms, "--json").answer["blocked"] is None
+        done = cli(*query, *far, *rooms, *closed, "--json")
+        assert done.answer["status"] == "goal outside the map"
+        assert done.answer["blocked"] == [str(closed[1])]
+        assert f"blocked    {closed[1]}\n" in cli(*query, *far, *rooms, *closed).out
+        seconds = cli(*query, *ends, *rooms, *closed, "--json").answer["seconds"]
+        assert {"load", "pyramid", "prepare", "portals", "around"} <= seconds.keys()
 
 
 def test_a_comparison_closes_the_same_for_the_whole_grid(

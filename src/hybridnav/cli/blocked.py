@@ -41,8 +41,8 @@ class Closing:
         return bool(self.doors or self.rooms)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is closed as plain values for JSON, nothing where nothing is."""
-        return {"blocked": list(self.given)} if self.given else {}
+        """Return what is closed as plain values for JSON: null where nothing is."""
+        return {"blocked": list(self.given) or None}
 
     def read(self, grid: hn.OccupancyGrid) -> hn.Blocked | None:
         """Read the files, and put all together; None where nothing is closed."""

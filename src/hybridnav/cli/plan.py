@@ -191,7 +191,7 @@ def plan(
     status = outside(grid, ends) if plot is None else None
     if status is not None:
         refused = refused_result(status, settings, ends)
-        figures = _figures(map_file, refused, seconds) | islands_figures(grid)
+        figures = _figures(map_file, refused, seconds) | islands_figures(grid) | closing.to_dict()
         figures |= _whole_grid(refused, None, asked=compare)
         _answer(grid, ends, figures, as_json=as_json)
         raise typer.Exit(EXIT_NOT_SOLVED)
