@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import sys
 import tempfile
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from hybridnav.config import Preset
 
 _SMOOTH = ("none", "line-of-sight")
+_OPTIMAL = 1e-9
+"""Gap of a path that equals its bound, lengths being sums of rounded numbers."""
 _PICTURES = (".pdf", ".png", ".svg")
 
 
@@ -181,7 +184,7 @@ def islands_figures(grid: hn.OccupancyGrid) -> dict[str, Any]:
     return {"dropped_islands": {"least_area_m2": grid.least_island_m2, **asdict(grid.dropped)}}
 
 
-def check_radius(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) -> None:
+def check_room_to_be(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) -> None:
     """Refuse a robot radius that leaves no cell of a map to be in."""
     was_free = (grid.measured == hn.CellClass.FREE).any()
     if was_free and not grid.enterable(allow_unexplored=allow_unexplored).any():
@@ -235,7 +238,8 @@ def grow_topology(
 def outside(
     grid: hn.OccupancyGrid, stops: Sequence[str | tuple[float, ...]]
 ) -> hn.PlanStatus | None:
-    """What a planner would say of a point that lies outside the map, before it is prepared."""
+    """Return the status that a planner would answer where a point lies outside the map, None where
+    none does; no planner is needed."""
     for number, stop in enumerate(stops):
         if isinstance(stop, str):
             continue
@@ -248,7 +252,7 @@ def outside(
 def refused_result(
     status: hn.PlanStatus, settings: Preset, stops: Sequence[str | tuple[float, ...]]
 ) -> hn.PlanResult:
-    """The result of a planner that here is not made."""
+    """Return the result that a planner would answer with a status; no planner is needed."""
     start, goal = (None if isinstance(stop, str) else tuple(stop) for stop in (stops[0], stops[-1]))
     record = {
         "preset": settings.name,
@@ -256,6 +260,14 @@ def refused_result(
         "pyramid": settings.pyramid.model_dump(),
     }
     return hn.PlanResult(status, settings=record, start=start, goal=goal)
+
+
+def told_bound(bound: float, gap: float) -> tuple[str, str]:
+    """Return a bound and how far from the optimum a path is at most, rounded to the safe side."""
+    if gap <= _OPTIMAL:
+        return f"{bound:.2f}", "optimal"
+    low = math.floor(bound * 100) / 100
+    return f"{low:.2f}", f"at most {math.ceil(gap * 1000) / 10:.1f} % too long"
 
 
 def timings(seconds: dict[str, float]) -> str:

@@ -14,7 +14,7 @@ from hybridnav.cli.common import (
     Reading,
     answer,
     check_picture,
-    check_radius,
+    check_room_to_be,
     grow_topology,
     islands_figures,
     islands_line,
@@ -24,6 +24,7 @@ from hybridnav.cli.common import (
     refused_result,
     stage,
     timings,
+    told_bound,
 )
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import (
@@ -53,9 +54,6 @@ if TYPE_CHECKING:
     from hybridnav.planner.named import At
 
 Point = tuple[float, ...]
-
-_OPTIMAL = 1e-9
-"""Gap of a path that equals its bound, lengths being sums of rounded numbers."""
 
 
 def _point(text: str) -> Point:
@@ -113,7 +111,7 @@ LeastHoleOption = Annotated[
     ),
 ]
 CompareOption = Annotated[
-    bool, typer.Option("--compare", help="Also plan on the whole grid, and tell the loss.")
+    bool, typer.Option("--compare", help="Also plan on the whole grid, and print the loss.")
 ]
 
 
@@ -186,7 +184,7 @@ def plan(
     start, goal = ends
     seconds: dict[str, float] = {}
     grid = load_grid(map_file, settings, seconds, reading)
-    check_radius(grid, allow_unexplored=settings.planner.allow_unexplored)
+    check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
     closed = closing.read(grid)
     status = outside(grid, ends) if plot is None else None
     if status is not None:
@@ -315,7 +313,8 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
         lines.append(f"path       {told}")
     elif figures["length_m"] is not None:
         lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
-        lines.append(f"bound      {_bound(figures['lower_bound'], figures['gap'])}")
+        bound, told = told_bound(figures["lower_bound"], figures["gap"])
+        lines.append(f"bound      {bound} m, the path is {told}")
     if figures["steps"] is not None:
         lines.append(f"steps      {'; '.join(figures['steps'])}")
     if figures["places"] is not None:
@@ -332,14 +331,6 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
     lines += _comparison(figures)
     lines.append(f"seconds    {timings(figures['seconds'])}")
     return "\n".join(lines) + "\n"
-
-
-def _bound(lower_bound_m: float, gap: float) -> str:
-    """The certificate, rounded to the safe side."""
-    if gap <= _OPTIMAL:
-        return f"{lower_bound_m:.2f} m, the path is optimal"
-    low = math.floor(lower_bound_m * 100) / 100
-    return f"{low:.2f} m, the path is at most {math.ceil(gap * 1000) / 10:.1f} % too long"
 
 
 def _comparison(figures: dict[str, Any]) -> list[str]:

@@ -13,7 +13,7 @@ from hybridnav.cli.common import (
     Reading,
     answer,
     check_picture,
-    check_radius,
+    check_room_to_be,
     check_writable,
     islands_line,
     load_grid,
@@ -102,7 +102,7 @@ def rooms(
     seconds: dict[str, float] = {}
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     grid = load_grid(map_file, settings, seconds, reading)
-    check_radius(grid)
+    check_room_to_be(grid)
     with stage("finding rooms", seconds, "rooms"):
         labels = (
             hn.find_rooms(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from hybridnav.cli.blocked import Closing, told_closing
 from hybridnav.cli.common import (
     Reading,
     answer,
-    check_radius,
+    check_room_to_be,
     complain,
     grow_topology,
     islands_figures,
@@ -25,6 +24,7 @@ from hybridnav.cli.common import (
     refused_result,
     stage,
     timings,
+    told_bound,
 )
 from hybridnav.cli.errors import UsageError
 from hybridnav.config.yaml_file import printable
@@ -33,9 +33,6 @@ from hybridnav.grid.rooms import read_point
 
 if TYPE_CHECKING:
     from hybridnav.planner.named import At
-
-_OPTIMAL = 1e-9
-"""Gap of a way that equals its bound, lengths being sums of rounded numbers."""
 
 Stop = str | tuple[float, ...]
 
@@ -58,10 +55,10 @@ class Errand:
 
 
 def run_errand(errand: Errand) -> bool:
-    """Plan a way between rooms and points, and tell it; gives whether there is one."""
+    """Plan a way between rooms and points, print it, and return whether it is solved."""
     seconds: dict[str, float] = {}
     grid = load_grid(errand.map_file, errand.settings, seconds, errand.reading)
-    check_radius(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
+    check_room_to_be(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
     closed = errand.closing.read(grid)
     status = outside(grid, errand.stops) if errand.plot is None else None
     if status is not None:
@@ -214,9 +211,6 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     bound, gap = figures["lower_bound"], 0.0
     if bound > 0:
         gap = figures["cost"] / bound - 1
-    told = "this way is optimal between its stops"
-    if gap > _OPTIMAL:
-        bound = math.floor(bound * 100) / 100
-        told = f"this way is at most {math.ceil(gap * 1000) / 10:.1f} % too long between its stops"
+    least, told = told_bound(bound, gap)
     unit = "m " if figures["cost"] == length_m else ""
-    return [*lines, f"bound      {bound:.2f} {unit}({metric}), {told}"]
+    return [*lines, f"bound      {least} {unit}({metric}), this way is {told} between its stops"]
