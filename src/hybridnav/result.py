@@ -48,8 +48,8 @@ class Path:
     any-angle one from point to point."""
 
     cells: LongArray
-    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. Of an
-    path shortened by line of sight those of the cell path that was shortened."""
+    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A
+    path shortened by line of sight keeps the cells of the path that was shortened."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
     where an any-angle path turns."""
@@ -200,8 +200,8 @@ class PlanBatch:
 
 @dataclass(frozen=True, eq=False)
 class PlanResult:
-    """Outcome of one query; `path` and `route` are None unless it is solved. Of an approximate one
-    the path ends short of the goal."""
+    """Outcome of one query; `path` and `route` are None unless it is solved. The path of an
+    approximate one ends short of the goal."""
 
     status: PlanStatus
     metric: Metric = "octile"
@@ -230,9 +230,9 @@ class PlanResult:
         return self.route_source() if callable(self.route_source) else self.route_source
 
     def __getstate__(self) -> dict[str, Any]:
-        """All that there is to tell, found by now: pickles and copies do without the planner."""
-        told = {name: value for name, value in vars(self).items() if name != "route"}
-        return told | {"route_source": self.route}
+        """Return the state with the route found, so that copies hold no planner."""
+        state = {name: value for name, value in vars(self).items() if name != "route"}
+        return state | {"route_source": self.route}
 
     @property
     def solved(self) -> bool:

@@ -238,7 +238,7 @@ def _check_arc(arc: LevelArc, topology: TopologicalMap) -> None:
 
 
 def _checked_ids(name: str, ids: Any, typed: type | None = None) -> tuple[Any, ...]:
-    """Whole numbers, and what is of a type that may stand in for them."""
+    """Return ids as integers, followed by objects of the accepted type."""
     is_listed = not isinstance(ids, str) and hasattr(ids, "__iter__")
     given = list(ids) if is_listed else [None]
     objects = [one for one in given if typed is not None and isinstance(one, typed)]

@@ -177,8 +177,8 @@ class AlternativeSearch:
         return ClassPaths(tuple(found), reason != _class_kernels.LIMITED, shortest)
 
     def _dead_ends_of(self, enterable: BoolArray, apart: int) -> DeadEnds:
-        """Where no path goes that is a shortest of its class and does not wind; kept while nothing
-        is closed."""
+        """Return the dead ends: cells that no shortest path of a class enters. They are kept while
+        nothing is closed."""
         if enterable is not self._enterable:
             return DeadEnds(enterable, apart)
         dead_ends = self._dead_ends
