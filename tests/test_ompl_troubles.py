@@ -220,6 +220,31 @@ planner.plan(*{ENDS})
     assert all(gone(pid, within_s=10 * BUDGET_S) for pid in [*forks, server])
 
 
+def test_ctrl_c_ends_a_search_that_has_an_hour_left(tmp_path: Path) -> None:
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += "from hybridnav.cli import main; main()"
+    points = ["--start", "1.0,13.2,0", "--goal", "40.6,19.4,0"]
+    settings = ["--preset", "ompl-rrtstar", "--set", "planner.ompl.space=se2"]
+    settings += ["--set", "planner.ompl.budget_s=3600"]
+    office = str(ROOT / "maps" / "office" / "office.yaml")
+    command = [sys.executable, "-c", code, "plan", office, *points, *settings]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, cwd=tmp_path) as planning:
+        servers: list[int] = []
+        forks: list[int] = []
+        lasting: list[int] = []  # a start too has children, for a moment
+        until = time.monotonic() + START_S
+        while not lasting and time.monotonic() < until and planning.poll() is None:
+            time.sleep(0.5)
+            before, servers = forks, children_of(planning.pid)
+            forks = [fork for server in servers for fork in children_of(server)]
+            lasting = [fork for fork in forks if fork in before]
+        planning.send_signal(signal.SIGINT)
+        complaint = planning.communicate(timeout=START_S)[1]
+    assert (planning.returncode, complaint) == (130, b"")
+    assert lasting
+    assert all(gone(pid, within_s=5) for pid in [*lasting, *servers])
+
+
 def test_a_closed_planner_plans_again_at_once(planner: hn.HybridPlanner) -> None:
     planner.close()
     result = planner.plan(*ENDS)

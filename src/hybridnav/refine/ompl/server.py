@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import select
 import signal
 import sys
 import time
@@ -104,16 +105,18 @@ def _answer(
     os.close(writing)
     try:
         with Connection(reading, writable=False) as replies:
-            return _last_reply(replies, kill_s, tell)
+            return _last_reply(replies, connection, kill_s, tell)
     finally:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
 
 
-def _last_reply(replies: Connection, kill_s: float, tell: Callable[[Reply], None]) -> Reply:
+def _last_reply(
+    replies: Connection, connection: Connection, kill_s: float, tell: Callable[[Reply], None]
+) -> Reply:
     best = without_answer()
     reason = "killed when the time was over"
-    while replies.poll(max(kill_s - time.monotonic(), 0.0)):
+    while _replied(replies, connection, kill_s):
         try:
             reply: Reply | Failure = replies.recv()
         except (EOFError, OSError):
@@ -127,6 +130,23 @@ def _last_reply(replies: Connection, kill_s: float, tell: Callable[[Reply], None
         best = reply
         tell(reply)
     return ended(best, reason)
+
+
+def _replied(replies: Connection, connection: Connection, until_s: float) -> bool:
+    """Wait until the fork replies or dies, or the time is over; return whether it did.
+
+    Raises
+    ------
+    EOFError
+        When the planner's process is gone, however much time the search has left.
+    """
+    waiting = select.poll()
+    waiting.register(replies, select.POLLIN)
+    waiting.register(connection, 0)  # its end alone: the next query may wait there
+    ready = [which for which, _ in waiting.poll(max(until_s - time.monotonic(), 0.0) * 1000)]
+    if connection.fileno() in ready:
+        raise EOFError
+    return bool(ready)
 
 
 def _run(base: Base, query: Query, replies: Connection) -> None:
