@@ -221,3 +221,16 @@ def test_a_disc_turns_anywhere_and_drives_where_its_base_does() -> None:
         assert check.drive_valid(*ends[0], 1.0, *ends[1], -2.0) is runs
     assert check.spin(2.4, 2.4, 0.0, 3.0) == pytest.approx(3.0)
     assert math.isnan(check.spin(2.525, 2.525, 0.0, 3.0))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_half_a_turn_takes_the_side_that_is_free(side: int) -> None:
+    occupied = np.zeros((40, 40), dtype=np.float32)
+    occupied[20 + 8 * side, 18:23] = 1
+    frame = Frame(CELL_M, (-20.5 * CELL_M, -20.5 * CELL_M))
+    grid = OccupancyGrid(occupied, frame=frame, robot_radius_m=0.05)
+    footprint = [(-0.1, -0.1), (0.6, -0.1), (0.6, 0.1), (-0.1, 0.1)]
+    check = MotionCheck(grid, footprint=footprint)
+    spelled = driven(check, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, math.pi]]))
+    assert spelled[:, 2].tolist() == pytest.approx([0, -side * math.pi / 2, math.pi])
+    assert check.path_valid(spelled)

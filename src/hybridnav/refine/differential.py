@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from hybridnav.refine.motions import MotionCheck
 
 _EQUAL_RAD = 1e-9
-"""Drives whose headings differ by less are one, where the robot can drive it at once."""
+"""Drives whose headings differ by less are one, where the robot can drive it at once; a turn
+that differs by less from half a circle has no short way."""
 
 
 def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> FloatArray:
@@ -39,8 +40,8 @@ def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> 
     FloatArray
         float64 (m, 3). From each pose to the next the robot either turns on the spot, the short
         way, or drives straight with one heading: where it turns, a point occurs with the heading
-        before and after, and with one half-way between where it turns the long way round. Without
-        rows where a motion between two of the poses is not valid.
+        before and after, and with one half-way between where it turns by half a circle or the long
+        way round. Without rows where a motion between two of the poses is not valid.
     """
     states: list[Pose] = [tuple(pose) for pose in poses.tolist()]
     drives = _drives(check, states, reverses=reverses)
@@ -52,7 +53,7 @@ def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> 
         turn = check.spin(x, y, before, first[2])
         if math.isnan(turn):
             return np.empty((0, 3))
-        if abs(turn) > math.pi:
+        if abs(turn) > math.pi - _EQUAL_RAD:
             spelled.append((x, y, math.remainder(before + turn / 2, math.tau)))
         if turn:
             spelled.append((x, y, first[2]))
