@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import select
 import signal
 import subprocess
 import sys
@@ -14,6 +16,8 @@ import pytest
 
 from hybridnav import _files
 from hybridnav._files import remove_unfinished, replace_file
+from hybridnav.cli.common import check_writable
+from hybridnav.cli.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -173,3 +177,37 @@ def test_what_is_half_written_when_the_process_ends_is_removed(
         replace_file(tmp_path / "rooms.yaml", b"new")
     assert not list(tmp_path.iterdir())
     assert not _files._unfinished
+
+
+def test_a_file_may_have_the_longest_name_of_any_letters(tmp_path: Path) -> None:
+    file = tmp_path / ("房" * 83 + ".yaml")
+    check_writable(file, "--out")
+    replace_file(file, b"rooms")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {file.name: b"rooms"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+def test_a_file_in_a_folder_that_takes_no_files_is_refused_before_anything_is_planned() -> None:
+    file = Path("/proc/self/comm")
+    assert os.access(file, os.W_OK)
+    with pytest.raises(UsageError, match="--out: cannot write '/proc/self/comm'"):
+        check_writable(file, "--out")
+
+
+def test_a_trial_does_not_end_what_the_reader_of_a_pipe_gets(tmp_path: Path) -> None:
+    pipe = tmp_path / "way.png"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        check_writable(pipe, "--plot")
+        waiting = select.poll()
+        waiting.register(reader, select.POLLIN)
+        assert waiting.poll(0) == []
+    finally:
+        os.close(reader)
+
+
+def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="Is a directory"):
+        check_writable(tmp_path, "--out")
+    assert not list(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import threading
@@ -29,11 +30,11 @@ def replace_file(path: Path, content: bytes) -> None:
     OSError
         When it cannot be written.
     """
-    if path.exists() and not path.is_file():  # a pipe or a terminal has nothing to lose
+    if _is_no_file(path):
         path.write_bytes(content)
         return
     path = path.resolve()
-    beside = path.with_name(f".{path.name[:200]}.{os.getpid()}.{threading.get_ident()}")
+    beside = _beside(path)
     _unfinished.add(beside)
     try:
         beside.write_bytes(content)
@@ -43,6 +44,43 @@ def replace_file(path: Path, content: bytes) -> None:
     finally:
         beside.unlink(missing_ok=True)
         _unfinished.discard(beside)
+
+
+def check_replaceable(path: Path) -> None:
+    """Try whether `replace_file` could write a file; nothing is left, nothing changed.
+
+    Parameters
+    ----------
+    path
+        The file. A pipe is left alone: whoever reads it would take the trial for all.
+
+    Raises
+    ------
+    OSError
+        When it could not.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if _is_no_file(path):
+        return
+    path = path.resolve()
+    beside = _beside(path)
+    _unfinished.add(beside)
+    try:
+        beside.touch(exist_ok=False)
+    finally:
+        beside.unlink(missing_ok=True)
+        _unfinished.discard(beside)
+
+
+def _is_no_file(path: Path) -> bool:
+    """Return whether a pipe, a terminal or a folder is there, which nothing can replace."""
+    return path.exists() and not path.is_file()
+
+
+def _beside(path: Path) -> Path:
+    """Return where a thread writes what becomes a file, however long the file's name is."""
+    return path.with_name(f".hybridnav.{os.getpid()}.{threading.get_ident()}")
 
 
 def remove_unfinished() -> None:

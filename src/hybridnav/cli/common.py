@@ -6,13 +6,13 @@ import io
 import math
 import os
 import sys
-import tempfile
 import time
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
+from hybridnav._files import check_replaceable
 from hybridnav.cli.errors import UsageError
 from hybridnav.config import load_preset
 from hybridnav.config.preset import is_preset_name
@@ -126,10 +126,7 @@ def check_picture(path: Path | None) -> None:
 def check_writable(path: Path, option: str) -> None:
     """Refuse a file that could not be written, by trying; nothing is left, nothing changed."""
     try:
-        if path.exists():
-            path.open("ab").close()
-        else:
-            tempfile.TemporaryFile(dir=path.parent).close()
+        check_replaceable(path)
     except OSError as error:
         raise UsageError(f"{option}: cannot write {str(path)!r}: {error.strerror}") from None
 
@@ -158,8 +155,10 @@ def load_grid(
         )
         if reading.least_island_m2 == 0:
             return grid
+        allowed = preset.planner.allow_unexplored
         whole, grid = grid, hn.drop_islands(grid, reading.least_island_m2)
-    if whole.enterable().any() and not grid.enterable().any():
+    before, after = (each.enterable(allow_unexplored=allowed).any() for each in (whole, grid))
+    if before and not after:
         raise UsageError(
             f"--least-island {reading.least_island_m2:g} leaves no free cell on "
             f"{printable(grid.name)}: give a smaller area"
