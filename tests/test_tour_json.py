@@ -87,3 +87,18 @@ def test_a_plan_to_a_room_says_where_in_it() -> None:
     assert result.path is not None
     assert result.goal == tuple(result.path.points[-1])
     assert planner().plan((0.5, 0.5), (99.0, 0.0)).goal == (99.0, 0.0)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_stop_where_the_robot_is_has_no_heading_of_its_own(place: int) -> None:
+    stops = [(0.55, 0.15), (0.55, 1.95), (0.55, 3.5)]
+    twice = [*stops[: place + 1], *stops[place:]]
+    told, plain = (read(hn.plan_tour(planner(), way)) for way in (twice, stops))
+    for key in ("points", "headings_rad"):
+        assert told[key] == plain[key]
+
+
+def test_a_tour_that_stays_where_it_is_has_a_point() -> None:
+    told = read(hn.plan_tour(planner(), [(0.5, 0.5)] * 3))
+    assert told["points"] == [[0.5, 0.5]]
+    assert len(told["headings_rad"]) == 1

@@ -131,8 +131,10 @@ class Tour:
 def _joined_points(
     parts: list[dict[str, Any]],
 ) -> tuple[list[list[float]], list[float]]:
-    """Points and headings of all parts; a point that one ends and the next begins with once, unless
-    the robot turns there."""
+    """Return points and headings of all parts; a point that one ends and the next begins with once,
+    unless the robot turns there. A part of one point, to a stop where the robot is, has no heading
+    of its own and is left out unless all are."""
+    parts = [part for part in parts if len(part["points"] or []) > 1] or parts[:1]
     points: list[list[float]] = []
     headings: list[float] = []
     for part in parts:
