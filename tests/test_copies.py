@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import weakref
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -237,6 +238,18 @@ def test_a_copied_search_finds_the_same_paths(scene: Scene) -> None:
             one, two = search.search(*ends), other.search(*ends)
             np.testing.assert_array_equal(one.cells, two.cells)
             assert one.expanded == two.expanded
+
+
+def test_a_copied_search_does_not_hold_the_original() -> None:
+    search = GridSearch(np.ones((4, 4), dtype=np.bool_))
+    moves = weakref.ref(search._moves)
+    other = copy.deepcopy(search)
+    del search
+    assert moves() is None
+    blocked = np.array([5])
+    found = other.search((0, 0), (3, 3), blocked=blocked)
+    assert found.cells is not None
+    assert [1, 1] not in found.cells.tolist()
 
 
 def test_a_lock_is_not_shared_with_a_copy() -> None:

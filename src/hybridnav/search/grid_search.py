@@ -38,7 +38,7 @@ class CellPath:
 
 
 class _Work:
-    """What one search at a time writes to: a record for each cell, and the open list."""
+    """Work arrays of one search: a record for each cell, and the open list."""
 
     def __init__(self, n_cells: int) -> None:
         self.records = np.zeros(n_cells, dtype=np.uint32)
@@ -70,7 +70,7 @@ class GridSearch:
         moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting)
         self._moves = moves.ravel()
         self._works = Pool(partial(_Work, enterable.size))
-        self._moves_to_edit: Pool[ByteArray] = Pool(self._moves.copy)
+        self._moves_to_edit: Pool[ByteArray] = Pool(partial(np.copy, self._moves))
 
     @property
     def memory_bytes(self) -> int:
