@@ -160,6 +160,7 @@ def test_a_name_is_a_room_s_or_a_point_s_never_both(text):
     ("options", "words"),
     [
         (("--at", "nowhere"), "--at must be anywhere or point, got 'nowhere'"),
+        (("--at", ""), "--at must be anywhere or point, got ''"),
         (("--least-hole", "inf"), "--least-hole must be a finite number of m²"),
         (("--least-hole", "nan", "--alternatives", "2"), "--least-hole"),
     ],

@@ -145,7 +145,7 @@ def plan(
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     check_picture(plot)
-    where = _checked_at(at or ("anywhere" if alternatives == 1 else "point"))
+    where = _checked_at(at, alternatives)
     _check_least_hole(least_hole_m2)
     settings = read_settings(preset, overrides, robot_radius_m, seed, smooth=smooth)
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
@@ -227,7 +227,9 @@ def _one_of(option: str, point: Any, other: str, text: str | None) -> Any:
     return parsed_stop(text) if text is not None else point
 
 
-def _checked_at(at: str) -> At:
+def _checked_at(at: str | None, alternatives: int) -> At:
+    if at is None:
+        return "anywhere" if alternatives == 1 else "point"
     if at == "anywhere":
         return "anywhere"
     if at == "point":
