@@ -73,6 +73,8 @@ def test_changing_something_else_does_not_make_the_default_a_choice() -> None:
     for changed in (replace(grid, corner_cutting=True), copy.deepcopy(grid)):
         assert changed.radius_is_default
     assert not replace(grid, robot_radius_m=0.3).radius_is_default
+    chosen = replace(grid, robot_radius_m=DEFAULT_ROBOT_RADIUS_M, radius_is_default=False)
+    assert not chosen.radius_is_default
     assert not replace(arrays(robot_radius_m=0.25), name="b").radius_is_default
 
 

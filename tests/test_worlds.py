@@ -89,6 +89,11 @@ def test_an_example_map_is_its_file_without_the_file(name, tmp_path, monkeypatch
     assert (made.frame, made.name) == (loaded.frame, loaded.name)
 
 
+def test_an_example_map_without_a_radius_has_the_default():
+    made = hn.example_map("figure1")
+    assert (made.robot_radius_m, made.radius_is_default) == (0.25, True)
+
+
 def test_an_unknown_example_map_names_those_there_are():
     with pytest.raises(InvalidValueError, match="'flat', only figure1 and office"):
         hn.example_map("flat", robot_radius_m=0.0)

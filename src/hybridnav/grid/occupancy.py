@@ -86,7 +86,8 @@ class OccupancyGrid:
     name
         What to call the map in messages and pictures.
     radius_is_default
-        Whether nobody gave the radius: set where it is None, and kept by `dataclasses.replace`.
+        Whether nobody gave the radius: set where it is None, and kept by `dataclasses.replace`,
+        even with a radius that equals the default; give False too to choose that radius.
     least_island_m2
         Square metres that an island must have to be kept; see `drop_islands`. 0 keeps all.
 

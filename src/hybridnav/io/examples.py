@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _WORLDS: dict[str, Callable[[], World]] = {"figure1": figure1_world, "office": office_world}
 
 
-def example_map(name: str = "office", *, robot_radius_m: float) -> OccupancyGrid:
+def example_map(name: str = "office", *, robot_radius_m: float | None = None) -> OccupancyGrid:
     """Make one of the project's own maps, the same as its file in the repository's `maps/`.
 
     Parameters
@@ -26,7 +26,7 @@ def example_map(name: str = "office", *, robot_radius_m: float) -> OccupancyGrid
         the source paper's Fig. 1.
     robot_radius_m
         Radius in metres: a cell is blocked when its centre lies within it of the centre of an
-        occupied cell; 0 for a point.
+        occupied cell; 0 for a point. None is the default, 0.25 m.
 
     Returns
     -------
