@@ -201,3 +201,17 @@ def test_smooth_wins_over_the_preset(raw_map, capsys):
     assert json.loads(capsys.readouterr().out)["metric"] == "octile"
     assert run([*query, "--smooth", "splines"]) == 2
     assert "--smooth must be one of none, line-of-sight, got 'splines'" in capsys.readouterr().err
+
+
+def test_an_area_may_leave_unexplored_cells_alone_where_they_may_be_entered(tmp_path, capsys):
+    (tmp_path / "m.pgm").write_bytes(b"P5\n8 4\n255\n" + b"\xfe" + b"\xcd" * 31)
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "image: m.pgm\nresolution: 1.0\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    query = ["plan", str(path), "--start", "1.5,0.5", "--goal", "6.5,2.5", *POINT]
+    query += ["--preset", "grid-astar", "--least-island", "4"]
+    assert run(query) == 2
+    assert run([*query, "--set", "planner.allow_unexplored=true"]) == 0
+    assert "leaves no free cell" in capsys.readouterr().err
