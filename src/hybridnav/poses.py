@@ -112,8 +112,8 @@ class Motion:
         total_m = float(lengths.sum())
         if not spacing_m > 0 or total_m / spacing_m > _MAX_POSES:
             raise InvalidValueError(
-                f"spacing_m must be a length in metres above 0, got {spacing_m}, and give at most "
-                f"{_MAX_POSES} poses on {total_m:.4g} m: ask for a longer one"
+                f"spacing_m must be above 0 and yield at most {_MAX_POSES} poses on "
+                f"{total_m:.4g} m, got {spacing_m}: increase it"
             )
         if len(lengths) == 0:
             return np.append(self.points[0], self.headings_at_points)[None], np.ones(1, np.int8)
@@ -173,7 +173,8 @@ def _part(along_m: FloatArray, lengths_m: FloatArray) -> FloatArray:
 
 
 def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
-    """Values, where they are not known those of the next known entry before, else behind."""
+    """Return the values, each unknown one replaced by the last known one before it, else the first
+    after it."""
     if known.all() or not known.any():
         return values
     last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))

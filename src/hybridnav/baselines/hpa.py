@@ -143,7 +143,7 @@ class HpaStar:
 
 
 class _Work:
-    """What one query at a time writes to."""
+    """Work arrays of one search."""
 
     def __init__(self, n_nodes: int, n_cells: int) -> None:
         self.cost_of = np.zeros(n_nodes, dtype=np.int64)

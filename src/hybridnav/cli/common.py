@@ -167,7 +167,7 @@ def load_grid(
 
 
 def islands_line(grid: hn.OccupancyGrid) -> list[str]:
-    """The line of a summary on islands, none where they were not to be dropped."""
+    """Return the summary's line on islands, none where they were not to be dropped."""
     dropped = grid.dropped
     if dropped is None:
         return []

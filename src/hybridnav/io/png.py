@@ -1,4 +1,4 @@
-"""Is a PNG whole? Every checksum of the file, which Pillow's decoder leaves unread."""
+"""Checks of a PNG's structure and checksums, which Pillow does not verify."""
 
 from __future__ import annotations
 

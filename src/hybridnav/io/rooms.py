@@ -265,8 +265,8 @@ def check_rooms(names: Sequence[str], label_of: IntArray, where: str, grid: Occu
 def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -> None:
     """Refuse named points that lie outside the map or in an obstacle.
 
-    Near an obstacle they may lie, and in unexplored cells: whether a robot can go there its radius
-    and its preset decide, and the status of a plan says it.
+    Points may lie near an obstacle or in unexplored cells; the status of a plan states whether the
+    robot can go there.
     """
     for name, point in points.items():
         row, col = grid.frame.cell_of(*point)
