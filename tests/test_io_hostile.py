@@ -116,7 +116,10 @@ def test_an_image_between_pillows_warning_and_its_error_loads_quietly(load, monk
     assert load(b"P5\n3 3\n255\n" + bytes(9)).shape == (3, 3)
     assert "too large" in load(b"P5\n4 4\n255\n" + bytes(16))
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", None)
-    assert "a grid holds at most" in load(b"P5\n20000 15000\n255\n" + bytes(100))
+    assert "truncated, 20000 x 15000" in load(b"P5\n20000 15000\n255\n" + bytes(100))
+    whole = io.BytesIO()
+    Image.new("1", (20000, 15000)).save(whole, "PNG")
+    assert "20000 x 15000 cells, a grid holds at most" in load(whole.getvalue(), "i.png")
 
 
 SAMPLES = [

@@ -12,7 +12,6 @@ from PIL import Image, UnidentifiedImageError
 
 from hybridnav.config.yaml_file import open_file, printable
 from hybridnav.errors import MapError, MapNotFoundError
-from hybridnav.grid import MAX_CELLS
 from hybridnav.io.png import DamagedPngError, check_png
 
 if TYPE_CHECKING:
@@ -119,8 +118,6 @@ def _open(stream: BinaryIO, where: str) -> ImageFile.ImageFile:
 def _check_extent(image: ImageFile.ImageFile, stream: BinaryIO, where: str) -> None:
     """Refuse a file that cannot hold the pixels of its header."""
     width, height = image.size
-    if width * height > MAX_CELLS:
-        raise MapError(f"{where}: {width} x {height} pixels, a grid holds at most {MAX_CELLS}")
     size = os.fstat(stream.fileno()).st_size
     most = _MOST_PIXELS_PER_BYTE.get(image.format or "")
     if most is not None and width * height > most * size:
