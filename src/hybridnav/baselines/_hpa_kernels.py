@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.baselines._weighted_kernels import COL_STEP, ROW_STEP, drop_least, push
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import grow, octile_cost

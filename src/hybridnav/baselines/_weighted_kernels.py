@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import grow, octile_cost
 

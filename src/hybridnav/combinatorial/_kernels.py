@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 
 ALIVE = 0
 CONTRACTED = 1

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 
 
 @guarded

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 
 
 @njit(cache=True, nogil=True)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.route._descent_kernels import descend, with_ends
 from hybridnav.route._portal_kernels import FAR, cells_of_way, field_at
 from hybridnav.route._side_kernels import best_gates, side_costs, ways_by_sides

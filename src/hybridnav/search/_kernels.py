@@ -12,8 +12,7 @@ import heapq
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 
 # A record of A*: generation, cost modulo 2^19, direction of arrival (see `astar`).

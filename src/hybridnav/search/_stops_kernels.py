@@ -6,8 +6,7 @@ import heapq
 
 import numpy as np
 
-from hybridnav._guard import guarded
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 
