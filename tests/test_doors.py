@@ -302,6 +302,7 @@ def test_list_picture_file_json_and_words_tell_the_same_doors(cli, map_file, tmp
     assert 'id="narrow-doors"' in (tmp_path / "rooms.svg").read_text()
     wide = cli("rooms", map_file, "--rooms", out, "--robot-radius", "0", "--json").answer
     narrow = cli(*query, "0.4", "--json").answer
+    assert not any(door["is_gap"] for door in wide["doors"])
     assert [door.pop("passable") for door in wide["doors"]] == [True, True]
     assert [door.pop("passable") for door in narrow["doors"]] == [False, False]
     assert wide["doors"] == narrow["doors"]

@@ -12,7 +12,9 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav.config import load_preset
 from hybridnav.grid import RoomLabels
+from hybridnav.planner.itinerary import Guide
 from hybridnav.planner.named import stop_points
+from hybridnav.result import Path
 from hybridnav.route import RoomSearch
 from hybridnav.viz import plot_rooms, plot_tour
 from tests.strategies import drawn, occupancy_grid
@@ -115,6 +117,16 @@ def test_a_tour_is_told_by_rooms_and_doors(planner):
     assert words[1].endswith("then left")
     assert words[2] == "3.5 m to door 2 (0.5 m wide), into lab, and you are there"
     assert words[-1].endswith("into hall, and you are there")
+
+
+def test_a_path_that_only_touches_a_room_is_not_told_of_it(planner):
+    cells = np.array(
+        [[6, 3], [5, 3], [4, 3], [3, 3], [4, 3], [5, 3], [4, 3], [3, 3], [3, 4], [3, 5]]
+    )
+    points = planner.topology.grid.frame.points_of(cells)
+    legs = Guide(planner.topology.rooms).legs(Path(cells, points, 9 * SIDE))
+    assert [leg.room for leg in legs] == ["kitchen", "hall"]
+    assert sum(leg.length_m for leg in legs) == pytest.approx(9 * SIDE)
 
 
 def test_legs_of_an_any_angle_path_share_its_length(planner):

@@ -162,6 +162,7 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                 "position_m": [round(number, 6) for number in door.position],
                 "width_m": round(door.width_m, 6),
                 "passable": door.passable,
+                "is_gap": door.is_gap,
             }
             for door in rooms.doors
         ],

@@ -12,6 +12,7 @@ from PIL import Image, UnidentifiedImageError
 
 from hybridnav.config.yaml_file import open_file, printable
 from hybridnav.errors import MapError, MapNotFoundError
+from hybridnav.grid import MAX_CELLS
 from hybridnav.io.png import DamagedPngError, check_png
 
 if TYPE_CHECKING:
@@ -105,8 +106,11 @@ class _UnsupportedPixelsError(Exception):
 def _open(stream: BinaryIO, where: str) -> ImageFile.ImageFile:
     try:
         image = Image.open(stream, formats=_FORMATS)
-    except Image.DecompressionBombError as failure:
-        raise MapError(f"{where}: too large ({_brief(failure)})") from None
+    except Image.DecompressionBombError:
+        raise MapError(
+            f"{where}: too large, more than {MAX_CELLS:,} pixels, the most that a grid holds "
+            "whatever the limit: make the image smaller, or cut it"
+        ) from None
     except UnidentifiedImageError:
         problem = "not an image of a known format, or its header is damaged or says 0 pixels"
         raise MapError(f"{where}: {problem}") from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,7 +105,7 @@ class Guide:
             )
             begun = ended
         last = float((along[-1] - begun) * scale)
-        return [*legs, Leg(rooms.name_of(labels[-1]), last, stop=stop)]
+        return _without_grazes([*legs, Leg(rooms.name_of(labels[-1]), last, stop=stop)])
 
     def _turn(self, cells: LongArray, along: FloatArray, step: int) -> str:
         """Which way a path bends at a step, seen over a few metres."""
@@ -120,6 +120,21 @@ class Guide:
         if abs(angle) < _TURN_RAD:
             return ""
         return "left" if angle > 0 else "right"
+
+
+def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:
+    """Join what lies on both sides of a leg that only touches a room: it enters by a door and comes
+    back by the same one within half a metre."""
+    kept: list[Leg] = []
+    for leg in legs:
+        kept.append(leg)
+        while len(kept) > 2:  # noqa: PLR2004
+            before, within, behind = kept[-3:]
+            if before.door is None or before.door != within.door or within.length_m > _SLIVER_M:
+                break
+            length_m = before.length_m + within.length_m + behind.length_m
+            kept[-3:] = [replace(behind, length_m=length_m)]
+    return kept
 
 
 def in_words(legs: Sequence[Leg]) -> list[str]:
