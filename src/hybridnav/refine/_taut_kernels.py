@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav.search._exact_kernels import turn_of
 
 FREE = 128
 """Bit of a mark: the cell may be entered."""
@@ -45,31 +46,6 @@ def marks_of(free):
                     mark = 2 * int(below_west and below_east) + int(west and below_west)
             marks[row, col] = mark + FREE * int(free[row, col])
     return marks
-
-
-@njit(cache=True, nogil=True)
-def _rounding_error(first, second, product):
-    """What rounding took from a product (T. J. Dekker: A floating-point technique, 1971)."""
-    scaled = 134217729.0 * first
-    first_high = scaled - (scaled - first)
-    first_low = first - first_high
-    scaled = 134217729.0 * second
-    second_high = scaled - (scaled - second)
-    second_low = second - second_high
-    error = product - first_high * second_high - first_low * second_high
-    return first_low * second_low - (error - first_high * second_low)
-
-
-@njit(cache=True, nogil=True)
-def turn_of(a_row, a_col, b_row, b_col, c_row, c_col):
-    """On which side of the line from a to b a point c lies: 1, -1 or 0, exact."""
-    p, q = b_row - a_row, c_col - a_col
-    r, s = b_col - a_col, c_row - a_row
-    left, right = p * q, r * s
-    # Rounding keeps order: only equal rounded products need their errors.
-    if left == right and left != 0.0:
-        left, right = _rounding_error(p, q, left), _rounding_error(r, s, right)
-    return int(left > right) - int(left < right)
 
 
 @njit(cache=True, nogil=True)
