@@ -1,0 +1,163 @@
+"""Kernels that merge triangles into convex polygons, and find the polygon of each cell.
+
+Points are (row, col) in grid units; with columns to the right and rows upwards, polygons run
+counter-clockwise. A *slot* is a side of a polygon, which lies to the left of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import guarded, njit
+
+WALL = -1
+"""The twin of a side that cannot be crossed."""
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def merge_triangles(corners, triangles, neighbours):
+    """Merge triangles into convex polygons, as long as a union is convex (S. Hertel, K. Mehlhorn,
+    1983), longest common sides first.
+
+    Parameters
+    ----------
+    corners
+        int32 (n, 2).
+    triangles
+        int32 (n, 3), corners counter-clockwise.
+    neighbours
+        int32 (n, 3), the triangle across the side from corner k to k + 1, -1 for a wall.
+
+    Returns
+    -------
+    tuple
+        int32 (p + 1,) first slot of each polygon; int32 (s,) corner at which each slot's side
+        begins; int32 (s,) twin slot, -1 for a wall; int32 (s,) polygon of each slot.
+    """
+    n = len(triangles)
+    twin = np.full(3 * n, WALL, np.int32)
+    following = np.empty(3 * n, np.int32)
+    before = np.empty(3 * n, np.int32)
+    for t in range(n):
+        for k in range(3):
+            side = 3 * t + k
+            following[side] = 3 * t + (k + 1) % 3
+            before[side] = 3 * t + (k + 2) % 3
+            other = neighbours[t, k]
+            if other < 0:
+                continue
+            for m in range(3):
+                if triangles[other, m] == triangles[t, (k + 1) % 3] and (
+                    triangles[other, (m + 1) % 3] == triangles[t, k]
+                ):
+                    twin[side] = 3 * other + m
+    tail = triangles.ravel()
+    length = np.zeros(3 * n)
+    for side in range(3 * n):
+        if twin[side] > side:
+            a, b = tail[side], tail[following[side]]
+            rows, cols = corners[a, 0] - corners[b, 0], corners[a, 1] - corners[b, 1]
+            length[side] = -float(rows * rows + cols * cols)
+    is_gone = np.zeros(3 * n, np.bool_)
+    for side in np.argsort(length, kind="mergesort"):
+        if length[side] == 0.0:
+            break
+        other = twin[side]
+        # The corners that see their angles add up: before the side and behind its twin, and back.
+        if _is_left(corners, tail, before[side], following[other]) and _is_left(
+            corners, tail, before[other], following[side]
+        ):
+            is_gone[side] = is_gone[other] = True
+            first, last = before[side], following[other]
+            following[first], before[last] = last, first
+            first, last = before[other], following[side]
+            following[first], before[last] = last, first
+    return _compact(tail, following, twin, is_gone)
+
+
+@njit(cache=True, nogil=True)
+def _is_left(corners, tail, incoming, outgoing):
+    """Whether the path along two sides, the second beginning where the first ends, turns left or
+    goes straight on."""
+    a, b = corners[tail[incoming]], corners[tail[outgoing]]
+    return incoming >= 0 and _turn(a, b, corners[_head(tail, outgoing)]) >= 0
+
+
+@njit(cache=True, nogil=True)
+def _head(tail, side):
+    """Corner at which a side of a triangle ends: sides are not moved when triangles merge."""
+    return tail[side - 2] if side % 3 == 2 else tail[side + 1]
+
+
+@njit(cache=True, nogil=True)
+def _turn(a, b, c):
+    """Sign of the turn from a over b to c; points (row, col), whole numbers."""
+    rows, cols = np.int64(b[0]) - a[0], np.int64(b[1]) - a[1]
+    cross = cols * (np.int64(c[0]) - b[0]) - rows * (np.int64(c[1]) - b[1])
+    return int(cross > 0) - int(cross < 0)
+
+
+@njit(cache=True, nogil=True)
+def _compact(tail, following, twin, is_gone):
+    """Slots of the polygons that are left, one polygon after the other."""
+    n = len(tail)
+    slot_of = np.full(n, -1, np.int32)
+    first = np.empty(n // 3 + 2, np.int32)
+    n_slots = n_polygons = 0
+    for side in range(n):
+        if is_gone[side] or slot_of[side] >= 0:
+            continue
+        first[n_polygons] = n_slots
+        n_polygons += 1
+        here = side
+        while slot_of[here] < 0:
+            slot_of[here] = n_slots
+            n_slots += 1
+            here = following[here]
+    first[n_polygons] = n_slots
+    begins = np.empty(n_slots, np.int32)
+    twins = np.full(n_slots, WALL, np.int32)
+    polygon_of = np.empty(n_slots, np.int32)
+    for side in range(n):
+        slot = slot_of[side]
+        if slot >= 0:
+            begins[slot] = tail[side]
+            if twin[side] >= 0:
+                twins[slot] = slot_of[twin[side]]
+    for polygon in range(n_polygons):
+        polygon_of[first[polygon] : first[polygon + 1]] = polygon
+    return first[: n_polygons + 1].copy(), begins, twins, polygon_of
+
+
+@njit(cache=True, nogil=True)
+def polygons_of_cells(first, begins, corners, shape):
+    """The polygon that holds the centre of each cell, int32 (rows, cols), -1 for none.
+
+    Where a side passes the centre either of its polygons is taken.
+    """
+    found = np.full(shape, -1, np.int32)
+    for polygon in range(len(first) - 1):
+        low, high = first[polygon], first[polygon + 1]
+        bottom = top = corners[begins[low], 0]
+        for slot in range(low, high):
+            row = corners[begins[slot], 0]
+            bottom, top = min(bottom, row), max(top, row)
+        for row in range(bottom, top):
+            left, right = -np.inf, np.inf
+            y = row + 0.5
+            for slot in range(low, high):
+                after = low if slot + 1 == high else slot + 1
+                a, b = corners[begins[slot]], corners[begins[after]]
+                if (a[0] <= row) == (b[0] <= row):
+                    continue
+                x = a[1] + (y - a[0]) * (b[1] - a[1]) / (b[0] - a[0])
+                if b[0] > a[0]:  # upwards: free space lies to the left of it
+                    right = min(right, x)
+                else:
+                    left = max(left, x)
+            for col in range(max(int(np.ceil(left - 0.5 - 1e-9)), 0), shape[1]):
+                if col + 0.5 > right + 1e-9:
+                    break
+                found[row, col] = polygon
+    return found

@@ -1,0 +1,128 @@
+"""The convex mesh of free space: polygons, who is beside whom, and the blocks that they form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pythoncdt
+
+from hybridnav.mesh._block_kernels import blocks_of
+from hybridnav.mesh._corner_kernels import NO_CORNER, kinds_of, walls_of
+from hybridnav.mesh._merge_kernels import WALL, merge_triangles, polygons_of_cells
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, ByteArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexMesh:
+    """Convex polygons that cover free space, without a gap and without overlap.
+
+    Free space is the union of the closed squares of the free cells, without the passages between
+    two blocked cells that meet at a corner. A *slot* is a side of a polygon, counter-clockwise with
+    columns to the right and rows upwards.
+    """
+
+    corners: IntArray
+    """int32 (n, 2), (row, col) in grid units: every vertex is a lattice corner of free space."""
+    kinds: ByteArray
+    """uint8 (n,), where one cell of four is blocked at a corner which one: bit 1 for the upper row,
+    bit 0 for the upper column; 4 at corners that no path bends round."""
+    first: IntArray
+    """int32 (p + 1,), polygon i has the slots `first[i]` to `first[i + 1]`."""
+    begins: IntArray
+    """int32 (s,), the corner at which each side begins."""
+    twins: IntArray
+    """int32 (s,), the same side seen from the polygon behind it, -1 for a wall."""
+    polygon_of: IntArray
+    """int32 (s,), the polygon of each slot."""
+    polygon_at: IntArray
+    """int32 (rows, cols), a polygon that holds the centre of each free cell, -1 elsewhere."""
+    block_of: IntArray
+    """int32 (s,), the block of the graph of polygons that each side belongs to, -1 for a wall."""
+    block_head: IntArray
+    """int32 (b,), the polygon by which each block hangs on the rest."""
+    block_up: IntArray
+    """int32 (p,), the block by which each polygon hangs on the rest, -1 for none."""
+    component: IntArray
+    """int32 (p,), the connected part of free space that each polygon belongs to."""
+    depth: IntArray
+    """int32 (p,), blocks between each polygon and the first one of its component."""
+
+    @property
+    def n_polygons(self) -> int:
+        """Number of polygons."""
+        return len(self.first) - 1
+
+
+def build_mesh(free: BoolArray) -> ConvexMesh:
+    """Build the convex mesh of free cells.
+
+    The constrained Delaunay triangulation of the corners and walls, its triangles merged while
+    their union is convex.
+
+    Parameters
+    ----------
+    free
+        bool (rows, cols); what lies outside is blocked.
+
+    Returns
+    -------
+    ConvexMesh
+        Without a polygon where no cell is free. Work and memory are linear in cells, but for the
+        triangulation's n log n in corners.
+
+    Notes
+    -----
+    S. Hertel, K. Mehlhorn: Fast triangulation of simple polygons, 1983 (merging). J. Hopcroft,
+    R. Tarjan: Algorithm 447, efficient algorithms for graph manipulation, 1973 (blocks).
+    """
+    cells = np.ascontiguousarray(free)
+    kinds = kinds_of(cells)
+    kind_of = kinds[kinds != NO_CORNER]
+    corners, walls = walls_of(cells, kinds, len(kind_of))
+    polygons = merge_triangles(corners, *_triangulated(corners, walls, cells))
+    polygon_at = polygons_of_cells(*polygons[:2], corners, cells.shape)
+    arrays = (corners, kind_of, *polygons, polygon_at, *blocks_of(polygons[0], *polygons[2:]))
+    for array in arrays:
+        array.flags.writeable = False
+    return ConvexMesh(*arrays)
+
+
+def _triangulated(corners: IntArray, walls: IntArray, free: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return the triangles of free space, int32 (n, 3) corners counter-clockwise, and the triangle
+    across each side, `WALL` for none."""
+    if len(corners) == 0:
+        return np.empty((0, 3), np.int32), np.empty((0, 3), np.int32)
+    made = pythoncdt.Triangulation(
+        pythoncdt.VertexInsertionOrder.AUTO, pythoncdt.IntersectingConstraintEdges.DONT_CHECK, 0.0
+    )
+    made.insert_vertices(corners[:, ::-1].astype(np.float64))  # type: ignore[call-overload]
+    made.insert_edges(walls.astype(np.uint32))  # type: ignore[call-overload]
+    made.erase_super_triangle()
+    found = made.triangles_array()
+    triangles = found["vertices"].astype(np.int32)
+    # No wall passes the middle of a triangle: all cells that it touches there are of one class.
+    middle = corners[triangles].sum(axis=1) // 3
+    inside = (middle < free.shape).all(axis=1)
+    is_free = np.zeros(len(triangles), dtype=np.bool_)
+    is_free[inside] = free[tuple(middle[inside].T)]
+    number = np.append(np.where(is_free, np.cumsum(is_free) - 1, WALL), WALL)
+    across = number[np.minimum(found["neighbors"], len(triangles))]
+    across[_are_walls(triangles, walls, len(corners))] = WALL
+    return triangles[is_free], across[is_free].astype(np.int32)
+
+
+def _are_walls(triangles: IntArray, walls: IntArray, n_corners: int) -> BoolArray:
+    """Return whether sides of triangles are walls, bool (n, 3)."""
+
+    def keys(pairs: IntArray) -> IntArray:
+        ordered = np.sort(pairs.astype(np.int64), axis=-1)
+        key: IntArray = ordered[..., 0] * n_corners + ordered[..., 1]
+        return key
+
+    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
+    found: BoolArray = np.isin(keys(sides), keys(walls))
+    return found

@@ -1,0 +1,207 @@
+"""The convex mesh covers free space exactly, and paths on it are shortest."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from hybridnav.grid import CellClass, OccupancyGrid
+from hybridnav.mesh import ConvexMesh, MeshSearch, build_mesh
+from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.metrics import _segment_kernels as segments
+from tests.strategies import class_grids, drawn, occupancy_grid
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Position = tuple[float, float]
+
+seeds = st.integers(0, 2**32 - 1)
+DATA = Path(os.environ.get("HYBRIDNAV_DATA", "no data")) / "any_angle_optima"
+OPTIMA = sorted(path.stem for path in DATA.glob("*.csv"))
+
+
+def polygon(mesh: ConvexMesh, number: int) -> NDArray[Any]:
+    """Corners of a polygon as (x, y), counter-clockwise."""
+    slots = slice(mesh.first[number], mesh.first[number + 1])
+    return mesh.corners[mesh.begins[slots]][:, ::-1].astype(np.int64)
+
+
+def crosses(points: NDArray[Any]) -> NDArray[Any]:
+    """Twice the signed areas of the corners of a ring."""
+    ahead, behind = np.roll(points, -1, axis=0) - points, points - np.roll(points, 1, axis=0)
+    found: NDArray[Any] = behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0]
+    return found
+
+
+@given(class_grids())
+def test_polygons_are_convex_and_their_area_is_that_of_the_free_cells(classes: Any) -> None:
+    free = classes == CellClass.FREE
+    mesh = build_mesh(free)
+    twice = 0
+    for number in range(mesh.n_polygons):
+        points = polygon(mesh, number)
+        assert (crosses(points) >= 0).all()
+        x, y = points.T
+        twice += int((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+    assert twice == 2 * free.sum()
+
+
+@given(class_grids())
+def test_sides_are_shared_by_two_polygons_or_are_walls(classes: Any) -> None:
+    free = classes == CellClass.FREE
+    mesh = build_mesh(free)
+    ends = np.concatenate(
+        [np.roll(mesh.begins[a:b], -1) for a, b in zip(mesh.first, mesh.first[1:], strict=False)]
+        or [np.empty(0, np.int32)]
+    )
+    crossable = np.flatnonzero(mesh.twins >= 0)
+    assert (mesh.twins[mesh.twins[crossable]] == crossable).all()
+    assert (mesh.begins[mesh.twins[crossable]] == ends[crossable]).all()
+    walls = mesh.corners[mesh.begins[mesh.twins < 0]], mesh.corners[ends[mesh.twins < 0]]
+    length = int(np.abs(walls[0] - walls[1]).sum())
+    padded = np.pad(free, 1).astype(np.int8)
+    assert length == sum(int(np.abs(np.diff(padded, axis=axis)).sum()) for axis in (0, 1))
+
+
+@given(class_grids())
+def test_each_free_cell_knows_a_polygon_round_its_centre(classes: Any) -> None:
+    free = classes == CellClass.FREE
+    mesh = build_mesh(free)
+    assert ((mesh.polygon_at >= 0) == free).all()
+    for row, col in np.argwhere(free).tolist():
+        points = polygon(mesh, mesh.polygon_at[row, col])
+        ahead = np.roll(points, -1, axis=0) - points
+        offset = np.array([col, row]) + 0.5 - points
+        assert (ahead[:, 0] * offset[:, 1] - ahead[:, 1] * offset[:, 0] >= 0).all()
+    # Cells that meet at a corner alone are not connected.
+    labels, _ = ndimage.label(free)
+    component = mesh.component[mesh.polygon_at[free]]
+    assert len(np.unique(np.stack([labels[free], component]), axis=1).T) == labels.max(initial=0)
+
+
+def some_positions(free: NDArray[np.bool_], seed: int) -> list[tuple[tuple[int, int], Position]]:
+    """Cells and positions in them: centres, anywhere, on sides, at corners."""
+    rng = np.random.default_rng(seed)
+    cells = np.argwhere(free)
+    found: list[tuple[tuple[int, int], Position]] = []
+    for _ in range(6):
+        row, col = cells[rng.integers(len(cells))].tolist()
+        up, right = rng.choice([0.0, 0.5, 0.5, 1.0, rng.integers(1, 2**24) / 2**24], 2).tolist()
+        position = row + up, col + right
+        if not is_pinch(free, position):
+            found.append(((row, col), position))
+    return found
+
+
+def is_pinch(free: NDArray[np.bool_], position: Position) -> bool:
+    """Whether two free cells meet at this corner alone: there sight asks which cell it is in."""
+    row, col = position
+    if row % 1 or col % 1:
+        return False
+    padded = np.pad(free, 1)
+    (a, b), (c, d) = padded[int(row) : int(row) + 2, int(col) : int(col) + 2]
+    return bool(a == d and b == c and a != b)
+
+
+def by_visibility(
+    grid: OccupancyGrid, graph: VisibilityGraph, start: Position, goal: Position
+) -> float:
+    """Length of a shortest path between positions by the visibility graph, in cells."""
+    free_of = np.array([False, True, False])
+    if start == goal:
+        return 0.0
+    if segments.segment_code(grid.classes, free_of, *start, *goal) == segments.CLEAR:
+        return math.dist(start, goal)
+    seen = [
+        segments.visible_from(grid.classes, free_of, *end, graph.corners, graph._slopes)
+        for end in (start, goal)
+    ]
+    left = np.hypot(*(graph.corners - goal).T)
+    chain = segments.cheapest_corners(graph._offsets, graph._heads, graph._lengths, *seen, left)
+    if not len(chain):
+        return math.inf
+    way = np.concatenate([[start], graph.corners[chain], [goal]])
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+
+@given(class_grids(max_side=14), seeds)
+def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed: int) -> None:
+    free = classes == CellClass.FREE
+    assume(free.any())
+    grid = occupancy_grid(classes)
+    graph, search = VisibilityGraph(grid), MeshSearch(build_mesh(free))
+    ends = some_positions(free, seed)
+    for (first, start), (last, goal) in itertools.pairwise(ends):
+        found = search.path((first, last), (start, goal))
+        assert found.length_cells == pytest.approx(by_visibility(grid, graph, start, goal))
+        if found.positions is not None:
+            points = grid.frame.points_of_grid(found.positions)
+            assert found.positions[0].tolist() == list(start)
+            assert found.positions[-1].tolist() == list(goal)
+            assert not segment_faults(grid, points)
+        back = search.path((last, first), (goal, start))
+        assert back.length_cells == pytest.approx(found.length_cells)
+
+
+def test_two_cells_that_meet_at_a_corner_are_not_connected() -> None:
+    free = drawn(".#", "#.") == CellClass.FREE
+    search = MeshSearch(build_mesh(free))
+    assert search.path(((0, 1), (1, 0)), ((1.0, 1.0), (1.0, 1.0))).positions is None
+    assert search.path(((0, 1), (0, 1)), ((1.0, 1.0), (0.0, 2.0))).length_cells == math.sqrt(2)
+
+
+def test_a_path_may_turn_at_a_corner_and_follow_walls() -> None:
+    classes = drawn(".....", ".###.", ".###.", ".....")
+    search = MeshSearch(build_mesh(classes == CellClass.FREE))
+    found = search.path(((0, 0), (3, 4)), ((1.0, 0.5), (3.0, 4.5)))
+    assert found.positions is not None
+    assert found.positions.tolist() in (
+        [[1.0, 0.5], [1.0, 4.0], [3.0, 4.0], [3.0, 4.5]],
+        [[1.0, 0.5], [1.0, 4.0], [3.0, 4.5]],
+        [[1.0, 0.5], [3.0, 1.0], [3.0, 4.5]],
+    )
+    assert found.length_cells == pytest.approx(2 * math.hypot(0.5, 2) / 2 + 3.5)
+
+
+def test_maps_of_one_kind_of_cell() -> None:
+    assert build_mesh(np.zeros((3, 4), np.bool_)).n_polygons == 0
+    search = MeshSearch(build_mesh(np.ones((3, 4), np.bool_)))
+    assert search.mesh.n_polygons == 1
+    assert search.path(((0, 0), (2, 3)), ((0.0, 0.0), (3.0, 4.0))).length_cells == 5.0
+
+
+def test_a_search_finds_room_for_its_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hybridnav.mesh.search._ROOM", 4)
+    rng = np.random.default_rng(3)
+    free = rng.random((40, 40)) > 0.2
+    free[0, 0] = free[-1, -1] = True
+    ends = ((0, 0), (39, 39)), ((0.5, 0.5), (39.5, 39.5))
+    graph = VisibilityGraph(occupancy_grid(np.where(free, np.uint8(1), np.uint8(0))))
+    expected = graph.shortest((0, 0), (39, 39)).length_m
+    assert MeshSearch(build_mesh(free)).path(*ends).length_cells == pytest.approx(expected)
+
+
+@pytest.mark.skipif(not OPTIMA, reason="HYBRIDNAV_DATA is not set")
+@pytest.mark.parametrize("name", OPTIMA or ["none"])
+def test_lengths_are_the_stated_optima(name: str) -> None:
+    lines = (DATA / f"{name}.map").read_text().split("\n")[4:]
+    free = np.array([[letter == "." for letter in line] for line in lines if line])
+    search = MeshSearch(build_mesh(free))
+    with (DATA / f"{name}.csv").open() as file:
+        problems = np.array([list(map(float, row)) for row in list(csv.reader(file))[1:]])
+    assert len(problems) == 200
+    for sx, sy, gx, gy, length in problems.tolist():
+        cells = (int(sy), int(sx)), (int(gy), int(gx))
+        found = search.path(cells, ((sy, sx), (gy, gx)))
+        assert abs(found.length_cells - length) < 1e-6
