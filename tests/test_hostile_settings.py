@@ -175,13 +175,12 @@ def test_what_cannot_be_written_is_told_before_the_work(capsys, monkeypatch, tmp
 
     monkeypatch.setattr(hn.io, "load_map", lambda *_, **__: pytest.fail("the map was read"))
     # Tests may run as root, who may write everywhere.
-    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    monkeypatch.setattr(Path, "touch", refuse)
     told = _refused(capsys, 2, *QUERY, "--plot", tmp_path / "p.png")
     assert f"--plot: cannot write '{tmp_path / 'p.png'}': Permission denied" in told
     assert "--out: cannot write" in _refused(capsys, 2, "rooms", FIGURE, "-o", tmp_path / "r.yaml")
     old = tmp_path / "old.png"
-    old.touch()
-    monkeypatch.setattr(Path, "open", refuse)
+    old.write_bytes(b"")
     assert "--plot: cannot write" in _refused(capsys, 2, *QUERY, "--plot", old)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -44,6 +44,7 @@ def crosses(points: NDArray[Any]) -> NDArray[Any]:
     return found
 
 
+@settings(max_examples=40, deadline=None)
 @given(class_grids())
 def test_polygons_are_convex_and_their_area_is_that_of_the_free_cells(classes: Any) -> None:
     free = classes == CellClass.FREE
@@ -57,6 +58,7 @@ def test_polygons_are_convex_and_their_area_is_that_of_the_free_cells(classes: A
     assert twice == 2 * free.sum()
 
 
+@settings(max_examples=40, deadline=None)
 @given(class_grids())
 def test_sides_are_shared_by_two_polygons_or_are_walls(classes: Any) -> None:
     free = classes == CellClass.FREE
@@ -74,6 +76,7 @@ def test_sides_are_shared_by_two_polygons_or_are_walls(classes: Any) -> None:
     assert length == sum(int(np.abs(np.diff(padded, axis=axis)).sum()) for axis in (0, 1))
 
 
+@settings(max_examples=40, deadline=None)
 @given(class_grids())
 def test_each_free_cell_knows_a_polygon_round_its_centre(classes: Any) -> None:
     free = classes == CellClass.FREE
@@ -135,6 +138,7 @@ def by_visibility(
     return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
+@settings(max_examples=60, deadline=None)
 @given(class_grids(max_side=14), seeds)
 def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed: int) -> None:
     free = classes == CellClass.FREE

@@ -104,7 +104,10 @@ def test_four_threads_on_one_planner_get_the_answers_of_one(preset: str) -> None
         assert answers == alone
 
 
-@pytest.mark.parametrize("preset", BY_OMPL)
+@pytest.mark.parametrize(
+    "preset",
+    [BY_OMPL[0], *(pytest.param(name, marks=pytest.mark.full) for name in BY_OMPL[1:])],
+)
 def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(preset: str) -> None:
     pytest.importorskip("ompl")
     grid = grid_with_rooms(seed=6, side=60)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.mesh._block_kernels import open_blocks
 from hybridnav.mesh._polyanya_kernels import shortest
 from hybridnav.search._exact_kernels import turn_of
@@ -86,6 +86,7 @@ def _touch(ax, ay, bx, by, px, py, qx, qy):
     )
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def query(mesh, blocks, tree, polygon_at, cells, ends, work):
     """Find a shortest path between two points.
