@@ -1,9 +1,11 @@
 """What a second thread on one planner is worth: queries per second of two threads over one.
 
-    python -m benchmarks.threads [--map FILE] [--seconds S]
+    python -m benchmarks.threads [--map FILE] [--seconds S] [--many]
 
 Two cores that do nothing else answer nearly twice as many; the load of the machine is printed
-beside. Presets with OMPL answer one query after the other and are left out.
+beside. A single look-up is over before Python has prepared the next one, for which it holds its
+lock; with `--many` each thread asks for all pairs in one call of `plan_many`. Presets with OMPL
+answer one query after the other and are left out.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ import threading
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 import hybridnav as hn
 from benchmarks.chain import OFFICE, RADIUS_M
@@ -32,8 +36,11 @@ def per_second(
     ends: list[tuple[FloatArray, FloatArray]],
     n_threads: int,
     time_s: float,
+    *,
+    many: bool = False,
 ) -> float:
     """Queries answered per second by so many threads, each with all pairs in its own order."""
+    starts, goals = (np.array(side) for side in zip(*ends, strict=True))
     counts = [0] * n_threads
     start = threading.Barrier(n_threads + 1)
 
@@ -42,8 +49,11 @@ def per_second(
         start.wait()
         until = time.perf_counter() + time_s
         while time.perf_counter() < until:
-            planner.plan(*ends[at % len(ends)])
-            counts[number] += 1
+            if many:
+                planner.plan_many(starts, goals)
+            else:
+                planner.plan(*ends[at % len(ends)])
+            counts[number] += len(ends) if many else 1
             at += 1
 
     threads = [threading.Thread(target=work, args=(number,)) for number in range(n_threads)]
@@ -61,6 +71,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--map", type=Path, default=OFFICE)
     parser.add_argument("--seconds", type=float, default=1.0)
+    parser.add_argument("--many", action="store_true", help="one call for all pairs")
     options = parser.parse_args()
     topology = hn.TopologicalMap(
         hn.DualGraphPyramid.build(hn.load_map(options.map, robot_radius_m=RADIUS_M))
@@ -75,10 +86,13 @@ def main() -> None:
         if preset.startswith("ompl-"):
             continue
         planner = hn.HybridPlanner(topology, preset=preset)
-        per_second(planner, ends, 2, options.seconds)
+        per_second(planner, ends, 2, options.seconds, many=options.many)
         # In turns, so that what else the machine does meets both.
         rates = [
-            [per_second(planner, ends, n_threads, options.seconds) for n_threads in (1, 2)]
+            [
+                per_second(planner, ends, n_threads, options.seconds, many=options.many)
+                for n_threads in (1, 2)
+            ]
             for _ in range(ROUNDS)
         ]
         one, two = (statistics.median(column) for column in zip(*rates, strict=True))
