@@ -44,7 +44,6 @@ def blocks_of(first, twins, polygon_of):
     for root in range(n):
         if number[root] >= 0:
             continue
-        size = 0
         path[0] = root
         size = 1
         number[root] = low[root] = clock
