@@ -1,0 +1,81 @@
+"""Kernels of lines: the cells that a polyline passes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybridnav._jit import guarded, njit
+
+_SLIVER_CELLS = 1e-9
+"""Pieces of a line below this are rounding: the line passes the corner of a cell."""
+
+
+@njit(cache=True, nogil=True)
+def _is_free(free, row, col):
+    return 0 <= row < free.shape[0] and 0 <= col < free.shape[1] and free[row, col]
+
+
+@njit(cache=True, nogil=True)
+def _free_cell_at(free, row, col):
+    """A free cell that holds a position: where that lies on lines of the lattice the cells beside
+    it are tried in turn."""
+    above, right = math.floor(row), math.floor(col)
+    below, left = math.ceil(row) - 1, math.ceil(col) - 1
+    if _is_free(free, above, right):
+        return above, right
+    if _is_free(free, above, left):
+        return above, left
+    if _is_free(free, below, right):
+        return below, right
+    return below, left
+
+
+@njit(cache=True, nogil=True)
+def _next_cut(start, way, line):
+    """Where a segment meets a line of the lattice, as a part of it; 2 behind its end."""
+    return 2.0 if way == 0.0 else (line - start) / way
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def passed_cells(free, positions):
+    """Return the cells that a polyline passes, int64 (m, 2); see `cells_of_line`."""
+    room = 2
+    for k in range(len(positions) - 1):
+        for axis in range(2):
+            room += int(abs(positions[k + 1, axis] - positions[k, axis])) + 2
+    cells = np.empty((room, 2), np.int64)
+    cells[0] = _free_cell_at(free, positions[0, 0], positions[0, 1])
+    n = 1
+    for k in range(len(positions) - 1):
+        row, col = positions[k]
+        down, across = positions[k + 1, 0] - row, positions[k + 1, 1] - col
+        length = math.hypot(down, across)
+        # The next line of the lattice in each direction, and where the segment meets it.
+        down_step, across_step = math.copysign(1.0, down), math.copysign(1.0, across)
+        line_row = math.floor(row) + 1.0 if down > 0.0 else math.ceil(row) - 1.0
+        line_col = math.floor(col) + 1.0 if across > 0.0 else math.ceil(col) - 1.0
+        by_row, by_col = _next_cut(row, down, line_row), _next_cut(col, across, line_col)
+        here = 0.0
+        while here < 1.0:
+            there = min(by_row, by_col, 1.0)
+            if (there - here) * length > _SLIVER_CELLS:
+                middle = (here + there) / 2
+                cell = _free_cell_at(free, row + middle * down, col + middle * across)
+                if cell[0] != cells[n - 1, 0] or cell[1] != cells[n - 1, 1]:
+                    cells[n] = cell
+                    n += 1
+            if by_row <= there:
+                line_row += down_step
+                by_row = _next_cut(row, down, line_row)
+            if by_col <= there:
+                line_col += across_step
+                by_col = _next_cut(col, across, line_col)
+            here = there
+    cell = _free_cell_at(free, positions[-1, 0], positions[-1, 1])
+    if cell[0] != cells[n - 1, 0] or cell[1] != cells[n - 1, 1]:
+        cells[n] = cell
+        n += 1
+    return cells[:n].copy()
