@@ -145,6 +145,7 @@ def behaviour() -> dict[str, str]:
             {
                 "chooses the route on the places first": "chosen on places",
                 "find a path first": "read off the path",
+                "finds the shortest any-angle path": "read off the path",
                 "searches the whole grid": "none",
             },
         ),
@@ -153,6 +154,7 @@ def behaviour() -> dict[str, str]:
             {
                 "| the places of the `TopologicalMap` |": "chosen on places",
                 "| portals between the fields of a second pyramid": "read off the path",
+                "| a convex mesh of free space": "read off the path",
                 "| the cells of the whole grid |": "none",
             },
         ),

@@ -35,6 +35,14 @@ _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")
 DEFAULT_ROBOT_RADIUS_M = 0.25
 """Radius of the robot in metres where nobody gives one: of presets and of every map."""
 
+_REFINED_BY = {
+    "max-distance": ("grid-astar",),
+    "portals": ("gates", "stored-paths"),
+    "mesh": ("none",),
+    "none": ("grid-astar",),
+}
+"""What refines each coarse search; OMPL refines them all."""
+
 _MAX_SHOWN = 80
 """Characters of a setting that a message quotes."""
 
@@ -70,16 +78,17 @@ class PyramidSettings(_Section):
 class PlannerSettings(_Section):
     """Section `planner`: coarse search, corridor, refinement."""
 
-    coarse: Literal["max-distance", "portals", "none"] = "max-distance"
+    coarse: Literal["max-distance", "portals", "mesh", "none"] = "max-distance"
     """What is planned on: the places, by that attribute of their arcs, which chooses the route; or
-    portals between fields grown for planning alone, so that the route is read off the path; or
-    `none`, the whole map at once, without a route."""
+    portals between fields grown for planning alone, or a mesh of convex polygons of free space, so
+    that the route is read off the path; or `none`, the whole map at once, without a route."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields that `grid-astar` and `ompl` start from: those of the coarse way, or also their
     neighbours. Of no effect with `gates`, `stored-paths` and `coarse: none`."""
-    refine: Literal["grid-astar", "gates", "stored-paths", "ompl"] = "grid-astar"
+    refine: Literal["grid-astar", "gates", "stored-paths", "ompl", "none"] = "grid-astar"
     """How a path is found: cell by cell in the corridor; over portals, with exact costs between all
-    border cells of the fields or by some stored paths alone; or by a sampling-based planner."""
+    border cells of the fields or by some stored paths alone; by a sampling-based planner; or
+    `none` where the search on the mesh has found it: the shortest any-angle path."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, section of its own; null elsewhere."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
@@ -109,10 +118,14 @@ class PlannerSettings(_Section):
             if self.epsilon is not None:
                 raise PydanticCustomError("gates_needed", "epsilon needs refine: gates")
             return self
-        if (self.refine == "grid-astar") == (self.coarse == "portals"):
+        if self.refine not in _REFINED_BY[self.coarse]:
+            fitting = " or ".join((*_REFINED_BY[self.coarse], "ompl"))
             raise PydanticCustomError(
-                "portals_needed",
-                "coarse: portals goes with refine: gates or stored-paths, and they with it",
+                "refine_needed", f"coarse: {self.coarse} goes with refine: {fitting}"
+            )
+        if self.coarse == "mesh" and self.smooth != "none":
+            raise PydanticCustomError(
+                "no_smooth", "smooth goes with grid paths: with coarse: mesh set it to none"
             )
         if self.epsilon is not None and self.refine != "gates":
             raise PydanticCustomError("gates_needed", "epsilon needs refine: gates")

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.refine import GridRefiner
+    from hybridnav.result import Metric
     from hybridnav.route import Effort, PortalAnswers
     from hybridnav.topology import TopologicalMap
 
@@ -30,9 +31,11 @@ class CellPlan:
     """A path between two cells, None for its cells where there is none."""
 
     cells: LongArray | None
+    metric: Metric = "octile"
     points: FloatArray | None = None
-    """Centres of the cells, where they are known already, and the path's length."""
+    """Centres of the cells, where they are known already, or the points of an any-angle path."""
     length_cells: float | None = None
+    """Length of the path, where it is known already."""
     bound_cells: float = 0.0
     """No path is shorter; in cells."""
     route_source: Callable[[], Route] | None = None

@@ -8,11 +8,46 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import FloatArray
+    from hybridnav.grid import OccupancyGrid
+
+Cell = tuple[int, int]
+Points = tuple["FloatArray", "FloatArray"]
+
+_OUTSIDE = PlanStatus.START_OUTSIDE, PlanStatus.GOAL_OUTSIDE
+_REFUSED = (
+    {
+        CellClass.OCCUPIED: PlanStatus.START_OCCUPIED,
+        CellClass.UNEXPLORED: PlanStatus.START_UNEXPLORED,
+    },
+    {
+        CellClass.OCCUPIED: PlanStatus.GOAL_OCCUPIED,
+        CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
+    },
+)
+
+
+def cells_of_ends(
+    grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
+) -> tuple[Cell, Cell] | PlanStatus:
+    """Find the cells that hold start and goal, or what is wrong with one of them."""
+    cells = [grid.frame.cell_of(float(x), float(y)) for x, y in points]
+    rows, cols = grid.shape
+    for (row, col), outside in zip(cells, _OUTSIDE, strict=True):
+        if not (0 <= row < rows and 0 <= col < cols):
+            return outside
+    for cell, refused in zip(cells, _REFUSED, strict=True):
+        of_class = int(grid.classes[cell])
+        may_enter = of_class == CellClass.UNEXPLORED and allow_unexplored
+        if of_class != CellClass.FREE and not may_enter:
+            return refused[CellClass(of_class)]
+    return cells[0], cells[1]
 
 
 def _numbers(given: ArrayLike) -> FloatArray:

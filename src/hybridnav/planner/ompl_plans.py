@@ -15,6 +15,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_plans import MaxDistance, OverPortals
+from hybridnav.planner.mesh_plans import OverMesh
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.differential import driven
@@ -59,7 +60,7 @@ def ompl_planner(
     field_of = None
     if isinstance(cells, OverPortals):
         field_of = cells.search.field_of
-    elif isinstance(cells, MaxDistance):
+    elif isinstance(cells, MaxDistance | OverMesh):
         field_of = topology.level.field_of
     free = np.argwhere(topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
     if len(free):  # kernels that load at the first query would eat up its budget

@@ -12,11 +12,11 @@ import numpy as np
 
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
 from hybridnav.planner.closed import ClosedCells
-from hybridnav.planner.ends import read_point, read_points, read_pose
+from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
+from hybridnav.planner.mesh_plans import OverMesh
 from hybridnav.planner.radius import check_radius
 from hybridnav.refine import GridRefiner, LineOfSight
 from hybridnav.result import Path, PlanResult, PlanStats, PlanStatus, Route
@@ -38,15 +38,6 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 Smooth = Literal["none", "line-of-sight"]
-
-_BAD_START = {
-    CellClass.OCCUPIED: PlanStatus.START_OCCUPIED,
-    CellClass.UNEXPLORED: PlanStatus.START_UNEXPLORED,
-}
-_BAD_GOAL = {
-    CellClass.OCCUPIED: PlanStatus.GOAL_OCCUPIED,
-    CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
-}
 
 
 class HybridPlanner:
@@ -80,6 +71,8 @@ class HybridPlanner:
             self._cells = MaxDistance(topology, self._refiner, settings)
         elif settings.coarse == "portals":
             self._cells = OverPortals(topology, self._refiner, settings)
+        elif settings.coarse == "mesh":
+            self._cells = OverMesh(topology.grid, allow_unexplored=settings.allow_unexplored)
         else:
             self._cells = WholeMap(self._refiner)
         self._ompl: OmplPlanner | None = None
@@ -115,7 +108,7 @@ class HybridPlanner:
             named ends face the way; in its other spaces the third number means nothing.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one; None as the preset says. Of no
-            effect with OMPL, whose paths are any-angle ones.
+            effect with `shortest` and with OMPL, whose paths are any-angle ones.
         blocked
             What is closed for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
             mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. Where
@@ -155,26 +148,20 @@ class HybridPlanner:
     ) -> PlanResult:
         """Plan between two points, or poses."""
         ends = poses[0][:2], poses[1][:2]
-        first, last = self._cell_of(ends[0]), self._cell_of(ends[1])
-        if first is None:
-            return self._answer(PlanStatus.START_OUTSIDE)
-        if last is None:
-            return self._answer(PlanStatus.GOAL_OUTSIDE)
-        status = self._refusal(first, last)
-        if status is not None:
-            return self._answer(status)
-        if closed is not None:
-            shut = closed.holds(np.array([first, last]) @ [self.topology.grid.shape[1], 1])
-            if shut.any():
-                refused = PlanStatus.START_BLOCKED if shut[0] else PlanStatus.GOAL_BLOCKED
-                return self._answer(refused)
-        plan = self._cells.plan(first, last)
+        grid, allowed = self.topology.grid, self.preset.planner.allow_unexplored
+        cells = cells_of_ends(grid, ends, allow_unexplored=allowed)
+        if isinstance(cells, PlanStatus):
+            return self._answer(cells)
+        if closed is not None and (refused := closed.refusal(cells, grid.shape)):
+            return self._answer(refused)
+        if isinstance(self._cells, OverMesh) and self._ompl is None:
+            return self._result(self._cells.between(cells, ends, closed), ends, finish, closed)
+        plan = self._cells.plan(*cells)
         if closed is not None and plan.cells is not None:
-            plan = self._round(closed, plan, first, last)
-        flat = None if closed is None else closed.flat
+            plan = self._round(closed, plan, *cells)
         if self._ompl is not None and plan.cells is not None:
-            return self._by_ompl(self._ompl, plan, poses, flat, began)
-        return self._result(plan, ends, finish, flat)
+            return self._by_ompl(self._ompl, plan, poses, closed, began)
+        return self._result(plan, ends, finish, closed)
 
     def plan_many(
         self,
@@ -245,29 +232,32 @@ class HybridPlanner:
         plan: CellPlan,
         ends: tuple[FloatArray, FloatArray],
         finish: Smooth,
-        closed: LongArray | None,
+        closed: ClosedCells | None,
     ) -> PlanResult:
         stats = _stats_of(plan)
         if plan.cells is None:
-            return self._answer(PlanStatus.NO_PATH, stats=stats)
-        if finish == "line-of-sight":
+            return self._answer(PlanStatus.NO_PATH, metric=plan.metric, stats=stats)
+        grid = self.topology.grid
+        bound = plan.bound_cells * grid.resolution_m
+        points, metric = plan.points, plan.metric
+        if metric == "octile" and finish == "line-of-sight":
             began = time.perf_counter()
-            points = self._sight(closed).shorten(plan.cells, *ends)
-            length_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
+            points, metric = self._sight(closed).shorten(plan.cells, *ends), "any-angle"
             stats.seconds["smooth"] = time.perf_counter() - began
-            path, metric = Path(plan.cells, points, length_m), "any-angle"
             bound = self._any_angle_bound(plan.cells, ends)
+        if points is None:
+            points = grid.frame.points_of(plan.cells)
+        if metric == "octile":
+            length_m = (plan.length_cells or path_length_in_cells(plan.cells)) * grid.resolution_m
         else:
-            grid = self.topology.grid
-            centres = plan.points if plan.points is not None else grid.frame.points_of(plan.cells)
-            length = plan.length_cells or path_length_in_cells(plan.cells)
-            length_m = length * grid.resolution_m
-            path, metric = Path(plan.cells, centres, length_m), "octile"
-            bound = plan.bound_cells * grid.resolution_m
+            length_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        if plan.metric == "any-angle" and plan.length_cells:
+            # A part of the length, so that what is proved optimal has no gap by rounding.
+            bound = length_m * (plan.bound_cells / plan.length_cells)
         return self._answer(
             PlanStatus.SOLVED,
             metric=metric,
-            path=path,
+            path=Path(plan.cells, points, length_m),
             route_source=self._route_source(plan),
             lower_bound=min(bound, length_m),
             stats=stats,
@@ -294,14 +284,15 @@ class HybridPlanner:
         planner: OmplPlanner,
         plan: CellPlan,
         poses: tuple[FloatArray, FloatArray],
-        closed: LongArray | None,
+        closed: ClosedCells | None,
         began: float,
     ) -> PlanResult:
         """The coarse path refined by OMPL."""
         assert plan.cells is not None  # noqa: S101 - the caller has looked
         ends = poses[0][:2], poses[1][:2]
         now = time.perf_counter()
-        found = planner.plan(plan.cells, poses, closed, spent_s=now - began)
+        flat = None if closed is None else closed.flat
+        found = planner.plan(plan.cells, poses, flat, spent_s=now - began)
         seconds = {**plan.seconds, "ompl": time.perf_counter() - now}
         source = self._route_source(plan)
         if source is not None and found.path is not None:
@@ -320,12 +311,12 @@ class HybridPlanner:
             stats=_stats_of(replace(plan, seconds=seconds)),
         )
 
-    def _sight(self, closed: LongArray | None) -> LineOfSight:
+    def _sight(self, closed: ClosedCells | None) -> LineOfSight:
         """What shortens paths; with closed cells one made for the query."""
         if closed is None:
             return self._line_of_sight
         allowed = self.preset.planner.allow_unexplored
-        return LineOfSight(self.topology.grid, allow_unexplored=allowed, closed=closed)
+        return LineOfSight(self.topology.grid, allow_unexplored=allowed, closed=closed.flat)
 
     @cached_property
     def _line_of_sight(self) -> LineOfSight:
@@ -367,23 +358,6 @@ class HybridPlanner:
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 
         return ClosedCells(as_blocked(blocked).cells_of(self.topology))
-
-    def _refusal(self, start: Cell, goal: Cell) -> PlanStatus | None:
-        """Status of a query that cannot be planned for where its ends lie."""
-        for cell, bad in ((start, _BAD_START), (goal, _BAD_GOAL)):
-            of_class = int(self.topology.grid.classes[cell])
-            if of_class == CellClass.FREE:
-                continue
-            if of_class == CellClass.UNEXPLORED and self.preset.planner.allow_unexplored:
-                continue
-            return bad[CellClass(of_class)]
-        return None
-
-    def _cell_of(self, point: FloatArray) -> Cell | None:
-        """The cell that holds a point, None where it lies outside the map."""
-        row, col = self.topology.grid.frame.cell_of(float(point[0]), float(point[1]))
-        rows, cols = self.topology.grid.shape
-        return (row, col) if 0 <= row < rows and 0 <= col < cols else None
 
     def _answer(self, status: PlanStatus, **outcome: Any) -> PlanResult:
         """A result that records the preset and how the pyramid was built."""

@@ -1,0 +1,148 @@
+"""The preset `shortest`: any-angle paths that nothing is shorter than, between any points."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.planner.mesh_plans import OverMesh
+from tests.oracle.any_angle import by_visibility, some_positions
+from tests.strategies import class_grids, drawn, occupancy_grid
+
+seeds = st.integers(0, 2**32 - 1)
+FRAMES = (hn.Frame(1.0), hn.Frame(0.05, (12.3, -400.0), 0.7), hn.Frame(0.1, (5e5, 4e6), -2.0))
+
+
+def mapped(classes: Any, frame: hn.Frame = FRAMES[0]) -> hn.TopologicalMap:
+    """The topological map of cells with these classes."""
+    probability = occupancy_grid(classes).probability
+    grid = hn.OccupancyGrid(probability, frame, robot_radius_m=0)
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4 * 0.05))
+
+
+def shortest(topology: hn.TopologicalMap, *overrides: str) -> hn.HybridPlanner:
+    return hn.HybridPlanner(topology, preset=hn.load_preset("shortest", overrides=overrides))
+
+
+def assert_optimal(grid: hn.OccupancyGrid, result: hn.PlanResult, optimum_m: float) -> None:
+    """A result that claims gap 0, against the length of a shortest path in metres."""
+    assert result.metric == "any-angle"
+    if math.isinf(optimum_m):
+        assert result.status is hn.PlanStatus.NO_PATH
+        assert result.lower_bound == math.inf
+        return
+    assert result.path is not None
+    assert result.gap == 0
+    # Far from the origin coordinates are rounded more coarsely.
+    assert result.cost == pytest.approx(optimum_m, rel=1e-9, abs=1e-7)
+    assert not segment_faults(grid, result.path.points)
+    cells = result.path.cells
+    assert np.abs(np.diff(cells, axis=0)).max(initial=0) <= 1
+    assert result.route is not None
+    assert len(result.route.arcs) == len(result.route.places) - 1
+
+
+@settings(max_examples=50, deadline=None)
+@given(class_grids(max_side=14), seeds, st.sampled_from(FRAMES))
+def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn.Frame) -> None:
+    free = classes == hn.CellClass.FREE
+    assume(free.any())
+    topology = mapped(classes, frame)
+    graph, planner = VisibilityGraph(topology.grid), shortest(topology)
+    for (first, start), (last, goal) in itertools.pairwise(some_positions(free, seed)):
+        ends = frame.points_of_grid([start, goal])
+        if (frame.cells_of(ends) != [first, last]).any():
+            continue  # a point on a side belongs to the cell behind it
+        result = planner.plan(*ends)
+        optimum = by_visibility(topology.grid, graph, start, goal)
+        assert_optimal(topology.grid, result, optimum * frame.resolution_m)
+        if result.path is not None:
+            np.testing.assert_array_equal(result.path.points[[0, -1]], ends)
+            assert result.path.cells[[0, -1]].tolist() == [list(first), list(last)]
+
+
+@settings(max_examples=50, deadline=None)
+@given(class_grids(max_side=14), seeds)
+def test_paths_round_closed_cells_are_optimal(classes: Any, seed: int) -> None:
+    cells = np.argwhere(classes == hn.CellClass.FREE)
+    assume(len(cells) > 4)
+    rng = np.random.default_rng(seed)
+    topology = mapped(classes)
+    planner = shortest(topology)
+    for _ in range(3):
+        shut = rng.choice(cells, rng.integers(1, 4))
+        left = classes.copy()
+        left[tuple(shut.T)] = hn.CellClass.OCCUPIED
+        grid = occupancy_grid(left)
+        graph, closed = VisibilityGraph(grid), planner.closed({"cells": shut})
+        ends = grid.frame.points_of(rng.choice(cells, 4))
+        for start, goal in itertools.pairwise(ends):
+            result = planner.plan(start, goal, blocked=closed)
+            if "blocked" in result.status:
+                held = grid.frame.cells_of([start, goal])
+                assert (held[:, None] == shut).all(axis=2).any()
+                continue
+            optimum = by_visibility(grid, graph, tuple(start[::-1]), tuple(goal[::-1]))
+            assert_optimal(grid, result, optimum)
+
+
+def test_meshes_of_what_was_closed_are_kept_for_the_next_query() -> None:
+    topology = mapped(drawn("......", "......", "......"))
+    planner = shortest(topology)
+    ways = [
+        planner.plan((0.5, 1.5), (5.5, 1.5), blocked={"cells": [(1, col)]}).cost
+        for col in (1, 2, 3, 4, 1, 2, 3, 4) * 3
+    ]
+    assert ways == ways[:8] * 3
+    assert isinstance(planner._cells, OverMesh)
+    assert len(planner._cells._cut) == 4
+
+
+def test_unexplored_cells_are_entered_where_that_is_allowed() -> None:
+    topology = mapped(drawn(".?.", ".#."))
+    ends = (0.5, 0.5), (2.5, 0.5)
+    assert shortest(topology).plan(*ends).status is hn.PlanStatus.NO_PATH
+    allowed = shortest(topology, "planner.allow_unexplored=true")
+    assert allowed.plan(*ends).cost == pytest.approx(1 + 2 * math.hypot(0.5, 0.5))
+    assert allowed.plan((1.5, 1.5), ends[1]).solved
+
+
+def test_a_map_whose_corners_may_be_cut_is_refused() -> None:
+    probability = occupancy_grid(drawn(".#", "#.")).probability
+    grid = hn.OccupancyGrid(probability, FRAMES[0], robot_radius_m=0, corner_cutting=True)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
+    with pytest.raises(hn.InvalidValueError, match="preset grid-astar"):
+        shortest(topology)
+
+
+def test_many_pairs_are_answered_as_one_by_one() -> None:
+    rng = np.random.default_rng(1)
+    topology = mapped((rng.random((30, 30)) > 0.3).astype(np.uint8))
+    planner = shortest(topology)
+    starts, goals = rng.uniform(-1, 31, (2, 60, 2))
+    many = planner.plan_many(starts, goals)
+    for query, ends in enumerate(zip(starts, goals, strict=True)):
+        one = planner.plan(*ends)
+        assert many.status[query] == one.status
+        assert many.cost[query] == one.cost
+        assert many.lower_bound[query] == one.lower_bound
+        if one.path is not None:
+            np.testing.assert_array_equal(many.path(query), one.path.points)
+
+
+def test_smoothing_changes_nothing() -> None:
+    topology = mapped(drawn(".....", ".###.", "....."))
+    results = [
+        shortest(topology).plan((0.5, 0.5), (4.5, 2.5), smooth=way)
+        for way in (None, "none", "line-of-sight")
+    ]
+    assert len({result.cost for result in results}) == 1
+    assert {result.metric for result in results} == {"any-angle"}
