@@ -8,8 +8,24 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.mesh._block_kernels import open_blocks
-from hybridnav.mesh._polyanya_kernels import shortest
+from hybridnav.mesh._polyanya_kernels import (
+    BEGUN,
+    DONE,
+    GOALS,
+    LAST,
+    LOWER,
+    MARKED,
+    STARTS,
+    TOUCHED,
+    UPPER,
+    advance,
+    seed,
+    way_to,
+)
 from hybridnav.search._exact_kernels import turn_of
+
+_OPENED, _SEEDED = 1, 2
+"""How far a query is: its blocks are opened; its first nodes are written."""
 
 
 @njit(cache=True, nogil=True)
@@ -19,7 +35,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
     Parameters
     ----------
     mesh
-        See `shortest`.
+        See `successors`.
     inner
         The polygon at the centre of the cell.
     row, col
@@ -35,7 +51,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
     int
         How many were found.
     """
-    cx, cy, _, first, begins, twins, polygon_of = mesh
+    cx, cy, _, first, begins, stops, twins, polygon_of = mesh
     found[0] = inner
     n = 1
     at = 0
@@ -47,7 +63,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
             if twins[slot] < 0:
                 continue
             u = begins[slot]
-            w = begins[low if slot + 1 == high else slot + 1]
+            w = stops[slot]
             # The segment from the centre to the point meets no wall: its polygons hang together.
             if not _touch(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5, x, y):
                 continue
@@ -65,7 +81,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
         holds = True
         for slot in range(low, high):
             u = begins[slot]
-            w = begins[low if slot + 1 == high else slot + 1]
+            w = stops[slot]
             holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], x, y) >= 0
         if holds:
             found[kept] = polygon
@@ -88,13 +104,13 @@ def _touch(ax, ay, bx, by, px, py, qx, qy):
 
 @guarded
 @njit(cache=True, nogil=True)
-def query(mesh, blocks, tree, polygon_at, cells, ends, work):
-    """Find a shortest path between two points.
+def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
+    """Find a shortest path between two points, or go on with it.
 
     Parameters
     ----------
     mesh, ends
-        See `shortest`.
+        See `successors`.
     blocks
         int32 (s,), the block of each slot.
     tree
@@ -105,69 +121,75 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work):
         Row and column of the start's cell, then of the goal's; free ones.
     work
         Of one query: room for the polygons of the ends, blocks that may be entered, those marked,
-        nodes (see `shortest`), best costs of corners, corners touched.
+        and what `seed` describes.
+    effort
+        Length of the best path known before, and `factor` and `limit` of `advance`; a limit below
+        zero ends the query.
 
     Returns
     -------
     tuple
-        Length, infinite where there is no path, `NO_ROOM` when there are too few nodes; the last
-        node, -1 where the path is one segment; nodes expanded.
+        `DONE`, `PAUSED` or `NO_ROOM`; when done the path, float64 (n, 2) as (row, col), without a
+        row where the search found none better than the bound that it began with.
     """
+    starts, goals, is_open, marked, nodes = work
+    counts, bounds = nodes[6], nodes[7]
+    upper, factor, limit = effort
+    none = np.empty((0, 2))
+    if not counts[BEGUN]:
+        counts[:] = 0
+        counts[LAST] = -1
+        bounds[UPPER], bounds[LOWER] = upper, 0.0
+        common = _begin(mesh, tree, polygon_at, cells, ends, work)
+        if common < 0:
+            bounds[:] = np.inf
+            return DONE, none
+        if common > 0:
+            bounds[:] = math.hypot(ends[2] - ends[0], ends[3] - ends[1])
+            return DONE, way_to(mesh, ends, nodes[0], -1)
+    entered = (blocks, is_open)
+    status = DONE
+    if counts[BEGUN] == _OPENED:
+        status = seed(mesh, entered, ends, starts[: counts[STARTS]], nodes)
+        if status == DONE:
+            counts[BEGUN] = _SEEDED
+    if status == DONE and limit >= 0:
+        status = advance(mesh, entered, ends, goals[: counts[GOALS]], nodes, factor, limit)
+    if status != DONE:
+        return status, none
+    best, touched = nodes[4], nodes[5]
+    for k in range(counts[TOUCHED]):
+        best[touched[k]] = np.inf
+    for k in range(counts[MARKED]):
+        is_open[marked[k]] = False
+    counts[BEGUN] = 0
+    if counts[LAST] < 0:
+        return DONE, none
+    return DONE, way_to(mesh, ends, nodes[0], counts[LAST])
+
+
+@njit(cache=True, nogil=True)
+def _begin(mesh, tree, polygon_at, cells, ends, work):
+    """Find the polygons of both ends, and open the blocks between them; returns 1 where the ends
+    have a polygon in common, -1 where they are not connected."""
     block_head, block_up, component, depth = tree
-    starts, goals, is_open, marked, nodes, best, touched = work
+    starts, goals, is_open, marked, nodes = work
+    counts = nodes[6]
     sx, sy, tx, ty = ends
     from_row, from_col, to_row, to_col = cells
     inner, last = polygon_at[from_row, from_col], polygon_at[to_row, to_col]
     if component[inner] != component[last]:
-        return np.inf, -1, 0
+        return -1
     n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
     n_goals = polygons_with(mesh, last, to_row, to_col, tx, ty, goals)
     for k in range(n_starts):
         for m in range(n_goals):
             if starts[k] == goals[m]:
-                return math.hypot(tx - sx, ty - sy), -1, 0
-    n_marked = 0
+                return 1
+    n = 0
     for k in range(n_starts):
         for m in range(n_goals):
-            n_marked = open_blocks(
-                block_head, block_up, depth, starts[k], goals[m], is_open, marked, n_marked
-            )
-    length, node, expanded, n_touched = shortest(
-        mesh, (blocks, is_open), ends, (starts[:n_starts], goals[:n_goals]), (*nodes, best, touched)
-    )
-    for k in range(n_touched):
-        best[touched[k]] = np.inf
-    for k in range(n_marked):
-        is_open[marked[k]] = False
-    return length, node, expanded
-
-
-@njit(cache=True, nogil=True)
-def corners_passed(whole, node):
-    """Return the corners at which a path turns, from the start to the goal.
-
-    Parameters
-    ----------
-    whole
-        int32 (n, 4), nodes of `shortest`.
-    node
-        The last node of the path, -1 for none.
-    """
-    size = 0
-    for is_counted in (True, False):
-        if not is_counted:
-            corners = np.empty(size, np.int32)
-        last, at = -1, node
-        while at >= 0:
-            root, ends = whole[at, 1], whole[at, 3]
-            if root >= 0 and root != last:
-                size += 1 if is_counted else -1
-                if not is_counted:
-                    corners[size] = root
-            if ends < 0 and root != whole[whole[at, 2], 1]:
-                size += 1 if is_counted else -1
-                if not is_counted:
-                    corners[size] = -1 - ends
-                root = -1 - ends
-            last, at = root, whole[at, 2]
-    return corners
+            n = open_blocks(block_head, block_up, depth, starts[k], goals[m], is_open, marked, n)
+    counts[STARTS], counts[GOALS], counts[MARKED] = n_starts, n_goals, n
+    counts[BEGUN] = _OPENED
+    return 0

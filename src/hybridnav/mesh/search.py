@@ -1,20 +1,22 @@
-"""Shortest any-angle paths on a convex mesh, exact."""
+"""Shortest any-angle paths on a convex mesh, exact, with a bound at any time."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import partial
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
+from hybridnav.mesh import _polyanya_kernels as polyanya
 from hybridnav.mesh import _query_kernels as kernels
-from hybridnav.mesh._polyanya_kernels import NO_ROOM
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, IntArray
+    from hybridnav._typing import FloatArray
     from hybridnav.mesh.build import ConvexMesh
 
 Cell = tuple[int, int]
@@ -24,17 +26,23 @@ _ROOM = 4096
 """Nodes that a query has room for at first."""
 _FRACTION = float(1 << 24)
 """Positions are rounded to this part of a cell: then every side test is exact."""
+_SLICE = 256
+"""Nodes that a query with a budget expands before it looks at the clock, some 0.2 ms."""
+_NO_LIMIT = 1 << 62
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPath:
-    """A shortest path between two positions; None for its positions where there is none."""
+    """The shortest path found between two positions; None for its positions where none was."""
 
     positions: FloatArray | None
     """float64 (n, 2), (row, col) in grid units: the start, the corners at which it turns, the
     goal."""
     length_cells: float
     """Its length, infinite for none."""
+    lower_bound_cells: float
+    """No path is shorter: its length where it is proved the shortest, infinite where it is proved
+    that there is none."""
     expanded: int
     """Intervals that the search expanded."""
 
@@ -43,27 +51,31 @@ class _Work:
     """Work arrays of one query."""
 
     def __init__(self, mesh: ConvexMesh) -> None:
-        self.starts = np.empty(mesh.n_polygons, dtype=np.int32)
-        self.goals = np.empty(mesh.n_polygons, dtype=np.int32)
-        self.is_open = np.zeros(len(mesh.block_head), dtype=np.bool_)
-        self.marked = np.empty(len(mesh.block_head), dtype=np.int32)
-        self.best = np.full(len(mesh.corners), np.inf)
-        self.touched = np.empty(len(mesh.corners), dtype=np.int32)
-        self.make_room(_ROOM)
+        self.ends = np.empty(mesh.n_polygons, np.int32), np.empty(mesh.n_polygons, np.int32)
+        n_blocks = len(mesh.block_head)
+        self.opened = np.zeros(n_blocks, np.bool_), np.empty(n_blocks, np.int32)
+        n_corners = len(mesh.corners)
+        self.corners = np.full(n_corners, np.inf), np.empty(n_corners, np.int32)
+        self.counts = np.zeros(polyanya.N_COUNTS, dtype=np.int64)
+        self.bounds = np.zeros(2)
+        self.nodes = np.empty((_ROOM, 4), np.int32), np.empty((_ROOM, 5))
+        self.heap = np.empty(_ROOM), np.empty(_ROOM, np.int32)
 
-    def make_room(self, size: int) -> None:
-        """Make room for so many nodes."""
-        self.whole = np.empty((size, 4), dtype=np.int32)
-        self.real = np.empty((size, 5), dtype=np.float64)
-        self.heap = np.empty(size, dtype=np.float64), np.empty(size, dtype=np.int32)
+    def make_room(self) -> None:
+        """Make room for twice as many nodes."""
+        whole, real = self.nodes
+        self.nodes = np.concatenate([whole, whole]), np.concatenate([real, real])
+        keys, values = self.heap
+        self.heap = np.concatenate([keys, keys]), np.concatenate([values, values])
 
     @property
     def arrays(self) -> tuple[object, ...]:
         """The arrays in the order of `query`."""
-        nodes = self.whole, self.real, *self.heap
-        return self.starts, self.goals, self.is_open, self.marked, nodes, self.best, self.touched
+        nodes = *self.nodes, *self.heap, *self.corners, self.counts, self.bounds
+        return *self.ends, *self.opened, nodes
 
 
+@copies_alike
 class MeshSearch:
     """Exact shortest any-angle paths on a mesh; threads may share it.
 
@@ -80,13 +92,24 @@ class MeshSearch:
 
     def __init__(self, mesh: ConvexMesh) -> None:
         self.mesh = mesh
-        rows, cols = mesh.corners.T.astype(np.float64)
-        arrays = mesh.kinds, mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
-        self._mesh = np.ascontiguousarray(cols), np.ascontiguousarray(rows), *arrays
-        self._tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
+        rows, cols = np.ascontiguousarray(mesh.corners.T, dtype=np.float64)
+        stops = np.roll(mesh.begins, -1)
+        stops[mesh.first[1:] - 1] = mesh.begins[mesh.first[:-1]]
+        sides = mesh.begins, stops, mesh.twins, mesh.polygon_of
+        tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
+        arrays = cols, rows, mesh.kinds, mesh.first, *sides
+        self._fixed = arrays, mesh.block_of, tree, mesh.polygon_at
         self._works = Pool(partial(_Work, mesh))
 
-    def path(self, cells: tuple[Cell, Cell], positions: tuple[Position, Position]) -> MeshPath:
+    def path(
+        self,
+        cells: tuple[Cell, Cell],
+        positions: tuple[Position, Position],
+        *,
+        epsilon: float = 0.0,
+        budget_s: float | None = None,
+        known: FloatArray | None = None,
+    ) -> MeshPath:
         """Find a shortest path between two positions.
 
         Parameters
@@ -95,38 +118,46 @@ class MeshSearch:
             The free cells (row, col) that hold start and goal.
         positions
             Start and goal, (row, col) in grid units, in the closed squares of these cells.
+        epsilon
+            The search may end as soon as its path is at most 1 + epsilon times as long as the lower
+            bound.
+        budget_s
+            Seconds after which the search ends with the best path so far, None for no end.
+        known
+            float64 (n, 2), a path from start to goal that is in free space: the answer until the
+            search finds a shorter one, and a bound that saves work.
+
+        Returns
+        -------
+        MeshPath
+            A shortest path, but for epsilon and budget.
         """
-        start, goal = (_inside(*end) for end in zip(cells, positions, strict=True))
-        ends = start[1], start[0], goal[1], goal[0]
-        with self._works.lent() as work:
-            length, node, expanded = self._query(cells, ends, work)
-            corners = kernels.corners_passed(work.whole, node)
-        if math.isinf(length):
-            return MeshPath(None, math.inf, expanded)
-        way = np.concatenate([[start], _bends(self.mesh.corners[corners]), [goal]])
-        return MeshPath(way, float(np.hypot(*np.diff(way, axis=0).T).sum()), expanded)
-
-    def _query(
-        self, cells: tuple[Cell, Cell], ends: tuple[float, ...], work: _Work
-    ) -> tuple[float, int, int]:
-        """Return length, last node and expansions; room is doubled until it is enough."""
+        until = math.inf if budget_s is None else perf_counter() + budget_s
+        ends = tuple(_inside(*end) for end in zip(cells, positions, strict=True))
+        upper = math.inf
+        if known is not None:
+            known = np.concatenate([ends[:1], known[1:-1], ends[1:]])
+            upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
         where = *cells[0], *cells[1]
-        while True:
-            found: tuple[float, int, int] = kernels.query(
-                self._mesh, self.mesh.block_of, self._tree, self.mesh.polygon_at, where, ends,
-                work.arrays,
-            )  # fmt: skip
-            if found[0] != NO_ROOM:
-                return found
-            work.make_room(2 * len(work.real))
-
-
-def _bends(corners: IntArray) -> IntArray:
-    """Return the corners but for those on a straight line between their neighbours."""
-    before, behind = corners[1:-1] - corners[:-2], corners[2:] - corners[1:-1]
-    kept = np.ones(len(corners), dtype=np.bool_)
-    kept[1:-1] = before[:, 0] * behind[:, 1] != before[:, 1] * behind[:, 0]
-    return corners[kept]
+        points = ends[0][1], ends[0][0], ends[1][1], ends[1][0]
+        limit = _NO_LIMIT if budget_s is None else _SLICE
+        with self._works.lent() as work:
+            while True:
+                status, way = kernels.query(
+                    *self._fixed, where, points, work.arrays, (upper, 1.0 + epsilon, limit)
+                )
+                if status == polyanya.DONE:
+                    break
+                if status == polyanya.NO_ROOM:
+                    work.make_room()
+                elif perf_counter() >= until:
+                    limit = -1
+                else:
+                    limit += _SLICE
+            length, bound = work.bounds.tolist()
+            expanded = int(work.counts[polyanya.EXPANDED])
+        positions_ = way if len(way) else known
+        return MeshPath(positions_, length, bound, expanded)
 
 
 def _inside(cell: Cell, position: Position) -> Position:
