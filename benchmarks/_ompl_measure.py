@@ -15,7 +15,8 @@ from benchmarks._queries_measure import MOVINGAI_MERGE_DISTANCE_M, ROS_MERGE_DIS
 from hybridnav.config import load_preset
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import environment, map_digest
-from hybridnav.metrics import segment_faults, shorten
+from hybridnav.harness.yardstick import AnyAngleOptimum
+from hybridnav.metrics import segment_faults
 from hybridnav.planner.ompl_plans import OmplPlanner
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ BUDGETS_S = (0.25, 1.0, 5.0)
 CONFINEMENTS = (("RRTConnect", "chain"), ("RRTConnect", "mask"), ("BITstar", "chain"),
                 ("BITstar", "mask"), ("PRMstar", "chain"), ("PRMstar", "prm"))  # fmt: skip
 NEAR = 1.02
-"""A path is near the best that is known when it is no longer than this times it."""
+"""A path is near the optimum when it is no longer than this times it."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def methods(*, confinements: bool = False) -> list[Method]:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A pair of a map with its coarse path and the best any-angle length that is known."""
+    """A pair of a map with its coarse path and its any-angle optimum."""
 
     pair: Pair
     poses: tuple[FloatArray, FloatArray]
@@ -116,15 +117,14 @@ class Bench:
         )
         topology = hn.TopologicalMap(pyramid)
         self._coarse = hn.HybridPlanner(topology, preset="fast")
-        optimal = hn.HybridPlanner(topology, preset="grid-astar")
+        optimum = AnyAngleOptimum(self.grid)
         self.problems: list[Problem] = []
         for pair in sample_pairs(self.grid, pairs, seed=seed):
             points = self.grid.frame.points_of(np.array([pair.start, pair.goal]))
-            coarse, best = self._coarse.plan(*points), optimal.plan(*points)
-            if coarse.path is None or best.path is None:
+            coarse = self._coarse.plan(*points)
+            if coarse.path is None:
                 continue
-            known = [shorten(self.grid, path.cells) for path in (coarse.path, best.path)]
-            length_m = min(float(np.hypot(*np.diff(line, axis=0).T).sum()) for line in known)
+            length_m = optimum.length_m(pair.start, pair.goal)
             poses = np.column_stack([points, np.zeros(2)])
             self.problems.append(Problem(pair, (poses[0], poses[1]), coarse.path.cells, length_m))
 

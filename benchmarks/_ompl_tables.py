@@ -18,8 +18,7 @@ HEAD = ("solved", "by line of sight", "loss mean", "loss max", "first path, medi
 def figures(records: Sequence[Record]) -> tuple[str, ...]:
     """One row: of OMPL's own paths, but for the column that counts those of the grid."""
     own = [record for record in records if record["length_m"] is not None]
-    best = _best_of(records)
-    losses = [record["length_m"] / best[_pair(record)] - 1 for record in own]
+    losses = [record["length_m"] / record["best_m"] - 1 for record in own]
     firsts = [record["first_s"] for record in own if record["first_s"] is not None]
     nears = [record["near_s"] for record in own if record["near_s"] is not None]
     over = [record["seconds"] / record["budget_s"] - 1 for record in records]
@@ -46,18 +45,6 @@ def table(records: Sequence[Record], keys: Sequence[str]) -> str:
         shown = [f"{value:g} s" if isinstance(value, float) else str(value) for value in group]
         lines.append(_line((*shown, *figures(members))))
     return "\n".join(lines) + "\n"
-
-
-def _pair(record: Record) -> tuple[str, str]:
-    return record["map_sha"], record["id"].rpartition("/")[2]
-
-
-def _best_of(records: Iterable[Record]) -> dict[tuple[str, str], float]:
-    best: dict[tuple[str, str], float] = {}
-    for record in records:
-        known = [record["best_m"], record["length_m"], best.get(_pair(record))]
-        best[_pair(record)] = min(value for value in known if value is not None)
-    return best
 
 
 def _percent(values: Sequence[float], reduce: Callable[[Sequence[float]], Any]) -> str:

@@ -15,11 +15,11 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.config import load_preset
 from hybridnav.grid.worlds import figure1_world, office_world
-from hybridnav.harness.judging import EXACT_CORNERS
 from hybridnav.harness.methods import _nbytes
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import environment
-from hybridnav.metrics import VisibilityGraph, judge_path, segment_faults
+from hybridnav.harness.yardstick import AnyAngleOptimum
+from hybridnav.metrics import judge_path, segment_faults
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -251,14 +251,11 @@ def _faults(grid: hn.OccupancyGrid, pair: Pair, result: hn.PlanResult) -> list[s
     return faults
 
 
-def _any_angle_optima(grid: hn.OccupancyGrid, record: Record) -> list[float] | None:
-    """Exact any-angle optima in metres; None where the map has too many corners."""
-    try:
-        graph = VisibilityGraph(grid, max_corners=EXACT_CORNERS)
-    except hn.InvalidValueError:
-        return None
+def _any_angle_optima(grid: hn.OccupancyGrid, record: Record) -> list[float]:
+    """Any-angle optima in metres, in the order of the pairs."""
+    optimum = AnyAngleOptimum(grid)
     ends = zip(record["starts"], record["goals"], strict=True)
-    return [graph.shortest(start, goal).length_m for start, goal in ends]
+    return [optimum.length_m(start, goal) for start, goal in ends]
 
 
 def _broken_promises(record: Record) -> list[str]:

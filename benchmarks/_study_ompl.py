@@ -10,7 +10,7 @@ import numpy as np
 
 import hybridnav as hn
 from hybridnav.config import load_preset
-from hybridnav.harness.analysis import nanmean, nanquantile
+from hybridnav.harness.analysis import nanmean, nanquantile, pairs_in_common
 from hybridnav.harness.charts import chart_file, loss_chart
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.run import RunSettings, evaluate
@@ -35,7 +35,7 @@ _COLUMNS = (
 )  # fmt: skip
 _OF_MAPS = (
     "map", "method", "solved by itself", "by the grid", "loss mean %", "loss max %",
-    "any-angle exact %", "first path ms, median", "query ms, median",
+    "first path ms, median", "query ms, median",
 )  # fmt: skip
 
 
@@ -93,7 +93,6 @@ def page(study: Study, *, pairs: int, budget_s: float | None) -> str:
     ]
     whole = study.of_method(REFERENCE)
     longer = nanmean(np.concatenate([outcome.any_angle_losses for outcome in whole]))
-    exact = nanmean(np.concatenate([outcome.any_angle_exact for outcome in whole]))
     budget = f"{1.0 if budget_s is None else budget_s:g} s"
     return f"""# The study: OMPL in the corridor
 
@@ -103,12 +102,10 @@ Thrun's three questions, asked of the presets `ompl-*` on {len(study.maps)} maps
 `python -m benchmarks.study --part ompl --data FOLDER -o DIR` makes this page anew. What the columns
 mean is said in [harness.md](harness.md).
 
-All these paths are any-angle, and so is what their loss refers to: the shortest any-angle path
-where it is known exactly, by a visibility graph ({100 * exact:.0f} % of the pairs), else the best
-one that is known, of all methods here and of the grid's optimum pulled taut. The grid's optimum
-itself is {100 * longer:.1f} % longer than that. A path counts as a method's own where OMPL found
-it; where it found none in its time the grid's path, shortened by line of sight, stands in, and is
-counted by itself.
+All these paths are any-angle, and so is what their loss refers to: the shortest any-angle path,
+proved. The grid's optimum itself is {100 * longer:.1f} % longer than that. A path counts as a
+method's own where OMPL found it; where it found none in its time the grid's path, shortened by line
+of sight, stands in, and is counted by itself.
 
 ## Consistency
 
@@ -142,7 +139,7 @@ def _labels(study: Study) -> list[str]:
 
 
 def _figures(outcomes: Sequence[Outcome]) -> Row:
-    found = figures(outcomes, outcomes)
+    found = figures(outcomes, outcomes, pairs_in_common(outcomes))
     firsts = np.concatenate([outcome.first_seconds for outcome in outcomes])
     asked = np.concatenate([outcome.figure("seconds") for outcome in outcomes])
     fallbacks = np.concatenate([outcome.fallback_losses for outcome in outcomes])

@@ -36,7 +36,7 @@ from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.svg import looks
 from hybridnav.harness.tables import (
     EFFICIENCY_COLUMNS,
-    LOSS_COLUMNS,
+    loss_columns,
     rows_of_map,
     rows_of_study,
     to_markdown,
@@ -156,7 +156,7 @@ without an answer.
 {_failures(study)}
 ## Loss
 
-{to_markdown(overall, ("method", "maps", *LOSS_COLUMNS))}
+{to_markdown(overall, ("method", "maps", *loss_columns(study.metric)))}
 ![Share of pairs that lose more than x, for each method](images/study-loss.svg)
 
 ## Efficiency

@@ -16,8 +16,8 @@ from hybridnav.baselines.grid import GridAstar
 from hybridnav.config import Preset
 from hybridnav.grid import CellClass
 from hybridnav.harness.methods import HybridMethod
-from hybridnav.metrics import shorten
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.refine.line_of_sight import LineOfSight
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 
@@ -227,7 +227,9 @@ class SoundLine(Sound):
         answer = super().solve(start, goal)
         if answer.cells is None:
             return answer
-        return Answer(None, line=self.line(shorten(self.grid, answer.cells)))
+        ends = self.grid.frame.points_of([start, goal])
+        points = LineOfSight(self.grid).shorten(answer.cells, ends[0], ends[1])
+        return Answer(None, line=self.line(points))
 
     def line(self, points: NDArray[np.float64]) -> Line:
         """What is said of the path."""

@@ -119,6 +119,23 @@ def test_a_scenario_file_and_its_optimum(cli, rooms, tmp_path):  # noqa: F811
     assert "2 answers checked, 0 counter-examples" in done.out
 
 
+@pytest.mark.usefixtures("here")
+def test_the_loss_over_the_metric_that_is_asked_for_leads(cli, rooms, tmp_path):  # noqa: F811
+    out = tmp_path / "run"
+    arguments = ["evaluate", rooms, "--preset", "grid-astar", "--pairs", 10, "-o", out]
+    loss = {}
+    for metric in ("any-angle", "octile", "both"):
+        done = cli(*arguments, "--metric", metric)
+        assert (done.code, done.err) == (0, "")
+        with (out / "summary.csv").open() as stream:
+            (row,) = csv.DictReader(stream)
+        loss[metric] = float(row["loss mean %"])
+        assert float(row["octile loss %"]) == 0 < float(row["any-angle loss %"])
+        assert row["pairs in common"] == "10"
+    assert loss["octile"] == loss["both"] == 0
+    assert loss["any-angle"] == float(row["any-angle loss %"])
+
+
 def test_wrong_usage_and_unreadable_files(cli, rooms, tmp_path):  # noqa: F811
     out = ("-o", tmp_path / "run")
     other = scenarios(tmp_path, "1\t1\t2\t2\t1.41", size="8\t8")
@@ -138,6 +155,8 @@ def test_wrong_usage_and_unreadable_files(cli, rooms, tmp_path):  # noqa: F811
         ((rooms, "--timeout", 0, *out), 2, "timeout"),
         ((rooms, "--robot-radius", -1, *out), 2, "radius"),
         ((rooms, "--scheduler", "nonsense", *out), 2, "scheduler nonsense"),
+        ((rooms, "--metric", "l2", *out), 2, "got metric 'l2'"),
+        ((rooms, "--metric", "any-angle", "--corner-cutting", *out), 2, "take --metric octile"),
         ((rooms,), 2, "--out"),
         ((*out,), 2, "MAP"),
         ((rooms, "-o", file), 2, "file"),
@@ -161,3 +180,4 @@ def test_a_damaged_record_is_named(cli, rooms, tmp_path):  # noqa: F811
 
 def test_runs_that_cannot_be_compared(cli, tmp_path):  # noqa: F811
     assert cli("compare", tmp_path, tmp_path / "none").refuses(2, "no records there")
+    assert cli("compare", tmp_path, tmp_path, "--metric", "l2").refuses(2, "got metric 'l2'")

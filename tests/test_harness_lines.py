@@ -1,11 +1,13 @@
 """Any-angle paths in the harness: judged, set beside their like only, and OMPL through it all."""
 
 import csv
+import json
 import math
 import time
 import uuid
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -14,12 +16,15 @@ from benchmarks import _study_ompl
 import hybridnav as hn
 from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness import AnyAngleOptimum, load_study
+from hybridnav.harness.analysis import pairs_in_common, query_key
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.contradictions import against
 from hybridnav.harness.methods import preset_spec
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.harness.yardstick import Yardstick
 from hybridnav.io import load_map
 from hybridnav.metrics import VisibilityGraph
 from tests import faulty_methods as faulty
@@ -32,7 +37,7 @@ FAULTS = {
     faulty.LineBelowItsBound: "is above the length",
     faulty.LineBesideTheGoal: "the last point",
     faulty.LineFromElsewhere: "the first point",
-    faulty.LineSaidOptimal: "m, a path that is known",
+    faulty.LineSaidOptimal: "m is above the any-angle optimum",
     faulty.LineForAll: "solvability: solved, the whole grid says no path",
     faulty.LineOfNothing: "no answer to judge: points need finite coordinates",
     faulty.LineUnsaid: "not nan m as reported",
@@ -40,6 +45,7 @@ FAULTS = {
 }
 SOUND = (faulty.SoundLine, faulty.OwnGridOrNothing)
 PRESETS = ("paper", "balanced")
+METRICS: tuple[Yardstick, ...] = get_args(Yardstick)
 N_PAIRS = 40
 MARK = "HYBRIDNAV_TEST_MARK"
 
@@ -113,37 +119,110 @@ def test_losses_refer_to_the_shortest_any_angle_path(study):
     assert (outcome.lengths_m < outcome.optima_m * (1 - 1e-3)).any()
 
 
-def test_the_best_of_all_methods_counts_where_nothing_is_exact(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr("hybridnav.harness.judging.EXACT_CORNERS", 0)
-    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
-    settings = RunSettings(
-        maps=(str(folder.parent / "rooms.map"),),
-        presets=(load_preset("balanced", overrides=["planner.smooth=line-of-sight"]),),
-        baselines=(name_of(faulty.SoundLine), name_of(faulty.LineThroughWall)),
-        pairs=N_PAIRS,
-        merge_distance_m=4.0,
-    )
-    evaluate(settings, tmp_path)
-    study = write_outputs(tmp_path)
-    lines = [o for o in study.outcomes if o.metric == "any-angle"]
-    assert len(lines) == 3
-    # What goes through walls is no path, so it is not the best one either.
-    best = np.nanmin([outcome.lengths_m for outcome in lines], axis=0)
-    assert (outcome_of(study, faulty.LineThroughWall).losses >= 0).any()
-    for outcome in lines:
-        np.testing.assert_allclose(outcome.best_m, best, rtol=1e-12)
-        assert not (outcome.losses < 0).any()
-        assert (outcome.any_angle_exact == 0).all()
+def test_no_path_in_any_metric_is_shorter_than_the_yardstick(study):
+    for outcome in study.outcomes:
+        losses = outcome.any_angle_losses[np.isfinite(outcome.any_angle_losses)]
+        assert (losses >= 0).all(), outcome.label
+        # Along the grid a path is never shorter than the grid's own optimum either.
+        assert np.isfinite(outcome.octile_losses).any() <= (outcome.metric == "octile")
+        assert not (outcome.octile_losses < 0).any()
+    longer = outcome_of(study, "grid-astar").any_angle_losses
+    assert longer.mean() > 0.01
+    np.testing.assert_array_equal(outcome_of(study, "grid-astar").octile_losses, 0)
 
 
-def test_a_line_below_the_exact_optimum_is_a_contradiction():
-    reference = {"status": "solved", "length_m": 11.0, "any_angle_m": 10.0, "any_angle_exact": True}
+def test_both_losses_are_over_the_pairs_that_all_methods_solved(study, rows):
+    third = {query_key(r) for r in outcome_of(study, faulty.OwnGridOrNothing).references}
+    solved = [outcome.solved_keys for outcome in study.outcomes if outcome.solved_keys]
+    common = set.intersection(*solved)
+    assert 3 < len(common) < len(third)
+    assert pairs_in_common(study.outcomes) == common
+    for label, row in rows.items():
+        outcome = outcome_of(study, label)
+        kept = outcome.among(common) & np.isfinite(outcome.lengths_m)
+        assert int(row["pairs in common"]) == kept.sum()
+        assert kept.sum() in (0, len(common))
+        if kept.any():
+            lengths, best = outcome.lengths_m[kept], outcome.any_angle_optima_m[kept]
+            loss = 100 * (lengths / best - 1).mean()
+            assert float(row["any-angle loss %"]) == pytest.approx(loss, abs=1e-6)
+        assert (row["octile loss %"] != "") == (bool(kept.any()) and outcome.metric == "octile")
+
+
+def test_the_metric_decides_what_losses_refer_to(folder, study):
+    line = name_of(faulty.SoundLine)
+    for metric in ("any-angle", "octile"):
+        other = write_outputs(folder, metric=metric)
+        cells, lines = outcome_of(other, "grid-astar"), outcome_of(other, line)
+        own = cells.octile_losses if metric == "octile" else cells.any_angle_losses
+        np.testing.assert_array_equal(cells.losses, own)
+        assert np.isfinite(lines.losses).any() == (metric == "any-angle")
+        assert np.isfinite(lines.seconds).sum() == np.isfinite(lines.lengths_m).sum()
+        table = (folder / "summary.md").read_text()
+        first, second = (f"{name} loss %" for name in ("any-angle", "octile"))
+        assert (table.index(first) < table.index(second)) == (metric == "any-angle")
+        report = (folder / "report.html").read_text()
+        assert f"the {metric} optimum" in report
+        assert ", octile paths" not in report
+    both = write_outputs(folder)
+    np.testing.assert_array_equal(outcome_of(both, line).losses, outcome_of(study, line).losses)
+    with pytest.raises(InvalidValueError, match="both, any-angle, octile, got metric 'l2'"):
+        write_outputs(folder, metric="l2")  # type: ignore[arg-type]
+
+
+def test_runs_are_compared_over_the_optimum_that_is_asked_for(folder):
+    loss: dict[tuple[str, str], Any] = {
+        (metric, str(row["method"])): row["loss of the first %"]
+        for metric in METRICS
+        for row in compare_runs(folder, folder, metric=metric)
+    }
+    line = name_of(faulty.SoundLine)
+    assert loss["any-angle", "paper"] > loss["octile", "paper"] + 1
+    assert loss["both", "paper"] == loss["octile", "paper"]
+    assert loss["both", line] == loss["any-angle", line]
+    assert math.isnan(loss["octile", line])
+
+
+def test_a_line_below_the_optimum_is_a_contradiction():
+    reference = {"status": "solved", "length_m": 11.0, "any_angle_m": 10.0}
     line = {"status": "solved", "metric": "any-angle", "length_m": 9.99, "lower_bound_m": 9.0}
-    assert against(line, reference, 9.99) == (
+    assert against(line, reference) == (
         "length 9.990000 m is below the any-angle optimum 10.000000 m"
     )
-    assert against(line, {**reference, "any_angle_exact": False}, 9.99) is None
-    assert against({**line, "length_m": 10.0 - 1e-9}, reference, 10.0) is None
+    assert against({**line, "length_m": 10.0 - 1e-9}, reference) is None
+    assert against({**line, "length_m": 10.5, "lower_bound_m": 10.1}, reference) == (
+        "the lower bound 10.100000 m is above the any-angle optimum 10.000000 m"
+    )
+    assert against(line, {"status": "solved", "length_m": 11.0}) is None
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("factor", "words"), [(2.0, "a path of cells has"), (0.99, "by a visibility graph")]
+)
+def test_a_yardstick_that_is_wrong_is_found_out(folder, tmp_path, monkeypatch, factor, words):
+    right = AnyAngleOptimum.length_m
+    monkeypatch.setattr(AnyAngleOptimum, "length_m", lambda *ends: factor * right(*ends))
+    only = RunSettings(maps=(str(folder.parent / "rooms.map"),), presets=(), pairs=5)
+    evaluate(only, tmp_path)
+    faults = [fault for _, _, fault in write_outputs(tmp_path).faults]
+    assert len(faults) >= 3
+    assert all("the any-angle optimum by the mesh is" in fault for fault in faults)
+    assert all(words in fault for fault in faults)
+
+
+def test_records_whose_any_angle_lengths_are_not_proved_are_refused(folder, tmp_path):
+    lines = (folder / "records.jsonl").read_text().splitlines()
+    at = next(at for at, line in enumerate(lines) if '"any_angle_m"' in line)
+    for exact, error in ((True, None), (False, rf"line {at + 1}: .* take a new folder$")):
+        old = json.loads(lines[at]) | {"any_angle_exact": exact}
+        records = "\n".join([*lines[:at], json.dumps(old), *lines[at + 1 :], ""])
+        (tmp_path / "records.jsonl").write_text(records)
+        if error is None:
+            assert len(load_study(tmp_path).outcomes) > 3
+            continue
+        with pytest.raises(InvalidValueError, match=error):
+            load_study(tmp_path)
 
 
 def test_each_metric_has_rows_and_charts_of_its_own(folder, study, rows):
@@ -153,7 +232,7 @@ def test_each_metric_has_rows_and_charts_of_its_own(folder, study, rows):
     assert rows["paper"]["by the grid"] == ""
     for name in ("balanced+line-of-sight", name_of(faulty.SoundLine)):
         assert rows[name]["metric"] == "any-angle"
-        assert float(rows[name]["loss mean %"]) == float(rows[name]["any-angle loss %"])
+        assert rows[name]["octile loss %"] == ""
     report = (folder / "report.html").read_text()
     for title in ("Speed against loss, all maps", f"Loss, {study.maps[0]}"):
         assert f"{title}, octile paths" in report
@@ -213,7 +292,8 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
         next(o for o in write_outputs(tmp_path / run).outcomes if o.label != "grid-astar")
         for run in ("cells", "lines")
     )
-    shorter = 100 * ((lines.lengths_m - cells.lengths_m) / lines.best_m).mean()
+    # Of two metrics the any-angle optimum is the shorter one: both losses are over it.
+    shorter = 100 * ((lines.lengths_m - cells.lengths_m) / lines.any_angle_optima_m).mean()
     assert row["difference, points"] == pytest.approx(shorter)
     assert shorter < -1
 

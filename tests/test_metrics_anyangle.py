@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -18,13 +18,9 @@ from hybridnav.metrics import (
     VisibilityGraph,
     anyangle_optimum,
     segment_faults,
-    shorten,
 )
-from tests.oracle.grid import length_of_points, move_graph
+from tests.oracle.grid import length_of_points
 from tests.strategies import class_grids, drawn, occupancy_grid
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Cell = tuple[int, int]
 
@@ -43,18 +39,6 @@ def two_cells(classes: Any, seed: int) -> tuple[Cell, Cell]:
     assume(len(free))
     (a, b), (c, d) = np.random.default_rng(seed).choice(free, 2).tolist()
     return (a, b), (c, d)
-
-
-def grid_path(enterable: Any, start: Cell, goal: Cell) -> NDArray[np.int64] | None:
-    """A shortest grid path, by networkx."""
-    graph = nx.from_scipy_sparse_array(move_graph(enterable))
-    cols = enterable.shape[1]
-    first, last = (row * cols + col for row, col in (start, goal))
-    try:
-        flat = nx.shortest_path(graph, first, last, weight="weight")
-    except nx.NetworkXNoPath:
-        return None
-    return np.stack(np.divmod(flat, cols), axis=1)
 
 
 def brute_force(grid: OccupancyGrid, start: Cell, goal: Cell) -> float:
@@ -120,25 +104,6 @@ def test_no_path_over_any_lattice_corners_is_shorter(classes: Any, seed: int) ->
     assert anyangle_optimum(grid, start, goal).length_m == pytest.approx(expected, rel=1e-12)
 
 
-@given(class_grids(max_side=12), seeds, yaws)
-@settings(max_examples=100)
-def test_a_shortened_path_is_legal_and_between_both_optima(
-    classes: Any, seed: int, yaw_rad: float
-) -> None:
-    start, goal = two_cells(classes, seed)
-    cells = grid_path(classes == CellClass.FREE, start, goal)
-    assume(cells is not None)
-    assert cells is not None
-    grid = framed(classes, yaw_rad)
-    points = shorten(grid, cells)
-    assert not segment_faults(grid, points)
-    np.testing.assert_allclose(points[0], grid.frame.points_of(start))
-    np.testing.assert_allclose(points[-1], grid.frame.points_of(goal))
-    length_m = length_of_points(points) if len(points) > 1 else 0.0
-    assert length_m >= anyangle_optimum(grid, start, goal).length_m - 1e-9
-    assert length_m <= ScipyOptimum(grid).lengths_from(start)[goal] + 1e-9
-
-
 ONE_SQUARE = np.ones((12, 12), np.uint8)
 ONE_SQUARE[3:9, 3:9] = CellClass.OCCUPIED
 
@@ -161,14 +126,6 @@ def test_one_square_obstacle_has_the_known_shortest_paths(
     assert found.length_m == pytest.approx(length * 0.05, rel=1e-12)
 
 
-def test_a_string_round_a_square_is_pulled_onto_its_corners() -> None:
-    grid = occupancy_grid(ONE_SQUARE)
-    side = [(row, 0) for row in range(5, 12)]
-    cells = [*side, *((11, col) for col in range(1, 12)), *((row, 11) for row in range(10, 4, -1))]
-    points = shorten(grid, cells)
-    np.testing.assert_allclose(points, [(0.5, 5.5), (3, 9), (9, 9), (11.5, 5.5)])
-
-
 def test_no_path_squeezes_between_two_cells_that_meet_at_a_corner() -> None:
     grid = occupancy_grid(drawn("....", ".#..", "..#.", "...."))
     found = anyangle_optimum(grid, (1, 1), (2, 2))
@@ -184,18 +141,6 @@ def test_unexplored_cells_are_crossed_only_when_allowed() -> None:
     grid = occupancy_grid(drawn("..?.."))
     assert anyangle_optimum(grid, (0, 0), (0, 4)).points is None
     assert anyangle_optimum(grid, (0, 0), (0, 4), allow_unexplored=True).length_m == 4
-    cells = [(0, col) for col in range(5)]
-    assert len(shorten(grid, cells, allow_unexplored=True)) == 2
-    with pytest.raises(InvalidValueError, match="not free"):
-        shorten(grid, cells)
-
-
-def test_a_path_that_is_not_legal_is_not_shortened() -> None:
-    grid = occupancy_grid(drawn(".#", "#."))
-    with pytest.raises(InvalidValueError, match="meet at a corner"):
-        shorten(grid, [(0, 1), (1, 0)])
-    with pytest.raises(InvalidValueError, match="no cells"):
-        shorten(grid, np.empty((0, 2), np.int64))
 
 
 def test_a_map_with_too_many_corners_is_refused_in_one_line() -> None:

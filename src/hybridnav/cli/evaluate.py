@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav.harness.run import RunSettings
+    from hybridnav.harness.yardstick import Yardstick
 
 MapsArgument = Annotated[
     list[Path], typer.Argument(metavar="MAP...", help="ROS maps (.yaml) or MovingAI maps (.map).")
@@ -71,6 +72,15 @@ CornersOption = Annotated[
 TimeoutOption = Annotated[
     float, typer.Option("--timeout", metavar="S", help="Longest silence of a process, seconds.")
 ]
+MetricOption = Annotated[
+    str,
+    typer.Option(
+        "--metric",
+        metavar="WHICH",
+        help="What losses refer to: the any-angle optimum for all paths, the octile optimum, or "
+        "both, each path's own (any-angle, octile, both).",
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Override one key of every preset."),
@@ -94,6 +104,7 @@ def evaluate(
     corner_cutting: CornersOption = False,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     timeout_s: TimeoutOption = 600.0,
+    metric: MetricOption = "both",
 ) -> None:
     """Measure consistency, loss and efficiency of methods on maps, pair by pair.
 
@@ -105,6 +116,12 @@ def evaluate(
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
+    yardstick = _yardstick(metric)
+    if yardstick == "any-angle" and corner_cutting:
+        raise UsageError(
+            "--metric any-angle does not go with --corner-cutting: no any-angle path passes "
+            "between two blocked cells that meet at a corner; take --metric octile"
+        )
     names = preset if preset is not None else ([] if baseline else ["balanced"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
@@ -123,7 +140,7 @@ def evaluate(
         timeout_s=timeout_s,
     )
     _run(settings, out)
-    study = write_outputs(out)
+    study = write_outputs(out, metric=yardstick)
     answer((out / "summary.md").read_text(encoding="utf-8") + f"\nreport: {out / 'report.html'}\n")
     faults = [f"{found.map_name}, {found.label}: {fault}" for found, _, fault in study.faults]
     unmade = [
@@ -138,6 +155,13 @@ def evaluate(
         complain("nothing was checked: the maps have no such pairs of free cells")
     if faults or unmade or not study.checks:
         raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _yardstick(metric: str) -> Yardstick:
+    from hybridnav.harness.yardstick import check_yardstick  # noqa: PLC0415 - on demand
+
+    check_yardstick(metric)
+    return cast("Yardstick", metric)
 
 
 def _run(settings: RunSettings, out: Path) -> None:
@@ -173,9 +197,10 @@ def _run(settings: RunSettings, out: Path) -> None:
 def compare(
     first: Annotated[Path, typer.Argument(metavar="DIR", help="A run.")],
     second: Annotated[Path, typer.Argument(metavar="DIR", help="Another run.")],
+    metric: MetricOption = "both",
 ) -> None:
     """Set two runs side by side, pair by pair, with the significance of the difference."""
     from hybridnav.harness.compare import compare_runs  # noqa: PLC0415 - loads scipy.stats
     from hybridnav.harness.tables import to_markdown  # noqa: PLC0415
 
-    answer(to_markdown(compare_runs(first, second)))
+    answer(to_markdown(compare_runs(first, second, metric=_yardstick(metric))))

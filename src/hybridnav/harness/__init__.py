@@ -7,5 +7,14 @@ from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.yardstick import AnyAngleOptimum
 
-__all__ = ["RunSettings", "Study", "compare_runs", "evaluate", "load_study", "write_outputs"]
+__all__ = [
+    "AnyAngleOptimum",
+    "RunSettings",
+    "Study",
+    "compare_runs",
+    "evaluate",
+    "load_study",
+    "write_outputs",
+]

@@ -10,17 +10,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.contradictions import ANSWERED, SLACK, against, is_line
+from hybridnav.harness.contradictions import ANSWERED, LINE_SLACK, SLACK, against, is_line
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.paths import path_steps
 from hybridnav.harness.records import read_records
+from hybridnav.harness.yardstick import check_yardstick
 from hybridnav.metrics import thrun_count
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.harness.records import Record
+    from hybridnav.harness.yardstick import Yardstick
 
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
+MapQuery = tuple[str, QueryKey]
 
 
 def query_key(record: Record) -> QueryKey:
@@ -44,8 +49,8 @@ class Outcome:
     """Of the pairs, all kinds."""
     optimum: dict[QueryKey, Record] = field(repr=False)
     """The reference's records on this map."""
-    lines: dict[QueryKey, float] = field(default_factory=dict, repr=False)
-    """Lengths of the best any-angle paths known on this map, metres."""
+    yardstick: Yardstick = "both"
+    """What `losses` refer to."""
 
     @cached_property
     def _matched(self) -> list[Record | None]:
@@ -69,7 +74,7 @@ class Outcome:
 
     @cached_property
     def metric(self) -> str:
-        """That of its paths, and of what their losses refer to: "octile" or "any-angle"."""
+        """That of its paths: "octile" or "any-angle"."""
         return "any-angle" if any(map(is_line, (self.preparation, *self.records))) else "octile"
 
     @cached_property
@@ -78,21 +83,52 @@ class Outcome:
         return np.array([record["length_m"] for record in self.references], dtype=float)
 
     @cached_property
-    def best_lines_m(self) -> FloatArray:
-        """Lengths of the any-angle optimum, or of the best any-angle path known."""
-        known = [self.lines.get(query_key(record), math.nan) for record in self.references]
+    def any_angle_optima_m(self) -> FloatArray:
+        """Lengths of the any-angle optimum between the same ends; NaN where corners are cut."""
+        known = [record.get("any_angle_m", math.nan) for record in self.references]
         return np.array(known, dtype=float)
 
     @cached_property
-    def best_m(self) -> FloatArray:
-        """Lengths that losses refer to: the best in the metric of each path."""
+    def _octile_optima_m(self) -> FloatArray:
+        """Those on the grid; NaN for any-angle paths, which have no loss over them."""
         lines = [bool(record and is_line(record)) for record in self._matched]
-        return np.where(lines, self.best_lines_m, self.optima_m)
+        return np.where(lines, math.nan, self.optima_m)
+
+    @cached_property
+    def best_m(self) -> FloatArray:
+        """Lengths that losses refer to."""
+        if self.yardstick == "octile":
+            return self._octile_optima_m
+        if self.yardstick == "any-angle":
+            return self.any_angle_optima_m
+        lines = np.isnan(self._octile_optima_m)
+        return np.where(lines, self.any_angle_optima_m, self.optima_m)
 
     @cached_property
     def losses(self) -> FloatArray:
-        """Length over that of the best path in its metric, minus one."""
+        """Length over what losses refer to, minus one."""
         return loss_of(self.lengths_m, self.best_m)
+
+    @cached_property
+    def octile_losses(self) -> FloatArray:
+        """Length over the octile optimum, minus one; NaN for any-angle paths."""
+        return loss_of(self.lengths_m, self._octile_optima_m)
+
+    @cached_property
+    def any_angle_losses(self) -> FloatArray:
+        """Length over the any-angle optimum, minus one: of paths in any metric."""
+        return loss_of(self.lengths_m, self.any_angle_optima_m)
+
+    @cached_property
+    def solved_keys(self) -> set[MapQuery]:
+        """The pairs that it solved itself, without a fault."""
+        solved = np.isfinite(self.lengths_m)
+        return {(self.map_name, query_key(self.references[at])) for at in np.flatnonzero(solved)}
+
+    def among(self, pairs: set[MapQuery]) -> BoolArray:
+        """Whether each pair is one of some."""
+        mine = [(self.map_name, query_key(record)) in pairs for record in self.references]
+        return np.array(mine, dtype=np.bool_)
 
     @cached_property
     def lengths_m(self) -> FloatArray:
@@ -126,19 +162,14 @@ class Outcome:
         return loss_of(self.figure("plan_optimum_m"), self.optima_m)
 
     @cached_property
-    def any_angle_losses(self) -> FloatArray:
-        """Length over the any-angle optimum or the best any-angle path known, minus one."""
-        return loss_of(self.lengths_m, self.best_lines_m)
-
-    @cached_property
     def seconds(self) -> FloatArray:
         """Wall-clock seconds of each query that it solved without a fault."""
-        return np.where(np.isfinite(self.losses), self.figure("seconds"), math.nan)
+        return np.where(np.isfinite(self.lengths_m), self.figure("seconds"), math.nan)
 
     @cached_property
     def first_seconds(self) -> FloatArray:
         """Of these, seconds until there was a first path, of planners that improve theirs."""
-        return np.where(np.isfinite(self.losses), self._stage("first path"), math.nan)
+        return np.where(np.isfinite(self.lengths_m), self._stage("first path"), math.nan)
 
     @cached_property
     def reference_seconds(self) -> FloatArray:
@@ -173,20 +204,13 @@ class Outcome:
         return thrun_count(self.preparation.get("n_nodes", math.nan), nanmean(steps))
 
     @cached_property
-    def any_angle_exact(self) -> FloatArray:
-        """1 for pairs whose any-angle optimum is exact, 0 where it is the best known."""
-        exact = (record.get("any_angle_exact") for record in self.references)
-        return np.array([math.nan if known is None else float(known) for known in exact])
-
-    @cached_property
     def faults(self) -> list[tuple[Record, str]]:
         """Every contradiction: what the judge found, lengths below the optimum, broken bounds."""
         found = [(self.preparation, fault) for fault in self.preparation.get("faults", ())]
         for record in self.records:
             found += [(record, fault) for fault in record.get("faults", ())]
-            key = query_key(record)
-            reference = self.optimum.get(key)
-            wrong = None if reference is None else against(record, reference, self.lines.get(key))
+            reference = self.optimum.get(query_key(record))
+            wrong = None if reference is None else against(record, reference)
             if wrong:
                 found.append((record, wrong))
         return found
@@ -203,9 +227,10 @@ class Outcome:
 
 
 def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:
-    """Lengths over the best ones, minus one, without what is rounding."""
+    """Lengths over the best ones, minus one, without what is rounding: what is still below zero is
+    a line that cuts corners by less than its judge can see."""
     loss = lengths / best - 1
-    rounded: FloatArray = np.where(np.abs(loss) <= SLACK, 0.0, loss)
+    rounded: FloatArray = np.where((loss <= SLACK) & (loss >= -LINE_SLACK), 0.0, loss)
     return rounded
 
 
@@ -221,11 +246,22 @@ def nanquantile(values: FloatArray, share: float) -> float:
     return float(np.quantile(finite, share)) if finite.size else math.nan
 
 
+def pairs_in_common(outcomes: Iterable[Outcome]) -> set[MapQuery]:
+    """Pairs that all methods solved; those that solved none at all are left out."""
+    solved: dict[str, set[MapQuery]] = {}
+    for outcome in outcomes:
+        solved.setdefault(outcome.label, set()).update(outcome.solved_keys)
+    known = [pairs for pairs in solved.values() if pairs]
+    return set.intersection(*known) if known else set()
+
+
 @dataclass
 class Study:
     """The outcomes of a run, maps in the order of the records, the reference first on each."""
 
     outcomes: list[Outcome]
+    metric: Yardstick = "both"
+    """What losses refer to."""
 
     @property
     def maps(self) -> list[str]:
@@ -266,7 +302,7 @@ class Study:
         return [(outcome, *fault) for outcome in self.outcomes for fault in outcome.faults]
 
 
-def load_study(folder: Path, *, root: Path | None = None) -> Study:
+def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "both") -> Study:
     """Read the records of a run.
 
     Parameters
@@ -275,12 +311,16 @@ def load_study(folder: Path, *, root: Path | None = None) -> Study:
         The run's.
     root
         Folder by whose paths maps below it are called; else by their names.
+    metric
+        What losses refer to: "any-angle", for all paths the any-angle optimum; "octile", the
+        octile optimum, any-angle paths having no loss then; "both", each path's own metric.
 
     Raises
     ------
     InvalidValueError
-        When a line is no record.
+        When a line is no record, or there is no such metric.
     """
+    check_yardstick(metric)
     preparations: dict[tuple[str, str], Record] = {}
     pairs: dict[tuple[str, str], list[Record]] = {}
     for record in read_records(folder):
@@ -299,14 +339,13 @@ def load_study(folder: Path, *, root: Path | None = None) -> Study:
         for (sha, method), record in preparations.items()
         if record["method"] == REFERENCE
     }
-    lines = {sha: _best_lines(known, pairs, sha) for sha, known in optima.items()}
     outcomes = []
     for (sha, method), record in preparations.items():
         name = names[sha]
         several = len(digests[f"{record['method']}@{name}"]) > 1
         label = f"{record['method']} {method[:4]}" if several else record["method"]
-        known = optima.get(sha, {}), lines.get(sha, {})
-        outcomes.append(Outcome(name, label, record, pairs.get((sha, method), []), *known))
+        own = pairs.get((sha, method), [])
+        outcomes.append(Outcome(name, label, record, own, optima.get(sha, {}), metric))
     order = {name: at for at, name in enumerate(dict.fromkeys(names.values()))}
     place = {name: at for at, name in enumerate(BASELINES)}
     outcomes.sort(
@@ -317,23 +356,7 @@ def load_study(folder: Path, *, root: Path | None = None) -> Study:
             outcome.label,
         )
     )
-    return Study(outcomes)
-
-
-def _best_lines(
-    optima: dict[QueryKey, Record], pairs: dict[tuple[str, str], list[Record]], sha: str
-) -> dict[QueryKey, float]:
-    """The shortest any-angle path that is known for each pair of a map: the reference's own, and
-    those in which no fault was found."""
-    best = {key: record["any_angle_m"] for key, record in optima.items() if "any_angle_m" in record}
-    for (map_sha, _), records in pairs.items():
-        if map_sha != sha:
-            continue
-        for record in records:
-            key = query_key(record)
-            if key in best and is_line(record) and not record["faults"]:
-                best[key] = min(best[key], record["length_m"])
-    return best
+    return Study(outcomes, metric)
 
 
 def _map_labels(preparations: dict[tuple[str, str], Record], root: Path | None) -> dict[str, str]:

@@ -18,11 +18,12 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.harness.analysis import Outcome, Study
     from hybridnav.harness.tables import Row
+    from hybridnav.harness.yardstick import Yardstick
 
 _Sample = tuple["FloatArray", "FloatArray", "FloatArray", "FloatArray"]
 
 
-def compare_runs(first: Path, second: Path) -> list[Row]:
+def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> list[Row]:
     """Compare the methods that two runs have in common, on the maps and pairs that they share.
 
     Parameters
@@ -30,6 +31,9 @@ def compare_runs(first: Path, second: Path) -> list[Row]:
     first, second
         Folders of runs. Where each has a single method beside the reference, those two are
         compared even under different names.
+    metric
+        What losses refer to, see `load_study`. With "both", where the two methods have different
+        metrics, the shorter optimum of each pair: the any-angle one.
 
     Returns
     -------
@@ -41,9 +45,10 @@ def compare_runs(first: Path, second: Path) -> list[Row]:
     Raises
     ------
     InvalidValueError
-        When a run has no records, or the two share no method, map and pair.
+        When a run has no records, the two share no method, map and pair, or there is no such
+        metric.
     """
-    studies = _loaded(first), _loaded(second)
+    studies = _loaded(first, metric), _loaded(second, metric)
     rows: list[Row] = []
     for labels in _methods(*studies):
         samples: list[_Sample] = []
@@ -62,8 +67,8 @@ def compare_runs(first: Path, second: Path) -> list[Row]:
     return rows
 
 
-def _loaded(folder: Path) -> Study:
-    study = load_study(folder)
+def _loaded(folder: Path, metric: Yardstick) -> Study:
+    study = load_study(folder, metric=metric)
     if not study.outcomes:
         raise InvalidValueError(f"run {folder}: no records there")
     return study
@@ -85,8 +90,7 @@ def _paired(first: Outcome, second: Outcome) -> _Sample:
     ]
     shared = [key for key in places[0] if key in places[1]]
     one, other = (np.array([place[key] for key in shared], dtype=np.int64) for place in places)
-    # Of any-angle paths each run knows a best one of its own, and of other metrics the shorter.
-    best = np.fmin(first.best_m[one], second.best_m[other])
+    best = np.minimum(first.best_m[one], second.best_m[other])
     losses = loss_of(first.lengths_m[one], best), loss_of(second.lengths_m[other], best)
     return *losses, first.seconds[one], second.seconds[other]
 

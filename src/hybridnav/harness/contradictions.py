@@ -23,7 +23,7 @@ def is_line(record: Record) -> bool:
     return bool(record.get("metric") == "any-angle")
 
 
-def against(record: Record, reference: Record, best_line_m: float | None) -> str | None:
+def against(record: Record, reference: Record) -> str | None:
     """What is known otherwise against an answer.
 
     Parameters
@@ -31,9 +31,7 @@ def against(record: Record, reference: Record, best_line_m: float | None) -> str
     record
         Of the answer.
     reference
-        The reference's record of the same pair.
-    best_line_m
-        Length of the best any-angle path known between the two, None for none.
+        The reference's record of the same pair, which holds both optima.
 
     Returns
     -------
@@ -45,7 +43,7 @@ def against(record: Record, reference: Record, best_line_m: float | None) -> str
     if record.get("length_m") is None or reference.get("length_m") is None:
         return None
     if is_line(record):
-        return _against_line(record, reference, best_line_m)
+        return _against_line(record, reference.get("any_angle_m"))
     return _against_cells(record, reference)
 
 
@@ -59,12 +57,13 @@ def _against_cells(record: Record, reference: Record) -> str | None:
     return None
 
 
-def _against_line(record: Record, reference: Record, best_line_m: float | None) -> str | None:
+def _against_line(record: Record, optimum: float | None) -> str | None:
+    if optimum is None:  # corners may be cut
+        return None
     length = record["length_m"]
-    optimum = reference["any_angle_m"] if reference.get("any_angle_exact") else 0.0
     if length < optimum * (1 - LINE_SLACK):
         return f"length {length:.6f} m is below the any-angle optimum {optimum:.6f} m"
     bound = record.get("lower_bound_m")
-    if bound is not None and best_line_m is not None and bound > best_line_m * (1 + LINE_SLACK):
-        return f"the lower bound {bound:.6f} m is above {best_line_m:.6f} m, a path that is known"
+    if bound is not None and bound > optimum * (1 + LINE_SLACK):
+        return f"the lower bound {bound:.6f} m is above the any-angle optimum {optimum:.6f} m"
     return None

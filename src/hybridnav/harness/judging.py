@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,14 +13,8 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.methods import HybridMethod, Prepared
-from hybridnav.metrics import (
-    ScipyOptimum,
-    VisibilityGraph,
-    judge_line,
-    judge_path,
-    line_cells,
-    shorten,
-)
+from hybridnav.harness.yardstick import AnyAngleOptimum
+from hybridnav.metrics import ScipyOptimum, VisibilityGraph, judge_line, judge_path, line_cells
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import path_length_in_cells
 
@@ -32,11 +27,12 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 
-SCIPY_SAMPLE = 3
-"""Pairs of a task whose optimum scipy computes too."""
+SAMPLE = 3
+"""Pairs of a task whose octile optimum scipy computes too, and whose any-angle optimum a visibility
+graph."""
 
-EXACT_CORNERS = 6000
-"""Convex corners up to which any-angle optima are exact: about a second to prepare."""
+VISIBILITY_CORNERS = 6000
+"""Convex corners up to which there is a visibility graph: about a second to prepare."""
 
 SLACK = 1e-9
 """Relative difference that two sums of the same moves may have."""
@@ -145,25 +141,32 @@ def _false_claims(line: Line, length_m: float) -> list[str]:
 
 
 class Oracles:
-    """What is known of pairs from elsewhere: scipy's optimum on a sample, the optimum that a
-    scenario states, any-angle lengths."""
+    """What is known of pairs from elsewhere: the any-angle optimum, the octile optimum that a
+    scenario states, and on a sample both optima by independent code."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
         self._grid = grid
-        self._left = 0 if grid.corner_cutting else SCIPY_SAMPLE
-        self._scipy: ScipyOptimum | None = None
-        self._visibility: VisibilityGraph | None = None
-        with suppress(InvalidValueError):  # too many corners: best known instead of exact
-            self._visibility = VisibilityGraph(grid, max_corners=EXACT_CORNERS)
+        self._left = 0 if grid.corner_cutting else SAMPLE
+        self._any_angle = None if grid.corner_cutting else AnyAngleOptimum(grid)
+
+    @cached_property
+    def _scipy(self) -> ScipyOptimum:
+        return ScipyOptimum(self._grid)
+
+    @cached_property
+    def _visibility(self) -> VisibilityGraph | None:
+        with suppress(InvalidValueError):  # too many corners
+            return VisibilityGraph(self._grid, max_corners=VISIBILITY_CORNERS)
+        return None
 
     def ask(self, answer: Answer, pair: Pair, length_m: float | None) -> tuple[Record, list[str]]:
         """Fields of the record, and faults."""
         known: Record = {}
         faults = []
         length = math.inf if length_m is None else length_m
-        if self._left > 0:
+        sampled = self._left > 0
+        if sampled:
             self._left -= 1
-            self._scipy = self._scipy or ScipyOptimum(self._grid)
             optimum = float(self._scipy.lengths_from(pair.start)[pair.goal])
             known["scipy_optimum_m"] = optimum if math.isfinite(optimum) else None
             if not (length == optimum or abs(length - optimum) <= SLACK * optimum):
@@ -173,15 +176,22 @@ class Oracles:
             off = STATED_SLACK_CELLS * self._grid.resolution_m + STATED_SLACK * stated
             if not abs(length - stated) <= off:
                 faults.append(f"the scenario states {stated:.6f} m, not {length:.6f} m")
-        if answer.cells is not None and not faults and not self._grid.corner_cutting:
-            known |= self._any_angle(answer.cells, pair)
+        if self._any_angle is not None and answer.cells is not None and not faults:
+            optimum = self._any_angle.length_m(pair.start, pair.goal)
+            faults = self._against_yardstick(optimum, pair, length, sampled=sampled)
+            known |= {} if faults else {"any_angle_m": optimum}
         return known, faults
 
-    def _any_angle(self, cells: LongArray, pair: Pair) -> Record:
-        exact = self._visibility is not None
-        if self._visibility is not None:
-            length = self._visibility.shortest(pair.start, pair.goal).length_m
-        else:
-            points = shorten(self._grid, cells)
-            length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-        return {"any_angle_m": length, "any_angle_exact": exact}
+    def _against_yardstick(
+        self, optimum: float, pair: Pair, length: float, *, sampled: bool
+    ) -> list[str]:
+        """What the path of cells, and on a sample the visibility graph, say against the any-angle
+        optimum, metres both."""
+        words = f"the any-angle optimum by the mesh is {optimum:.6f} m"
+        if not optimum <= length * (1 + SLACK):
+            return [f"{words}, a path of cells has {length:.6f} m"]
+        if sampled and self._visibility is not None:
+            other = self._visibility.shortest(pair.start, pair.goal).length_m
+            if not abs(optimum - other) <= SLACK * other:
+                return [f"{words}, by a visibility graph {other:.6f} m"]
+        return []

@@ -16,8 +16,8 @@ from hybridnav.harness.records import map_digest
 from hybridnav.harness.report_html import MapSection, ReportData, Table, WorstCase, render_report
 from hybridnav.harness.tables import (
     EFFICIENCY_COLUMNS,
-    LOSS_COLUMNS,
     Row,
+    loss_columns,
     rows_by_distance,
     rows_of_map,
     rows_of_study,
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.records import Record
+    from hybridnav.harness.yardstick import Yardstick
 
 MAX_FAULTS_SHOWN = 50
 WORST_CASES = 2
@@ -41,9 +42,20 @@ WORST_CASES = 2
 _WORDS = ("method", "map", "metric")
 """Columns that hold no numbers."""
 
+REFERS_TO: dict[Yardstick, str] = {
+    "both": "the optimum in the metric of each path",
+    "any-angle": "the any-angle optimum, for all paths",
+    "octile": "the octile optimum; any-angle paths have none",
+}
+"""What losses refer to, in words."""
+
 
 def write_outputs(
-    folder: Path, *, title: str = "hybridnav evaluation", root: Path | None = None
+    folder: Path,
+    *,
+    title: str = "hybridnav evaluation",
+    root: Path | None = None,
+    metric: Yardstick = "both",
 ) -> Study:
     """Write `summary.csv`, `maps.csv`, `summary.md` and `report.html` into the folder of a run.
 
@@ -55,13 +67,15 @@ def write_outputs(
         Of the report.
     root
         Folder by whose paths maps below it are called; else by their names.
+    metric
+        What losses refer to, see `load_study`.
 
     Returns
     -------
     Study
         What was found; `faults` lists every counter-example.
     """
-    study = load_study(folder, root=root)
+    study = load_study(folder, root=root, metric=metric)
     overall = rows_of_study(study)
     by_map = {name: rows_of_map(study, name) for name in study.maps}
     replace_file(folder / "summary.csv", to_csv(overall).encode())
@@ -79,7 +93,7 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
     return (
         f"## Consistency\n\n{study.checks:,} answers checked, {found} counter-examples, "
         f"{study.failures} queries without an answer.\n\n"
-        f"## Loss\n\n{to_markdown(overall, ('method', 'maps', *LOSS_COLUMNS))}\n"
+        f"## Loss\n\n{to_markdown(overall, ('method', 'maps', *loss_columns(study.metric)))}\n"
         f"## Efficiency\n\n{to_markdown(overall, ('method', *EFFICIENCY_COLUMNS))}"
     )
 
@@ -94,11 +108,12 @@ def _report(
     hidden = len(faults) - MAX_FAULTS_SHOWN
     if hidden > 0:
         faults = [*faults[:MAX_FAULTS_SHOWN], f"and {hidden} more, see records.jsonl"]
-    drawn = dict.fromkeys(outcome.label for outcome in _drawn(study.outcomes))
+    drawn = dict.fromkeys(outcome.label for outcome in _drawn(study, study.outcomes))
     facts = [
         *_machines(study).items(),
         ("maps", str(len(study.maps))),
         ("methods", ", ".join(study.labels)),
+        ("losses refer to", REFERS_TO[study.metric]),
         ("queries without an answer", f"{study.failures:,}"),
     ]
     return ReportData(
@@ -107,14 +122,18 @@ def _report(
         faults=faults,
         checks=study.checks,
         criteria=_table(
-            overall, ("method", "maps", *LOSS_COLUMNS, *EFFICIENCY_COLUMNS), "All maps together"
+            overall,
+            ("method", "maps", *loss_columns(study.metric), *EFFICIENCY_COLUMNS),
+            "All maps together",
         ),
         maps=[_section(study, name, by_map[name]) for name in study.maps],
         overall_losses={label: study.pooled(label, "losses") for label in drawn},
         overall_times_ms={
             label: 1e3 * nanquantile(study.pooled(label, "seconds"), 0.5) for label in drawn
         },
-        metric_of={outcome.label: outcome.metric for outcome in study.outcomes},
+        metric_of={
+            outcome.label: outcome.metric for outcome in study.outcomes if study.metric == "both"
+        },
     )
 
 
@@ -146,7 +165,7 @@ def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
 
 def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
     outcomes = study.of_map(name)
-    drawn = _drawn(outcomes)
+    drawn = _drawn(study, outcomes)
     first = outcomes[0].preparation
     shape = first.get("shape", [0, 0])
     distance = rows_by_distance(study, name)
@@ -160,7 +179,7 @@ def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
             ("SHA-256", str(first["map_sha"])[:16]),
         ],
         tables=[
-            _table(rows, ("method", *LOSS_COLUMNS), "Loss"),
+            _table(rows, ("method", *loss_columns(study.metric)), "Loss"),
             _table(rows, ("method", *EFFICIENCY_COLUMNS), "Efficiency"),
             _table(distance, columns, "Mean loss in per cent by length of the optimum (pairs)"),
         ],
@@ -170,10 +189,12 @@ def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
     )
 
 
-def _drawn(outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
-    """Those for charts: without the reference where all others are of another metric."""
+def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
+    """Those for charts: each with those that its losses can be set beside."""
+    if study.metric == "octile":
+        return [outcome for outcome in outcomes if outcome.metric == "octile"]
     others = [outcome for outcome in outcomes if outcome.label != REFERENCE]
-    if all(outcome.metric == "any-angle" for outcome in others):
+    if study.metric == "both" and all(outcome.metric == "any-angle" for outcome in others):
         return others or outcomes
     return outcomes
 

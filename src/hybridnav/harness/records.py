@@ -137,7 +137,8 @@ def read_records(folder: Path) -> list[Record]:
     Raises
     ------
     InvalidValueError
-        When the file cannot be read or a line of it is no record.
+        When the file cannot be read, or a line of it is no record, or one of an older version whose
+        any-angle length is not proved to be shortest.
     """
     path = folder / RECORDS_FILE
     records: list[Record] = []
@@ -156,5 +157,10 @@ def read_records(folder: Path) -> list[Record]:
             isinstance(record.get(key), str) for key in _KEYS
         ):
             raise InvalidValueError(f"records {path}, line {number}: no record of this harness")
+        if record.get("any_angle_exact") is False:
+            raise InvalidValueError(
+                f"records {path}, line {number}: its any-angle length is of an older version and "
+                "no optimum: take a new folder"
+            )
         records.append(record)
     return records

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.analysis import nanmean, nanquantile
+from hybridnav.harness.analysis import nanmean, nanquantile, pairs_in_common
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.metrics import distance_buckets, summarise
 
@@ -17,19 +17,23 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._typing import FloatArray
-    from hybridnav.harness.analysis import Outcome, Study
+    from hybridnav.harness.analysis import MapQuery, Outcome, Study
+    from hybridnav.harness.yardstick import Yardstick
 
 Row = dict[str, str | float]
 
 _DIGITS = 3
 _LEAST = 1e-4
 
-LOSS_COLUMNS = (
+_LOSS_COLUMNS = (
     "metric",
     "pairs",
     "solved",
     "by the grid",
     "faults",
+    "pairs in common",
+    "any-angle loss %",
+    "octile loss %",
     "loss mean %",
     "loss 95 % interval",
     "loss median %",
@@ -38,8 +42,6 @@ LOSS_COLUMNS = (
     "loss max %",
     "without loss %",
     "loss of the plan %",
-    "any-angle loss %",
-    "any-angle exact %",
     "loss mean m",
 )
 EFFICIENCY_COLUMNS = (
@@ -59,7 +61,18 @@ EFFICIENCY_COLUMNS = (
 )
 
 
-def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
+def loss_columns(metric: Yardstick) -> tuple[str, ...]:
+    """Columns of a table of losses: the loss over the optimum that is asked for leads."""
+    leading, other = "any-angle loss %", "octile loss %"
+    if metric != "octile":
+        return _LOSS_COLUMNS
+    swapped = {leading: other, other: leading}
+    return tuple(swapped.get(column, column) for column in _LOSS_COLUMNS)
+
+
+def figures(
+    outcomes: Sequence[Outcome], references: Sequence[Outcome], common: set[MapQuery]
+) -> Row:
     """The figures of one method on some maps.
 
     Parameters
@@ -68,6 +81,8 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
         The method's, one for each map.
     references
         The reference's on the same maps, in the same order.
+    common
+        The pairs over which losses of different methods are set side by side.
 
     Returns
     -------
@@ -79,15 +94,19 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
     finite = losses[np.isfinite(losses)]
     summary = summarise(finite)
     lengths = _pooled([outcome.lengths_m for outcome in outcomes])
+    shared = np.array([one for outcome in outcomes for one in outcome.among(common)], np.bool_)
     best = _pooled([outcome.best_m for outcome in outcomes])
     fallbacks = [outcome.by_grid for outcome in outcomes if not math.isnan(outcome.by_grid)]
     low, high = (100 * end for end in summary.mean_interval)
     return {
         "metric": outcomes[0].metric if outcomes else "",
         "pairs": len(losses),
-        "solved": len(finite),
+        "solved": int(np.isfinite(lengths).sum()),
         "by the grid": int(sum(fallbacks)) if fallbacks else math.nan,
         "faults": sum(len(outcome.faults) for outcome in outcomes),
+        "pairs in common": int(np.isfinite(lengths[shared]).sum()),
+        "any-angle loss %": 100 * nanmean(_pooled([o.any_angle_losses for o in outcomes])[shared]),
+        "octile loss %": 100 * nanmean(_pooled([o.octile_losses for o in outcomes])[shared]),
         "loss mean %": 100 * summary.mean,
         "loss 95 % interval": f"{text_of(low)} to {text_of(high)}" if len(finite) else "",
         "loss median %": 100 * summary.median,
@@ -96,8 +115,6 @@ def figures(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
         "loss max %": 100 * summary.max,
         "without loss %": 100 * summary.share_without_loss,
         "loss of the plan %": 100 * nanmean(_pooled([o.plan_losses for o in outcomes])),
-        "any-angle loss %": 100 * nanmean(_pooled([o.any_angle_losses for o in outcomes])),
-        "any-angle exact %": 100 * nanmean(_pooled([o.any_angle_exact for o in outcomes])),
         "loss mean m": nanmean(lengths - best),
         **_efficiency(outcomes, references),
     }
@@ -160,8 +177,9 @@ def rows_of_map(study: Study, name: str) -> list[Row]:
     """One row for each method on a map."""
     outcomes = study.of_map(name)
     reference = [outcome for outcome in outcomes if outcome.label == REFERENCE]
+    common = pairs_in_common(outcomes)
     return [
-        {"map": name, "method": outcome.label, **figures([outcome], reference)}
+        {"map": name, "method": outcome.label, **figures([outcome], reference, common)}
         for outcome in outcomes
     ]
 
@@ -169,11 +187,12 @@ def rows_of_map(study: Study, name: str) -> list[Row]:
 def rows_of_study(study: Study) -> list[Row]:
     """One row for each method, over all maps that it was run on."""
     references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
+    common = pairs_in_common(study.outcomes)
     rows = []
     for label in study.labels:
         outcomes = [o for o in study.of_method(label) if o.map_name in references]
         there = [references[outcome.map_name] for outcome in outcomes]
-        rows.append({"method": label, "maps": len(outcomes), **figures(outcomes, there)})
+        rows.append({"method": label, "maps": len(outcomes), **figures(outcomes, there, common)})
     return rows
 
 

@@ -5,7 +5,6 @@ from hybridnav.metrics.anyangle import (
     AnyAnglePath,
     VisibilityGraph,
     anyangle_optimum,
-    shorten,
 )
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
 from hybridnav.metrics.judge_line import judge_line, line_cells
@@ -40,7 +39,6 @@ __all__ = [
     "paired_difference",
     "scipy_optimum",
     "segment_faults",
-    "shorten",
     "summarise",
     "thrun_count",
 ]

@@ -1,4 +1,4 @@
-"""Any-angle paths: the exact shortest on small maps, and the best known on large ones."""
+"""Exact shortest any-angle paths on small maps, by a visibility graph."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ from scipy import sparse
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.metrics import _segment_kernels as kernels
-from hybridnav.metrics.judge import Cell, free_classes, judge_path
+from hybridnav.metrics.judge import Cell, free_classes
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
 MAX_CORNERS = 2000
@@ -169,92 +167,6 @@ def anyangle_optimum(
     """
     graph = VisibilityGraph(grid, allow_unexplored=allow_unexplored)
     return graph.shortest(start_cell, goal_cell)
-
-
-def shorten(grid: OccupancyGrid, cells: ArrayLike, *, allow_unexplored: bool = False) -> FloatArray:
-    """Shorten a legal grid path to the best any-angle path known from it.
-
-    Points that see each other are joined, then the string is pulled tight: each bend moves to the
-    convex corners that hold it, until none gives way (the shortest path among those that pass the
-    obstacles on the same sides). Short cuts between its points and further tightening alternate
-    until nothing is gained. The result is legal, no longer than the grid path, and an upper bound
-    on the any-angle optimum, not a proof of it.
-
-    Parameters
-    ----------
-    grid
-        The map.
-    cells
-        A legal path, whole numbers (n, 2) of (row, col), n >= 1.
-    allow_unexplored
-        Whether unexplored cells count as free.
-
-    Returns
-    -------
-    FloatArray
-        float64 (m, 2), `(x, y)` in metres, map frame, from the first centre to the last.
-
-    Raises
-    ------
-    InvalidValueError
-        When the path is not legal.
-
-    Notes
-    -----
-    Tightening is the triangle step of J. Hershberger, J. Snoeyink: Computing minimum length paths
-    of a given homotopy class, 1994.
-    """
-    path = np.asarray(cells)
-    ends = {"start": tuple(path[0]), "goal": tuple(path[-1])} if len(path) else {}
-    verdict = judge_path(
-        grid,
-        path,
-        start=ends.get("start", (0, 0)),
-        goal=ends.get("goal", (0, 0)),
-        allow_unexplored=allow_unexplored,
-    )
-    if not verdict.ok:
-        raise InvalidValueError(f"only a legal path can be shortened: {verdict.faults[0]}")
-    free_of = free_classes(allow_unexplored=allow_unexplored)
-    positions = path + 0.5
-    string = positions[kernels.pull(grid.classes, free_of, positions)]
-    length = math.inf
-    while True:
-        string = _tighten(grid.classes, free_of, string)
-        steps = np.diff(string, axis=0)
-        now = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
-        if now >= length - 1e-9:
-            return grid.frame.points_of_grid(string)
-        length = now
-        string = string[kernels.shortcut(grid.classes, free_of, string)]
-
-
-def _tighten(classes: ByteArray, free_of: BoolArray, string: FloatArray) -> FloatArray:
-    """Pull a legal polyline tight; bends are put on whole numbers, in doubled grid units."""
-    doubled = np.rint(2 * string).astype(np.int64)
-    done, ahead = [doubled[0]], list(doubled[:0:-1])
-    while len(ahead) > 1:
-        bend = ahead.pop()
-        chain = _held(classes, free_of, done[-1], bend, ahead[-1])
-        if len(chain) == 1 and (chain[0] == bend).all():
-            done.append(bend)
-            continue
-        ahead.extend(chain[::-1])
-        # The bend before may give way now that the string leaves it in another direction.
-        if len(done) > 1:
-            ahead.append(done.pop())
-    return np.array([*done, *ahead]) / 2
-
-
-def _held(
-    classes: ByteArray, free_of: BoolArray, before: LongArray, bend: LongArray, after: LongArray
-) -> LongArray:
-    """Points that hold the string between two others: the bend itself where it cannot give way."""
-    chain = kernels.taut_chain(classes, free_of, before, bend, after)
-    string = np.concatenate([before[None], chain, after[None]]) / 2
-    if kernels.segment_codes(classes, free_of, string).any():
-        return bend[None]
-    return np.asarray(chain, dtype=np.int64)
 
 
 def _convex_corners(free: BoolArray) -> tuple[FloatArray, LongArray]:

@@ -1,0 +1,54 @@
+"""What losses refer to: the metrics to choose from, and the any-angle optimum, proved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, get_args
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.mesh import MeshSearch, build_mesh
+
+if TYPE_CHECKING:
+    from hybridnav.grid import OccupancyGrid
+
+Cell = tuple[int, int]
+
+Yardstick = Literal["both", "any-angle", "octile"]
+"""What losses refer to: each path's own metric; for all paths the any-angle optimum; the octile
+optimum, which any-angle paths have no loss over."""
+
+
+def check_yardstick(metric: str) -> None:
+    """Raise `InvalidValueError` where there is no such yardstick."""
+    if metric not in get_args(Yardstick):
+        known = ", ".join(get_args(Yardstick))
+        raise InvalidValueError(f"losses refer to one of {known}, got metric {metric!r}")
+
+
+class AnyAngleOptimum:
+    """Lengths of shortest any-angle paths between the centres of cells, by the convex mesh.
+
+    Every legal path of the octile grid is an any-angle path between the same two centres, so no
+    method's path is shorter, whatever its metric.
+
+    Parameters
+    ----------
+    grid
+        The map. Without corner cutting: an any-angle path never passes between two blocked cells
+        that meet at a corner.
+    """
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self._search = MeshSearch(build_mesh(grid.classes == CellClass.FREE))
+        self._resolution_m = grid.resolution_m
+
+    def length_m(self, start: Cell, goal: Cell) -> float:
+        """Return the length between the centres of two free cells, infinite for no path.
+
+        Parameters
+        ----------
+        start, goal
+            (row, col) of free cells.
+        """
+        centres = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.5, goal[1] + 0.5)
+        return self._search.path((start, goal), centres).length_cells * self._resolution_m
