@@ -7,7 +7,7 @@ import itertools
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,44 +16,22 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from hybridnav.grid import CellClass
-from hybridnav.mesh import ConvexMesh, MeshSearch, build_mesh
+from hybridnav.mesh import MeshSearch, build_mesh
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from tests.oracle.any_angle import by_visibility, some_positions
+from tests.oracle.mesh import assert_sides_agree, ends_of_sides, polygon, twice_the_area
 from tests.strategies import class_grids, drawn, occupancy_grid
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 seeds = st.integers(0, 2**32 - 1)
 DATA = Path(os.environ.get("HYBRIDNAV_DATA", "no data")) / "any_angle_optima"
 OPTIMA = sorted(path.stem for path in DATA.glob("*.csv"))
 
 
-def polygon(mesh: ConvexMesh, number: int) -> NDArray[Any]:
-    """Corners of a polygon as (x, y), counter-clockwise."""
-    slots = slice(mesh.first[number], mesh.first[number + 1])
-    return mesh.corners[mesh.begins[slots]][:, ::-1].astype(np.int64)
-
-
-def crosses(points: NDArray[Any]) -> NDArray[Any]:
-    """Twice the signed areas of the corners of a ring."""
-    ahead, behind = np.roll(points, -1, axis=0) - points, points - np.roll(points, 1, axis=0)
-    found: NDArray[Any] = behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0]
-    return found
-
-
 @settings(max_examples=40, deadline=None)
 @given(class_grids())
 def test_polygons_are_convex_and_their_area_is_that_of_the_free_cells(classes: Any) -> None:
     free = classes == CellClass.FREE
-    mesh = build_mesh(free)
-    twice = 0
-    for number in range(mesh.n_polygons):
-        points = polygon(mesh, number)
-        assert (crosses(points) >= 0).all()
-        x, y = points.T
-        twice += int((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
-    assert twice == 2 * free.sum()
+    assert twice_the_area(build_mesh(free)) == 2 * free.sum()
 
 
 @settings(max_examples=40, deadline=None)
@@ -61,13 +39,8 @@ def test_polygons_are_convex_and_their_area_is_that_of_the_free_cells(classes: A
 def test_sides_are_shared_by_two_polygons_or_are_walls(classes: Any) -> None:
     free = classes == CellClass.FREE
     mesh = build_mesh(free)
-    ends = np.concatenate(
-        [np.roll(mesh.begins[a:b], -1) for a, b in zip(mesh.first, mesh.first[1:], strict=False)]
-        or [np.empty(0, np.int32)]
-    )
-    crossable = np.flatnonzero(mesh.twins >= 0)
-    assert (mesh.twins[mesh.twins[crossable]] == crossable).all()
-    assert (mesh.begins[mesh.twins[crossable]] == ends[crossable]).all()
+    assert_sides_agree(mesh)
+    ends = ends_of_sides(mesh)
     walls = mesh.corners[mesh.begins[mesh.twins < 0]], mesh.corners[ends[mesh.twins < 0]]
     length = int(np.abs(walls[0] - walls[1]).sum())
     padded = np.pad(free, 1).astype(np.int8)

@@ -1,6 +1,7 @@
 """Exact any-angle paths: the convex mesh of free space and the search of its intervals."""
 
 from hybridnav.mesh.build import ConvexMesh, build_mesh
+from hybridnav.mesh.cut import cut_mesh
 from hybridnav.mesh.search import MeshPath, MeshSearch
 
-__all__ = ["ConvexMesh", "MeshPath", "MeshSearch", "build_mesh"]
+__all__ = ["ConvexMesh", "MeshPath", "MeshSearch", "build_mesh", "cut_mesh"]

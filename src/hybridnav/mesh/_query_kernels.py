@@ -169,6 +169,23 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
 
 
 @njit(cache=True, nogil=True)
+def _polygon_in(mesh, component, polygon_at, row, col):
+    """A polygon that holds the centre of a free cell; where a mesh was cut, one of the last."""
+    cx, cy, _, first, begins, stops, _, _ = mesh
+    polygon = polygon_at[row, col]
+    if component[polygon] >= 0:
+        return polygon
+    for other in range(len(first) - 2, -1, -1):
+        holds = component[other] >= 0
+        for slot in range(first[other], first[other + 1]):
+            u, w = begins[slot], stops[slot]
+            holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5) >= 0
+        if holds:
+            return other
+    return polygon
+
+
+@njit(cache=True, nogil=True)
 def _begin(mesh, tree, polygon_at, cells, ends, work):
     """Find the polygons of both ends, and open the blocks between them; returns 1 where the ends
     have a polygon in common, -1 where they are not connected."""
@@ -177,7 +194,8 @@ def _begin(mesh, tree, polygon_at, cells, ends, work):
     counts = nodes[6]
     sx, sy, tx, ty = ends
     from_row, from_col, to_row, to_col = cells
-    inner, last = polygon_at[from_row, from_col], polygon_at[to_row, to_col]
+    inner = _polygon_in(mesh, component, polygon_at, from_row, from_col)
+    last = _polygon_in(mesh, component, polygon_at, to_row, to_col)
     if component[inner] != component[last]:
         return -1
     n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)

@@ -13,6 +13,8 @@ from hybridnav.mesh._corner_kernels import NO_CORNER, kinds_of, walls_of
 from hybridnav.mesh._merge_kernels import WALL, merge_triangles, polygons_of_cells
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._typing import BoolArray, ByteArray, IntArray
 
 
@@ -92,8 +94,38 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
 
 
 def _triangulated(corners: IntArray, walls: IntArray, free: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the triangles of free space, int32 (n, 3) corners counter-clockwise, and the triangle
-    across each side, `WALL` for none."""
+    """Return the triangles of free space, and what lies across their sides; see `triangulate`."""
+
+    def is_free(triangles: IntArray) -> BoolArray:
+        # No wall passes the middle of a triangle: all cells that it touches there are of one class.
+        middle = corners[triangles].sum(axis=1) // 3
+        inside: BoolArray = (middle < free.shape).all(axis=1)
+        inside[inside] = free[tuple(middle[inside].T)]
+        return inside
+
+    return triangulate(corners, walls, is_free)
+
+
+def triangulate(
+    corners: IntArray, walls: IntArray, is_kept: Callable[[IntArray], BoolArray]
+) -> tuple[IntArray, IntArray]:
+    """Triangulate corners so that walls are sides of triangles.
+
+    Parameters
+    ----------
+    corners
+        int32 (n, 2), (row, col).
+    walls
+        int (m, 2), pairs of corners; none passes a third.
+    is_kept
+        Says of triangles, int32 (t, 3), which to keep.
+
+    Returns
+    -------
+    tuple
+        int32 (t, 3) corners counter-clockwise; int32 (t, 3) the triangle across the side from
+        corner k to k + 1, `WALL` for none.
+    """
     if len(corners) == 0:
         return np.empty((0, 3), np.int32), np.empty((0, 3), np.int32)
     made = pythoncdt.Triangulation(
@@ -104,15 +136,11 @@ def _triangulated(corners: IntArray, walls: IntArray, free: BoolArray) -> tuple[
     made.erase_super_triangle()
     found = made.triangles_array()
     triangles = found["vertices"].astype(np.int32)
-    # No wall passes the middle of a triangle: all cells that it touches there are of one class.
-    middle = corners[triangles].sum(axis=1) // 3
-    inside = (middle < free.shape).all(axis=1)
-    is_free = np.zeros(len(triangles), dtype=np.bool_)
-    is_free[inside] = free[tuple(middle[inside].T)]
-    number = np.append(np.where(is_free, np.cumsum(is_free) - 1, WALL), WALL)
+    kept = is_kept(triangles)
+    number = np.append(np.where(kept, np.cumsum(kept) - 1, WALL), WALL)
     across = number[np.minimum(found["neighbors"], len(triangles))]
     across[_are_walls(triangles, walls, len(corners))] = WALL
-    return triangles[is_free], across[is_free].astype(np.int32)
+    return triangles[kept], across[kept].astype(np.int32)
 
 
 def _are_walls(triangles: IntArray, walls: IntArray, n_corners: int) -> BoolArray:

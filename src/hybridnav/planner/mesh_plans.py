@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import cells_of_line
-from hybridnav.mesh import MeshSearch, build_mesh
+from hybridnav.mesh import MeshSearch, build_mesh, cut_mesh
 from hybridnav.planner.cell_plans import CellPlan
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ class OverMesh:
         expanded = found.expanded
         passed = self._passed(free, cells, found)
         if closed is not None and passed is not None and closed.are_near(passed, free.shape):
-            search, free = self._without(closed)
+            search, free = self._without(search, closed)
             found = search.path(cells, positions)
             expanded += found.expanded
             passed = self._passed(free, cells, found)
@@ -114,7 +114,7 @@ class OverMesh:
             metric="any-angle",
             points=points,
             length_cells=found.length_cells,
-            bound_cells=found.length_cells,
+            bound_cells=found.lower_bound_cells,
             expanded=expanded,
             seconds=seconds,
         )
@@ -132,7 +132,7 @@ class OverMesh:
         behind = ends[1] if (passed[-1] != cells[1]).any() else passed[:0]
         return np.concatenate([before, passed, behind])
 
-    def _without(self, closed: ClosedCells) -> tuple[MeshSearch, BoolArray]:
+    def _without(self, whole: MeshSearch, closed: ClosedCells) -> tuple[MeshSearch, BoolArray]:
         """The mesh without closed cells, and what is free of them."""
         free = self._free.copy()
         free.ravel()[closed.flat] = False
@@ -140,7 +140,7 @@ class OverMesh:
         with self._building:
             search = self._cut.pop(key, None)
             if search is None:
-                search = MeshSearch(build_mesh(free))
+                search = MeshSearch(cut_mesh(whole.mesh, free, closed.flat))
             self._cut[key] = search
             if len(self._cut) > _KEPT:
                 self._cut.popitem(last=False)

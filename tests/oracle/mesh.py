@@ -1,0 +1,46 @@
+"""What holds for the polygons of every convex mesh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav.mesh import ConvexMesh
+
+
+def polygon(mesh: ConvexMesh, number: int) -> NDArray[Any]:
+    """Corners of a polygon as (x, y), counter-clockwise."""
+    slots = slice(mesh.first[number], mesh.first[number + 1])
+    return mesh.corners[mesh.begins[slots]][:, ::-1].astype(np.int64)
+
+
+def twice_the_area(mesh: ConvexMesh) -> int:
+    """Twice the area of all polygons that belong to a component, each of them convex."""
+    twice = 0
+    for number in np.flatnonzero(mesh.component >= 0).tolist():
+        points = polygon(mesh, number)
+        ahead = np.roll(points, -1, axis=0) - points
+        behind = points - np.roll(points, 1, axis=0)
+        assert (behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0] >= 0).all()
+        x, y = points.T
+        twice += int((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+    return twice
+
+
+def ends_of_sides(mesh: ConvexMesh) -> NDArray[Any]:
+    """The corner at which each side ends."""
+    ends = np.roll(mesh.begins, -1)
+    ends[mesh.first[1:] - 1] = mesh.begins[mesh.first[:-1]]
+    return ends
+
+
+def assert_sides_agree(mesh: ConvexMesh) -> None:
+    """Hold that twins are each other's, and run the other way."""
+    crossable = np.flatnonzero(mesh.twins >= 0)
+    assert (mesh.twins[mesh.twins[crossable]] == crossable).all()
+    assert (mesh.begins[mesh.twins[crossable]] == ends_of_sides(mesh)[crossable]).all()
+    assert (mesh.component[mesh.polygon_of[crossable]] >= 0).all()
