@@ -140,5 +140,5 @@ def test_unexplored_cells_are_entered_where_they_may_be(preset):
 
 
 def test_stored_paths_need_portals():
-    with pytest.raises(hn.PresetError, match="coarse: portals goes with refine"):
+    with pytest.raises(hn.PresetError, match="coarse: max-distance goes with refine"):
         hn.load_preset("paper", overrides=["planner.refine=stored-paths"])

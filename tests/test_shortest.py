@@ -127,15 +127,18 @@ def test_many_pairs_are_answered_as_one_by_one() -> None:
     rng = np.random.default_rng(1)
     topology = mapped((rng.random((30, 30)) > 0.3).astype(np.uint8))
     planner = shortest(topology)
-    starts, goals = rng.uniform(-1, 31, (2, 60, 2))
-    many = planner.plan_many(starts, goals)
-    for query, ends in enumerate(zip(starts, goals, strict=True)):
-        one = planner.plan(*ends)
-        assert many.status[query] == one.status
-        assert many.cost[query] == one.cost
-        assert many.lower_bound[query] == one.lower_bound
-        if one.path is not None:
-            np.testing.assert_array_equal(many.path(query), one.path.points)
+    starts, goals = rng.uniform(-1, 31, (2, 400, 2))
+    closed = planner.closed({"cells": rng.choice(30, (5, 2))})
+    for shut in (None, closed):
+        many = planner.plan_many(starts, goals, blocked=shut)
+        assert (many.status == "solved").sum() > 100
+        for query, ends in enumerate(zip(starts, goals, strict=True)):
+            one = planner.plan(*ends, blocked=shut)
+            assert many.status[query] == one.status
+            assert many.cost[query] == one.cost
+            assert many.lower_bound[query] == one.lower_bound
+            if one.path is not None:
+                np.testing.assert_array_equal(many.path(query), one.path.points)
 
 
 def test_smoothing_changes_nothing() -> None:

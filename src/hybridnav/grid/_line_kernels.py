@@ -79,3 +79,23 @@ def passed_cells(free, positions):
         cells[n] = cell
         n += 1
     return cells[:n].copy()
+
+
+@njit(cache=True, nogil=True)
+def polyline_length(points):
+    """Return the length of a line through points, float64 (n, 2)."""
+    length = 0.0
+    for k in range(len(points) - 1):
+        length += math.hypot(points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1])
+    return length
+
+
+@njit(cache=True, nogil=True)
+def polyline_lengths(points, starts):
+    """Return the lengths of many lines, float64 (n,); line k is `points[starts[k]:starts[k + 1]]`,
+    and without points infinitely long."""
+    lengths = np.full(len(starts) - 1, np.inf)
+    for k in range(len(lengths)):
+        if starts[k + 1] > starts[k]:
+            lengths[k] = polyline_length(points[starts[k] : starts[k + 1]])
+    return lengths

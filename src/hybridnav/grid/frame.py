@@ -173,3 +173,22 @@ class Frame:
         across = min(max(y, -_FAR), _FAR) - y0
         row = (cosine * across - sine * along) / self.resolution_m
         return row, (cosine * along + sine * across) / self.resolution_m
+
+    def positions_of(self, points: FloatArray) -> FloatArray:
+        """Many points as (row, column) in grid units, each as `position_of` finds it.
+
+        Parameters
+        ----------
+        points
+            float64 (n, 2), finite, in metres, map frame.
+
+        Returns
+        -------
+        FloatArray
+            float64 (n, 2).
+        """
+        cosine, sine, x0, y0 = self._turned
+        along = np.clip(points[:, 0], -_FAR, _FAR) - x0
+        across = np.clip(points[:, 1], -_FAR, _FAR) - y0
+        row = (cosine * across - sine * along) / self.resolution_m
+        return np.stack([row, (cosine * along + sine * across) / self.resolution_m], axis=1)

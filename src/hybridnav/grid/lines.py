@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid._line_kernels import passed_cells
+from hybridnav.grid._line_kernels import passed_cells, polyline_length, polyline_lengths
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+
+__all__ = ["cells_of_line", "polyline_length", "polyline_lengths"]
 
 
 def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:

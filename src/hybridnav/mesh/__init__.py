@@ -2,6 +2,15 @@
 
 from hybridnav.mesh.build import ConvexMesh, build_mesh
 from hybridnav.mesh.cut import cut_mesh
+from hybridnav.mesh.many import MeshPaths, shortest_paths
 from hybridnav.mesh.search import MeshPath, MeshSearch
 
-__all__ = ["ConvexMesh", "MeshPath", "MeshSearch", "build_mesh", "cut_mesh"]
+__all__ = [
+    "ConvexMesh",
+    "MeshPath",
+    "MeshPaths",
+    "MeshSearch",
+    "build_mesh",
+    "cut_mesh",
+    "shortest_paths",
+]

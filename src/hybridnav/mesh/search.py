@@ -16,7 +16,7 @@ from hybridnav.mesh import _query_kernels as kernels
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import FloatArray, LongArray
     from hybridnav.mesh.build import ConvexMesh
 
 Cell = tuple[int, int]
@@ -28,7 +28,8 @@ _FRACTION = float(1 << 24)
 """Positions are rounded to this part of a cell: then every side test is exact."""
 _SLICE = 256
 """Nodes that a query with a budget expands before it looks at the clock, some 0.2 ms."""
-_NO_LIMIT = 1 << 62
+NO_LIMIT = 1 << 62
+"""Of nodes that a query expands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +99,8 @@ class MeshSearch:
         sides = mesh.begins, stops, mesh.twins, mesh.polygon_of
         tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
         arrays = cols, rows, mesh.kinds, mesh.first, *sides
-        self._fixed = arrays, mesh.block_of, tree, mesh.polygon_at
-        self._works = Pool(partial(_Work, mesh))
+        self.fixed = arrays, mesh.block_of, tree, mesh.polygon_at
+        self.works = Pool(partial(_Work, mesh))
 
     def path(
         self,
@@ -140,11 +141,11 @@ class MeshSearch:
             upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
         where = *cells[0], *cells[1]
         points = ends[0][1], ends[0][0], ends[1][1], ends[1][0]
-        limit = _NO_LIMIT if budget_s is None else _SLICE
-        with self._works.lent() as work:
+        limit = NO_LIMIT if budget_s is None else _SLICE
+        with self.works.lent() as work:
             while True:
                 status, way = kernels.query(
-                    *self._fixed, where, points, work.arrays, (upper, 1.0 + epsilon, limit)
+                    *self.fixed, where, points, work.arrays, (upper, 1.0 + epsilon, limit)
                 )
                 if status == polyanya.DONE:
                     break
@@ -155,6 +156,7 @@ class MeshSearch:
                 else:
                     limit += _SLICE
             length, bound = work.bounds.tolist()
+            bound = min(bound, length)
             expanded = int(work.counts[polyanya.EXPANDED])
         positions_ = way if len(way) else known
         return MeshPath(positions_, length, bound, expanded)
@@ -167,3 +169,10 @@ def _inside(cell: Cell, position: Position) -> Position:
         for along, low in zip(position, cell, strict=True)
     )
     return row, col
+
+
+def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:
+    """Round positions, and move each into the closed square of its cell; float64 (n, 2)."""
+    rounded = np.round(positions * _FRACTION) / _FRACTION
+    inside: FloatArray = np.clip(rounded, cells, cells + 1.0)
+    return inside

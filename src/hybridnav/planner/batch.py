@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.grid import CellClass
+from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_plans import OverPortals
+from hybridnav.planner.mesh_plans import OverMesh
 from hybridnav.result import PlanBatch, PlanStatus
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.cell_plans import CellPlanner, CellPlans
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner, Smooth
-    from hybridnav.route import PortalAnswers
 
 
 def plan_many(
@@ -42,26 +42,27 @@ def plan_many(
         What is closed; None for nothing.
     """
     starts, goals = ends
-    n = len(starts)
+    n, grid = len(starts), planner.topology.grid
     status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)
     paths: list[FloatArray] = [np.empty((0, 2))] * n
     headings = [np.empty(0)] * n
     left = np.ones(n, dtype=np.bool_)
-    if n and smooth == "none" and isinstance(cell_planner, OverPortals):
-        grid = planner.topology.grid
-        first, last = grid.frame.cells_of(starts), grid.frame.cells_of(goals)
-        asked = np.flatnonzero(_are_free(planner, first) & _are_free(planner, last))
+    first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
+    asked = np.flatnonzero(_are_free(planner, first) & _are_free(planner, last))
+    found = None
+    if len(asked) and isinstance(cell_planner, OverMesh):
+        found = cell_planner.plan_many((first[asked], last[asked]), (starts[asked], goals[asked]))
+    elif len(asked) and smooth == "none" and isinstance(cell_planner, OverPortals):
         found = cell_planner.plan_many(first[asked], last[asked])
+    if found is not None:
         kept = found.is_done
         if closed is not None:
-            shut = _met(closed, found, (first[asked], last[asked]), grid)
-            kept = kept & ~shut
+            kept = kept & ~_met(closed, found, (first[asked], last[asked]), planner)
         done = asked[kept]
         left[done] = False
-        cost[done] = found.length_cells[kept] * grid.resolution_m
-        bound[done] = found.lower_bound_cells[kept] * grid.resolution_m
-        bound[done] = np.minimum(bound[done], cost[done])
+        cost[done] = found.cost_m[kept]
+        bound[done] = np.minimum(found.lower_bound_m[kept], cost[done])
         status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
         for i, k in zip(done.tolist(), np.flatnonzero(kept).tolist(), strict=True):
             paths[i] = found.points[found.path_start[k] : found.path_start[k + 1]]
@@ -84,16 +85,24 @@ def plan_many(
 
 def _met(
     closed: ClosedCells,
-    found: PortalAnswers,
+    found: CellPlans,
     ends: tuple[LongArray, LongArray],
-    grid: OccupancyGrid,
+    planner: HybridPlanner,
 ) -> BoolArray:
     """Which answers meet what is closed, with an end or on the way; bool (n,)."""
+    grid = planner.topology.grid
+    free = grid.enterable(allow_unexplored=planner.preset.planner.allow_unexplored)
     across = np.array([grid.shape[1], 1])
     met: BoolArray = closed.holds(ends[0] @ across) | closed.holds(ends[1] @ across)
     for k in np.flatnonzero(found.is_done & ~met).tolist():
         points = found.points[found.path_start[k] : found.path_start[k + 1]]
-        met[k] = len(points) > 0 and closed.meets(grid.frame.cells_of(points), grid)
+        if not len(points):
+            continue
+        if found.metric == "octile":
+            met[k] = closed.meets(grid.frame.cells_of(points), grid)
+        else:
+            passed = cells_of_line(free, grid.frame.positions_of(points))
+            met[k] = closed.are_near(passed, grid.shape)
     return met
 
 

@@ -16,11 +16,11 @@ from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cel
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.refine import GridRefiner
     from hybridnav.result import Metric
-    from hybridnav.route import Effort, PortalAnswers
+    from hybridnav.route import Effort
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
@@ -44,6 +44,22 @@ class CellPlan:
     expanded_gates: int = 0
     corridor_cells: int = 0
     seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class CellPlans:
+    """Paths of many queries, arrays of n."""
+
+    is_done: BoolArray
+    """bool (n,), whether the answer is that of `plan`; False where that is yet to be asked."""
+    metric: Metric
+    cost_m: FloatArray
+    """float64 (n,), lengths in metres, infinite where there is no path."""
+    lower_bound_m: FloatArray
+    path_start: LongArray
+    """int64 (n + 1,), where the points of each path begin."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame."""
 
 
 class CellPlanner(Protocol):
@@ -128,6 +144,7 @@ class OverPortals:
             all_gates=settings.refine == "gates",
             allow_unexplored=settings.allow_unexplored,
         )
+        self._resolution_m = topology.grid.resolution_m
         self._epsilon = settings.epsilon
         self._effort: Effort = "exact" if settings.refine == "gates" else "stored"
 
@@ -145,6 +162,15 @@ class OverPortals:
             seconds={"portals": time.perf_counter() - began},
         )
 
-    def plan_many(self, starts: LongArray, goals: LongArray) -> PortalAnswers:
+    def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
         """The same for many pairs of cells, int64 (n, 2) each, as far as look-ups answer them."""
-        return self.search.many(starts, goals, effort=self._effort, epsilon=self._epsilon or 0.0)
+        found = self.search.many(starts, goals, effort=self._effort, epsilon=self._epsilon or 0.0)
+        per_cell = self._resolution_m
+        return CellPlans(
+            found.is_done,
+            "octile",
+            found.length_cells * per_cell,
+            found.lower_bound_cells * per_cell,
+            found.path_start,
+            found.points,
+        )

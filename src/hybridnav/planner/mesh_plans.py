@@ -11,9 +11,9 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.lines import cells_of_line
-from hybridnav.mesh import MeshSearch, build_mesh, cut_mesh
-from hybridnav.planner.cell_plans import CellPlan
+from hybridnav.grid.lines import cells_of_line, polyline_lengths
+from hybridnav.mesh import MeshSearch, build_mesh, cut_mesh, shortest_paths
+from hybridnav.planner.cell_plans import CellPlan, CellPlans
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
@@ -118,6 +118,30 @@ class OverMesh:
             expanded=expanded,
             seconds=seconds,
         )
+
+    def plan_many(
+        self, cells: tuple[LongArray, LongArray], points: tuple[FloatArray, FloatArray]
+    ) -> CellPlans:
+        """Find a shortest path for each of many pairs of points, on all cores.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), those that hold the starts, and the goals; they may be entered.
+        points
+            float64 (n, 2), starts and goals, `(x, y)` in metres, map frame.
+        """
+        positions = self._frame.positions_of(points[0]), self._frame.positions_of(points[1])
+        found = shortest_paths(self.prepare(), cells, positions)
+        along = self._frame.points_of_grid(found.positions)
+        solved = np.isfinite(found.length_cells)
+        along[found.path_start[:-1][solved]] = points[0][solved]
+        along[found.path_start[1:][solved] - 1] = points[1][solved]
+        cost_m = polyline_lengths(along, found.path_start)
+        return CellPlans(
+            np.ones(len(cost_m), dtype=np.bool_), "any-angle", cost_m, cost_m,
+            found.path_start, along,
+        )  # fmt: skip
 
     def _passed(
         self, free: BoolArray, cells: tuple[Cell, Cell], found: MeshPath

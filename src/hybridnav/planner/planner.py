@@ -8,10 +8,9 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import numpy as np
-
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
 from hybridnav.planner.closed import ClosedCells
@@ -169,7 +168,7 @@ class HybridPlanner:
         goals: ArrayLike,
         *,
         smooth: Smooth | None = None,
-        blocked: Closable | None = None,
+        blocked: Closable | ClosedCells | None = None,
     ) -> PlanBatch:
         """Plan paths between many pairs of points: the answers of `plan`, in arrays.
 
@@ -250,7 +249,7 @@ class HybridPlanner:
         if metric == "octile":
             length_m = (plan.length_cells or path_length_in_cells(plan.cells)) * grid.resolution_m
         else:
-            length_m = float(np.hypot(*np.diff(points, axis=0).T).sum())
+            length_m = polyline_length(points)
         if plan.metric == "any-angle" and plan.length_cells:
             # A part of the length, so that what is proved optimal has no gap by rounding.
             bound = length_m * (plan.bound_cells / plan.length_cells)

@@ -1,0 +1,55 @@
+"""Kernel of many queries on a mesh, one after the other."""
+
+from __future__ import annotations
+
+from hybridnav._jit import guarded, njit
+from hybridnav.mesh._polyanya_kernels import DONE, NO_ROOM
+from hybridnav.mesh._query_kernels import query
+
+FULL = 3
+"""What `many` returns where there are more positions than room."""
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def many(mesh, asked, work, effort, answers, begin, n):
+    """Answer queries from one on, until all are answered or room is short.
+
+    Parameters
+    ----------
+    mesh
+        The first four arguments of `query`.
+    asked
+        int64 (q, 4) cells and float64 (q, 4) ends of all queries, as `query` takes them.
+    work, effort
+        See `query`.
+    answers
+        float64 (q,) lengths, float64 (q,) bounds, int64 (q + 1,) where the positions of each path
+        begin, float64 (room, 2) positions.
+    begin
+        The query to begin, or to go on with.
+    n
+        Positions written.
+
+    Returns
+    -------
+    tuple
+        The query to go on with, positions written, and `DONE`, `NO_ROOM` or `FULL`.
+    """
+    fixed, block_of, tree, polygon_at = mesh
+    cells, ends = asked
+    lengths, bounds, starts, positions = answers
+    for k in range(begin, len(cells)):
+        where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
+        points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+        status, way = query(fixed, block_of, tree, polygon_at, where, points, work, effort)
+        if status == NO_ROOM:
+            return k, n, NO_ROOM
+        if n + len(way) > len(positions):
+            return k, n, FULL  # and found once more
+        lengths[k], bounds[k] = work[4][7][0], work[4][7][1]
+        positions[n : n + len(way)] = way
+        starts[k] = n
+        n += len(way)
+    starts[len(cells)] = n
+    return len(cells), n, DONE

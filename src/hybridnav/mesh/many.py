@@ -1,0 +1,104 @@
+"""Shortest any-angle paths between many pairs, on all cores."""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.mesh._many_kernels import FULL, many
+from hybridnav.mesh._polyanya_kernels import NO_ROOM
+from hybridnav.mesh.search import NO_LIMIT, rounded_into
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav.mesh.search import MeshSearch
+
+_ROOM = 16
+"""Positions of a path that there is room for at first, in the mean."""
+_LEAST = 64
+"""Queries that are worth a thread."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPaths:
+    """The shortest paths of many queries, arrays of n."""
+
+    length_cells: FloatArray
+    """float64 (n,), infinite where there is no path."""
+    lower_bound_cells: FloatArray
+    """float64 (n,)."""
+    path_start: LongArray
+    """int64 (n + 1,), where the positions of each path begin."""
+    positions: FloatArray
+    """float64 (m, 2), (row, col) in grid units, of all paths."""
+
+
+def shortest_paths(
+    search: MeshSearch,
+    cells: tuple[LongArray, LongArray],
+    positions: tuple[FloatArray, FloatArray],
+    *,
+    epsilon: float = 0.0,
+) -> MeshPaths:
+    """Find a shortest path for each of many pairs, what `MeshSearch.path` answers.
+
+    Parameters
+    ----------
+    search
+        Of the map.
+    cells
+        int64 (n, 2), the free cells (row, col) that hold the starts, and the goals.
+    positions
+        float64 (n, 2), starts and goals, (row, col) in grid units, in the closed squares of these
+        cells.
+    epsilon
+        As for `MeshSearch.path`.
+    """
+    where = np.concatenate(cells, axis=1)
+    ends = np.concatenate([rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1)
+    ends = np.ascontiguousarray(ends[:, [1, 0, 3, 2]])
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    n_parts = max(1, min(cores or 1, len(where) // _LEAST))
+    parts = np.array_split(np.arange(len(where)), n_parts)
+
+    def answer(part: LongArray) -> MeshPaths:
+        return _one_by_one(search, where[part], ends[part], epsilon)
+
+    if n_parts == 1:
+        return answer(parts[0])
+    with ThreadPoolExecutor(n_parts) as pool:
+        found = list(pool.map(answer, parts))
+    before = np.cumsum([0, *(len(of.positions) for of in found)])
+    starts = [of.path_start[:-1] + base for of, base in zip(found, before, strict=False)]
+    return MeshPaths(
+        np.concatenate([of.length_cells for of in found]),
+        np.concatenate([of.lower_bound_cells for of in found]),
+        np.concatenate([*starts, before[-1:]]),
+        np.concatenate([of.positions for of in found]),
+    )
+
+
+def _one_by_one(
+    search: MeshSearch, where: LongArray, ends: FloatArray, epsilon: float
+) -> MeshPaths:
+    """The answers of one thread; rooms are doubled until they are large enough."""
+    count = len(where)
+    length, bound = np.empty(count), np.empty(count)
+    starts = np.zeros(count + 1, dtype=np.int64)
+    positions = np.empty((_ROOM * max(count, 4), 2))
+    effort = math.inf, 1.0 + epsilon, NO_LIMIT
+    at = n = 0
+    with search.works.lent() as work:
+        while at < count:
+            answers = length, bound, starts, positions
+            at, n, short = many(search.fixed, (where, ends), work.arrays, effort, answers, at, n)
+            if short == NO_ROOM:
+                work.make_room()
+            elif short == FULL:
+                positions = np.concatenate([positions, np.empty_like(positions)])
+    return MeshPaths(length, np.minimum(bound, length), starts, positions[:n])
