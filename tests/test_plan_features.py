@@ -552,9 +552,9 @@ def test_what_cannot_be_closed_is_refused_in_one_line(preset: str, blocked: Any)
 @pytest.mark.parametrize(
     ("preset", "override", "message"),
     [
-        ("fast", "planner.epsilon=0.1", "epsilon needs refine: gates"),
-        ("paper", "planner.epsilon=0.1", "epsilon needs refine: gates"),
-        ("grid-astar", "planner.epsilon=0", "epsilon needs refine: gates"),
+        ("fast", "planner.epsilon=0.1", "epsilon needs refine: gates, or none"),
+        ("paper", "planner.epsilon=0.1", "epsilon needs refine: gates, or none"),
+        ("grid-astar", "planner.epsilon=0", "epsilon needs refine: gates, or none"),
         ("paper", "planner.refine=gates", "coarse: max-distance goes with refine: grid-astar"),
         ("grid-astar", "planner.refine=stored-paths", "coarse: none goes with refine: grid-astar"),
         ("balanced", "planner.coarse=none", "coarse: none goes with refine"),

@@ -149,3 +149,25 @@ def test_smoothing_changes_nothing() -> None:
     ]
     assert len({result.cost for result in results}) == 1
     assert {result.metric for result in results} == {"any-angle"}
+
+
+@settings(max_examples=30, deadline=None)
+@given(class_grids(max_side=14), seeds, st.sampled_from([0.0, 0.01, 0.3]))
+def test_a_path_is_as_near_the_optimum_as_it_was_asked_to_be(
+    classes: Any, seed: int, epsilon: float
+) -> None:
+    cells = np.argwhere(classes == hn.CellClass.FREE)
+    assume(len(cells))
+    topology = mapped(classes)
+    exact, near = shortest(topology), shortest(topology, f"planner.epsilon={epsilon}")
+    starts, goals = np.random.default_rng(seed).choice(cells, (2, 8)) + 0.5
+    many = near.plan_many(starts[:, ::-1], goals[:, ::-1])
+    for query, ends in enumerate(zip(starts[:, ::-1], goals[:, ::-1], strict=True)):
+        optimum, found = exact.plan(*ends).cost, near.plan(*ends)
+        assert many.cost[query] == found.cost
+        assert many.lower_bound[query] == found.lower_bound
+        assert found.solved == math.isfinite(optimum)
+        if found.solved:
+            assert found.gap <= epsilon + 1e-9
+            assert found.lower_bound <= optimum * (1 + 1e-9)
+            assert optimum <= found.cost * (1 + 1e-9)

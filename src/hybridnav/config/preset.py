@@ -92,8 +92,8 @@ class PlannerSettings(_Section):
     ompl: OmplSettings | None = None
     """With `refine: ompl`, section of its own; null elsewhere."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
-    """With `gates`: what is looked at ends once no path can be shorter by more than this part; null
-    or 0 for the optimum."""
+    """With `gates`, and on the mesh: the search ends once no path can be shorter by more than this
+    part; null or 0 for the optimum."""
     smooth: Literal["none", "line-of-sight"] = "none"
     """Whether the path is shortened to an any-angle one."""
     allow_unexplored: bool = False
@@ -116,7 +116,7 @@ class PlannerSettings(_Section):
                     "no_smooth", "smooth goes with grid paths: with refine: ompl set it to none"
                 )
             if self.epsilon is not None:
-                raise PydanticCustomError("gates_needed", "epsilon needs refine: gates")
+                raise PydanticCustomError("bounds_needed", "epsilon goes with no refine: ompl")
             return self
         if self.refine not in _REFINED_BY[self.coarse]:
             fitting = " or ".join((*_REFINED_BY[self.coarse], "ompl"))
@@ -127,8 +127,10 @@ class PlannerSettings(_Section):
             raise PydanticCustomError(
                 "no_smooth", "smooth goes with grid paths: with coarse: mesh set it to none"
             )
-        if self.epsilon is not None and self.refine != "gates":
-            raise PydanticCustomError("gates_needed", "epsilon needs refine: gates")
+        if self.epsilon is not None and self.refine not in {"gates", "none"}:
+            raise PydanticCustomError(
+                "bounds_needed", "epsilon needs refine: gates, or none on the mesh"
+            )
         return self
 
 

@@ -2,26 +2,42 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import OrderedDict
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.lines import cells_of_line, polyline_lengths
-from hybridnav.mesh import MeshSearch, build_mesh, cut_mesh, shortest_paths
+from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
+from hybridnav.mesh import MeshPath, MeshSearch, build_mesh, cut_mesh, shortest_paths
 from hybridnav.planner.cell_plans import CellPlan, CellPlans
+from hybridnav.refine import LineOfSight
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.mesh import MeshPath
     from hybridnav.planner.closed import ClosedCells
+    from hybridnav.refine import GridRefiner
 
 Cell = tuple[int, int]
+Position = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Query:
+    """Ends as cells and as (row, col) in grid units, what is closed, and the time there is."""
+
+    cells: tuple[Cell, Cell]
+    positions: tuple[Position, Position]
+    closed: ClosedCells | None
+    budget_s: float | None
+
 
 _KEPT = 4
 """Meshes with something closed that are kept for the next queries which close the same."""
@@ -35,8 +51,10 @@ class OverMesh:
     ----------
     grid
         The map, without corner cutting.
-    allow_unexplored
-        Whether unexplored cells may be entered.
+    refiner
+        Finds paths of cells, for queries whose time is up before the search of the mesh has one.
+    settings
+        Whether unexplored cells may be entered, and how near the optimum is near enough.
 
     Raises
     ------
@@ -44,15 +62,20 @@ class OverMesh:
         When the map allows corner cutting.
     """
 
-    def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool) -> None:
+    def __init__(
+        self, grid: OccupancyGrid, refiner: GridRefiner, settings: PlannerSettings
+    ) -> None:
         if grid.corner_cutting:
             raise InvalidValueError(
                 "shortest any-angle paths do not pass between two blocked cells that meet at a "
                 "corner, and this map allows that (corner_cutting): load it without, or take "
                 "preset grid-astar"
             )
-        self._frame = grid.frame
-        self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=allow_unexplored))
+        self._grid, self._frame = grid, grid.frame
+        self._refiner = refiner
+        self._allow_unexplored = settings.allow_unexplored
+        self._epsilon = settings.epsilon or 0.0
+        self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
         self._search: MeshSearch | None = None
         self._cut: OrderedDict[bytes, MeshSearch] = OrderedDict()
         self._building = threading.Lock()
@@ -75,6 +98,8 @@ class OverMesh:
         cells: tuple[Cell, Cell],
         ends: tuple[FloatArray, FloatArray],
         closed: ClosedCells | None,
+        *,
+        budget_s: float | None = None,
     ) -> CellPlan:
         """Find a shortest path between two points.
 
@@ -86,36 +111,79 @@ class OverMesh:
             `(x, y)` in metres, map frame.
         closed
             What is closed for this query, the ends not; None for nothing.
+        budget_s
+            Seconds for the search of the mesh. When they are over, and where the mesh is not built
+            yet, a path of cells that is shortened by line of sight is the answer, with the bound
+            that the search has proved. None for as long as it takes.
         """
         began = time.perf_counter()
         seconds = {}
-        if self._search is None:
+        if self._search is None and budget_s is None:
             self.prepare()
             seconds["mesh"] = time.perf_counter() - began
-        search = self.prepare()
-        places = [self._frame.position_of(float(end[0]), float(end[1])) for end in ends]
-        positions = places[0], places[1]
+        row, col = self._frame.position_of(float(ends[0][0]), float(ends[0][1]))
+        positions = (row, col), self._frame.position_of(float(ends[1][0]), float(ends[1][1]))
+        query = _Query(cells, positions, closed, budget_s)
         now = time.perf_counter()
-        found, free = search.path(cells, positions), self._free
-        expanded = found.expanded
-        passed = self._passed(free, cells, found)
-        if closed is not None and passed is not None and closed.are_near(passed, free.shape):
-            search, free = self._without(search, closed)
-            found = search.path(cells, positions)
-            expanded += found.expanded
-            passed = self._passed(free, cells, found)
+        found, passed, expanded = self._found(query)
         seconds["shortest"] = time.perf_counter() - now
-        if found.positions is None:
-            return CellPlan(None, metric="any-angle", expanded=expanded, seconds=seconds)
-        points = self._frame.points_of_grid(found.positions)
-        points[0], points[-1] = ends
-        return CellPlan(
+        plan = CellPlan(
             passed,
             metric="any-angle",
-            points=points,
             length_cells=found.length_cells,
             bound_cells=found.lower_bound_cells,
             expanded=expanded,
+            seconds=seconds,
+        )
+        if found.positions is not None:
+            points = self._frame.points_of_grid(found.positions)
+            points[0], points[-1] = ends
+            return replace(plan, points=points)
+        if math.isinf(found.lower_bound_cells):
+            return plan  # there is none
+        return self._in_sight(query, ends, plan)
+
+    def _found(self, query: _Query) -> tuple[MeshPath, LongArray | None, int]:
+        """What the search of the mesh finds, the cells that it passes, and nodes expanded."""
+        search, free = self._search, self._free
+        if search is None:
+            bound = math.dist(*query.positions)
+            return MeshPath(None, math.inf, bound, 0), None, 0
+        effort: Any = {"epsilon": self._epsilon, "budget_s": query.budget_s}
+        found = search.path(query.cells, query.positions, **effort)
+        expanded = found.expanded
+        passed = self._passed(free, query.cells, found)
+        closed = query.closed
+        if closed is not None and (passed is None or closed.are_near(passed, free.shape)):
+            if passed is None and math.isinf(found.lower_bound_cells):
+                return found, None, expanded
+            search, free = self._without(search, closed)
+            found = search.path(query.cells, query.positions, **effort)
+            expanded += found.expanded
+            passed = self._passed(free, query.cells, found)
+        return found, passed, expanded
+
+    def _in_sight(
+        self, query: _Query, ends: tuple[FloatArray, FloatArray], plan: CellPlan
+    ) -> CellPlan:
+        """The shortest path of cells, shortened by line of sight, with the bound of a plan."""
+        began = time.perf_counter()
+        flat = None if query.closed is None else query.closed.flat
+        found = self._refiner.search.search(*query.cells, blocked=flat)
+        points, cells = None, found.cells
+        if cells is not None:
+            allowed = self._allow_unexplored
+            sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=flat)
+            points = sight.shorten(cells, *ends)
+        seconds = {**plan.seconds, "line-of-sight": time.perf_counter() - began}
+        length = math.inf if points is None else polyline_length(points) / self._frame.resolution_m
+        return replace(
+            plan,
+            cells=cells,
+            points=points,
+            length_cells=length,
+            bound_cells=min(plan.bound_cells, length),
+            expanded=plan.expanded + found.expanded,
             seconds=seconds,
         )
 
@@ -132,16 +200,23 @@ class OverMesh:
             float64 (n, 2), starts and goals, `(x, y)` in metres, map frame.
         """
         positions = self._frame.positions_of(points[0]), self._frame.positions_of(points[1])
-        found = shortest_paths(self.prepare(), cells, positions)
+        found = shortest_paths(self.prepare(), cells, positions, epsilon=self._epsilon)
         along = self._frame.points_of_grid(found.positions)
         solved = np.isfinite(found.length_cells)
         along[found.path_start[:-1][solved]] = points[0][solved]
         along[found.path_start[1:][solved] - 1] = points[1][solved]
         cost_m = polyline_lengths(along, found.path_start)
+        share = np.ones(len(cost_m))
+        moves = solved & (found.length_cells > 0)
+        np.divide(found.lower_bound_cells, found.length_cells, out=share, where=moves)
         return CellPlans(
-            np.ones(len(cost_m), dtype=np.bool_), "any-angle", cost_m, cost_m,
-            found.path_start, along,
-        )  # fmt: skip
+            is_done=np.ones(len(cost_m), dtype=np.bool_),
+            metric="any-angle",
+            cost_m=cost_m,
+            lower_bound_m=cost_m * share,
+            path_start=found.path_start,
+            points=along,
+        )
 
     def _passed(
         self, free: BoolArray, cells: tuple[Cell, Cell], found: MeshPath

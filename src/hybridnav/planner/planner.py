@@ -71,7 +71,7 @@ class HybridPlanner:
         elif settings.coarse == "portals":
             self._cells = OverPortals(topology, self._refiner, settings)
         elif settings.coarse == "mesh":
-            self._cells = OverMesh(topology.grid, allow_unexplored=settings.allow_unexplored)
+            self._cells = OverMesh(topology.grid, self._refiner, settings)
         else:
             self._cells = WholeMap(self._refiner)
         self._ompl: OmplPlanner | None = None
