@@ -6,10 +6,11 @@ import errno
 import os
 import shutil
 import threading
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 _unfinished: set[Path] = set()
@@ -34,16 +35,11 @@ def replace_file(path: Path, content: bytes) -> None:
         path.write_bytes(content)
         return
     path = path.resolve()
-    beside = _beside(path)
-    _unfinished.add(beside)
-    try:
+    with _beside(path) as beside:
         beside.write_bytes(content)
         if path.exists():
             shutil.copymode(path, beside)
         beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
-        _unfinished.discard(beside)
 
 
 def check_replaceable(path: Path) -> None:
@@ -63,14 +59,8 @@ def check_replaceable(path: Path) -> None:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if _is_no_file(path):
         return
-    path = path.resolve()
-    beside = _beside(path)
-    _unfinished.add(beside)
-    try:
+    with _beside(path.resolve()) as beside:
         beside.touch(exist_ok=False)
-    finally:
-        beside.unlink(missing_ok=True)
-        _unfinished.discard(beside)
 
 
 def _is_no_file(path: Path) -> bool:
@@ -78,9 +68,16 @@ def _is_no_file(path: Path) -> bool:
     return path.exists() and not path.is_file()
 
 
-def _beside(path: Path) -> Path:
-    """Return where a thread writes what becomes a file, however long the file's name is."""
-    return path.with_name(f".hybridnav.{os.getpid()}.{threading.get_ident()}")
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    """Yield where a thread writes what becomes a file, however long its name is, and remove it."""
+    beside = path.with_name(f".hybridnav.{os.getpid()}.{threading.get_ident()}")
+    _unfinished.add(beside)
+    try:
+        yield beside
+    finally:
+        beside.unlink(missing_ok=True)
+        _unfinished.discard(beside)
 
 
 def remove_unfinished() -> None:
