@@ -85,7 +85,7 @@ def test_axes_given_are_axes_returned_and_settings_stay(name):
     assert dict(mpl.rcParams) == before
 
 
-@pytest.mark.parametrize("width", [3.0, 12.0])
+@pytest.mark.parametrize("width", [3.0, 3.75, 6.5, 12.0])
 @pytest.mark.parametrize("name", NEW)
 def test_words_fit_and_do_not_collide_at_any_width(name, width):
     ax = NEW[name](width_in=width)

@@ -88,7 +88,7 @@ def add_title(canvas: Canvas, pieces: Sequence[str]) -> None:
     """Put a title over the map, no wider than the room there is."""
     font = canvas.sizes.font
     canvas.ax.set_title(
-        wrapped(pieces, font, canvas.room),
+        wrapped(pieces, font, _room_over(canvas)),
         fontsize=font,
         pad=0.6 * font,
         linespacing=1.3,
@@ -146,7 +146,7 @@ def add_legend(canvas: Canvas, entries: Sequence[Entry], *, bar: float, below: f
     """
     font = canvas.sizes.font
     widths = [text_width(label, font) for _, label in entries]
-    columns = _columns(widths, font, canvas.room)
+    columns = _columns(widths, font, _room_over(canvas))
     beside = _columns(widths, font, canvas.map_width - bar - 2 * font)
     rows, rows_beside = (-(-len(entries) // max(n, 1)) for n in (columns, beside))
     is_beside = bar > 0 and beside > 0 and rows_beside <= rows + 1
@@ -197,13 +197,7 @@ def fit_height(canvas: Canvas, legend: Legend) -> None:
     box = ax.get_window_extent()
     around = ax.get_tightbbox() or box
     lowest = min(around.y0, legend.get_window_extent().y0)
-    left = right = 0.0
-    if ax.axison:
-        # Of what stands left and right only ticks take room from the map: a title may be wider.
-        ticks = [t for axis in (ax.xaxis, ax.yaxis) if (t := axis.get_tightbbox()) is not None]
-        left = max((box.x0 - tick.x0 for tick in ticks), default=0.0)
-        right = max((tick.x1 - box.x1 for tick in ticks), default=0.0)
-    outside = np.array([left, right, box.y0 - lowest, around.y1 - box.y1])
+    outside = np.array([*_ticks(ax), box.y0 - lowest, around.y1 - box.y1])
     left, right, bottom, top = outside.clip(0) / figure.dpi + PAD_IN
     map_width = width - left - right
     map_height = min(map_width * view.size[1] / view.size[0], MAX_HEIGHT * width)
@@ -211,6 +205,32 @@ def fit_height(canvas: Canvas, legend: Legend) -> None:
     figure.set_size_inches(width, height)
     place = Bbox.from_bounds(left / width, bottom / height, map_width / width, map_height / height)
     ax.set_position(place)
+
+
+def _room_over(canvas: Canvas) -> float:
+    """Return the width in points of what stands over or under the middle of the map.
+
+    `fit_height` moves the map of a new figure aside, to where its ticks have room.
+    """
+    if not canvas.is_new:
+        return canvas.room
+    left, right = _ticks(canvas.ax)
+    return canvas.room - 72 * abs(left - right) / canvas.ax.figure.dpi
+
+
+def _ticks(ax: Axes) -> tuple[float, float]:
+    """Return how far ticks with their labels stand out left and right of the map, in pixels.
+
+    Of what stands there they alone take room from the map: a title may be wider.
+    """
+    if not ax.axison:
+        return 0.0, 0.0
+    ax.apply_aspect()
+    box = ax.get_window_extent()
+    ticks = [t for axis in (ax.xaxis, ax.yaxis) if (t := axis.get_tightbbox()) is not None]
+    left = max((box.x0 - tick.x0 for tick in ticks), default=0.0)
+    right = max((tick.x1 - box.x1 for tick in ticks), default=0.0)
+    return max(left, 0.0), max(right, 0.0)
 
 
 def _shift(ax: Axes, right: float, up: float) -> ScaledTranslation:

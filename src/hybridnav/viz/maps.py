@@ -174,10 +174,10 @@ def arc_handle(sizes: Sizes) -> Line2D:
 def _finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
     """Title, axes in metres, legend."""
     ax, font = canvas.ax, canvas.sizes.font
-    add_title(canvas, words)
     ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
     ax.set_xlabel("x in metres", fontsize=font, labelpad=0.3 * font)
     ax.set_ylabel("y in metres", fontsize=font, labelpad=0.3 * font)
     for spine in ax.spines.values():
         spine.set(linewidth=0.6, color=style.ARC)
+    add_title(canvas, words)
     fit_height(canvas, add_legend(canvas, entries, bar=0, below=3.4 * font))
