@@ -1,0 +1,134 @@
+"""What a search of the mesh looked at, to be drawn and counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.mesh._interval_kernels import G
+from hybridnav.mesh._polyanya_kernels import N
+from hybridnav.mesh.search import Cell, MeshPath, MeshSearch, Position, _inside
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, FloatArray, IntArray
+    from hybridnav.mesh.build import ConvexMesh
+
+_LEFT, _RIGHT = 1, 2
+"""Bits of a node: its interval reaches the left, the right corner of its side."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchTrace:
+    """The intervals that a search of the mesh made, in the order in which it made them.
+
+    An interval is a part of a side that is all seen from one point, its root.
+    """
+
+    mesh: ConvexMesh
+    """The mesh."""
+    path: MeshPath
+    """What was found."""
+    ends: FloatArray
+    """float64 (2, 2), (row, col) of start and goal in grid units."""
+    intervals: FloatArray
+    """float64 (n, 2, 2), (row, col) of the left and the right end of each interval, as its root
+    sees them."""
+    roots: FloatArray
+    """float64 (n, 2), (row, col) of each interval's root: the start, or a corner at which the
+    path to the interval turns last."""
+    costs_cells: FloatArray
+    """float64 (n,), length of the path from the start to each root."""
+    parents: IntArray
+    """int32 (n,), the interval behind which each was found, -1 for the first ones."""
+
+    @property
+    def is_followed(self) -> BoolArray:
+        """bool (n,), whether an interval was found behind each: not behind those that were left in
+        the open list, that another way to their root beat, or that lead nowhere."""
+        followed = np.zeros(len(self.parents), dtype=np.bool_)
+        followed[self.parents[self.parents >= 0]] = True
+        return followed
+
+
+def trace_search(
+    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
+) -> SearchTrace:
+    """Search a shortest path as `MeshSearch.path` does, and keep what was looked at.
+
+    Parameters
+    ----------
+    mesh
+        Of the map's free space.
+    cells
+        The free cells (row, col) that hold start and goal.
+    positions
+        Start and goal, (row, col) in grid units, in the closed squares of these cells.
+
+    Returns
+    -------
+    SearchTrace
+        Without intervals where start and goal lie in one polygon or are not connected.
+    """
+    ends = np.array([_inside(*end) for end in zip(cells, positions, strict=True)])
+    path, whole, real = _nodes(mesh, cells, positions)
+    slots, roots, parents, marks = whole.T
+    # Nodes that are the goal itself have no side.
+    kept = slots >= 0
+    number = np.append(np.cumsum(kept) - 1, -1)
+    sides = _sides(mesh, slots[kept])
+    at = mesh.corners[roots[kept]].astype(np.float64)
+    at[roots[kept] < 0] = ends[0]
+    return SearchTrace(
+        mesh,
+        path,
+        ends,
+        _seen(sides, at, marks[kept], real[kept]),
+        at,
+        real[kept, G],
+        number[parents[kept]].astype(np.int32),
+    )
+
+
+def _nodes(
+    mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
+) -> tuple[MeshPath, IntArray, FloatArray]:
+    """Return what a search finds, and its nodes: see the columns of `_interval_kernels`."""
+    search = MeshSearch(mesh)
+    path = search.path(cells, positions)
+    # Nobody else has this search: it lends again what the query has just returned.
+    with search._works.lent() as work:  # noqa: SLF001 - the nodes of the query
+        n = work.counts[N]
+        whole, real = work.nodes
+        return path, whole[:n].copy(), real[:n].copy()
+
+
+def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
+    """Return the corners of sides, float64 (n, 2, 2): the one on the left of who comes through."""
+    stops = np.roll(mesh.begins, -1)
+    stops[mesh.first[1:] - 1] = mesh.begins[mesh.first[:-1]]
+    pairs: FloatArray = mesh.corners[np.stack([mesh.begins, stops], axis=1)[slots]].astype(
+        np.float64
+    )
+    return pairs
+
+
+def _seen(sides: FloatArray, roots: FloatArray, marks: IntArray, real: FloatArray) -> FloatArray:
+    """Return the parts of sides that are seen between two rays, (n, 2, 2)."""
+    intervals = sides.copy()
+    along = sides[:, 1] - sides[:, 0]
+    off = sides[:, 0] - roots
+    at_side = (sides == roots[:, None]).all(axis=2).any(axis=1)
+    for end, bit, ray in ((0, _LEFT, real[:, 2:0:-1]), (1, _RIGHT, real[:, 4:2:-1])):
+        cut = (marks >= 0) & (marks & bit == 0) & ~at_side
+        way = (ray - roots)[cut]
+        side, start = along[cut], off[cut]
+        share = _cross(start, way) / _cross(way, side)
+        intervals[cut, end] = sides[cut, 0] + share.clip(0, 1)[:, None] * side
+    return intervals
+
+
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    found: FloatArray = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return found
