@@ -14,12 +14,15 @@ from matplotlib.text import Text
 from PIL import Image
 
 import hybridnav as hn
+from hybridnav.mesh import build_mesh, trace_search
 from hybridnav.viz import (
     plot_dual,
     plot_map,
+    plot_mesh,
     plot_places,
     plot_plan,
     plot_rooms,
+    plot_search,
     plot_topology,
     plot_tour,
 )
@@ -67,6 +70,13 @@ def _tour(ax: Axes) -> Axes:
     return plot_tour(two_rooms(), tour, ax=ax)
 
 
+def _search(ax: Axes) -> Axes:
+    grid = two_rooms().grid
+    mesh = build_mesh(grid.classes == hn.CellClass.FREE)
+    cells, positions = ((5, 4), (12, 56)), ((5.5, 4.25), (12.5, 56.5))
+    return plot_search(grid, trace_search(mesh, cells, positions), ax=ax)
+
+
 PICTURES: dict[str, Callable[[Axes], Axes]] = {
     "map": lambda ax: plot_map(two_rooms().grid, ax=ax),
     "places": lambda ax: plot_places(two_rooms(), ax=ax, self_loops=True),
@@ -75,6 +85,8 @@ PICTURES: dict[str, Callable[[Axes], Axes]] = {
     "plan": _plan,
     "rooms": lambda ax: plot_rooms(two_rooms(), ax=ax),
     "tour": _tour,
+    "mesh": lambda ax: plot_mesh(two_rooms().grid, ax=ax),
+    "search": _search,
 }
 
 

@@ -21,6 +21,7 @@ from hybridnav.viz import (
     plot_dual,
     plot_level,
     plot_map,
+    plot_mesh,
     plot_places,
     plot_rooms,
     plot_topology,
@@ -35,6 +36,7 @@ NEW = {
     "topology": partial(plot_topology, figure1()),
     "dual": partial(plot_dual, figure1()),
     "rooms": partial(plot_rooms, two_rooms()),
+    "mesh": partial(plot_mesh, two_rooms().grid),
 }
 TOLERANCE = 4.0
 """Root mean square over all channels, out of 255; 256 colours and other rounding make about 1."""
@@ -68,6 +70,7 @@ def test_a_picture_looks_as_it_did(name, tmp_path):
         ("dual", "INK", style.FREE),
         ("plan", "PATH", style.FREE),
         ("rooms", "PLACES", style.PLACES[::-1]),
+        ("search", "PATH", style.FREE),
     ],
 )
 def test_a_picture_that_lacks_something_does_not(name, setting, value, tmp_path, monkeypatch):

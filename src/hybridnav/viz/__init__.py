@@ -4,6 +4,7 @@ from hybridnav.viz.dual import plot_dual
 from hybridnav.viz.kernels import plot_kernels
 from hybridnav.viz.levels import plot_levels
 from hybridnav.viz.maps import plot_level, plot_map, plot_places
+from hybridnav.viz.mesh import plot_mesh
 from hybridnav.viz.paper import plot_figure1
 from hybridnav.viz.plan import plot_plan
 from hybridnav.viz.rooms import plot_rooms
@@ -20,6 +21,7 @@ __all__ = [
     "plot_level",
     "plot_levels",
     "plot_map",
+    "plot_mesh",
     "plot_places",
     "plot_plan",
     "plot_rooms",

@@ -1,4 +1,4 @@
-"""Pictures of a sampling-based search: what it drew, what it joined, and what came of it."""
+"""Pictures of a search: what it looked at, and what came of it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.mesh import SearchTrace
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
-from hybridnav.viz.maps import ground_entries
-from hybridnav.viz.topology import frame_axes
+from hybridnav.viz.mesh import check_mesh, draw_intervals, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +31,7 @@ _STATE, _EDGE = style.HOLE, style.PARALLEL
 
 def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     grid: OccupancyGrid,
-    search: Search | None,
+    search: Search | SearchTrace | None,
     *,
     corridor: BoolArray | None = None,
     path: Path | None = None,
@@ -40,23 +39,27 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw the states and motions of an OMPL search, the corridor that it kept to, and its path.
+    """Draw what a search looked at, the corridor that it kept to, and its path.
+
+    The states and motions of a search by OMPL; or what a search of the mesh saw through each
+    interval, coloured in the order in which it was found, and the roots from which it was seen.
 
     Parameters
     ----------
     grid
         The map. The picture is cropped to its known part.
     search
-        States that were drawn and found valid (dots), and motions of trees or roadmaps (lines);
-        None for a search that looked at nothing, as where a straight line will do.
+        Of OMPL: states that were drawn and found valid (dots), and motions of trees or roadmaps
+        (lines); None for a search that looked at nothing, as where a straight line will do. Of the
+        mesh: what `trace_search` returned.
     corridor
         bool (rows, cols), the cells that the search might stand on; None for all.
     path
-        The path found.
+        The path found; a search of the mesh has its own.
     ax
         Where to draw; by default new axes in a new figure. Leave room below for the legend.
     title
-        Replaces the title that counts states and motions; an empty one leaves it out.
+        Replaces the title that counts what was looked at; an empty one leaves it out.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -68,7 +71,7 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     Raises
     ------
     InvalidValueError
-        When the corridor has another shape than the grid.
+        When the corridor or the mesh has another shape than the grid.
     """
     if corridor is not None:
         corridor = np.asarray(corridor, dtype=np.bool_)
@@ -78,24 +81,15 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
             )
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     _draw_ground(canvas, grid, corridor)
-    n_states = 0 if search is None else len(search.states)
-    n_edges = 0 if search is None else len(search.edges)
+    if isinstance(search, SearchTrace):
+        check_mesh(grid, search.mesh)
+        entries = draw_intervals(canvas, grid, search)
+        counts = [f"{len(search.parents):,} intervals", f"{search.path.expanded:,} expanded"]
+    else:
+        entries = _draw_states(canvas, search)
+        sizes = (0, 0) if search is None else (len(search.states), len(search.edges))
+        counts = [f"{sizes[0]:,} states", f"{sizes[1]:,} motions"]
     line = canvas.sizes.line
-    entries: list[Entry] = []
-    if search is not None and n_edges:
-        lines = np.array(search.edges, dtype=np.float64).reshape(-1, 2, 2)
-        drawn = LineCollection(list(lines), colors=_EDGE, linewidths=0.5 * line, zorder=3)
-        drawn.set_gid("motions")
-        canvas.ax.add_collection(drawn, autolim=False)
-        entries.append((Line2D([], [], color=_EDGE, lw=1.2 * line), "motions of the trees"))
-    if search is not None and n_states:
-        at = np.array(search.states, dtype=np.float64).reshape(-1, 2)
-        dots = canvas.ax.scatter(
-            at[:, 0], at[:, 1], s=(1.3 * line) ** 2, c=_STATE, linewidths=0, zorder=4
-        )
-        dots.set_gid("states")
-        dot = Line2D([], [], ls="", marker="o", ms=3 * line, mfc=_STATE, mec="none")
-        entries.append((dot, "states drawn"))
     if path is not None:
         way = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5)
         way.set_gid("path")
@@ -104,14 +98,29 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     if corridor is not None:
         (colour,) = style.rgb(_CORRIDOR, strength=_STRENGTH) / 255
         entries.append((Patch(fc=colour), "corridor"))
-    frame_axes(canvas)
-    words = [grid.name, f"{n_states:,} states", f"{n_edges:,} motions"]
-    add_title(canvas, words if title is None else [title])
-    bar = add_scale_bar(canvas)
-    below = 0.35 * canvas.sizes.font
-    legend = add_legend(canvas, entries + ground_entries(grid), bar=bar, below=below)
-    fit_height(canvas, legend)
+    finish(canvas, grid, entries, [grid.name, *counts] if title is None else [title])
     return canvas.ax
+
+
+def _draw_states(canvas: Canvas, search: Search | None) -> list[Entry]:
+    """The states and motions of a search by OMPL."""
+    line = canvas.sizes.line
+    entries: list[Entry] = []
+    if search is not None and len(search.edges):
+        lines = np.array(search.edges, dtype=np.float64).reshape(-1, 2, 2)
+        drawn = LineCollection(list(lines), colors=_EDGE, linewidths=0.5 * line, zorder=3)
+        drawn.set_gid("motions")
+        canvas.ax.add_collection(drawn, autolim=False)
+        entries.append((Line2D([], [], color=_EDGE, lw=1.2 * line), "motions of the trees"))
+    if search is not None and len(search.states):
+        at = np.array(search.states, dtype=np.float64).reshape(-1, 2)
+        dots = canvas.ax.scatter(
+            at[:, 0], at[:, 1], s=(1.3 * line) ** 2, c=_STATE, linewidths=0, zorder=4
+        )
+        dots.set_gid("states")
+        dot = Line2D([], [], ls="", marker="o", ms=3 * line, mfc=_STATE, mec="none")
+        entries.append((dot, "states drawn"))
+    return entries
 
 
 def _draw_ground(canvas: Canvas, grid: OccupancyGrid, corridor: BoolArray | None) -> None:
