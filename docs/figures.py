@@ -10,18 +10,21 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.viz import plot_level, plot_rooms, save_figure
+from hybridnav.mesh import build_mesh, trace_search
+from hybridnav.viz import plot_level, plot_mesh, plot_rooms, plot_search, save_figure
 
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
 LEVELS = (6, 8, 10, -1)
+START, GOAL = (1.0, 13.2), (40.6, 19.4)
 
 
 def draw_route(file: Path) -> None:
     """Draw what `make route` draws, with its command."""
     command = [sys.executable, "-m", "hybridnav", "plan", str(OFFICE)]
-    command += ["--start", "1.0,13.2", "--goal", "40.6,19.4", "--compare", "--plot", str(file)]
+    ends = (",".join(map(str, end)) for end in (START, GOAL))
+    command += ["--start", next(ends), "--goal", next(ends), "--compare", "--plot", str(file)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own command
 
 
@@ -44,6 +47,20 @@ def draw_rooms(file: Path) -> None:
     save_figure(plot_rooms(hn.TopologicalMap(pyramid)), file, dpi=150)
 
 
+def draw_mesh(file: Path) -> None:
+    """Draw the convex mesh of the office."""
+    save_figure(plot_mesh(hn.load_map(OFFICE, robot_radius_m=0.25)), file, dpi=150)
+
+
+def draw_search(file: Path) -> None:
+    """Draw the search of the mesh that finds the shortest path through the office."""
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    mesh, frame = build_mesh(grid.classes == hn.CellClass.FREE), grid.frame
+    cells = frame.cell_of(*START), frame.cell_of(*GOAL)
+    trace = trace_search(mesh, cells, (frame.position_of(*START), frame.position_of(*GOAL)))
+    save_figure(plot_search(grid, trace), file, dpi=150)
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -55,6 +72,8 @@ if __name__ == "__main__":
         (draw_route, "office-route.png"),
         (draw_levels, "office-levels.png"),
         (draw_rooms, "office-rooms.png"),
+        (draw_mesh, "mesh-office.png"),
+        (draw_search, "mesh-search.png"),
     ):
         draw(IMAGES / name)
         shrink(IMAGES / name)
