@@ -332,6 +332,25 @@ def test_what_a_smoothed_preset_is_called():
     names = [s.name for s in methods_of(RunSettings(maps=(), presets=(smooth,)), None)]
     assert names == ["grid-astar", "grid-astar+line-of-sight"]
     assert preset_spec("paper").metric == "octile"
+    assert preset_spec("shortest").metric == "any-angle"
+
+
+@pytest.mark.usefixtures("here")
+def test_the_preset_of_shortest_paths_loses_nothing(folder, tmp_path):
+    only = RunSettings(
+        maps=(str(folder.parent / "rooms.map"),),
+        presets=("shortest", "grid-astar"),
+        pairs=N_PAIRS,
+        merge_distance_m=4.0,
+    )
+    evaluate(only, tmp_path)
+    study = write_outputs(tmp_path, metric="any-angle")
+    assert study.faults == []
+    losses = outcome_of(study, "shortest").losses
+    np.testing.assert_array_equal(losses, np.zeros(N_PAIRS))
+    assert (outcome_of(study, "grid-astar").losses >= losses).all()
+    with pytest.raises(InvalidValueError, match=r"preset shortest.*corner cutting"):
+        methods_of(replace(only, corner_cutting=True), None)
 
 
 # --- OMPL ---------------------------------------------------------------------------------------

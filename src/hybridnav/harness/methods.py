@@ -68,7 +68,8 @@ class MethodSpec:
     def metric(self) -> Metric:
         """Of its paths. A baseline whose answers have a `line` is not known as any-angle here."""
         planner = (self.preset or {}).get("planner", {})
-        is_line = planner.get("refine") == "ompl" or planner.get("smooth") == LINE_OF_SIGHT
+        settings = ("refine", "ompl"), ("smooth", LINE_OF_SIGHT), ("coarse", "mesh")
+        is_line = any(planner.get(key) == value for key, value in settings)
         return "any-angle" if is_line else "octile"
 
     @cached_property
