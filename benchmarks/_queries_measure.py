@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import gc
+import math
+import os
 import resource
 import time
 import warnings
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
@@ -15,19 +16,19 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.config import load_preset
 from hybridnav.grid.worlds import figure1_world, office_world
+from hybridnav.harness.analysis import loss_of
 from hybridnav.harness.methods import _nbytes
 from hybridnav.harness.pairs import sample_pairs
-from hybridnav.harness.records import environment
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.metrics import judge_path, segment_faults
+from hybridnav.metrics import judge_line, judge_path
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from hybridnav._typing import FloatArray
     from hybridnav.harness.pairs import Pair
-
-Record = dict[str, Any]
+    from hybridnav.harness.tables import Row
 
 YARDSTICK = "grid-astar"
 RADIUS_M = 0.25
@@ -40,26 +41,17 @@ N_WARM = 3
 SLACK = 1e-9
 """Relative difference of two lengths that is rounding."""
 
-
-@dataclass(frozen=True)
-class Method:
-    """A row of the table: a preset, what is set otherwise in it, and what it promises."""
-
-    preset: str
-    overrides: tuple[str, ...] = ()
-    metric: str = "octile"
-    epsilon: float | None = None
+Presets = dict[str, hn.Preset]
 
 
-METHODS = {
-    YARDSTICK: Method("grid-astar"),
-    "paper": Method("paper"),
-    "fast": Method("fast"),
-    "balanced": Method("balanced"),
-    "certified, epsilon 0.01": Method("certified", ("planner.epsilon=0.01",), epsilon=0.01),
-    "certified, epsilon 0": Method("certified", ("planner.epsilon=0",), epsilon=0.0),
-    "balanced, any-angle": Method("balanced", ("planner.smooth=line-of-sight",), "any-angle"),
-}
+def presets_of(names: Iterable[str]) -> Presets:
+    """Presets by what they were called: a name, and overrides behind colons, such as
+    `balanced:planner.smooth=line-of-sight`; that of grid A* comes first."""
+    found = {}
+    for text in dict.fromkeys((YARDSTICK, *names)):
+        name, *overrides = text.split(":")
+        found[text] = load_preset(name, overrides=overrides)
+    return found
 
 
 def read(path: Path) -> hn.OccupancyGrid:
@@ -69,20 +61,23 @@ def read(path: Path) -> hn.OccupancyGrid:
         return hn.load_map(path, robot_radius_m=0.0 if path.suffix == ".map" else RADIUS_M)
 
 
-def warm_up() -> None:
+def warm_up(presets: Presets) -> None:
     """Load every kernel, so that no preparation includes it."""
     for world in (figure1_world(), office_world()):
         grid = world.grid(robot_radius_m=RADIUS_M)
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+        AnyAngleOptimum(grid)
         pairs = sample_pairs(grid, N_WARM, seed=0)
-        for method in METHODS.values():
-            planner = hn.HybridPlanner(topology, preset=_preset(method))
+        for preset in presets.values():
+            planner = hn.HybridPlanner(topology, preset=preset)
             for pair in pairs:
                 planner.plan(*_ends(grid, pair))
 
 
-def measure(path: Path, grid: hn.OccupancyGrid, *, pairs: int, seed: int) -> Record:
-    """Prepare all methods on a map and ask them the same queries.
+def measure(
+    path: Path, grid: hn.OccupancyGrid, presets: Presets, *, pairs: int, seed: int
+) -> tuple[list[Row], list[str]]:
+    """Prepare all presets on a map and ask them the same queries.
 
     Parameters
     ----------
@@ -90,103 +85,107 @@ def measure(path: Path, grid: hn.OccupancyGrid, *, pairs: int, seed: int) -> Rec
         The map's file, for its kind.
     grid
         The map.
+    presets
+        Those of `presets_of`.
     pairs, seed
         As `sample_pairs` takes them.
 
     Returns
     -------
-    dict
-        Plain values: the map, its pairs that have a path, and under `methods` for each method
-        arrays over these pairs (`us`, `search_us`, `cost_m`, `bound_m`, `expanded`), or why it
-        could not be prepared. `violations` has one line for each answer that breaks a promise.
-        `core_share` is the part of the time that the process had a core to itself: well below
-        1 the machine was busy, and times are too long.
+    tuple
+        A row of figures for each preset, times over the pairs that all solved; and a line for each
+        answer that breaks a promise. `core %` is the part of the time that the process had a core
+        to itself: well below 100 the machine was busy, and times are too long.
 
     Raises
     ------
     InvalidValueError
         When the map has no pair of cells to ask for.
     """
-    is_movingai = path.suffix == ".map"
-    merge_distance_m = MOVINGAI_MERGE_DISTANCE_M if is_movingai else ROS_MERGE_DISTANCE_M
     queries = sample_pairs(grid, pairs, seed=seed)
     if not queries:
         raise hn.InvalidValueError(f"map {grid.name} has no two free cells that are joined")
+    is_movingai = path.suffix == ".map"
+    distance_m = MOVINGAI_MERGE_DISTANCE_M if is_movingai else ROS_MERGE_DISTANCE_M
+    load = os.getloadavg()[0]
     began = time.perf_counter()
-    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=merge_distance_m))
-    places_seconds = time.perf_counter() - began
-    open_floor = _is_open(grid, merge_distance_m)
-    record: Record = {
-        "kind": "MovingAI" if is_movingai else "open floor" if open_floor else "building",
-        "cells": int(grid.classes.size),
-        "traversable_cells": int((grid.classes == hn.CellClass.FREE).sum()),
-        "resolution_m": grid.resolution_m,
-        "places": topology.n_places,
-        "places_seconds": places_seconds,
-        "places_bytes": _nbytes(topology, set()),
-        "environment": environment(),
-        "methods": {},
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=distance_m))
+    about: Row = {
+        "kind": f"MovingAI {path.parent.name}" if is_movingai else _kind(path, grid),
+        "free cells": int((grid.classes == hn.CellClass.FREE).sum()),
+        "load": load,
+        "places s": time.perf_counter() - began,
     }
-    planners = _prepare(topology, record["methods"], _ends(grid, queries[0])[0])
-    _ask(planners, grid, queries, record, seed)
-    record["peak_gb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
+    planners, rows = _prepare(topology, presets, _ends(grid, queries[-1]))
+    solved, answers, faults, core = _ask(planners, grid, queries, seed)
+    peak_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    about |= {"core %": 100 * core, "peak GB": peak_gb}
     planners.clear()
-    record["any_angle_m"] = _any_angle_optima(grid, record)
-    record["violations"] += _broken_promises(record)
-    return record
-
-
-def _preset(method: Method) -> hn.Preset:
-    return load_preset(method.preset, overrides=method.overrides)
+    optimum = AnyAngleOptimum(grid)
+    any_angle_m = np.array([optimum.length_m(pair.start, pair.goal) for pair in solved])
+    octile_m = answers[YARDSTICK]["cost_m"]
+    for name in rows:
+        rows[name] |= about
+    for name in answers:
+        is_line = bool(answers[name]["is_line"].any())
+        best_m = any_angle_m if is_line else octile_m
+        faults[name] += _broken(solved, answers[name], best_m, presets[name].planner.epsilon)
+        rows[name] |= {
+            "metric": "any-angle" if is_line else "octile",
+            **_figures(answers[name], answers[YARDSTICK]["us"], best_m),
+            **_losses(answers[name]["cost_m"], any_angle_m, None if is_line else octile_m),
+            **_per_cell(rows[name]),
+            "broken": len(faults[name]),
+        }
+    return list(rows.values()), [f"{name}: {line}" for name in faults for line in faults[name]]
 
 
 def _ends(grid: hn.OccupancyGrid, pair: Pair) -> FloatArray:
     return grid.frame.points_of(np.array([pair.start, pair.goal]))
 
 
-def _is_open(grid: hn.OccupancyGrid, distance_m: float) -> bool:
+def _kind(path: Path, grid: hn.OccupancyGrid) -> str:
+    """A raw scan, an open floor, or a building."""
+    if "radish_grids" in path.parts:
+        return "raw SLAM"
     free = np.pad(grid.classes == hn.CellClass.FREE, 1)
-    far = ndimage.distance_transform_edt(free)[free] > distance_m / grid.resolution_m
-    return bool(far.mean() > OPEN_SHARE)
+    far = ndimage.distance_transform_edt(free)[free] > ROS_MERGE_DISTANCE_M / grid.resolution_m
+    return "open floor" if far.mean() > OPEN_SHARE else "building"
 
 
 def _prepare(
-    topology: hn.TopologicalMap, notes: dict[str, Record], point: FloatArray
-) -> dict[str, hn.HybridPlanner]:
-    """Planners by name; what each adds to the topological map, in seconds and bytes, is noted."""
-    planners = {}
-    for name, method in METHODS.items():
+    topology: hn.TopologicalMap, presets: Presets, ends: FloatArray
+) -> tuple[dict[str, hn.HybridPlanner], dict[str, Row]]:
+    """Planners by name, and rows that hold what each adds to the topological map: seconds up to
+    the first answer, and bytes."""
+    planners, rows = {}, {}
+    for name, preset in presets.items():
         counted: set[int] = set()
         _nbytes(topology, counted)
         gc.collect()
-        began, cpu = time.perf_counter(), time.process_time()
+        row: Row = {"preset": name}
+        rows[name] = row
+        began = time.perf_counter()
         try:
-            planner = hn.HybridPlanner(topology, preset=_preset(method))
+            planner = hn.HybridPlanner(topology, preset=preset)
+            planner.plan(*ends)  # makes what is made on demand
         except hn.InvalidValueError as error:
-            notes[name] = {"error": str(error)}
+            row["error"] = str(error)
             continue
-        planner.plan(point, point)  # makes what is made on demand
-        notes[name] = {
-            "seconds": time.perf_counter() - began,
-            "cpu_seconds": time.process_time() - cpu,
-            "bytes": _nbytes(planner, counted),
-        }
+        row["preparation s"] = time.perf_counter() - began
+        row["bytes"] = _nbytes(planner, counted)
         planners[name] = planner
-    return planners
+    return planners, rows
 
 
 def _ask(
-    planners: dict[str, hn.HybridPlanner],
-    grid: hn.OccupancyGrid,
-    queries: list[Pair],
-    record: Record,
-    seed: int,
-) -> None:
-    """Ask pair by pair, the methods in another order each time, and note what they answer."""
+    planners: dict[str, hn.HybridPlanner], grid: hn.OccupancyGrid, queries: list[Pair], seed: int
+) -> tuple[list[Pair], dict[str, dict[str, FloatArray]], dict[str, list[str]], float]:
+    """Ask pair by pair, the planners in another order each time: the pairs that all solved, what
+    they answered, what is wrong with it, and the share of a core."""
     solved: list[Pair] = []
-    faults: list[str] = []
+    faults: dict[str, list[str]] = {name: [] for name in planners}
     answers: dict[str, list[tuple[float, ...]]] = {name: [] for name in planners}
-    agreed = dict.fromkeys(planners, 0)
     rng = np.random.default_rng(seed)
     for pair in queries[:N_WARM]:
         for planner in planners.values():
@@ -203,36 +202,27 @@ def _ask(
             results[name] = result, 1e6 * (time.perf_counter() - began)
         expected = results[YARDSTICK][0].status
         for name, (result, _) in results.items():
-            agreed[name] += result.status == expected
-            faults += [f"{name}: {_at(pair)}: {text}" for text in _faults(grid, pair, result)]
-            if result.status != expected:
-                faults.append(f"{name}: {_at(pair)}: {result.status}, not {expected}")
+            wrong = _faults(grid, pair, result)
+            wrong += [] if result.status == expected else [f"{result.status}, not {expected}"]
+            faults[name] += [f"{pair.start} to {pair.goal}: {text}" for text in wrong]
         if all(result.solved for result, _ in results.values()):
             solved.append(pair)
             for name, (result, us) in results.items():
-                answers[name].append(_figures_of(result, us))
-    record["core_share"] = (time.process_time() - cpu) / (time.perf_counter() - wall)
+                answers[name].append(_columns_of(result, us))
+    core = (time.process_time() - cpu) / (time.perf_counter() - wall)
     gc.enable()
-    record["asked"] = len(queries)
-    record["starts"] = [pair.start for pair in solved]
-    record["goals"] = [pair.goal for pair in solved]
-    record["violations"] = faults
-    columns = ("us", "search_us", "cost_m", "bound_m", "expanded")
-    for name, rows in answers.items():
-        by_column = np.array(rows, dtype=np.float64).reshape(-1, len(columns)).T.tolist()
-        record["methods"][name] |= dict(zip(columns, by_column, strict=True))
-        record["methods"][name]["agreed"] = agreed[name]
+    columns = ("us", "cost_m", "bound_m", "expanded", "is_line")
+    arrays = {
+        name: dict(zip(columns, np.array(rows, np.float64).reshape(-1, 5).T, strict=True))
+        for name, rows in answers.items()
+    }
+    return solved, arrays, faults, core
 
 
-def _figures_of(result: hn.PlanResult, us: float) -> tuple[float, ...]:
+def _columns_of(result: hn.PlanResult, us: float) -> tuple[float, ...]:
     stats = result.stats
-    search_us = 1e6 * sum(stats.seconds.values())
     expanded = stats.expanded + stats.expanded_gates
-    return us, search_us, result.cost, result.lower_bound, expanded
-
-
-def _at(pair: Pair) -> str:
-    return f"{pair.start} to {pair.goal}"
+    return us, result.cost, result.lower_bound, expanded, result.metric == "any-angle"
 
 
 def _faults(grid: hn.OccupancyGrid, pair: Pair, result: hn.PlanResult) -> list[str]:
@@ -240,53 +230,74 @@ def _faults(grid: hn.OccupancyGrid, pair: Pair, result: hn.PlanResult) -> list[s
     path = result.path
     if path is None:
         return []
-    verdict = judge_path(grid, path.cells, start=pair.start, goal=pair.goal)
-    faults = list(verdict.faults)
     if result.metric == "any-angle":
-        faults += segment_faults(grid, path.points)
-        if path.length_m > verdict.length_m * (1 + SLACK):
-            faults.append(f"{path.length_m!r} m, its cells {verdict.length_m!r} m")
-    elif abs(path.length_m - verdict.length_m) > SLACK * verdict.length_m:
+        verdict = judge_line(grid, path.points, start=pair.start, goal=pair.goal)
+    else:
+        verdict = judge_path(grid, path.cells, start=pair.start, goal=pair.goal)
+    faults = list(verdict.faults)
+    if abs(path.length_m - verdict.length_m) > SLACK * verdict.length_m:
         faults.append(f"states {path.length_m!r} m, is {verdict.length_m!r} m long")
     return faults
 
 
-def _any_angle_optima(grid: hn.OccupancyGrid, record: Record) -> list[float]:
-    """Any-angle optima in metres, in the order of the pairs."""
-    optimum = AnyAngleOptimum(grid)
-    ends = zip(record["starts"], record["goals"], strict=True)
-    return [optimum.length_m(start, goal) for start, goal in ends]
+def _figures(answers: Mapping[str, FloatArray], yard_us: FloatArray, best_m: FloatArray) -> Row:
+    """Times in milliseconds, beside A*'s on the same pairs; what was optimal, what was proved."""
+    ms, cost, bound = 1e-3 * answers["us"], answers["cost_m"], answers["bound_m"]
+    gaps = 100 * (cost / bound - 1)
+    return {
+        "pairs": len(ms),
+        "ms median": _quantile(ms, 0.5),
+        "ms p95": _quantile(ms, 0.95),
+        "ms max": _quantile(ms, 1.0),
+        "times A*": _quantile(yard_us / answers["us"], 0.5),
+        "optimal %": 100 * _mean(np.where(cost <= best_m * (1 + SLACK), 1.0, 0.0)),
+        "gap mean %": _mean(gaps),
+        "gap p95 %": _quantile(gaps, 0.95),
+        "expanded": _mean(answers["expanded"]),
+    }
 
 
-def _broken_promises(record: Record) -> list[str]:
+def _losses(cost_m: FloatArray, any_angle_m: FloatArray, octile_m: FloatArray | None) -> Row:
+    """Losses over both optima; paths at any angle have none over the octile one."""
+    row: Row = {}
+    for words, best in (("any-angle", any_angle_m), ("octile", octile_m)):
+        percent = np.empty(0) if best is None else 100 * loss_of(cost_m, best)
+        row[f"{words} loss %"] = _mean(percent)
+        row[f"{words} loss max %"] = _quantile(percent, 1.0)
+    return row
+
+
+def _per_cell(row: Row) -> Row:
+    cells = float(row["free cells"])
+    return {
+        "us/cell": 1e6 * float(row["preparation s"]) / cells,
+        "B/cell": float(row.pop("bytes")) / cells,
+    }
+
+
+def _mean(values: FloatArray) -> float:
+    return float(np.mean(values)) if len(values) else math.nan
+
+
+def _quantile(values: FloatArray, share: float) -> float:
+    return float(np.quantile(values, share)) if len(values) else math.nan
+
+
+def _broken(
+    pairs: list[Pair], answers: Mapping[str, FloatArray], best: FloatArray, epsilon: float | None
+) -> list[str]:
     """Bounds above the optimum, costs below it, gaps above epsilon."""
-    broken = []
-    for name, method in METHODS.items():
-        answers = record["methods"][name]
-        best = optima_m(record, method)
-        if "error" in answers or best is None:
-            continue
-        cost, bound = (np.array(answers[key]) for key in ("cost_m", "bound_m"))
-        checks = [
-            ("lower bound above the optimum", bound > best * (1 + SLACK)),
-            ("cost below the optimum", cost < best * (1 - SLACK)),
-        ]
-        if method.epsilon is not None:
-            limit = (1 + method.epsilon) * (1 + SLACK)
-            checks.append(("gap above epsilon", cost > bound * limit))
-            checks.append(("loss above epsilon", cost > best * limit))
-        for text, wrong in checks:
-            for i in np.flatnonzero(wrong):
-                ends = f"{record['starts'][i]} to {record['goals'][i]}"
-                figures = (
-                    f"cost {cost[i]:.17g} m, bound {bound[i]:.17g} m, optimum {best[i]:.17g} m"
-                )
-                broken.append(f"{name}: {ends}: {text}: {figures}")
-    return broken
-
-
-def optima_m(record: Record, method: Method) -> FloatArray | None:
-    """Optima of a method's metric in metres, in the order of the pairs; None where not known."""
-    octile = method.metric == "octile"
-    known = record["methods"][YARDSTICK]["cost_m"] if octile else record["any_angle_m"]
-    return None if known is None else np.array(known, dtype=np.float64)
+    cost, bound = answers["cost_m"], answers["bound_m"]
+    checks = [
+        ("lower bound above the optimum", bound > best * (1 + SLACK)),
+        ("cost below the optimum", cost < best * (1 - SLACK)),
+    ]
+    if epsilon is not None and not answers["is_line"].any():
+        limit = (1 + epsilon) * (1 + SLACK)
+        checks.append(("gap above epsilon", cost > bound * limit))
+    return [
+        f"{pairs[i].start} to {pairs[i].goal}: {text}: cost {cost[i]:.17g} m, "
+        f"bound {bound[i]:.17g} m, optimum {best[i]:.17g} m"
+        for text, wrong in checks
+        for i in np.flatnonzero(wrong)
+    ]

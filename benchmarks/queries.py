@@ -1,121 +1,138 @@
-"""The table of queries: every preset against the tuned grid A*, at `planner.plan`.
+"""The table of queries: presets against the tuned grid A*, at `planner.plan`.
 
-    python -m benchmarks.queries --data FOLDER -o DIR [--pairs 200] [--seed 0] [--map GLOB]
+    python -m benchmarks.queries [--data FOLDER] [-o FILE.csv] [--presets A,B] [--maps GLOB]
+                                 [--pairs 200] [--seed 0]
+    python -m benchmarks.queries --scale 16,64 [--maps GLOB] [--pairs 100]
 
-All ROS maps of kind `map` in FOLDER/maps.tsv with at least 0.3 M cells (robot radius 0.25 m, merge
-distance 4 m) and all MovingAI maps (a point robot, merge distance 40 cells); `--map`, which may be
-repeated, takes instead the maps of any size whose path in FOLDER it matches. Everything runs in one
+All ROS maps of kind `map` in FOLDER/maps.tsv (robot radius 0.25 m, merge distance 4 m) and all
+MovingAI maps (a point robot, merge distance 40 cells), or those whose path in FOLDER a glob of
+`--maps` matches. `--presets` takes names, separated by commas, with overrides behind colons, as in
+`balanced:planner.smooth=line-of-sight`; by default all presets without OMPL. Everything runs in one
 process: on each map all planners share one topological map, and every pair is put to every planner
-before the next pair, in another order each time. DIR/queries.jsonl gets a line for each map, with
-all times and costs; maps that it has already, with the same pairs and seed, are not measured again.
-DIR/queries.md gets the tables, which are printed too.
+before the next pair, in another order each time. Tables are printed; FILE.csv gets a row for each
+map and preset as soon as the map is measured, and a run that was stopped goes on: maps that it has
+already are not measured again.
 
 The answers are checked as well: paths are legal, statuses agree with A*'s, lower bound <= optimum
-<= cost, gap <= epsilon. Where one is not, all are listed and the exit code is 1.
+<= cost in the metric of the path, gap <= epsilon. Where one is not, it is listed on stderr and the
+exit code is 1.
+
+With `--scale` one building, tiled to so many millions of cells: see `benchmarks._queries_scale`.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import fnmatch
 import gc
-import json
 import os
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from benchmarks._queries_measure import METHODS, Record, measure, read, warm_up
-from benchmarks._queries_tables import figures, page, violations
+import hybridnav as hn
+from benchmarks._queries_measure import measure, presets_of, read, warm_up
+from benchmarks._queries_scale import scale
+from benchmarks._queries_tables import n_broken, page
+from hybridnav.harness.tables import to_csv
 
-LEAST_CELLS = 300_000
+if TYPE_CHECKING:
+    from benchmarks._queries_measure import Presets
+    from hybridnav.harness.tables import Row
+
+ROOT = Path(__file__).parents[1]
+Asked = dict[str, int]
+"""Pairs that were asked for, and their seed."""
+_WORDS = frozenset({"map", "preset", "kind", "metric", "error"})
 
 
-def maps_of(data: Path) -> list[str]:
-    """Paths of all maps in the data folder, the ROS maps first."""
+def maps_of(data: Path, globs: list[str]) -> list[str]:
+    """Paths of the maps in the data folder that a glob matches, all without one, ROS maps first."""
     lines = (data / "maps.tsv").read_text(encoding="utf-8").splitlines()[1:]
     ros = [path for path, kind in (line.split("\t") for line in lines) if kind == "map"]
     movingai = sorted((data / "movingai").rglob("*.map"))
-    return ros + [path.relative_to(data).as_posix() for path in movingai]
+    every = ros + [path.relative_to(data).as_posix() for path in movingai]
+    return [n for n in every if not globs or any(fnmatch.fnmatch(n, glob) for glob in globs)]
 
 
-def run(data: Path, out: Path, globs: list[str], *, pairs: int, seed: int) -> list[Record]:
-    """Measure the maps that are not measured yet; the records of all maps that were asked for."""
-    file = out / "queries.jsonl"
-    known = _known(file, pairs=pairs, seed=seed)
-    chosen = [
-        name
-        for name in maps_of(data)
-        if not globs or any(fnmatch.fnmatch(name, glob) for glob in globs)
-    ]
-    if not set(chosen) <= set(known):
-        warm_up()
-    for number, name in enumerate(chosen, start=1):
+def run(files: dict[str, Path], presets: Presets, out: Path | None, asked: Asked) -> list[Row]:
+    """Measure the maps that are not measured yet; the rows of all."""
+    known = _known(out, presets, asked)
+    if not set(files) <= set(known):
+        warm_up(presets)
+    for number, (name, file) in enumerate(files.items(), start=1):
         if name in known:
             continue
-        grid = read(data / name)
-        if not globs and grid.classes.size < LEAST_CELLS and not name.endswith(".map"):
-            continue
         began = time.perf_counter()
-        record: Record = {"map": name, "pairs": pairs, "seed": seed}
-        record |= measure(data / name, grid, pairs=pairs, seed=seed)
-        record["figures"] = {method: figures(record, method) for method in METHODS}
-        with file.open("a", encoding="utf-8") as stream:
-            stream.write(json.dumps(record) + "\n")
-        known[name] = record
-        del grid
+        pairs, seed = asked["asked"], asked["seed"]
+        rows, broken = measure(file, read(file), presets, pairs=pairs, seed=seed)
+        known[name] = [{"map": name, **asked, **row} for row in rows]
+        for line in broken:
+            sys.stderr.write(f"broken promise: {name}: {line}\n")
+        if out is not None:
+            everything = [row for rows in known.values() for row in rows]
+            out.write_text(to_csv(everything), encoding="utf-8")
         gc.collect()
-        sys.stderr.write(
-            f"{number} of {len(chosen)}: {name}, {time.perf_counter() - began:.0f} s, peak "
-            f"{record['peak_gb']:.1f} GB, {len(record['violations'])} violations\n"
-        )
-    return [known[name] for name in chosen if name in known]
+        seconds, load = time.perf_counter() - began, os.getloadavg()[0]
+        sys.stderr.write(f"{number} of {len(files)}: {name}, {seconds:.0f} s, load {load:.1f}\n")
+    return [row for name in files for row in known[name]]
 
 
-def _known(file: Path, *, pairs: int, seed: int) -> dict[str, Record]:
-    """Records of an earlier run with the same settings, by map; a line cut short is left out."""
-    known = {}
-    lines = file.read_text(encoding="utf-8").splitlines(keepends=True) if file.exists() else []
-    if lines and not lines[-1].endswith("\n"):
-        file.write_text("".join(lines[:-1]), encoding="utf-8")
-        lines.pop()
-    for line in lines:
-        record = json.loads(line)
-        if (record["pairs"], record["seed"]) == (pairs, seed):
-            known[record["map"]] = record
-    return known
+def _known(out: Path | None, presets: Presets, asked: Asked) -> dict[str, list[Row]]:
+    """Rows of an earlier run by map, which must have had the same presets and settings."""
+    found: dict[str, list[Row]] = {}
+    if out is None or not out.exists():
+        return found
+    with out.open(encoding="utf-8", newline="") as stream:
+        for text in csv.DictReader(stream):
+            row: Row = {
+                key: value if key in _WORDS else float(value or "nan")
+                for key, value in text.items()
+            }
+            found.setdefault(str(row["map"]), []).append(row)
+    for rows in found.values():
+        same = all(row[key] == value for row in rows for key, value in asked.items())
+        if not same or [row["preset"] for row in rows] != list(presets):
+            raise hn.InvalidValueError(
+                f"{out} holds a run with other presets, pairs or seed: take a new file"
+            )
+    return found
 
 
 def main() -> int:
-    """Run, write the tables, list what is wrong."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, default=os.environ.get("HYBRIDNAV_DATA"))
-    parser.add_argument("-o", "--out", type=Path, required=True)
-    parser.add_argument("--pairs", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--map", action="append", default=[], metavar="GLOB")
-    arguments = parser.parse_args()
-    if arguments.data is None:
-        parser.error("the table needs --data or HYBRIDNAV_DATA")
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    records = run(
-        Path(arguments.data),
-        arguments.out,
-        arguments.map,
-        pairs=arguments.pairs,
-        seed=arguments.seed,
+    """Run and print the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    if not records:
-        parser.error("no map matches")
-    text = page(records, pairs=arguments.pairs)
-    (arguments.out / "queries.md").write_text(text, encoding="utf-8")
-    print(text)
-    broken = violations(records)
-    for line in broken:
-        sys.stderr.write(f"violation: {line}\n")
-    if broken:
-        sys.stderr.write(f"{len(broken)} violations\n")
-    return 1 if broken else 0
+    parser.add_argument("--data", type=Path, default=os.environ.get("HYBRIDNAV_DATA"))
+    parser.add_argument("-o", "--out", type=Path)
+    parser.add_argument("--presets", metavar="A,B")
+    parser.add_argument("--maps", action="append", default=[], metavar="GLOB")
+    parser.add_argument("--pairs", type=int)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--scale", metavar="MILLIONS")
+    given = parser.parse_args()
+    names = [] if given.data is None else maps_of(Path(given.data), given.maps)
+    if given.scale is not None:
+        if given.maps and len(names) != 1:
+            parser.error(f"--scale tiles one map, --maps matches {len(names)}")
+        file = Path(given.data) / names[0] if given.maps else ROOT / "maps/office/office.yaml"
+        millions = [float(text) for text in given.scale.split(",")]
+        print(scale(file, millions, pairs=given.pairs or 100, seed=given.seed))
+        return 0
+    if not names:
+        parser.error("no map: the table needs --data or HYBRIDNAV_DATA, and --maps that match")
+    all_presets = ",".join(name for name in hn.preset_names() if not name.startswith("ompl-"))
+    presets = presets_of((given.presets or all_presets).split(","))
+    files = {name: Path(given.data) / name for name in names}
+    try:
+        rows = run(files, presets, given.out, {"asked": given.pairs or 200, "seed": given.seed})
+    except hn.InvalidValueError as error:
+        parser.error(str(error))
+    print(page(rows))
+    return 1 if n_broken(rows) else 0
 
 
 if __name__ == "__main__":
