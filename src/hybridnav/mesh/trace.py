@@ -98,7 +98,7 @@ def _nodes(
     search = MeshSearch(mesh)
     path = search.path(cells, positions)
     # Nobody else has this search: it lends again what the query has just returned.
-    with search._works.lent() as work:  # noqa: SLF001 - the nodes of the query
+    with search.works.lent() as work:
         n = work.counts[N]
         whole, real = work.nodes
         return path, whole[:n].copy(), real[:n].copy()
