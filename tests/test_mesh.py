@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from hybridnav.grid import CellClass
-from hybridnav.mesh import MeshSearch, build_mesh
+from hybridnav.mesh import ConvexMesh, MeshSearch, build_mesh
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from tests.oracle.any_angle import by_visibility, some_positions
 from tests.oracle.mesh import assert_sides_agree, ends_of_sides, polygon, twice_the_area
@@ -64,15 +64,24 @@ def test_each_free_cell_knows_a_polygon_round_its_centre(classes: Any) -> None:
     assert len(np.unique(np.stack([labels[free], component]), axis=1).T) == labels.max(initial=0)
 
 
+def both_searches(mesh: ConvexMesh) -> tuple[MeshSearch, MeshSearch]:
+    """A search of intervals, and one that has prepared its graph of corners."""
+    prepared = MeshSearch(mesh)
+    prepared.prepare()
+    return MeshSearch(mesh), prepared
+
+
 @settings(max_examples=60, deadline=None)
 @given(class_grids(max_side=14), seeds)
 def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed: int) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
     grid = occupancy_grid(classes)
-    graph, search = VisibilityGraph(grid), MeshSearch(build_mesh(free))
+    graph, mesh = VisibilityGraph(grid), build_mesh(free)
     ends = some_positions(free, seed)
-    for (first, start), (last, goal) in itertools.pairwise(ends):
+    for search, ((first, start), (last, goal)) in itertools.product(
+        both_searches(mesh), itertools.pairwise(ends)
+    ):
         found = search.path((first, last), (start, goal))
         assert found.length_cells == pytest.approx(by_visibility(grid, graph, start, goal))
         if found.positions is not None:
@@ -86,29 +95,29 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
 
 def test_two_cells_that_meet_at_a_corner_are_not_connected() -> None:
     free = drawn(".#", "#.") == CellClass.FREE
-    search = MeshSearch(build_mesh(free))
-    assert search.path(((0, 1), (1, 0)), ((1.0, 1.0), (1.0, 1.0))).positions is None
-    assert search.path(((0, 1), (0, 1)), ((1.0, 1.0), (0.0, 2.0))).length_cells == math.sqrt(2)
+    for search in both_searches(build_mesh(free)):
+        assert search.path(((0, 1), (1, 0)), ((1.0, 1.0), (1.0, 1.0))).positions is None
+        assert search.path(((0, 1), (0, 1)), ((1.0, 1.0), (0.0, 2.0))).length_cells == math.sqrt(2)
 
 
 def test_a_path_may_turn_at_a_corner_and_follow_walls() -> None:
     classes = drawn(".....", ".###.", ".###.", ".....")
-    search = MeshSearch(build_mesh(classes == CellClass.FREE))
-    found = search.path(((0, 0), (3, 4)), ((1.0, 0.5), (3.0, 4.5)))
-    assert found.positions is not None
-    assert found.positions.tolist() in (
-        [[1.0, 0.5], [1.0, 4.0], [3.0, 4.0], [3.0, 4.5]],
-        [[1.0, 0.5], [1.0, 4.0], [3.0, 4.5]],
-        [[1.0, 0.5], [3.0, 1.0], [3.0, 4.5]],
-    )
-    assert found.length_cells == pytest.approx(2 * math.hypot(0.5, 2) / 2 + 3.5)
+    for search in both_searches(build_mesh(classes == CellClass.FREE)):
+        found = search.path(((0, 0), (3, 4)), ((1.0, 0.5), (3.0, 4.5)))
+        assert found.positions is not None
+        assert found.positions.tolist() in (
+            [[1.0, 0.5], [1.0, 4.0], [3.0, 4.0], [3.0, 4.5]],
+            [[1.0, 0.5], [1.0, 4.0], [3.0, 4.5]],
+            [[1.0, 0.5], [3.0, 1.0], [3.0, 4.5]],
+        )
+        assert found.length_cells == pytest.approx(2 * math.hypot(0.5, 2) / 2 + 3.5)
 
 
 def test_maps_of_one_kind_of_cell() -> None:
     assert build_mesh(np.zeros((3, 4), np.bool_)).n_polygons == 0
-    search = MeshSearch(build_mesh(np.ones((3, 4), np.bool_)))
-    assert search.mesh.n_polygons == 1
-    assert search.path(((0, 0), (2, 3)), ((0.0, 0.0), (3.0, 4.0))).length_cells == 5.0
+    for search in both_searches(build_mesh(np.ones((3, 4), np.bool_))):
+        assert search.mesh.n_polygons == 1
+        assert search.path(((0, 0), (2, 3)), ((0.0, 0.0), (3.0, 4.0))).length_cells == 5.0
 
 
 def test_a_search_finds_room_for_its_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,7 +128,8 @@ def test_a_search_finds_room_for_its_nodes(monkeypatch: pytest.MonkeyPatch) -> N
     ends = ((0, 0), (39, 39)), ((0.5, 0.5), (39.5, 39.5))
     graph = VisibilityGraph(occupancy_grid(np.where(free, np.uint8(1), np.uint8(0))))
     expected = graph.shortest((0, 0), (39, 39)).length_m
-    assert MeshSearch(build_mesh(free)).path(*ends).length_cells == pytest.approx(expected)
+    for search in both_searches(build_mesh(free)):
+        assert search.path(*ends).length_cells == pytest.approx(expected)
 
 
 @pytest.mark.skipif(not OPTIMA, reason="HYBRIDNAV_DATA is not set")
@@ -127,11 +137,12 @@ def test_a_search_finds_room_for_its_nodes(monkeypatch: pytest.MonkeyPatch) -> N
 def test_lengths_are_the_stated_optima(name: str) -> None:
     lines = (DATA / f"{name}.map").read_text().split("\n")[4:]
     free = np.array([[letter == "." for letter in line] for line in lines if line])
-    search = MeshSearch(build_mesh(free))
+    searches = both_searches(build_mesh(free))
     with (DATA / f"{name}.csv").open() as file:
         problems = np.array([list(map(float, row)) for row in list(csv.reader(file))[1:]])
     assert len(problems) == 200
     for sx, sy, gx, gy, length in problems.tolist():
         cells = (int(sy), int(sx)), (int(gy), int(gx))
-        found = search.path(cells, ((sy, sx), (gy, gx)))
-        assert abs(found.length_cells - length) < 1e-6
+        for search in searches:
+            found = search.path(cells, ((sy, sx), (gy, gx)))
+            assert abs(found.length_cells - length) < 1e-6

@@ -32,6 +32,21 @@ def some_cells(free: NDArray[np.bool_], seed: int, number: int) -> list[Cell]:
     return [(row, col) for row, col in cells[rng.integers(len(cells), size=number)].tolist()]
 
 
+def scattered() -> NDArray[np.bool_]:
+    """A map with many ways round small obstacles."""
+    free = np.random.default_rng(3).random((40, 40)) > 0.2
+    free[0, 0] = free[-1, -1] = True
+    return free
+
+
+def a_search(free: NDArray[np.bool_], *, is_prepared: bool) -> MeshSearch:
+    """A search of intervals, or one that has prepared its graph of corners."""
+    search = MeshSearch(build_mesh(free))
+    if is_prepared:
+        search.prepare()
+    return search
+
+
 def between(search: MeshSearch, start: Cell, goal: Cell, **effort: Any) -> MeshPath:
     """The path between the centres of two cells."""
     centres = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.5, goal[1] + 0.5)
@@ -60,11 +75,13 @@ def length_of(way: NDArray[Any] | None) -> float:
 
 
 @settings(max_examples=40, deadline=None)
-@given(class_grids(max_side=14), seeds)
-def test_bounds_rise_to_the_optimum_at_every_step(classes: Any, seed: int) -> None:
+@given(classes=class_grids(max_side=14), seed=seeds, is_prepared=st.booleans())
+def test_bounds_rise_to_the_optimum_at_every_step(
+    classes: Any, seed: int, *, is_prepared: bool
+) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
-    search = MeshSearch(build_mesh(free))
+    search = a_search(free, is_prepared=is_prepared)
     start, goal = some_cells(free, seed, 2)
     optimum = between(search, start, goal).length_cells
     with pytest.MonkeyPatch.context() as patch:
@@ -83,11 +100,13 @@ def test_bounds_rise_to_the_optimum_at_every_step(classes: Any, seed: int) -> No
 
 
 @settings(max_examples=40, deadline=None)
-@given(class_grids(max_side=14), seeds)
-def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(classes: Any, seed: int) -> None:
+@given(classes=class_grids(max_side=14), seed=seeds, is_prepared=st.booleans())
+def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(
+    classes: Any, seed: int, *, is_prepared: bool
+) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
-    search = MeshSearch(build_mesh(free))
+    search = a_search(free, is_prepared=is_prepared)
     start, middle, goal = some_cells(free, seed, 3)
     halves = between(search, start, middle).positions, between(search, middle, goal).positions
     first, then = (np.empty((0, 2)) if half is None else half for half in halves)
@@ -105,13 +124,18 @@ def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(classes: Any, s
 
 
 @settings(max_examples=40, deadline=None)
-@given(class_grids(max_side=14), seeds, st.sampled_from([0.01, 0.1, 1.0]))
+@given(
+    classes=class_grids(max_side=14),
+    seed=seeds,
+    epsilon=st.sampled_from([0.01, 0.1, 1.0]),
+    is_prepared=st.booleans(),
+)
 def test_epsilon_bounds_the_ratio_of_length_and_bound(
-    classes: Any, seed: int, epsilon: float
+    classes: Any, seed: int, epsilon: float, *, is_prepared: bool
 ) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
-    search = MeshSearch(build_mesh(free))
+    search = a_search(free, is_prepared=is_prepared)
     start, goal = some_cells(free, seed, 2)
     plain = between(search, start, goal)
     found = between(search, start, goal, epsilon=epsilon)
@@ -124,12 +148,38 @@ def test_epsilon_bounds_the_ratio_of_length_and_bound(
         assert found.length_cells <= (1 + epsilon) * found.lower_bound_cells + SLACK
 
 
-def test_a_search_out_of_time_without_a_path_still_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
-    free = np.random.default_rng(3).random((40, 40)) > 0.2
-    free[0, 0] = free[-1, -1] = True
-    search = MeshSearch(build_mesh(free))
+@pytest.mark.parametrize("is_prepared", [False, True])
+def test_a_search_out_of_time_without_a_path_still_bounds(
+    monkeypatch: pytest.MonkeyPatch, *, is_prepared: bool
+) -> None:
+    search = a_search(scattered(), is_prepared=is_prepared)
     found = list(interrupted(search, (0, 0), (39, 39), monkeypatch))
-    assert len(found) > 20
+    assert len(found) > 10
     assert found[0].positions is None
     assert math.isinf(found[0].length_cells)
     assert math.hypot(39, 39) <= found[0].lower_bound_cells < found[-1].length_cells
+
+
+def test_a_search_prepares_itself_when_that_has_paid(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hybridnav.mesh.search._WORTH", 0)
+    search = MeshSearch(build_mesh(scattered()))
+    found = [between(search, (0, 0), (39, 39)) for _ in range(12)]
+    assert found[0].expanded == found[1].expanded > 10 * found[-1].expanded
+    lengths = [path.length_cells for path in found]
+    assert lengths == pytest.approx([lengths[0]] * len(lengths))
+
+
+def test_a_search_with_a_budget_does_not_prepare_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hybridnav.mesh.search._WORTH", 0)
+    search = MeshSearch(build_mesh(scattered()))
+    found = [between(search, (0, 0), (39, 39), budget_s=100.0).expanded for _ in range(12)]
+    assert found == [found[0]] * 12
+
+
+def test_too_many_edges_leave_the_search_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hybridnav.mesh.corner_graph._MOST_EDGES", 1)
+    search = MeshSearch(build_mesh(scattered()))
+    before = between(search, (0, 0), (39, 39))
+    search.prepare()
+    after = between(search, (0, 0), (39, 39))
+    assert (after.length_cells, after.expanded) == (before.length_cells, before.expanded)

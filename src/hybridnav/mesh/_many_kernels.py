@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from hybridnav._jit import guarded, njit
-from hybridnav.mesh._polyanya_kernels import DONE, NO_ROOM
+from hybridnav.mesh._corner_search_kernels import query_corners
+from hybridnav.mesh._polyanya_kernels import DONE, LOWER, NO_ROOM, UPPER
 from hybridnav.mesh._query_kernels import query
 
 FULL = 3
@@ -12,17 +13,25 @@ FULL = 3
 
 @guarded
 @njit(cache=True, nogil=True)
-def many(mesh, asked, work, effort, answers, begin, n):
+def many(mesh, blocks, graph, place, asked, work, bounds, effort, answers, begin, n):
     """Answer queries from one on, until all are answered or room is short.
 
     Parameters
     ----------
     mesh
-        The first four arguments of `query`.
+        See `successors`.
+    blocks
+        Block of each slot, and the tree, of `query`.
+    graph
+        Of `query_corners`; None for a search of intervals.
+    place
+        Component of polygons, and the polygon of each cell.
     asked
         int64 (q, 4) cells and float64 (q, 4) ends of all queries, as `query` takes them.
     work, effort
-        See `query`.
+        See `query`, or `query_corners`.
+    bounds
+        The last array of the work.
     answers
         float64 (q,) lengths, float64 (q,) bounds, int64 (q + 1,) where the positions of each path
         begin, float64 (room, 2) positions.
@@ -36,18 +45,21 @@ def many(mesh, asked, work, effort, answers, begin, n):
     tuple
         The query to go on with, positions written, and `DONE`, `NO_ROOM` or `FULL`.
     """
-    fixed, block_of, tree, polygon_at = mesh
     cells, ends = asked
-    lengths, bounds, starts, positions = answers
+    lengths, least, starts, positions = answers
     for k in range(begin, len(cells)):
         where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
         points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
-        status, way = query(fixed, block_of, tree, polygon_at, where, points, work, effort)
+        if graph is None:
+            status, way = query(mesh, blocks[0], blocks[1], place[1], where, points, work, effort)
+        else:
+            found = (place[0], place[1], where)
+            status, way = query_corners(mesh, graph, found, points, work, effort)
         if status == NO_ROOM:
             return k, n, NO_ROOM
         if n + len(way) > len(positions):
             return k, n, FULL  # and found once more
-        lengths[k], bounds[k] = work[4][7][0], work[4][7][1]
+        lengths[k], least[k] = bounds[UPPER], bounds[LOWER]
         positions[n : n + len(way)] = way
         starts[k] = n
         n += len(way)

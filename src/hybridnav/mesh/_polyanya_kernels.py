@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav.mesh._heap_kernels import pop, push
 from hybridnav.mesh._interval_kernels import (
     ENDS,
     PARENT,
@@ -32,7 +33,7 @@ allowed; there are more nodes than room."""
 
 # Whole numbers that a search keeps from run to run: nodes written, entries of the heap, corners
 # touched, nodes expanded, the last node of the best path (-1 where it is not the search's own); and
-# of `query`: whether it began, polygons of start and goal, blocks opened.
+# of a query: whether it began, polygons of start and goal, blocks or corners marked.
 N, SIZE, TOUCHED, EXPANDED, LAST, BEGUN, STARTS, GOALS, MARKED = range(9)
 N_COUNTS = 9
 # Reals: the length of the best path known, a lower bound on every path.
@@ -40,42 +41,6 @@ UPPER, LOWER = 0, 1
 
 _SAME = 1e-9
 """Costs of a root that differ by less are taken for equal, in cells."""
-
-
-@njit(cache=True, nogil=True)
-def _push(heap, size, key, value):
-    """Put an entry into a binary heap; returns its size."""
-    keys, values = heap
-    at = size
-    while at > 0:
-        above = (at - 1) >> 1
-        if keys[above] <= key:
-            break
-        keys[at], values[at] = keys[above], values[above]
-        at = above
-    keys[at], values[at] = key, value
-    return size + 1
-
-
-@njit(cache=True, nogil=True)
-def _pop(heap, size):
-    """Take the least entry out of a binary heap; returns its size."""
-    keys, values = heap
-    size -= 1
-    key, value = keys[size], values[size]
-    at = 0
-    while True:
-        below = 2 * at + 1
-        if below >= size:
-            break
-        if below + 1 < size and keys[below + 1] < keys[below]:
-            below += 1
-        if keys[below] >= key:
-            break
-        keys[at], values[at] = keys[below], values[below]
-        at = below
-    keys[at], values[at] = key, value
-    return size
 
 
 @njit(cache=True, nogil=True)
@@ -123,7 +88,7 @@ def seed(mesh, blocks, ends, starts, work):
             key = g + estimate(x, y, wx, wy, ux, uy, tx, ty)
             if key < bounds[UPPER]:
                 put((whole, real), n, twins[slot], root, -1, WHOLE_SIDE, g, wx, wy, ux, uy)
-                size = _push((keys, values), size, key, n)
+                size = push((keys, values), size, key, n)
                 n += 1
     counts[N], counts[SIZE] = n, size
     return DONE
@@ -163,20 +128,20 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
         top, key = values[0], keys[0]
         root = whole[top, ROOT]
         if root >= 0 and real[top, G] > best[root] + _SAME:
-            size = _pop(heap, size)
+            size = pop(heap, size)
             continue
         if key * factor >= bounds[UPPER]:
             break
         if counts[EXPANDED] >= limit:
             status = PAUSED
             break
-        size = _pop(heap, size)
+        size = pop(heap, size)
         # A node with one successor is followed at once.
         while top >= 0:
             polygon = polygon_of[whole[top, SLOT]]
             # Three successors for each side at most, and the goal.
             if counts[N] + 3 * (first[polygon + 1] - first[polygon]) + 1 > len(whole):
-                size = _push(heap, size, key, top)
+                size = push(heap, size, key, top)
                 status = NO_ROOM
                 break
             is_goal = False
@@ -192,7 +157,7 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
                 if whole[new, SLOT] >= 0:
                     estimated = real[new, G] + estimate_of(mesh, ends, whole, real, new)
                     if estimated < bounds[UPPER]:
-                        size = _push(heap, size, max(key, estimated), new)
+                        size = push(heap, size, max(key, estimated), new)
     counts[SIZE] = size
     least = min(keys[0], bounds[UPPER]) if size else bounds[UPPER]
     bounds[LOWER] = max(bounds[LOWER], least)
@@ -261,19 +226,20 @@ def way_to(mesh, ends, whole, node):
     while at >= 0:
         root, marks, parent = whole[at, ROOT], whole[at, ENDS], whole[at, PARENT]
         if root >= 0 and root != last:
-            n = _put_corner(way, n, cx[root], cy[root])
+            n = put_corner(way, n, cx[root], cy[root])
         if marks < 0 and root != whole[parent, ROOT]:
             root = -1 - marks
-            n = _put_corner(way, n, cx[root], cy[root])
+            n = put_corner(way, n, cx[root], cy[root])
         at, last = parent, root
-    way[n - 1, 0], way[n - 1, 1] = sy, sx
-    return way[n - 1 :].copy()
+    n = put_corner(way, n, sx, sy)
+    return way[n:].copy()
 
 
 @njit(cache=True, nogil=True)
-def _put_corner(way, n, x, y):
-    """Put a corner before place n of a way; between corners on one line a path does not turn."""
-    if n + 2 < len(way):
+def put_corner(way, n, x, y):
+    """Put a point before place n of a way, in place of the next one if that is on the line from it
+    to the one after: there the path does not turn. Returns its place."""
+    if n + 1 < len(way):
         (by, bx), (cy, cx) = way[n], way[n + 1]
         if turn_of(x, y, bx, by, cx, cy) == 0:
             n += 1

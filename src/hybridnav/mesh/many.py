@@ -22,6 +22,8 @@ _ROOM = 16
 """Positions of a path that there is room for at first, in the mean."""
 _LEAST = 64
 """Queries that are worth a thread."""
+_MANY = 1000
+"""Queries that are worth the graph of corners."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,8 @@ def shortest_paths(
     def answer(part: LongArray) -> MeshPaths:
         return _one_by_one(search, where[part], ends[part], epsilon)
 
+    if len(where) >= _MANY:
+        search.prepare()
     if n_parts == 1:
         return answer(parts[0])
     with ThreadPoolExecutor(n_parts) as pool:
@@ -92,11 +96,16 @@ def _one_by_one(
     starts = np.zeros(count + 1, dtype=np.int64)
     positions = np.empty((_ROOM * max(count, 4), 2))
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
+    graph = search.graph
+    edges = None if graph is None else (graph.first, graph.heads, graph.landmark_distances)
+    mesh = search.mesh
+    fixed = search.arrays, (mesh.block_of, search.tree), edges, (mesh.component, mesh.polygon_at)
     at = n = 0
-    with search.works.lent() as work:
+    with (search.works if graph is None else search.corner_works).lent() as work:
         while at < count:
-            answers = length, bound, starts, positions
-            at, n, short = many(search.fixed, (where, ends), work.arrays, effort, answers, at, n)
+            found = length, bound, starts, positions
+            asked = (where, ends), work.arrays, work.bounds, effort
+            at, n, short = many(*fixed, *asked, found, at, n)
             if short == NO_ROOM:
                 work.make_room()
             elif short == FULL:

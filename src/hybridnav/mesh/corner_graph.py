@@ -1,0 +1,79 @@
+"""The graph of the corners of a mesh at which paths bend, with landmarks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._copies import copies_alike
+from hybridnav.mesh import _corner_graph_kernels as kernels
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, IntArray
+    from hybridnav.mesh.build import ConvexMesh
+
+_LANDMARKS = 8
+_MOST_EDGES = 200
+"""Edges a corner, on average, above which the graph is not worth its memory: real maps have 13 to
+35."""
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class CornerGraph:
+    """Corners that see each other, where a path along the segment between them may bend at both.
+
+    A shortest path bends at such corners alone, and every segment of it between two of them is an
+    edge, or several on one line.
+    """
+
+    first: IntArray
+    """int64 (2 n + 1,), the edges of corner i into one of the two quadrants beside its blocked cell
+    are `first[2 i]` to `first[2 i + 1]`, those into the other `first[2 i + 1]` to
+    `first[2 i + 2]`."""
+    heads: IntArray
+    """int32 (m,), the corner at which each edge ends; every edge is there in both directions."""
+    landmark_distances: FloatArray
+    """float64 (n, landmarks), distances in the graph in cells, infinite where there is no way."""
+
+
+def build_corner_graph(mesh: ConvexMesh, arrays: tuple[object, ...]) -> CornerGraph | None:
+    """Build the graph of corners of a mesh.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+    arrays
+        Of the kernel `successors`.
+
+    Returns
+    -------
+    CornerGraph or None
+        None where sights are so far and free that there are too many edges.
+
+    Notes
+    -----
+    S. Oh, H. W. Leong: Edge N-level sparse visibility graphs: fast optimal any-angle pathfinding
+    using hierarchical taut paths, 2017 (the edges). A. V. Goldberg, C. Harrelson: Computing the
+    shortest path: A* search meets graph theory, 2005 (landmarks, each the corner farthest from
+    those before).
+    """
+    n = len(mesh.corners)
+    first, heads = kernels.edges_of(arrays, _MOST_EDGES * n)
+    if first[-1] < 0:
+        return None
+    degrees = first[2::2] - first[:-2:2]
+    table = np.empty((n, _LANDMARKS if len(heads) else 0))
+    if len(heads):
+        # In the part of the map that has the most edges.
+        part = np.empty(n, dtype=np.int32)
+        part[mesh.begins] = mesh.component[mesh.polygon_of]
+        inside = part == np.bincount(part, weights=degrees).argmax()
+        source = int(np.where(inside, degrees, -1).argmax())
+        kernels.landmarks_of(arrays[:2], (first, heads), source, table)
+    for array in (first, heads, table):
+        array.flags.writeable = False
+    return CornerGraph(first, heads, table)
