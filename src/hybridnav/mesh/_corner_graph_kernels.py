@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.mesh._heap_kernels import pop, push
-from hybridnav.mesh._view_kernels import see_from_corner
+from hybridnav.mesh._view_kernels import distance, see_from_corner
 
 
 @njit(cache=True, nogil=True)
@@ -99,7 +97,7 @@ def distances_from(points, graph, source, distances):
             heap = (_doubled(heap[0]), _doubled(heap[1]))
         for k in range(low, high):
             other = heads[k]
-            reached = cost + math.hypot(cx[other] - cx[here], cy[other] - cy[here])
+            reached = cost + distance(cx[here], cy[here], cx[other], cy[other])
             if reached < distances[other]:
                 distances[other] = reached
                 size = push(heap, size, reached, other)
@@ -107,15 +105,15 @@ def distances_from(points, graph, source, distances):
 
 @njit(cache=True, nogil=True)
 def landmarks_of(points, graph, source, table):
-    """Compute the distances of all corners from landmarks: each the corner farthest from those
-    before, the first one from a given corner.
+    """Compute the distances of all corners from landmarks: a given corner, and then each the corner
+    farthest from those before.
 
     Parameters
     ----------
     points, graph
         See `distances_from`.
     source
-        A corner in the part of the graph that the landmarks are for.
+        The first landmark: the others are in the part of the graph that holds it.
     table
         float64 (n, landmarks), the result.
     """
@@ -123,13 +121,11 @@ def landmarks_of(points, graph, source, table):
     distances = np.empty(n)
     nearest = np.full(n, np.inf)
     landmark = source
-    for k in range(-1, number):
+    for k in range(number):
         distances_from(points, graph, landmark, distances)
-        if k >= 0:
-            table[:, k] = distances
-            nearest = np.minimum(nearest, distances)
+        table[:, k] = distances
         far = 0.0
         for corner in range(n):
-            reached = nearest[corner] if k >= 0 else distances[corner]
-            if far < reached < np.inf:
-                far, landmark = reached, corner
+            nearest[corner] = min(nearest[corner], distances[corner])
+            if far < nearest[corner] < np.inf:
+                far, landmark = nearest[corner], corner

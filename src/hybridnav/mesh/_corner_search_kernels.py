@@ -27,7 +27,7 @@ from hybridnav.mesh._polyanya_kernels import (
     UPPER,
     put_corner,
 )
-from hybridnav.mesh._view_kernels import lobe_of, see_from_point
+from hybridnav.mesh._view_kernels import distance, lobe_of, see_from_point
 from hybridnav.search._exact_kernels import turn_of
 
 _SLACK = 1e-9
@@ -116,7 +116,7 @@ def _seed(mesh, graph, ends, seen, work):
     goal_bounds[0] = np.inf
     goal_bounds[1] = -np.inf
     for corner in from_goal:
-        to_goal[corner] = _distance(cx[corner], cy[corner], tx, ty)
+        to_goal[corner] = distance(cx[corner], cy[corner], tx, ty)
         for k in range(table.shape[1]):
             if table[corner, k] < np.inf:
                 at_most, at_least = table[corner, k] + to_goal[corner], table[corner, k]
@@ -182,12 +182,12 @@ def _relax(mesh, table, ends, work, before, way, cost_before, heads):
     size, n_touched, upper = counts[SIZE], counts[TOUCHED], bounds[UPPER]
     for corner in heads:
         wx, wy = cx[corner], cy[corner]
-        cost = cost_before + _distance(x, y, wx, wy)
+        cost = cost_before + distance(x, y, wx, wy)
         if cost >= costs[corner] or turn_of(px, py, x, y, wx, wy) * side < 0.0:
             continue
         is_new = costs[corner] == np.inf
         if is_new:
-            left = _distance(wx, wy, tx, ty)
+            left = distance(wx, wy, tx, ty)
             for k in range(table.shape[1]):
                 reached = table[corner, k]
                 if reached < np.inf:
@@ -208,12 +208,6 @@ def _relax(mesh, table, ends, work, before, way, cost_before, heads):
         if cost + left < upper:
             size = push(heap, size, cost + left, corner)
     counts[SIZE], counts[TOUCHED], bounds[UPPER] = size, n_touched, upper
-
-
-@njit(cache=True, nogil=True)
-def _distance(ax, ay, bx, by):
-    """Distance of two points."""
-    return math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
 
 
 @njit(cache=True, nogil=True)

@@ -16,6 +16,61 @@ WALL = -1
 
 @guarded
 @njit(cache=True, nogil=True)
+def are_free(corners, vertices, free):
+    """Whether triangles between walls, (m, 3) corners, lie in free space, bool (m,)."""
+    rows, cols = free.shape
+    found = np.zeros(len(vertices), np.bool_)
+    for triangle in range(len(vertices)):
+        row = col = np.int64(0)
+        for k in range(3):
+            row += corners[vertices[triangle, k], 0]
+            col += corners[vertices[triangle, k], 1]
+        # No wall passes the middle of a triangle: all cells that it touches there are of one class.
+        row, col = row // 3, col // 3
+        found[triangle] = row < rows and col < cols and free[row, col]
+    return found
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def select_triangles(vertices, neighbours, is_kept):
+    """Select some triangles.
+
+    Parameters
+    ----------
+    vertices, neighbours
+        (m, 3) corners of all triangles, and the triangle across the side from corner k to k + 1,
+        none where there are not so many.
+    is_kept
+        bool (m,); a wall parts those that are from those that are not.
+
+    Returns
+    -------
+    tuple
+        int32 (f, 3) corners, int32 (f, 3) the triangle across each side, `WALL` for none.
+    """
+    n = len(vertices)
+    number = np.full(n, WALL, np.int32)
+    count = 0
+    for triangle in range(n):
+        if is_kept[triangle]:
+            number[triangle] = count
+            count += 1
+    kept, across = np.empty((count, 3), np.int32), np.full((count, 3), WALL, np.int32)
+    for triangle in range(n):
+        place = number[triangle]
+        if place < 0:
+            continue
+        for k in range(3):
+            kept[place, k] = vertices[triangle, k]
+            other = neighbours[triangle, k]
+            if other < n:
+                across[place, k] = number[other]
+    return kept, across
+
+
+@guarded
+@njit(cache=True, nogil=True)
 def merge_triangles(corners, triangles, neighbours):
     """Merge triangles into convex polygons, as long as a union is convex (S. Hertel, K. Mehlhorn,
     1983), longest common sides first.

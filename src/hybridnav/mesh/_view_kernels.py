@@ -7,6 +7,8 @@ of two.
 
 from __future__ import annotations
 
+import math
+
 from hybridnav._jit import njit
 from hybridnav.search._exact_kernels import turn_of
 
@@ -14,6 +16,12 @@ from hybridnav.search._exact_kernels import turn_of
 _LEFT, _RIGHT = 1, 2
 _BENDING = 4
 """Kinds of corners below this are those that paths may bend round."""
+
+
+@njit(cache=True, nogil=True)
+def distance(ax, ay, bx, by):
+    """Distance of two points."""
+    return math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
 
 
 @njit(cache=True, nogil=True)

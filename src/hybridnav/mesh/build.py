@@ -10,12 +10,15 @@ import pythoncdt
 
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import NO_CORNER, kinds_of, walls_of
-from hybridnav.mesh._merge_kernels import WALL, merge_triangles, polygons_of_cells
+from hybridnav.mesh._merge_kernels import (
+    are_free,
+    merge_triangles,
+    polygons_of_cells,
+    select_triangles,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._typing import BoolArray, ByteArray, IntArray
+    from hybridnav._typing import AnyArray, BoolArray, ByteArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +88,9 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
     kinds = kinds_of(cells)
     kind_of = kinds[kinds != NO_CORNER]
     corners, walls = walls_of(cells, kinds, len(kind_of))
-    polygons = merge_triangles(corners, *_triangulated(corners, walls, cells))
+    vertices, neighbours = triangulate(corners, walls)
+    kept = are_free(corners, vertices, cells)
+    polygons = merge_triangles(corners, *select_triangles(vertices, neighbours, kept))
     polygon_at = polygons_of_cells(*polygons[:2], corners, cells.shape)
     arrays = (corners, kind_of, *polygons, polygon_at, *blocks_of(polygons[0], *polygons[2:]))
     for array in arrays:
@@ -93,22 +98,7 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
     return ConvexMesh(*arrays)
 
 
-def _triangulated(corners: IntArray, walls: IntArray, free: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the triangles of free space, and what lies across their sides; see `triangulate`."""
-
-    def is_free(triangles: IntArray) -> BoolArray:
-        # No wall passes the middle of a triangle: all cells that it touches there are of one class.
-        middle = corners[triangles].sum(axis=1) // 3
-        inside: BoolArray = (middle < free.shape).all(axis=1)
-        inside[inside] = free[tuple(middle[inside].T)]
-        return inside
-
-    return triangulate(corners, walls, is_free)
-
-
-def triangulate(
-    corners: IntArray, walls: IntArray, is_kept: Callable[[IntArray], BoolArray]
-) -> tuple[IntArray, IntArray]:
+def triangulate(corners: IntArray, walls: IntArray) -> tuple[AnyArray, AnyArray]:
     """Triangulate corners so that walls are sides of triangles.
 
     Parameters
@@ -117,17 +107,15 @@ def triangulate(
         int32 (n, 2), (row, col).
     walls
         int (m, 2), pairs of corners; none passes a third.
-    is_kept
-        Says of triangles, int32 (t, 3), which to keep.
 
     Returns
     -------
     tuple
-        int32 (t, 3) corners counter-clockwise; int32 (t, 3) the triangle across the side from
-        corner k to k + 1, `WALL` for none.
+        (t, 3) corners counter-clockwise; (t, 3) the triangle across the side from corner k to
+        k + 1, at least t for none.
     """
     if len(corners) == 0:
-        return np.empty((0, 3), np.int32), np.empty((0, 3), np.int32)
+        return np.empty((0, 3), np.uint32), np.empty((0, 3), np.uint32)
     made = pythoncdt.Triangulation(
         pythoncdt.VertexInsertionOrder.AUTO, pythoncdt.IntersectingConstraintEdges.DONT_CHECK, 0.0
     )
@@ -135,22 +123,4 @@ def triangulate(
     made.insert_edges(walls.astype(np.uint32))  # type: ignore[call-overload]
     made.erase_super_triangle()
     found = made.triangles_array()
-    triangles = found["vertices"].astype(np.int32)
-    kept = is_kept(triangles)
-    number = np.append(np.where(kept, np.cumsum(kept) - 1, WALL), WALL)
-    across = number[np.minimum(found["neighbors"], len(triangles))]
-    across[_are_walls(triangles, walls, len(corners))] = WALL
-    return triangles[kept], across[kept].astype(np.int32)
-
-
-def _are_walls(triangles: IntArray, walls: IntArray, n_corners: int) -> BoolArray:
-    """Return whether sides of triangles are walls, bool (n, 3)."""
-
-    def keys(pairs: IntArray) -> IntArray:
-        ordered = np.sort(pairs.astype(np.int64), axis=-1)
-        key: IntArray = ordered[..., 0] * n_corners + ordered[..., 1]
-        return key
-
-    sides = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
-    found: BoolArray = np.isin(keys(sides), keys(walls))
-    return found
+    return found["vertices"], found["neighbors"]

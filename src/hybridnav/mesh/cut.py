@@ -9,7 +9,7 @@ import numpy as np
 from hybridnav.mesh import _cut_kernels as kernels
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import MANY, NO_CORNER
-from hybridnav.mesh._merge_kernels import merge_triangles
+from hybridnav.mesh._merge_kernels import are_free, merge_triangles, select_triangles
 from hybridnav.mesh.build import ConvexMesh, triangulate
 
 if TYPE_CHECKING:
@@ -71,14 +71,11 @@ def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh
         ]
     )
 
-    def is_kept(triangles: IntArray) -> BoolArray:
-        triples = local[triangles].sum(axis=1, dtype=np.int64)
-        kept: BoolArray = kernels.are_inside(mesh.corners, mesh.first, mesh.begins, cut, triples)
-        middle = triples[kept] // 3
-        kept[kept] = free[tuple(middle.T)]
-        return kept
-
-    anew = merge_triangles(local, *triangulate(local, walls, is_kept))
+    vertices, neighbours = triangulate(local, walls)
+    kept = are_free(local, vertices, free)
+    triples = local[vertices[kept]].sum(axis=1, dtype=np.int64)
+    kept[kept] = kernels.are_inside(mesh.corners, mesh.first, mesh.begins, cut, triples)
+    anew = merge_triangles(local, *select_triangles(vertices, neighbours, kept))
     first, begins, twins, polygon_of = anew[0], number_of[anew[1]], anew[2], anew[3]
     count, n_slots = mesh.n_polygons, len(mesh.begins)
     all_twins = np.concatenate([mesh.twins, np.where(twins >= 0, twins + n_slots, -1)])

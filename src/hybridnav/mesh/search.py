@@ -139,10 +139,15 @@ class MeshSearch:
         self.arrays = cols, rows, mesh.kinds, mesh.first, *sides
         self.tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
         self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))
-        self.graph: CornerGraph | None = None
+        self._graph: CornerGraph | None = None
         self._is_prepared = False
         self._lock = threading.Lock()
         self._expanded = 0
+
+    @property
+    def graph(self) -> CornerGraph | None:
+        """The graph of corners, None until it is built."""
+        return self._graph
 
     def prepare(self) -> None:
         """Build the graph of corners now, if it is not there yet: some 0.5 microseconds a cell."""
@@ -152,7 +157,7 @@ class MeshSearch:
                 if graph is not None:
                     n_landmarks = graph.landmark_distances.shape[1]
                     self.corner_works = Pool(partial(_CornerWork, self.mesh, n_landmarks))
-                self.graph = graph
+                self._graph = graph
                 self._is_prepared = True
 
     def path(
