@@ -17,7 +17,7 @@ def _doubled(array):
 
 @guarded
 @njit(cache=True, nogil=True)
-def edges_of(mesh, limit):
+def edges_of(mesh, component, limit):
     """Find the edges of the graph: two corners at which a path along the segment between them may
     bend, and which see each other.
 
@@ -25,6 +25,8 @@ def edges_of(mesh, limit):
     ----------
     mesh
         See `successors`.
+    component
+        int32 (p,), below 0 for polygons that were cut out.
     limit
         Edges at most.
 
@@ -35,11 +37,11 @@ def edges_of(mesh, limit):
         corner at which each edge ends. Each edge is there in both directions. Where there are more
         than the limit the last whole number of the first is -1.
     """
-    kinds, begins, twins = mesh[2], mesh[4], mesh[6]
+    kinds, begins, twins, polygon_of = mesh[2], mesh[4], mesh[6], mesh[7]
     n = len(kinds)
     wall = np.full(n, -1, np.int32)
     for slot in range(len(begins)):
-        if twins[slot] < 0:
+        if twins[slot] < 0 and component[polygon_of[slot]] >= 0:
             wall[begins[slot]] = slot
     target = (0.0, 0.0, np.empty(0, np.int32))
     whole, real, seen = np.empty((1024, 2), np.int32), np.empty((1024, 4)), np.empty(1024, np.int32)
@@ -49,7 +51,7 @@ def edges_of(mesh, limit):
     for corner in range(n):
         for lobe in range(2):
             found = 0
-            while kinds[corner] < 4:
+            while kinds[corner] < 4 and wall[corner] >= 0:
                 room = (whole, real, seen)
                 found = see_from_corner(mesh, corner, wall[corner], lobe, target, room, 0)
                 if found >= 0:

@@ -62,15 +62,16 @@ def build_corner_graph(mesh: ConvexMesh, arrays: tuple[object, ...]) -> CornerGr
     those before).
     """
     n = len(mesh.corners)
-    first, heads = kernels.edges_of(arrays, _MOST_EDGES * n)
+    first, heads = kernels.edges_of(arrays, mesh.component, _MOST_EDGES * n)
     if first[-1] < 0:
         return None
     degrees = first[2::2] - first[:-2:2]
     table = np.empty((n, _LANDMARKS if len(heads) else 0))
     if len(heads):
         # In the part of the map that has the most edges.
-        part = np.empty(n, dtype=np.int32)
-        part[mesh.begins] = mesh.component[mesh.polygon_of]
+        part = np.zeros(n, dtype=np.int32)
+        of_slot = mesh.component[mesh.polygon_of]
+        part[mesh.begins[of_slot >= 0]] = of_slot[of_slot >= 0]
         inside = part == np.bincount(part, weights=degrees).argmax()
         source = int(np.where(inside, degrees, -1).argmax())
         kernels.landmarks_of(arrays[:2], (first, heads), source, table)
