@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.portal_memory import remember_portals
+
 # Time is for benchmarks: a first call that imports or compiles is no failure.
 settings.register_profile("hybridnav", deadline=None)
 settings.load_profile("hybridnav")
@@ -20,6 +22,14 @@ def data() -> Path:
     if not folder:
         pytest.skip("HYBRIDNAV_DATA is not set")
     return Path(folder)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _shared_portals() -> Iterator[None]:
+    """Prepare the portals of a large map once for all tests of a process."""
+    with pytest.MonkeyPatch.context() as patch:
+        remember_portals(patch.setattr)
+        yield
 
 
 @pytest.fixture(autouse=True)

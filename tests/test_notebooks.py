@@ -29,6 +29,13 @@ ELSEWHERE: dict[str, dict[str, Any]] = {
     | {"DOORS": ((15.5, 6.2), (9.9, 6.2))},
 }
 """Settings with which each notebook runs on another map."""
+SHARED_PORTALS = f"""
+import sys
+sys.path.append({str(ROOT)!r})
+from tests.portal_memory import remember_portals
+remember_portals(setattr)
+sys.path.remove({str(ROOT)!r})
+"""
 WITHOUT_OMPL = """
 import importlib.util
 found = importlib.util.find_spec
@@ -38,8 +45,11 @@ importlib.util.find_spec = lambda name, *args: None if name == "ompl" else found
 
 @pytest.fixture(autouse=True)
 def clean_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No start-up files of whoever runs the tests."""
+    """No start-up files of whoever runs the tests; one that prepares the office's portals once."""
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    startup = tmp_path / "profile_default" / "startup"
+    startup.mkdir(parents=True)
+    (startup / "shared_portals.py").write_text(SHARED_PORTALS)
 
 
 def executed(notebook: Any, start: Path = ROOT / "notebooks") -> list[Any]:
@@ -108,9 +118,7 @@ def test_a_notebook_holds_on_another_map(path: Path, tmp_path: Path) -> None:
 
 
 def test_without_ompl_one_sentence_says_so_and_the_rest_runs(tmp_path: Path) -> None:
-    startup = tmp_path / "profile_default" / "startup"
-    startup.mkdir(parents=True)
-    (startup / "without_ompl.py").write_text(WITHOUT_OMPL)
+    (tmp_path / "profile_default" / "startup" / "without_ompl.py").write_text(WITHOUT_OMPL)
     outputs = executed(nbformat.read(NEEDS_OMPL, as_version=4))
     assert written(outputs).count("not installed") == 1
     assert "Error" not in written(outputs)
