@@ -13,13 +13,14 @@ from hybridnav.grid.worlds import office_world
 from hybridnav.metrics import VisibilityGraph
 from hybridnav.route.any_angle_bound import AnyAngleBound
 from tests.divided import Divided, halves, partitions
+from tests.strategies import examples
 
 
 def position(cell: tuple[int, int]) -> tuple[float, float]:
     return cell[0] + 0.5, cell[1] + 0.5
 
 
-@settings(max_examples=150, derandomize=True, deadline=None)
+@settings(max_examples=examples(50), derandomize=True, deadline=None)
 @given(partitions(), st.sampled_from(["all", "few"]), st.integers(0, 2**32 - 1))
 def test_no_any_angle_path_is_shorter(divided: Divided, gates: str, seed: int) -> None:
     assume(divided.free.any() and not divided.allow_unexplored)

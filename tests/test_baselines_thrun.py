@@ -17,7 +17,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, components, recounted
-from tests.strategies import MAX_SIDE, Scene, drawn, occupancy_grid, scenes
+from tests.strategies import MAX_SIDE, Scene, drawn, examples, occupancy_grid, scenes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +49,7 @@ def region_of(made: ThrunMap) -> Any:
     return made.region_of
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(50))
 @given(scene=scenes(), epsilon=st.sampled_from([1, 2, 5, 10, 40]))
 def test_regions_partition_free_space_and_are_connected(scene: Scene, epsilon: int) -> None:
     made = ThrunMap(scene.grid, epsilon_cells=epsilon)
@@ -62,7 +62,7 @@ def test_regions_partition_free_space_and_are_connected(scene: Scene, epsilon: i
     assert made.n_nodes >= components(free).max(initial=0)
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(40))
 @given(scene=scenes(), epsilon=st.sampled_from([1, 3, 10]), seed=st.integers(0, 10**6))
 def test_solvability_is_that_of_the_grid(scene: Scene, epsilon: int, seed: int) -> None:
     made = ThrunMap(scene.grid, epsilon_cells=epsilon)
@@ -91,7 +91,7 @@ def test_solvability_is_that_of_the_grid(scene: Scene, epsilon: int, seed: int) 
         assert recounted(answer.cells) >= recounted(optimum) - 1e-9
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(40))
 @given(scene=scenes(), epsilon=st.sampled_from([1, 3, 10]))
 def test_critical_points_are_free_and_their_basis_points_are_obstacles_on_two_sides(
     scene: Scene, epsilon: int

@@ -11,10 +11,10 @@ from hybridnav.pyramid import DualGraphPyramid
 from tests.oracle.blocks import blocks, in_pieces, piece_of
 from tests.oracle.checks import check_level
 from tests.oracle.pyramid import Base
-from tests.strategies import MAX_SIDE, Scene, occupancy_grid, scenes
+from tests.strategies import MAX_SIDE, Scene, examples, occupancy_grid, scenes
 
 LINKAGES = ("radius", "survivor", "diameter")
-ORDINARY = settings(max_examples=100, deadline=None, derandomize=True)
+ORDINARY = settings(max_examples=examples(30), deadline=None, derandomize=True)
 
 
 @st.composite

@@ -23,9 +23,9 @@ from tests.certificates import (
     random_pairs,
     search_of,
 )
-from tests.strategies import Scene, drawn, scenes
+from tests.strategies import Scene, drawn, examples, scenes
 
-PLAIN = settings(max_examples=100, deadline=None, derandomize=True)
+PLAIN = settings(max_examples=examples(30), deadline=None, derandomize=True)
 
 
 # --- random maps --------------------------------------------------------------------------------

@@ -73,7 +73,7 @@ def strike(folder: Path, arguments: tuple[object, ...], count: int) -> int:
 
 
 def test_ctrl_c_at_a_few_moments_of_a_command(tmp_path: Path) -> None:
-    assert strike(tmp_path, ("rooms", FIGURE, "-o", "rooms.yaml", "--force"), 3) > 0
+    assert strike(tmp_path, ("rooms", FIGURE, "-o", "rooms.yaml", "--force"), 2) > 0
 
 
 @pytest.mark.full

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine.curves import shortest_curve
+from tests.strategies import examples
 
 RADIUS_M = 0.8
 
@@ -25,7 +26,7 @@ both = pytest.mark.parametrize("reverses", [False, True])
 
 @both
 @given(start=poses, goal=poses)
-@settings(max_examples=500, derandomize=True)
+@settings(max_examples=examples(125), derandomize=True)
 def test_curve_arrives_and_bends_by_its_radius(
     reverses: bool,  # noqa: FBT001
     start: Any,
@@ -49,7 +50,7 @@ def test_curve_arrives_and_bends_by_its_radius(
 
 @both
 @given(start=poses, goal=poses)
-@settings(max_examples=500, derandomize=True)
+@settings(max_examples=examples(125), derandomize=True)
 def test_curve_is_as_long_as_that_of_ompl(
     reverses: bool,  # noqa: FBT001
     start: Any,
@@ -67,7 +68,7 @@ def test_curve_is_as_long_as_that_of_ompl(
 
 
 @given(start=poses, goal=poses)
-@settings(max_examples=200, derandomize=True)
+@settings(max_examples=examples(60), derandomize=True)
 def test_going_backwards_makes_no_curve_longer_and_works_both_ways(start: Any, goal: Any) -> None:
     forwards = shortest_curve(start, goal, radius_m=RADIUS_M, reverses=False)
     either = shortest_curve(start, goal, radius_m=RADIUS_M, reverses=True)

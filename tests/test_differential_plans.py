@@ -57,13 +57,13 @@ def rooms() -> hn.TopologicalMap:
     ("planner", "reverses"),
     [
         ("RRTConnect", False),
-        ("RRT", False),
         ("BITstar", False),
         ("RRTConnect", True),
         ("RRTstar", True),
-        ("InformedRRTstar", True),
-        ("PRM", True),
-        ("PRMstar", True),
+        pytest.param("RRT", False, marks=pytest.mark.full),
+        pytest.param("InformedRRTstar", True, marks=pytest.mark.full),
+        pytest.param("PRM", True, marks=pytest.mark.full),
+        pytest.param("PRMstar", True, marks=pytest.mark.full),
     ],
 )
 def test_every_planner_of_the_space_goes_through_doors_without_touching(

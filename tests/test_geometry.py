@@ -16,9 +16,9 @@ from hybridnav.grid import Frame
 from hybridnav.pyramid import DualGraphPyramid, FaceKind
 from hybridnav.pyramid._outline_kernels import boundary_corners
 from hybridnav.pyramid.geometry import boundary_lines, field_polygons
-from tests.strategies import drawn, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
-ORDINARY = settings(max_examples=100, deadline=None, derandomize=True)
+ORDINARY = settings(max_examples=examples(30), deadline=None, derandomize=True)
 MANY = settings(max_examples=1000, deadline=None)
 UNIT = Frame()
 LINKAGES = st.sampled_from(["radius", "survivor", "diameter"])

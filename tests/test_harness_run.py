@@ -163,7 +163,7 @@ def test_a_worker_that_fails_costs_one_query(settings, tmp_path, monkeypatch, me
     fatal = pairs[N_PAIRS // 2]
     monkeypatch.setenv(faulty.FATAL_PAIR, fatal.key.partition(":")[2])
     # The timeout must leave time for the imports of a process, on a busy machine too.
-    only = replace(settings, presets=(), baselines=(name_of(method),), timeout_s=15.0)
+    only = replace(settings, presets=(), baselines=(name_of(method),), timeout_s=10.0)
     if method is faulty.Dies:
         only = replace(only, timeout_s=100.0)
     assert evaluate(only, tmp_path) == total(2)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.metrics import VisibilityGraph, judge_line, line_cells
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 ROOM = drawn(
     ".....",
@@ -33,7 +33,7 @@ def framed(classes: Any) -> OccupancyGrid:
 
 
 @given(class_grids(max_side=8), st.integers(0, 2**32 - 1))
-@settings(max_examples=200)
+@settings(max_examples=examples(60))
 def test_the_cells_of_a_shortest_path_are_those_that_it_passes(classes: Any, seed: int) -> None:
     free = classes == CellClass.FREE
     assume(free.any())

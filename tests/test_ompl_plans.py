@@ -186,16 +186,16 @@ def test_clearance_weighs_more_than_length(planner_of: Any) -> None:
     ("space", "planner"),
     [
         ("se2", "RRTConnect"),
-        ("se2", "RRTstar"),
-        ("se2", "InformedRRTstar"),
-        ("se2", "BITstar"),
+        pytest.param("se2", "RRTstar", marks=pytest.mark.full),
+        pytest.param("se2", "InformedRRTstar", marks=pytest.mark.full),
+        pytest.param("se2", "BITstar", marks=pytest.mark.full),
         ("se2", "PRMstar"),
-        ("dubins", "RRTConnect"),
+        pytest.param("dubins", "RRTConnect", marks=pytest.mark.full),
         ("dubins", "BITstar"),
         ("reeds-shepp", "RRTConnect"),
         ("reeds-shepp", "RRTstar"),
-        ("reeds-shepp", "BITstar"),
-        ("reeds-shepp", "PRMstar"),
+        pytest.param("reeds-shepp", "BITstar", marks=pytest.mark.full),
+        pytest.param("reeds-shepp", "PRMstar", marks=pytest.mark.full),
     ],
 )
 def test_a_long_robot_goes_through_doors_without_touching(

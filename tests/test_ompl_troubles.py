@@ -31,6 +31,8 @@ ROOT = Path(__file__).parents[1]
 ENDS = (1.0, 13.2), (40.6, 19.4)
 BUDGET_S = 1.0
 START_S = 60.0
+OVER_PLACES = "planner.coarse=max-distance"
+"""For processes of their own, which would prepare portals for seconds."""
 LATE = "the worker did not answer in time"
 """What a busy machine can make of the first of these."""
 REASONS = {
@@ -197,9 +199,8 @@ from hybridnav.grid.worlds import office_world
 from hybridnav.planner import ompl_plans
 from tests.troubled_query import TroubledQuery
 grid = office_world().grid(robot_radius_m=0.25)
-planner = hn.HybridPlanner(
-    hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset="ompl-rrtconnect"
-)
+preset = hn.load_preset("ompl-rrtconnect", overrides=["{OVER_PLACES}"])
+planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset=preset)
 print(planner._ompl._worker._running.process.pid, flush=True)
 ompl_plans.Query = TroubledQuery
 planner.plan(*{ENDS})
@@ -225,7 +226,7 @@ def test_ctrl_c_ends_a_search_that_has_an_hour_left(tmp_path: Path) -> None:
     code += "from hybridnav.cli import main; main()"
     points = ["--start", "1.0,13.2,0", "--goal", "40.6,19.4,0"]
     settings = ["--preset", "ompl-rrtstar", "--set", "planner.ompl.space=se2"]
-    settings += ["--set", "planner.ompl.budget_s=3600"]
+    settings += ["--set", "planner.ompl.budget_s=3600", "--set", OVER_PLACES]
     office = str(ROOT / "maps" / "office" / "office.yaml")
     command = [sys.executable, "-c", code, "plan", office, *points, *settings]
     with subprocess.Popen(command, stderr=subprocess.PIPE, cwd=tmp_path) as planning:
@@ -303,7 +304,8 @@ import hybridnav as hn
 from hybridnav.grid.worlds import office_world
 grid = office_world().grid(robot_radius_m=0.25)
 topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-planner = hn.HybridPlanner(topology, preset="ompl-rrtconnect")
+preset = hn.load_preset("ompl-rrtconnect", overrides=["{OVER_PLACES}"])
+planner = hn.HybridPlanner(topology, preset=preset)
 print([planner.plan(*{ENDS}).refinement.by_grid for _ in range(2)])
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -321,6 +323,7 @@ def test_files_of_the_working_directory_are_not_taken_for_modules(tmp_path: Path
         str(ROOT / "maps/office/office.yaml"),
     ]
     command += ["--start", "1.0,13.2", "--goal", "40.6,19.4", "--preset", "ompl-rrtconnect"]
+    command += ["--set", OVER_PLACES]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 

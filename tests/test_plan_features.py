@@ -19,10 +19,10 @@ from hybridnav.metrics import VisibilityGraph, segment_faults
 from hybridnav.planner.blocked import Blocked
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, length_of_points, recounted
-from tests.strategies import Scene, drawn, scenes
+from tests.strategies import Scene, drawn, examples, scenes
 
 PRESETS = ("paper", "grid-astar", "fast", "balanced", "certified")
-PLAIN = settings(max_examples=60, deadline=None, derandomize=True)
+PLAIN = settings(max_examples=examples(25), deadline=None, derandomize=True)
 TWO_ROOMS = drawn(
     ".......#.......",
     "...............",

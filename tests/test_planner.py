@@ -27,7 +27,7 @@ from tests.oracle.grid import (
     move_graph,
     recounted,
 )
-from tests.strategies import Scene, drawn, occupancy_grid, scenes
+from tests.strategies import Scene, drawn, examples, occupancy_grid, scenes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -227,7 +227,7 @@ def test_gap_is_what_separates_the_cost_from_the_bound() -> None:
 
 
 @given(scenes(max_side=16), st.integers(0, 2**32 - 1), st.sampled_from(["true", "false"]))
-@settings(max_examples=150)
+@settings(max_examples=examples(50))
 def test_routes_paths_and_bounds_are_right_on_random_maps(
     scene: Scene, seed: int, allow_unexplored: str
 ) -> None:

@@ -22,7 +22,7 @@ from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 from tests.divided import GATES, Divided, costs_from, partitions, pieces_of
 from tests.portal_judge import ALWAYS, EFFORTS, EPSILONS, NEVER, Judge
-from tests.strategies import MAX_SIDE, drawn, occupancy_grid, scenes
+from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid, scenes
 
 if TYPE_CHECKING:
     from tests.strategies import Scene
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 seeds = st.integers(0, 2**32 - 1)
 
 
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=examples(60), derandomize=True, deadline=None)
 @given(partitions(), st.sampled_from(GATES), st.sampled_from([NEVER, NEVER, ALWAYS]), seeds)
 def test_paths_and_bounds_on_random_fields(
     divided: Divided, gates: str, short: int, seed: int
@@ -39,7 +39,7 @@ def test_paths_and_bounds_on_random_fields(
     Judge(divided, gates, short=short).run(seed)
 
 
-@settings(max_examples=100, derandomize=True, deadline=None)
+@settings(max_examples=examples(30), derandomize=True, deadline=None)
 @given(
     partitions(),
     st.sampled_from(GATES),
@@ -54,7 +54,7 @@ def test_paths_and_bounds_with_a_rounded_table(
     Judge(divided, gates, bits=bits, short=short).run(seed)
 
 
-@settings(max_examples=150, derandomize=True, deadline=None)
+@settings(max_examples=examples(50), derandomize=True, deadline=None)
 @given(partitions(), st.sampled_from(["all", "few"]), st.sampled_from([0, 0, 3]), seeds)
 def test_ways_by_two_sides_cost_at_least_what_bounds_say(
     divided: Divided, gates: str, bits: int, seed: int
@@ -92,7 +92,7 @@ def cost_by_sides(divided: Divided, every: Any, sides: tuple[int, int], inside: 
     return best
 
 
-@settings(max_examples=150, derandomize=True, deadline=None)
+@settings(max_examples=examples(50), derandomize=True, deadline=None)
 @given(partitions(), st.sampled_from(GATES), st.sampled_from([0, 9]), seeds)
 def test_many_answers_are_those_of_each_pair(
     divided: Divided, gates: str, bits: int, seed: int
@@ -121,7 +121,7 @@ def test_many_answers_are_those_of_each_pair(
                 assert np.array_equal(points, answer.points)
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=examples(15), derandomize=True, deadline=None)
 @given(scenes(min(MAX_SIDE, 40)), st.sampled_from(["all", "few"]), seeds)
 def test_paths_and_bounds_on_the_fields_that_are_chosen(
     scene: Scene, gates: str, seed: int
@@ -135,17 +135,18 @@ def test_paths_and_bounds_on_the_fields_that_are_chosen(
     ("name", "merge_distance_m", "gates"),
     [
         ("figure1", 1.0, "all"),
-        ("office", 2.0, "all"),
-        ("office", 2.0, "few"),
+        ("office", 4.0, "all"),
+        pytest.param("office", 2.0, "few", marks=pytest.mark.full),
         ("office", math.inf, "sparse"),
     ],
 )
 def test_paths_and_bounds_on_generated_worlds(
     name: str, merge_distance_m: float, gates: str
 ) -> None:
-    world = figure1_world() if name == "figure1" else office_world()
+    is_small = name == "figure1"
+    world, radius_m = (figure1_world(), 0.0) if is_small else (office_world(), 0.25)
     pyramid = DualGraphPyramid.build(
-        world.grid(robot_radius_m=0), merge_distance_m=merge_distance_m, seed=1
+        world.grid(robot_radius_m=radius_m), merge_distance_m=merge_distance_m
     )
     Judge.of(TopologicalMap(pyramid), gates).run(7, 6)
 
@@ -197,7 +198,7 @@ def test_a_map_without_free_cells_has_no_portals(drawing: tuple[str, ...], gates
     assert Judge.of(TopologicalMap(pyramid), gates).search.portals.n_gates == 0
 
 
-@settings(max_examples=30, derandomize=True, deadline=None)
+@settings(max_examples=examples(15), derandomize=True, deadline=None)
 @given(partitions(), st.sampled_from(GATES), seeds)
 def test_an_answer_depends_on_its_query_only(divided: Divided, gates: str, seed: int) -> None:
     assume(divided.free.any())

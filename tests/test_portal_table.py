@@ -26,9 +26,10 @@ from tests.divided import (
     partitions,
     with_rounding,
 )
+from tests.strategies import examples
 
-ENOUGH = settings(max_examples=120, derandomize=True, deadline=None)
-FEWER = settings(max_examples=60, derandomize=True, deadline=None)
+ENOUGH = settings(max_examples=examples(40), derandomize=True, deadline=None)
+FEWER = settings(max_examples=examples(20), derandomize=True, deadline=None)
 ROUNDED = st.sampled_from([0, 0, 1, 3, 9])
 """Bits that costs lose, as on maps with paths that are too long for the table."""
 

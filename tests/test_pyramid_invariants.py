@@ -25,10 +25,10 @@ from tests.oracle.checks import (
 )
 from tests.oracle.pyramid import Base, Dart
 from tests.oracle.reference import PlaneMap
-from tests.strategies import MAX_SIDE, Scene, drawn, occupancy_grid, scenes
+from tests.strategies import MAX_SIDE, Scene, drawn, examples, occupancy_grid, scenes
 
 LINKAGES = ("radius", "survivor", "diameter")
-ORDINARY = settings(max_examples=150, deadline=None, derandomize=True)
+ORDINARY = settings(max_examples=examples(40), deadline=None, derandomize=True)
 MANY = settings(max_examples=1000, deadline=None)
 ARRAYS = (
     "field_of",

@@ -22,7 +22,7 @@ from tests.oracle.pyramid import (
     through_cells,
 )
 from tests.oracle.reference import ALL_RULES, PlaneMap
-from tests.strategies import class_grids, drawn
+from tests.strategies import class_grids, drawn, examples
 
 ISLAND = drawn("......", "..??..", "..??..", "......")
 """A free place round an unexplored island."""
@@ -90,7 +90,7 @@ def base_sigma_round(cell):
 
 
 @given(class_grids(max_side=12))
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=examples(60), deadline=None, derandomize=True)
 def test_base_faces_are_blocks_and_obstacles(classes):
     base = Base.of(classes)
     inside = np.where(classes > 0, 0, -1)
@@ -181,7 +181,7 @@ def test_collapsed_maps_have_the_arcs_of_their_boundaries(classes, arcs, loops):
 
 
 @given(class_grids(max_side=14), st.randoms(use_true_random=False))
-@settings(max_examples=120, deadline=None, derandomize=True)
+@settings(max_examples=examples(40), deadline=None, derandomize=True)
 def test_rules_and_oracle_agree(classes, rng):
     agree(classes, rng)
 

@@ -3,12 +3,12 @@
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.grid import RoomLabels
-from tests.strategies import MAX_SIDE, class_grids, drawn, occupancy_grid
+from tests.strategies import MAX_SIDE, class_grids, drawn, examples, occupancy_grid
 
 TWO_ROOMS = drawn(
     "#########",
@@ -62,6 +62,7 @@ def fields_of(level):
     }
 
 
+@settings(max_examples=examples(25))
 @given(scene=labelled(), merge_distance_m=st.sampled_from([1.5, 4.0, 30.0]))
 def test_rooms_are_the_connected_parts_of_one_label_whatever_the_merge_distance(
     scene, merge_distance_m
@@ -81,6 +82,7 @@ def test_rooms_are_the_connected_parts_of_one_label_whatever_the_merge_distance(
         assert all(len(label) == 1 for label in labels)
 
 
+@settings(max_examples=examples(40))
 @given(scene=labelled(), linkage=st.sampled_from(["survivor", "radius", "diameter"]))
 def test_places_below_rooms_keep_the_cap_and_every_level_has_its_dual(scene, linkage):
     classes, rooms = scene

@@ -59,7 +59,9 @@ def many_rooms(side):
     return RoomLabels(tuple(f"laboratory {n}" for n in range(64)), label_of), grid
 
 
-@pytest.mark.parametrize(("side", "width_in"), [(9, 2.5), (9, 3.0), (9, 15.0)])
+@pytest.mark.parametrize(
+    ("side", "width_in"), [pytest.param(9, 2.5, marks=pytest.mark.full), (9, 3.0), (9, 15.0)]
+)
 def test_names_hide_neither_each_other_nor_the_room_beside(side, width_in):
     labels, grid = many_rooms(side)
     ax = plot_rooms(labels, grid, width_in=width_in)
