@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pythoncdt
 
+from hybridnav._copies import copies_alike
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import NO_CORNER, kinds_of, walls_of
 from hybridnav.mesh._merge_kernels import (
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, BoolArray, ByteArray, IntArray
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class ConvexMesh:
     """Convex polygons that cover free space, without a gap and without overlap.
