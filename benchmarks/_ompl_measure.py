@@ -116,7 +116,7 @@ class Bench:
             merge_distance_m=MOVINGAI_MERGE_DISTANCE_M if is_movingai else ROS_MERGE_DISTANCE_M,
         )
         topology = hn.TopologicalMap(pyramid)
-        self._coarse = hn.HybridPlanner(topology, preset="fast")
+        self._coarse = hn.HybridPlanner(topology, preset="portals")
         optimum = AnyAngleOptimum(self.grid)
         self.problems: list[Problem] = []
         for pair in sample_pairs(self.grid, pairs, seed=seed):

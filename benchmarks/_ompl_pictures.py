@@ -29,7 +29,7 @@ def draw(out: Path) -> list[Path]:
     """A picture for each planner: the whole map's run, and the corridor's in both ways."""
     grid = office_world().grid(robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    coarse = hn.HybridPlanner(topology, preset="fast")
+    coarse = hn.HybridPlanner(topology, preset="portals")
     cells: Any = coarse._cells  # noqa: SLF001 - the planner's own fields, built once
     field_of = cells.search.field_of
     path = coarse.plan(*ENDS).raise_for_status().path

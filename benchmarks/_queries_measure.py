@@ -46,7 +46,7 @@ Presets = dict[str, hn.Preset]
 
 def presets_of(names: Iterable[str]) -> Presets:
     """Presets by what they were called: a name, and overrides behind colons, such as
-    `balanced:planner.smooth=line-of-sight`; that of grid A* comes first."""
+    `portals:planner.smooth=line-of-sight`; that of grid A* comes first."""
     found = {}
     for text in dict.fromkeys((YARDSTICK, *names)):
         name, *overrides = text.split(":")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.analysis import Outcome, Study
     from hybridnav.harness.tables import Row
 
-BESIDE = "balanced"
+BESIDE = "portals"
 """Preset whose grid paths, shortened by line of sight, are set beside OMPL's."""
 
 _COLUMNS = (

@@ -53,7 +53,7 @@ def rows_crossed(alternatives):
     ]
 
 
-@pytest.mark.parametrize("preset", ["grid-astar", "balanced", "fast", "paper"])
+@pytest.mark.parametrize("preset", ["grid-astar", "shortest", "portals", "paper"])
 def test_the_second_route_takes_the_other_door(preset):
     found = hn.plan_alternatives(planner_of(TWO_DOORS, preset), (1.5, 1.5), (12.5, 2.5), 3)
     assert rows_crossed(found) == [{2}, {6}]
@@ -249,7 +249,7 @@ def test_grids_with_corner_cutting_have_walks_and_no_alternatives():
         AlternativeSearch(topology)
     walks = Walks(topology)
     free = np.argwhere(CORNERS == CellClass.FREE)
-    planner = hn.HybridPlanner(topology, preset="balanced")
+    planner = hn.HybridPlanner(topology, preset="portals")
     pinched = 0
     for start in free:
         for goal in free:

@@ -100,22 +100,16 @@ def test_bounds_are_lengths_in_metres_whatever_the_frame() -> None:
 
 
 def test_a_smaller_epsilon_proves_more(office: list[hn.HybridPlanner]) -> None:
-    by_epsilon = {p.preset.planner.epsilon: p for p in office if p.preset.name == "certified"}
-    steps = [0.1, 0.01, 0.0]
+    by_epsilon = {p.preset.planner.epsilon: p for p in office if p.preset.name == "portals"}
+    steps = [0.1, 0.01, None]
     gaps = []
     for pair in pairs_of(office[0].topology.grid, 200, 8):
         results = [planned(by_epsilon[step], *pair) for step in steps]
         if results[0].solved:
             gaps.append([result.gap for result in results])
-    assert (np.max(gaps, axis=0) <= np.array(steps) + 1e-9).all()
+    assert (np.max(gaps, axis=0) <= np.array([0.1, 0.01, 0]) + 1e-9).all()
     means = np.mean(gaps, axis=0)
     assert means[0] > means[1] > means[2] == 0
-
-
-def test_the_bound_is_worth_having(office: list[hn.HybridPlanner]) -> None:
-    planner = next(p for p in office if p.preset.name == "balanced")
-    gaps = [planned(planner, *pair).gap for pair in pairs_of(planner.topology.grid, 300, 9)]
-    assert np.nanpercentile(gaps, 95) < 0.05
 
 
 # --- the reference data -------------------------------------------------------------------------

@@ -76,10 +76,10 @@ def things() -> dict[str, Any]:
         "rooms": topo.rooms,
         "labels": topo.rooms.labels,
         "door": topo.rooms.doors[0],
-        "preset": hn.load_preset("certified"),
+        "preset": hn.load_preset("portals"),
         "blocked": hn.Blocked(cells=[[1, 1]], polygons=[box(0, 0, 1, 1)]),
-        "tour": hn.plan_tour(planner("balanced"), [START, topo.rooms.names[0], GOAL]),
-        "alternatives": hn.plan_alternatives(planner("balanced"), START, GOAL, 2),
+        "tour": hn.plan_tour(planner("shortest"), [START, topo.rooms.names[0], GOAL]),
+        "alternatives": hn.plan_alternatives(planner("shortest"), START, GOAL, 2),
         "dual": topo.level.dual,
         "map": topo.pyramid[0].darts,
         "islands": topo.pyramid.islands,
@@ -210,7 +210,7 @@ def test_a_result_travels_without_its_planner(preset: str) -> None:
 
 
 def test_a_result_is_read_where_there_is_no_map(tmp_path: Path) -> None:
-    result = planner("balanced").plan(START, GOAL)
+    result = planner("shortest").plan(START, GOAL)
     (tmp_path / "result").write_bytes(pickle.dumps(result))
     script = (
         "import pickle, sys\n"

@@ -44,7 +44,7 @@ FAULTS = {
     faulty.LineOverHomelessCells: "the path leaves the regions",
 }
 SOUND = (faulty.SoundLine, faulty.OwnGridOrNothing)
-PRESETS = ("paper", "balanced")
+PRESETS = ("paper", "portals")
 METRICS: tuple[Yardstick, ...] = get_args(Yardstick)
 N_PAIRS = 40
 MARK = "HYBRIDNAV_TEST_MARK"
@@ -230,7 +230,7 @@ def test_each_metric_has_rows_and_charts_of_its_own(folder, study, rows):
     assert metrics == sorted(metrics, reverse=True)
     assert rows["paper"]["metric"] == rows["grid-astar"]["metric"] == "octile"
     assert rows["paper"]["by the grid"] == ""
-    for name in ("balanced+line-of-sight", name_of(faulty.SoundLine)):
+    for name in ("portals+line-of-sight", name_of(faulty.SoundLine)):
         assert rows[name]["metric"] == "any-angle"
         assert rows[name]["octile loss %"] == ""
     report = (folder / "report.html").read_text()
@@ -278,8 +278,8 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
     settings = RunSettings(
         maps=(str(folder.parent / "rooms.map"),), pairs=N_PAIRS, merge_distance_m=4.0
     )
-    smooth = load_preset("balanced", overrides=["planner.smooth=line-of-sight"])
-    evaluate(replace(settings, presets=("balanced",)), tmp_path / "cells")
+    smooth = load_preset("portals", overrides=["planner.smooth=line-of-sight"])
+    evaluate(replace(settings, presets=("portals",)), tmp_path / "cells")
     evaluate(replace(settings, presets=(smooth,)), tmp_path / "lines")
     # What is no loss by definition is no line in a chart of another metric.
     write_outputs(tmp_path / "lines")
@@ -287,7 +287,7 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
     assert "Loss, rooms, any-angle paths" in report
     assert "octile paths" not in report
     (row,) = compare_runs(tmp_path / "cells", tmp_path / "lines")
-    assert row["method"] == "balanced+line-of-sight against balanced"
+    assert row["method"] == "portals+line-of-sight against portals"
     cells, lines = (
         next(o for o in write_outputs(tmp_path / run).outcomes if o.label != "grid-astar")
         for run in ("cells", "lines")

@@ -144,7 +144,7 @@ def test_a_preset_is_a_frozen_value(write):
         ("planner: {speed: 3}\n", ["planner.speed: unknown key", "coarse", "allow_unexplored"]),
         ('planner: {"a\\nb": 3}\n', ["a\\nb", "unknown key"]),
         ("planner: {1: 3}\n", ["planner.1"]),
-        ("name: fast\n", ["name: a preset is named after its file"]),
+        ("name: portals\n", ["name: a preset is named after its file"]),
         ("pyramid:\n", ["pyramid: expected a section with keys, got nothing"]),
         ("planner: [coarse]\n", ["planner: expected a section with keys, got ['coarse']"]),
         ("description: 3\n", ["description: should be a valid string, got 3"]),

@@ -294,12 +294,15 @@ def test_the_title_tells_map_length_loss_and_places(rooms, plan):
     assert _title(plot_plan(rooms, plan, title="")) == ""
 
 
-def test_a_search_of_the_whole_map_shows_a_path_and_no_route(rooms):
-    result = _plan(rooms, START, GOAL, "grid-astar")
+@pytest.mark.parametrize("preset", ["shortest", "portals", "grid-astar"])
+def test_a_route_that_is_read_off_the_path_is_shown_and_no_corridor(rooms, preset):
+    result = _plan(rooms, START, GOAL, preset)
     ax = plot_plan(rooms, result)
     assert _find(ax, "path") is not None
-    assert _find(ax, "route") is None
-    assert "corridor" not in [text.get_text() for text in _legend(ax).get_texts()]
+    assert _find(ax, "route") is not None
+    words = [text.get_text() for text in _legend(ax).get_texts()]
+    assert {"route", "its places"} <= set(words)
+    assert not {"coarse route", "corridor"} & set(words)
 
 
 def test_an_unsolved_plan_shows_its_ends_and_says_why(rooms):

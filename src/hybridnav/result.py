@@ -160,6 +160,8 @@ class PlanStats:
     """Places that the coarse search expanded."""
     expanded_gates: int = 0
     """Border cells that the search over portals expanded."""
+    expanded_intervals: int = 0
+    """Intervals that the search on the mesh expanded."""
     corridor_cells: int = 0
     """Cells in the corridor; 0 where it is the whole map, or the route leads over portals."""
     seconds: dict[str, float] = field(default_factory=dict)
@@ -225,8 +227,8 @@ class PlanResult:
 
     @cached_property
     def route(self) -> Route | None:
-        """The places and arcs that were chosen before the path (`paper`), or are read off it (the
-        presets over portals); None too where the preset searches the whole map."""
+        """The places and arcs of the path: chosen before it (`paper`), or read off it (all other
+        presets); None unless there is a path."""
         return self.route_source() if callable(self.route_source) else self.route_source
 
     def __getstate__(self) -> dict[str, Any]:
@@ -290,6 +292,7 @@ class PlanResult:
             "expanded": self.stats.expanded,
             "expanded_places": self.stats.expanded_places,
             "expanded_gates": self.stats.expanded_gates,
+            "expanded_intervals": self.stats.expanded_intervals,
             "corridor_cells": self.stats.corridor_cells,
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},
             "settings": _finite(self.settings),

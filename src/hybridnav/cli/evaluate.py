@@ -122,7 +122,7 @@ def evaluate(
             "--metric any-angle does not go with --corner-cutting: no any-angle path passes "
             "between two blocked cells that meet at a corner; take --metric octile"
         )
-    names = preset if preset is not None else ([] if baseline else ["balanced"])
+    names = preset if preset is not None else ([] if baseline else ["shortest"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
         presets=tuple(read_settings(name, overrides, None, None) for name in names),

@@ -111,7 +111,8 @@ LeastHoleOption = Annotated[
     ),
 ]
 CompareOption = Annotated[
-    bool, typer.Option("--compare", help="Also plan on the whole grid, and print the loss.")
+    bool,
+    typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
 ]
 
 
@@ -127,7 +128,7 @@ def plan(
     alternatives: AlternativesOption = 1,
     least_hole_m2: LeastHoleOption = 1.0,
     blocked: BlockedOption = None,
-    preset: PresetOption = "balanced",
+    preset: PresetOption = "shortest",
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,
@@ -196,13 +197,15 @@ def plan(
     topology = grow_topology(grid, settings, seconds)
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=settings)
-    result = planner.plan(start, goal, blocked=closed)
+    with stage("planning", {}, "plan"):  # the result has the seconds of its stages
+        result = planner.plan(start, goal, blocked=closed)
     figures = _figures(map_file, result, seconds) | islands_figures(grid) | closing.to_dict()
     if compare:
         figures |= _compare(topology, settings, (start, goal), result, closed)
     _answer(grid, (start, goal), figures, as_json=as_json)
     if plot is not None:
-        _draw(topology, result, (start, goal), figures.get("optimum_m"), plot)
+        optimum_m = figures["optimum_m"] if figures.get("loss") is not None else None
+        _draw(topology, result, (start, goal), optimum_m, plot)
     if not result.solved:
         raise typer.Exit(EXIT_NOT_SOLVED)
 
@@ -271,14 +274,14 @@ def _whole_grid(
     """What a plan on the whole grid came to, and a result's loss against it, if asked for."""
     if not asked:
         return {}
-    optimum_m, loss = None, None
-    if grid_result.solved:
-        optimum_m = grid_result.cost
-        if result is not None and result.solved and result.metric == grid_result.metric:
-            loss = result.cost / optimum_m - 1 if optimum_m > 0 else 0.0
+    length_m, loss = grid_result.cost if grid_result.solved else None, None
+    alike = result is None or result.metric == grid_result.metric
+    if length_m is not None and result is not None and result.solved and alike:
+        loss = result.cost / length_m - 1 if length_m > 0 else 0.0
     return {
-        "optimum_m": optimum_m,
+        "optimum_m": length_m if alike else None,
         "loss": loss,
+        "grid_length_m": length_m,
         "grid_expanded": grid_result.stats.expanded,
         "grid_seconds": round(sum(grid_result.stats.seconds.values()), 6),
     }
@@ -325,7 +328,7 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
             lines.append(f"{key:<10} {len(ids)}: {' '.join(map(str, ids))}".rstrip(": "))
     expanded = [
         f"{n:,} {what}"
-        for what in ("cells", "places", "gates")
+        for what in ("cells", "places", "gates", "intervals")
         if (n := figures["expanded" if what == "cells" else f"expanded_{what}"])
     ]
     if expanded:
@@ -336,13 +339,15 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
 
 
 def _comparison(figures: dict[str, Any]) -> list[str]:
+    """Lines on the whole grid: its optimum where the path has the same metric, octile, and else
+    its length alone, for a loss over another metric's optimum would mean nothing."""
     if "grid_expanded" not in figures:
         return []
-    if figures["optimum_m"] is None:
+    if figures["grid_length_m"] is None:
         return ["optimum    none, the whole grid has no path either"]
-    loss = f", loss {figures['loss'] * 100:.2f} %" if figures["loss"] is not None else ""
     cells, seconds = figures["grid_expanded"], figures["grid_seconds"]
-    return [
-        f"optimum    {figures['optimum_m']:.2f} m{loss}",
-        f"grid       {cells:,} cells expanded on the whole map, {seconds:.3f} s",
-    ]
+    took = f"{cells:,} cells expanded on the whole map, {seconds:.3f} s"
+    if figures["optimum_m"] is None:
+        return [f"grid       {figures['grid_length_m']:.2f} m (octile), {took}"]
+    loss = f", loss {figures['loss'] * 100:.2f} %" if figures["loss"] is not None else ""
+    return [f"optimum    {figures['optimum_m']:.2f} m{loss}", f"grid       {took}"]

@@ -73,7 +73,7 @@ def rooms(
     method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
-    preset: PresetOption = "balanced",
+    preset: PresetOption = "shortest",
     robot_radius_m: RadiusOption = None,
     free_threshold: FreeOption = None,
     occupied_threshold: OccupiedOption = None,

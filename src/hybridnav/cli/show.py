@@ -48,7 +48,7 @@ LevelOption = Annotated[
 def show(
     map_file: MapArgument,
     level: LevelOption = -1,
-    preset: PresetOption = "balanced",
+    preset: PresetOption = "shortest",
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,

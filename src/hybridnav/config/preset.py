@@ -80,8 +80,8 @@ class PlannerSettings(_Section):
 
     coarse: Literal["max-distance", "portals", "mesh", "none"] = "max-distance"
     """What is planned on: the places, by that attribute of their arcs, which chooses the route; or
-    portals between fields grown for planning alone, or a mesh of convex polygons of free space, so
-    that the route is read off the path; or `none`, the whole map at once, without a route."""
+    portals between fields grown for planning alone, a mesh of convex polygons of free space, or
+    `none`, the cells of the whole map at once, so that the route is read off the path."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields that `grid-astar` and `ompl` start from: those of the coarse way, or also their
     neighbours. Of no effect with `gates`, `stored-paths` and `coarse: none`."""
@@ -125,7 +125,8 @@ class PlannerSettings(_Section):
             )
         if self.coarse == "mesh" and self.smooth != "none":
             raise PydanticCustomError(
-                "no_smooth", "smooth goes with grid paths: with coarse: mesh set it to none"
+                "no_smooth",
+                "smooth shortens grid paths, with coarse: mesh they are any-angle: set it to none",
             )
         if self.epsilon is not None and self.refine not in {"gates", "none"}:
             raise PydanticCustomError(

@@ -33,7 +33,8 @@ REFERENCE = "grid-astar"
 """The baseline whose lengths are the optimum; part of every run."""
 
 LINE_OF_SIGHT = "line-of-sight"
-"""Value of `planner.smooth`; added to the names of presets that have it: `fast+line-of-sight`."""
+"""Value of `planner.smooth`; added to the names of presets that have it, as in
+`portals+line-of-sight`."""
 
 BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
     "grid-astar": ("hybridnav.baselines.grid:GridAstar", {}),
@@ -154,16 +155,13 @@ class HybridMethod:
         self.topology = topology
         self.name = preset.name
         self._planner = HybridPlanner(topology, preset=preset)
+        self._planner.prepare()
         self._frame = topology.grid.frame
         free = topology.classes == CellClass.FREE
-        self.region_of: IntArray | None = None
-        self.n_nodes = int((topology.grid.classes == CellClass.FREE).sum())
-        self.n_edges = 0
-        if preset.planner.coarse != "none":
-            self.region_of = topology.level.field_of
-            self.n_nodes = int(free.sum())
-            plain = ~topology.level.is_self_loop & free[topology.arcs].all(axis=1)
-            self.n_edges = int(plain.sum())
+        self.region_of: IntArray = topology.level.field_of
+        self.n_nodes = int(free.sum())
+        plain = ~topology.level.is_self_loop & free[topology.arcs].all(axis=1)
+        self.n_edges = int(plain.sum())
 
     @cached_property
     def memory_bytes(self) -> int:
@@ -185,7 +183,7 @@ class HybridMethod:
             nodes=None if route is None else _dense(self.topology.place_ids, route.places),
             arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
             bound=1 + result.gap if result.solved and line is None else np.inf,
-            expanded=stats.expanded,
+            expanded=stats.expanded + stats.expanded_intervals,
             expanded_nodes=stats.expanded_places,
             seconds=_stages(result),
         )

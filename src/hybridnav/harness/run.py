@@ -47,7 +47,7 @@ class RunSettings:
     """What a run evaluates; see `evaluate`."""
 
     maps: tuple[str, ...]
-    presets: tuple[str | Preset, ...] = ("balanced",)
+    presets: tuple[str | Preset, ...] = ("shortest",)
     baselines: tuple[str, ...] = ()
     pairs: int | None = None
     """Sampled pairs a map, 100 unless given; of a scenario file as many, evenly spread over it, or
@@ -182,7 +182,8 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
     if lines and settings.corner_cutting:
         raise InvalidValueError(
             f"preset {lines[0]}: an any-angle path never passes between two blocked cells that "
-            "meet at a corner, so it goes not with corner cutting"
+            "meet at a corner: leave corner cutting out, or take presets with octile paths, such "
+            "as portals"
         )
     return list({spec.digest: spec for spec in specs}.values())
 

@@ -73,16 +73,17 @@ def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
 ) -> Alternatives:
     """Plan paths of different homotopy classes: by another door, on the other side of an obstacle.
 
-    Octile paths, whatever the preset's `smooth`. The first is a shortest path, the planner's own
-    where that is one. The others follow by length, each a shortest path of its class. Paths that
-    wind are left out: those that, once they have circled a hole, come back to where they were, or
-    within sight of it along a row or a column, nearer than the side of a square hole of the least
-    area (one cell at least, 1 m at most, half the shortest path at most).
+    Octile paths, whatever the preset: of the classes only the lengths of cell paths are known. The
+    first is a shortest one, the planner's own where that is octile and shortest. The others follow
+    by length, each a shortest path of its class. Paths that wind are left out: those that, once
+    they have circled a hole, come back to where they were, or within sight of it along a row or a
+    column, nearer than the side of a square hole of the least area (one cell at least, 1 m at most,
+    half the shortest path at most).
 
     Parameters
     ----------
     planner
-        Plans the first path; not with OMPL.
+        Plans a first path; not with OMPL.
     start, goal
         Points `(x, y)` in metres, or names as in `HybridPlanner.plan`.
     count
@@ -123,14 +124,16 @@ def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
     topology = planner.topology
     allowed = planner.preset.planner.allow_unexplored
     search = alternative_search(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)
-    own = planner.plan(*ends, smooth="none", blocked=closed).path
+    result = planner.plan(*ends, smooth="none", blocked=closed)
+    own = result.path
     if own is None:
         return Alternatives((), complete=True)
     first, last = (tuple(own.cells[i].tolist()) for i in (0, -1))
     flat = None if closed is None else closed.flat
     found = search.paths(first, last, wanted, closed=flat)
     alternatives = {}
-    if path_length_in_cells(own.cells) <= found.shortest_cells * (1 + 1e-12):
+    length_cells = path_length_in_cells(own.cells)
+    if result.metric == "octile" and length_cells <= found.shortest_cells * (1 + 1e-12):
         alternatives[search.classes.word_of_path(own.cells)] = own
     elif not found.paths:  # it gave up before it came to the goal
         enterable = topology.grid.enterable(allow_unexplored=allowed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.result import Route
 from hybridnav.route import MaxDistanceSearch, PortalSearch, corridor_of
 from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
@@ -65,6 +67,10 @@ class CellPlans:
 class CellPlanner(Protocol):
     """Plans between two cells that may be entered."""
 
+    def prepare(self) -> object:
+        """Build what queries need, once; the first query does it otherwise."""
+        ...
+
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
         """Find a path, as good as the preset asks for."""
         ...
@@ -76,6 +82,10 @@ class WholeMap:
     def __init__(self, refiner: GridRefiner) -> None:
         self._refiner = refiner
 
+    def prepare(self) -> object:
+        """Build the search of cells; see `CellPlanner`."""
+        return self._refiner.search
+
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
         """Find a shortest path; see `CellPlanner`."""
         began = time.perf_counter()
@@ -85,6 +95,7 @@ class WholeMap:
         return CellPlan(cells, bound_cells=bound, expanded=expanded, seconds=seconds)
 
 
+@copies_alike
 class MaxDistance:
     """The cheapest coarse route by max-distance arcs, and grid A* in its corridor.
 
@@ -97,22 +108,32 @@ class MaxDistance:
     ) -> None:
         self._topology = topology
         self._refiner = refiner
-        self._search = MaxDistanceSearch(topology, allow_unexplored=settings.allow_unexplored)
-        self._beside = self._search.enterable if settings.corridor == "neighbours" else None
-        self._corner_cutting = topology.grid.corner_cutting
+        self._settings = settings
+        self._search: MaxDistanceSearch | None = None
+        self._building = threading.Lock()
+
+    def prepare(self) -> MaxDistanceSearch:
+        """Compute the attributes of the arcs; see `CellPlanner`."""
+        if self._search is None:
+            allowed = self._settings.allow_unexplored
+            with self._building:
+                if self._search is None:
+                    self._search = MaxDistanceSearch(self._topology, allow_unexplored=allowed)
+        return self._search
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
         """Find the shortest path in the corridor; see `CellPlanner`."""
         began = time.perf_counter()
-        topology = self._topology
-        route = self._search.search(topology.place_at(start), topology.place_at(goal))
+        topology, search = self._topology, self.prepare()
+        route = search.search(topology.place_at(start), topology.place_at(goal))
         seconds = {"coarse": time.perf_counter() - began}
-        if route is None and self._corner_cutting:
+        if route is None and topology.grid.corner_cutting:
             whole = WholeMap(self._refiner).plan(start, goal)
             return replace(whole, seconds=seconds | whole.seconds)
         if route is None:
             return CellPlan(None, seconds=seconds)
-        corridor = corridor_of(topology, route.places, neighbours=self._beside)
+        beside = search.enterable if self._settings.corridor == "neighbours" else None
+        corridor = corridor_of(topology, route.places, neighbours=beside)
         seconds["coarse"] = time.perf_counter() - began
         cells, expanded = self._refiner.refine(start, goal, corridor)
         seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
@@ -132,26 +153,48 @@ def _route(place_ids: LongArray, arc_ids: LongArray, places: LongArray, arcs: Lo
     return Route(tuple(place_ids[places].tolist()), tuple(arc_ids[arcs].tolist()))
 
 
+@copies_alike
 class OverPortals:
-    """The way by the portal table, improved as far as the preset asks for."""
+    """The way by the portal table, improved as far as the preset asks for; the table is built when
+    the first query needs it."""
 
     def __init__(
         self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
     ) -> None:
-        self.search = PortalSearch(
-            topology,
-            refiner.search,
-            all_gates=settings.refine == "gates",
-            allow_unexplored=settings.allow_unexplored,
-        )
-        self._resolution_m = topology.grid.resolution_m
-        self._epsilon = settings.epsilon
+        self._topology = topology
+        self._refiner = refiner
+        self._settings = settings
         self._effort: Effort = "exact" if settings.refine == "gates" else "stored"
+        self._search: PortalSearch | None = None
+        self._building = threading.Lock()
+
+    def prepare(self) -> PortalSearch:
+        """Build portals and table, once."""
+        if self._search is None:
+            with self._building:
+                if self._search is None:
+                    self._search = PortalSearch(
+                        self._topology,
+                        self._refiner.search,
+                        all_gates=self._settings.refine == "gates",
+                        allow_unexplored=self._settings.allow_unexplored,
+                    )
+        return self._search
+
+    @property
+    def search(self) -> PortalSearch:
+        """What finds the ways, built if it was not."""
+        return self.prepare()
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
         """Find a path over portals; see `CellPlanner`."""
-        began = time.perf_counter()
-        found = self.search.path(start, goal, effort=self._effort, epsilon=self._epsilon or 0.0)
+        began, seconds = time.perf_counter(), {}
+        if self._search is None:
+            self.prepare()
+            seconds["table"] = time.perf_counter() - began
+        now, epsilon = time.perf_counter(), self._settings.epsilon or 0.0
+        found = self.search.path(start, goal, effort=self._effort, epsilon=epsilon)
+        seconds["portals"] = time.perf_counter() - now
         return CellPlan(
             found.cells,
             points=found.points,
@@ -159,13 +202,14 @@ class OverPortals:
             bound_cells=found.lower_bound_cells,
             expanded=found.expanded,
             expanded_gates=found.expanded_gates,
-            seconds={"portals": time.perf_counter() - began},
+            seconds=seconds,
         )
 
     def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
         """The same for many pairs of cells, int64 (n, 2) each, as far as look-ups answer them."""
-        found = self.search.many(starts, goals, effort=self._effort, epsilon=self._epsilon or 0.0)
-        per_cell = self._resolution_m
+        epsilon = self._settings.epsilon or 0.0
+        found = self.search.many(starts, goals, effort=self._effort, epsilon=epsilon)
+        per_cell = self._topology.grid.resolution_m
         return CellPlans(
             found.is_done,
             "octile",

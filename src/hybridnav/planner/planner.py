@@ -23,8 +23,6 @@ from hybridnav.route import Walks
 from hybridnav.search.octile import path_length_in_cells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import FloatArray, LongArray, PathLike
@@ -41,7 +39,8 @@ Smooth = Literal["none", "line-of-sight"]
 
 class HybridPlanner:
     """Plan paths between points of one map by a preset. Threads may share a planner; queries with
-    OMPL run one after the other.
+    OMPL run one after the other. What a preset plans on is built at the first query, or by
+    `prepare`; with OMPL it is built at once, so that no query's time goes into it.
 
     Parameters
     ----------
@@ -59,7 +58,7 @@ class HybridPlanner:
         When nobody gave the map's radius, so that it has the default, and the preset names another.
     """
 
-    def __init__(self, topology: TopologicalMap, *, preset: PathLike | Preset = "balanced") -> None:
+    def __init__(self, topology: TopologicalMap, *, preset: PathLike | Preset = "shortest") -> None:
         self.topology = topology
         self.preset = load_preset(preset)
         check_radius(topology.grid, self.preset)
@@ -113,8 +112,8 @@ class HybridPlanner:
             mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. Where
             it lies in the way the whole map is searched.
         at
-            Where in a named room: `"anywhere"`, the cells that make the way shortest, or at its
-            `"point"`.
+            Where in a named room: `"anywhere"`, the cells that make the way from cell to cell
+            shortest, or at its `"point"`.
 
         Returns
         -------
@@ -153,11 +152,12 @@ class HybridPlanner:
             return self._answer(cells)
         if closed is not None and (refused := closed.refusal(cells, grid.shape)):
             return self._answer(refused)
-        if isinstance(self._cells, OverMesh) and self._ompl is None:
-            return self._result(self._cells.between(cells, ends, closed), ends, finish, closed)
-        plan = self._cells.plan(*cells)
-        if closed is not None and plan.cells is not None:
-            plan = self._round(closed, plan, *cells)
+        if isinstance(self._cells, OverMesh):
+            plan = self._cells.between(cells, ends, closed)
+        else:
+            plan = self._cells.plan(*cells)
+            if closed is not None and plan.cells is not None:
+                plan = self._round(closed, plan, *cells)
         if self._ompl is not None and plan.cells is not None:
             return self._by_ompl(self._ompl, plan, poses, closed, began)
         return self._result(plan, ends, finish, closed)
@@ -194,6 +194,14 @@ class HybridPlanner:
         cells = self._cells if self._ompl is None else None
         return plan_many(self, cells, (first, last), finish, self.closed(blocked))
 
+    def prepare(self) -> None:
+        """Build what the first query would build: the mesh, or the table of portals.
+
+        Nothing happens where that is built already. Threads may call it, and plan meanwhile: what
+        is built is built once.
+        """
+        self._cells.prepare()
+
     def close(self) -> None:
         """End the process that a preset with OMPL plans in; the next query waits for another."""
         if self._ompl is not None:
@@ -214,14 +222,13 @@ class HybridPlanner:
         if found.cells is None:
             return CellPlan(None, expanded=expanded, seconds=seconds)
         bound = path_length_in_cells(found.cells)
-        walked = plan.route_source and partial(self._walked, found.cells)
         return replace(
             plan,
             cells=found.cells,
             points=None,
             length_cells=bound,
             bound_cells=bound,
-            route_source=walked,
+            route_source=None,
             expanded=expanded,
             seconds=seconds,
         )
@@ -233,7 +240,7 @@ class HybridPlanner:
         finish: Smooth,
         closed: ClosedCells | None,
     ) -> PlanResult:
-        stats = _stats_of(plan)
+        stats = self._stats_of(plan)
         if plan.cells is None:
             return self._answer(PlanStatus.NO_PATH, metric=plan.metric, stats=stats)
         grid = self.topology.grid
@@ -243,13 +250,14 @@ class HybridPlanner:
             began = time.perf_counter()
             points, metric = self._sight(closed).shorten(plan.cells, *ends), "any-angle"
             stats.seconds["smooth"] = time.perf_counter() - began
-            bound = self._any_angle_bound(plan.cells, ends)
+            bound = self._any_angle_bound(plan, ends)
         if points is None:
             points = grid.frame.points_of(plan.cells)
         if metric == "octile":
             length_m = (plan.length_cells or path_length_in_cells(plan.cells)) * grid.resolution_m
         else:
             length_m = polyline_length(points)
+            points = points if length_m > 0 else points[:1]
         if plan.metric == "any-angle" and plan.length_cells:
             # A part of the length, so that what is proved optimal has no gap by rounding.
             bound = length_m * (plan.bound_cells / plan.length_cells)
@@ -257,18 +265,20 @@ class HybridPlanner:
             PlanStatus.SOLVED,
             metric=metric,
             path=Path(plan.cells, points, length_m),
-            route_source=self._route_source(plan),
+            route_source=plan.route_source or partial(self._walked, plan.cells),
             lower_bound=min(bound, length_m),
             stats=stats,
         )
 
-    def _any_angle_bound(self, cells: LongArray, ends: tuple[FloatArray, FloatArray]) -> float:
+    def _any_angle_bound(self, plan: CellPlan, ends: tuple[FloatArray, FloatArray]) -> float:
         """No any-angle path between two points is shorter, in metres."""
-        if not isinstance(self._cells, OverPortals):
-            return math.dist(*ends)
         frame = self.topology.grid.frame
+        if isinstance(self._cells, OverMesh):
+            return plan.bound_cells * frame.resolution_m
+        if not isinstance(self._cells, OverPortals) or plan.cells is None:
+            return math.dist(*ends)
         start, goal = (frame.position_of(float(end[0]), float(end[1])) for end in ends)
-        first, last = tuple(cells[0].tolist()), tuple(cells[-1].tolist())
+        first, last = tuple(plan.cells[0].tolist()), tuple(plan.cells[-1].tolist())
         bound = self._cells.search.any_angle_bound(first, last, (start, goal))
         return bound * frame.resolution_m
 
@@ -293,10 +303,8 @@ class HybridPlanner:
         flat = None if closed is None else closed.flat
         found = planner.plan(plan.cells, poses, flat, spent_s=now - began)
         seconds = {**plan.seconds, "ompl": time.perf_counter() - now}
-        source = self._route_source(plan)
-        if source is not None and found.path is not None:
-            source = partial(self._walked, found.path.cells)
-        bound = max(found.lower_bound, self._any_angle_bound(plan.cells, ends))
+        source = None if found.path is None else partial(self._walked, found.path.cells)
+        bound = max(found.lower_bound, self._any_angle_bound(plan, ends))
         if found.path is not None and found.status is PlanStatus.SOLVED:
             bound = min(bound, found.weighted_cost or found.path.length_m)
         return self._answer(
@@ -307,7 +315,7 @@ class HybridPlanner:
             lower_bound=bound,
             weighted_cost=found.weighted_cost,
             refinement=found.refinement,
-            stats=_stats_of(replace(plan, seconds=seconds)),
+            stats=self._stats_of(replace(plan, seconds=seconds)),
         )
 
     def _sight(self, closed: ClosedCells | None) -> LineOfSight:
@@ -335,13 +343,6 @@ class HybridPlanner:
     def _walks(self) -> Walks:
         return Walks(self.topology)
 
-    def _route_source(self, plan: CellPlan) -> Callable[[], Route] | None:
-        """What finds the route of a plan with a path; None where the whole map was searched."""
-        if plan.route_source is None and self.preset.planner.coarse != "none":
-            assert plan.cells is not None  # noqa: S101 - the caller has looked
-            return partial(self._walked, plan.cells)
-        return plan.route_source
-
     def _walked(self, cells: LongArray) -> Route:
         """The places and arcs that a path passes."""
         places, arcs = self._walks.of(cells)
@@ -357,6 +358,17 @@ class HybridPlanner:
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 
         return ClosedCells(as_blocked(blocked).cells_of(self.topology))
+
+    def _stats_of(self, plan: CellPlan) -> PlanStats:
+        on_mesh = isinstance(self._cells, OverMesh)
+        return PlanStats(
+            expanded=0 if on_mesh else plan.expanded,
+            expanded_places=plan.expanded_places,
+            expanded_gates=plan.expanded_gates,
+            expanded_intervals=plan.expanded if on_mesh else 0,
+            corridor_cells=plan.corridor_cells,
+            seconds=plan.seconds,
+        )
 
     def _answer(self, status: PlanStatus, **outcome: Any) -> PlanResult:
         """A result that records the preset and how the pyramid was built."""
@@ -380,13 +392,3 @@ class HybridPlanner:
                 "robot_radius_m": pyramid.grid.robot_radius_m,
             },
         }
-
-
-def _stats_of(plan: CellPlan) -> PlanStats:
-    return PlanStats(
-        expanded=plan.expanded,
-        expanded_places=plan.expanded_places,
-        expanded_gates=plan.expanded_gates,
-        corridor_cells=plan.corridor_cells,
-        seconds=plan.seconds,
-    )

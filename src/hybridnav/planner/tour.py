@@ -23,7 +23,13 @@ if TYPE_CHECKING:
     from hybridnav.planner.planner import HybridPlanner, Smooth
     from hybridnav.result import Metric, PlanResult
 
-_COUNTS = ("expanded", "expanded_places", "expanded_gates", "corridor_cells")
+_COUNTS = (
+    "expanded",
+    "expanded_places",
+    "expanded_gates",
+    "expanded_intervals",
+    "corridor_cells",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +179,8 @@ def plan_tour(
         Two or more: points `(x, y)` in metres, names of rooms or of named points. With OMPL in a
         space with headings points are `(x, y, yaw)`, and names face the way.
     at
-        Where in a room: `"anywhere"`, chosen for all stops together so that the whole way is
-        shortest, or at the room's `"point"`.
+        Where in a room: `"anywhere"`, chosen for all stops together so that the whole way from cell
+        to cell is shortest, or at the room's `"point"`.
     smooth, blocked
         As in `HybridPlanner.plan`.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 from hybridnav.search.grid_search import Cell, GridSearch
@@ -38,8 +39,14 @@ class GridRefiner:
     """
 
     def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
-        enterable = grid.enterable(allow_unexplored=allow_unexplored)
-        self.search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
+        self._grid = grid
+        self._allow_unexplored = allow_unexplored
+
+    @cached_property
+    def search(self) -> GridSearch:
+        """The search of cells, built when it is first needed."""
+        enterable = self._grid.enterable(allow_unexplored=self._allow_unexplored)
+        return GridSearch(enterable, corner_cutting=self._grid.corner_cutting)
 
     def refine(
         self, start: Cell, goal: Cell, corridor: Corridor | None

@@ -43,11 +43,11 @@ def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
     optimum_m: float | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw a plan: map, places, arcs, corridor, coarse route, path, start and goal, scale bar.
+    """Draw a plan: map, places, arcs, route, path, start and goal, scale bar.
 
     Arcs run through the middle of their boundaries, so that two doors are two lines. Places of the
-    corridor keep their full colours, the others are pale. Without a path the title says why;
-    without a route (a search of the whole map) no corridor is shown.
+    route, or of the corridor where the preset searched in one, keep their full colours; the others
+    are pale. Without a path the title says why.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
         Replaces the title made of the map's name, length, loss and places; an empty one leaves it
         out.
     optimum_m
-        Length of an optimal path in metres, for the loss in the title.
+        Length of an optimal path of the same metric in metres, for the loss in the title.
     width_in
         Width of a new figure in inches, 3.3 for one column of a paper; its height follows.
 
@@ -187,7 +187,7 @@ def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None
         loss = length / optimum_m - 1 if optimum_m > 0 else 0.0
         words.append(f"loss {round(loss, 3) + 0.0:.1%}")  # no "-0.0%" from rounding
     if result.route is None:
-        return [*words, "searched on the whole map"]
+        return words
     n_places = len(result.route.places)
     return [*words, f"{n_places} place{'s' if n_places > 1 else ''} on the route"]
 
@@ -201,7 +201,9 @@ def _entries(result: PlanResult, places: Places, strong: BoolArray, sizes: Sizes
     if result.route is not None:
         line = Line2D([], [], color=style.INK, lw=_ROUTE_WIDTH * width, marker="o")
         line.set(markerfacecolor=style.FREE, markersize=3.6 * width, markeredgewidth=width)
-        entries += [(line, "coarse route"), (swatch(style.PLACES), "corridor")]
+        chosen = result.settings.get("planner", {}).get("coarse") == "max-distance"
+        words = ("coarse route", "corridor") if chosen else ("route", "its places")
+        entries += [(line, words[0]), (swatch(style.PLACES), words[1])]
     entries.append((arc_handle(sizes), "place, arc"))
     if (places.free & ~strong).any():
         label = "other places" if result.route is not None else "places"
