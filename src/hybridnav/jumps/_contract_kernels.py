@@ -1,0 +1,275 @@
+"""Kernels that contract a graph of corner cells into a hierarchy.
+
+R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. One corner cell
+after the other is taken out, and a shortcut put in between two of its neighbours where the way past
+it may be the only shortest one.
+
+The arcs that lead from one corner cell stand beside each other in a pool, int64 (n, 3): the cost;
+the head and the classes of the first and the last leg (see `pack`); the middle, which is the corner
+cell that a shortcut leads past or -1, and the number of legs. With each arc there is its reverse.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import guarded, njit
+from hybridnav.jumps._heap_kernels import pop, push
+from hybridnav.jumps._leg_kernels import pack, reverse
+
+SETTLED = 10
+"""Corner cells that a search for another way settles at most. With 80 there are 1 to 3 % fewer
+shortcuts, and it takes four times as long."""
+SLACK = 6000
+"""How much later than it should come a corner cell is still contracted, in thousandths of a level.
+With 0 there are 3 % fewer shortcuts, and it takes twice as long."""
+_UNKNOWN = -(1 << 40)
+
+
+@njit(cache=True, nogil=True)
+def _pool_of(first, arcs):
+    """Return a pool of the arcs of a graph, with room: begin, size and room of each corner cell's
+    part, the pool, and how much of it is used."""
+    n = first.size - 1
+    begin, size, room = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
+    pool = np.empty((2 * arcs.shape[0] + 4 * n, 3), np.int64)
+    used = 0
+    for node in range(n):
+        begin[node], size[node] = used, first[node + 1] - first[node]
+        for k in range(size[node]):
+            arc = first[node] + k
+            pool[used + k, 0], pool[used + k, 1] = arcs[arc, 0], arcs[arc, 1]
+            pool[used + k, 2] = -1 << 32 | 1
+        room[node] = size[node] + 2
+        used += room[node]
+    return begin, size, room, pool, used
+
+
+@njit(cache=True, nogil=True)
+def _search(graph, node, source, limit, n_wanted, stamp, work):
+    """Search for ways from a neighbour of a corner cell that do without it.
+
+    Parameters
+    ----------
+    graph
+        Begin and size of parts of the pool, the pool, blocked corners of the cells, which legs may
+        follow.
+    node
+        What ways must do without.
+    source
+        Its neighbour.
+    limit
+        What a way may cost.
+    n_wanted
+        Number of corner cells whose record has the stamp in column 2: the search ends when it has
+        settled them.
+    stamp
+        Of this search.
+    work
+        Records, int64 (n, 3): distance, stamp and class of the leg that led there, stamp of those
+        wanted; a heap with room for `SETTLED` times the greatest number of arcs from a cell.
+    """
+    begin, size, pool, kinds, follow = graph
+    records, heap = work
+    records[node, 0], records[node, 1] = -1, stamp << 8
+    records[source, 0], records[source, 1] = 0, stamp << 8 | 255
+    heap[0, 0], heap[0, 1] = 0, source
+    waiting, settled = 1, 0
+    while waiting > 0 and settled < SETTLED and n_wanted > 0:
+        cost = heap[0, 0]
+        at = pop(heap, waiting)
+        waiting -= 1
+        if cost != records[at, 0]:
+            continue
+        settled += 1
+        n_wanted -= records[at, 2] == stamp
+        last = records[at, 1] & 255
+        may_follow = np.int64(65535) if last == 255 else follow[kinds[at], last]
+        for arc in range(begin[at], begin[at] + size[at]):
+            packed = pool[arc, 1]
+            further = cost + pool[arc, 0]
+            if further > limit or may_follow >> (packed >> 4 & 15) & 1 == 0:
+                continue
+            there = packed >> 8
+            if records[there, 1] >> 8 != stamp or further < records[there, 0]:
+                records[there, 0], records[there, 1] = further, stamp << 8 | packed & 15
+                push(heap, waiting, further, there)
+                waiting += 1
+
+
+@njit(cache=True, nogil=True)
+def _shortcuts(graph, node, stamp, work, pairs):
+    """Find the shortcuts that taking a corner cell out asks for.
+
+    Parameters
+    ----------
+    graph, work
+        See `_search`.
+    node
+        The corner cell.
+    stamp
+        Of the last search.
+    pairs
+        int64 (n, 2), room for as many as there are pairs of arcs from it: gets those that a
+        shortcut joins.
+
+    Returns
+    -------
+    tuple
+        Number of shortcuts, number of legs in them, stamp of the last search.
+    """
+    begin, size, pool, kinds, follow = graph
+    records = work[0]
+    n_pairs = n_legs = 0
+    end = begin[node] + size[node]
+    for one in range(begin[node], end - 1):
+        cost, packed = pool[one, 0], pool[one, 1]
+        may_follow = follow[kinds[node], reverse(packed >> 4 & 15)]
+        stamp += 1
+        n_wanted, limit = 0, np.int64(0)
+        for two in range(one + 1, end):
+            if may_follow >> (pool[two, 1] >> 4 & 15) & 1:
+                records[pool[two, 1] >> 8, 2] = stamp
+                limit = max(limit, cost + pool[two, 0])
+                n_wanted += 1
+        if n_wanted == 0:
+            continue
+        _search(graph, node, packed >> 8, limit, n_wanted, stamp, work)
+        for two in range(one + 1, end):
+            if may_follow >> (pool[two, 1] >> 4 & 15) & 1 == 0:
+                continue
+            there = pool[two, 1] >> 8
+            if records[there, 1] >> 8 != stamp or records[there, 0] > cost + pool[two, 0]:
+                pairs[n_pairs, 0], pairs[n_pairs, 1] = one, two
+                n_pairs += 1
+                n_legs += (pool[one, 2] & 0xFFFFFFFF) + (pool[two, 2] & 0xFFFFFFFF)
+    return n_pairs, n_legs, stamp
+
+
+@njit(cache=True, nogil=True)
+def _take_out(begin, size, pool, node):
+    """Take the arcs to a corner cell out of the parts of its neighbours."""
+    for arc in range(begin[node], begin[node] + size[node]):
+        other = pool[arc, 1] >> 8
+        last = begin[other] + size[other] - 1
+        at = begin[other]
+        while pool[at, 1] >> 8 != node:
+            at += 1
+        for k in range(3):
+            pool[at, k] = pool[last, k]
+        size[other] -= 1
+
+
+@njit(cache=True, nogil=True)
+def _put_in(parts, pool, used, tail, arc):
+    """Put an arc into a corner cell's part of the pool, or improve the one that has its head.
+
+    Returns the pool, which is another one where there was no room, and how much of it is used.
+    """
+    begin, size, room = parts
+    cost, packed, past = arc
+    for at in range(begin[tail], begin[tail] + size[tail]):
+        if pool[at, 1] >> 8 == packed >> 8:
+            if cost < pool[at, 0]:
+                pool[at, 0], pool[at, 1], pool[at, 2] = cost, packed, past
+            return pool, used
+    if size[tail] == room[tail]:
+        room[tail] = 2 * size[tail] + 2
+        while used + room[tail] > pool.shape[0]:
+            larger = np.empty((2 * pool.shape[0], 3), np.int64)
+            larger[:used] = pool[:used]
+            pool = larger
+        pool[used : used + size[tail]] = pool[begin[tail] : begin[tail] + size[tail]]
+        begin[tail] = used
+        used += room[tail]
+    at = begin[tail] + size[tail]
+    pool[at, 0], pool[at, 1], pool[at, 2] = cost, packed, past
+    size[tail] += 1
+    return pool, used
+
+
+@njit(cache=True, nogil=True)
+def _packed_arcs(begin, size, pool):
+    """Return what is left in the pool without the room: where the arcs of each corner cell begin,
+    their costs and heads, their middles."""
+    n = begin.size
+    first = np.zeros(n + 1, np.int32)
+    for node in range(n):
+        first[node + 1] = first[node] + size[node]
+    arcs, middles = np.empty((first[n], 2), np.int64), np.empty(first[n], np.int32)
+    for node in range(n):
+        for k in range(size[node]):
+            arc = pool[begin[node] + k]
+            arcs[first[node] + k, 0], arcs[first[node] + k, 1] = arc[0], arc[1]
+            middles[first[node] + k] = arc[2] >> 32
+    return first, arcs, middles
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def contract(kinds, first, arcs, follow):
+    """Contract all corner cells of a graph, those first that leave few and short shortcuts.
+
+    Parameters
+    ----------
+    kinds
+        uint8 (n,), blocked corners of the corner cells.
+    first, arcs
+        The graph: where the arcs of each corner cell begin, int64 (m, 2) arcs.
+    follow
+        Of `legs_that_follow`.
+
+    Returns
+    -------
+    tuple
+        int32 (n + 1,), where the arcs of each corner cell to those contracted after it begin; int64
+        (u, 2), these arcs; int32 (u,), the corner cell that each leads past, -1 for none.
+    """
+    n = kinds.size
+    begin, size, room, pool, used = _pool_of(first, arcs)
+    level = np.zeros(n, np.int64)
+    queue = np.empty((n, 2), np.int64)
+    most = np.int64(1)
+    for node in range(n):
+        push(queue, node, _UNKNOWN + size[node], node)
+        most = max(most, size[node])
+    records = np.zeros((n, 3), np.int64)
+    heap = np.empty((SETTLED * most + 1, 2), np.int64)
+    pairs = np.empty((most, 2), np.int64)
+    stamp = np.int64(0)
+    waiting = n
+    while waiting > 0:
+        node = pop(queue, waiting)
+        waiting -= 1
+        if SETTLED * most >= heap.shape[0]:
+            heap = np.empty((2 * SETTLED * most + 1, 2), np.int64)
+        if size[node] * size[node] > pairs.shape[0]:
+            pairs = np.empty((2 * size[node] * size[node], 2), np.int64)
+        n_pairs, n_legs, stamp = _shortcuts(
+            (begin, size, pool, kinds, follow), node, stamp, (records, heap), pairs
+        )
+        key = 1000 * level[node]
+        if size[node] > 0:
+            legs = np.int64(0)
+            for arc in range(begin[node], begin[node] + size[node]):
+                legs += pool[arc, 2] & 0xFFFFFFFF
+            key += 1000 * n_pairs // size[node] + 1000 * n_legs // legs
+        if waiting > 0 and key > queue[0, 0] + SLACK:
+            push(queue, waiting, key, node)
+            waiting += 1
+            continue
+        _take_out(begin, size, pool, node)
+        for arc in range(begin[node], begin[node] + size[node]):
+            other = pool[arc, 1] >> 8
+            level[other] = max(level[other], level[node] + 1)
+        for i in range(n_pairs):
+            one, two = pairs[i, 0], pairs[i, 1]
+            cost = pool[one, 0] + pool[two, 0]
+            past = node << 32 | (pool[one, 2] & 0xFFFFFFFF) + (pool[two, 2] & 0xFFFFFFFF)
+            for there, back in ((one, two), (two, one)):
+                tail, head = pool[there, 1] >> 8, pool[back, 1] >> 8
+                packed = pack(head, reverse(pool[there, 1] & 15), pool[back, 1] & 15)
+                arc = cost, packed, past
+                pool, used = _put_in((begin, size, room), pool, used, tail, arc)
+                most = max(most, size[tail])
+    return _packed_arcs(begin, size, pool)

@@ -1,0 +1,41 @@
+"""Kernels of a heap of four branches: int64 (n, 2), keys and values."""
+
+from __future__ import annotations
+
+from hybridnav._jit import njit
+
+
+@njit(cache=True, nogil=True)
+def push(heap, size, key, value):
+    """Put an entry into a heap of `size`, which then has one more."""
+    at = size
+    while at > 0:
+        above = at - 1 >> 2
+        if heap[above, 0] <= key:
+            break
+        heap[at, 0], heap[at, 1] = heap[above, 0], heap[above, 1]
+        at = above
+    heap[at, 0], heap[at, 1] = key, value
+
+
+@njit(cache=True, nogil=True)
+def pop(heap, size):
+    """Take the value with the least key out of a heap of `size`, which then has one fewer."""
+    found = heap[0, 1]
+    size -= 1
+    key, value = heap[size, 0], heap[size, 1]
+    at = 0
+    while True:
+        below = 4 * at + 1
+        if below >= size:
+            break
+        least = below
+        for other in range(below + 1, min(below + 4, size)):
+            if heap[other, 0] < heap[least, 0]:
+                least = other
+        if heap[least, 0] >= key:
+            break
+        heap[at, 0], heap[at, 1] = heap[least, 0], heap[least, 1]
+        at = least
+    heap[at, 0], heap[at, 1] = key, value
+    return found

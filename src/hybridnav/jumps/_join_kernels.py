@@ -1,0 +1,211 @@
+"""Kernels that join cells to corner cells, by what the tables of a jump-point graph state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import guarded, njit
+from hybridnav.jumps._leg_kernels import class_of, pack, row_col_kind
+from hybridnav.search._kernels import grow, octile_cost
+
+
+@njit(cache=True, nogil=True)
+def join(tables, cell, found):
+    """Find the corner cells that are reached from a cell along a diagonal and then a side.
+
+    All that can be the next corner cell on a shortest path are among them: those that no other one
+    lies before. Where a cell is a corner cell it is not found itself.
+
+    Parameters
+    ----------
+    tables
+        Numbers of cells and what they see (see `look_ahead`), width of the framed grid, number of
+        corner cells.
+    cell
+        Flat free cell.
+    found
+        int32, room for the corner cells, as many as there are.
+
+    Returns
+    -------
+    int
+        How many were found.
+    """
+    number, ahead, width, n_corners = tables
+    here = np.int64(number[cell])
+    n_found = 0
+    for side in range(0, 8, 2):
+        seen = np.int64(ahead[here, side])
+        if seen > 0:
+            found[n_found] = number[cell + seen * step_of(side, width)]
+            n_found += 1
+    for k in range(1, 8, 2):
+        first, second = k - 1, k + 1 & 7
+        step = step_of(k, width)
+        first_step, second_step = step_of(first, width), step_of(second, width)
+        first_limit, second_limit = _limit(ahead[here, first]), _limit(ahead[here, second])
+        at, there = cell, here
+        while True:
+            seen = np.int64(ahead[there, k])
+            if seen <= 0:
+                break
+            at += seen * step
+            there = np.int64(number[at])
+            if there < n_corners:
+                found[n_found] = there
+                n_found += 1
+                break
+            seen = np.int64(ahead[there, first])
+            if 0 < seen < first_limit:
+                found[n_found] = number[at + seen * first_step]
+                n_found += 1
+            first_limit = min(first_limit, _limit(seen))
+            seen = np.int64(ahead[there, second])
+            if 0 < seen < second_limit:
+                found[n_found] = number[at + seen * second_step]
+                n_found += 1
+            second_limit = min(second_limit, _limit(seen))
+    return n_found
+
+
+@njit(cache=True, nogil=True)
+def step_of(k, width):
+    """From a flat cell to its neighbour in a direction."""
+    if k == 0:
+        return 1
+    if k < 4:
+        return width + 2 - k
+    if k == 4:
+        return -1
+    return k - 6 - width
+
+
+@njit(cache=True, nogil=True)
+def _limit(seen):
+    """Nothing so far along a side, or further, is the next corner cell further on along a diagonal:
+    a corner cell or a blocked one lies before it."""
+    return seen if seen > 0 else 1 - seen
+
+
+@njit(cache=True, nogil=True)
+def is_direct(tables, cell, goal):
+    """Whether the way from a cell along a diagonal and then a side to another one is free."""
+    width = tables[2]
+    rows, cols = goal // width - cell // width, goal % width - cell % width
+    diagonal = min(abs(rows), abs(cols))
+    side = max(abs(rows), abs(cols)) - diagonal
+    at = cell
+    if diagonal > 0:
+        k = (1 if cols > 0 else 3) if rows > 0 else (7 if cols > 0 else 5)
+        if not _is_free(tables, at, k, diagonal):
+            return False
+        at += diagonal * step_of(k, width)
+    if side > 0:
+        along_col, along_row = (2 if rows > 0 else 6), (0 if cols > 0 else 4)
+        k = along_col if abs(rows) > abs(cols) else along_row
+        return _is_free(tables, at, k, side)
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _is_free(tables, at, k, distance):
+    """Whether so many moves in a direction are legal."""
+    number, ahead, width, _ = tables
+    step = step_of(k, width)
+    while True:
+        seen = np.int64(ahead[number[at], k])
+        if seen <= 0:
+            return -seen >= distance
+        if seen >= distance:
+            return True
+        at += seen * step
+        distance -= seen
+
+
+@njit(cache=True, nogil=True)
+def _joined(tables, corners):
+    """Join every corner cell to others: where those that each finds begin, and these."""
+    n_corners = corners.size
+    begin = np.zeros(n_corners + 1, np.int64)
+    heads = np.empty(16 * n_corners + 16, np.int32)
+    found = np.empty(n_corners, np.int32)
+    n_heads = 0
+    for corner in range(n_corners):
+        n_found = join(tables, np.int64(corners[corner]), found)
+        while n_heads + n_found > heads.size:
+            heads = grow(heads)
+        heads[n_heads : n_heads + n_found] = found[:n_found]
+        n_heads += n_found
+        begin[corner + 1] = n_heads
+    return begin, heads[:n_heads]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def arcs_of(tables, corners, places):
+    """Build the arcs between corner cells.
+
+    Parameters
+    ----------
+    tables
+        See `join`.
+    corners
+        int32 (n,), flat corner cells.
+    places
+        int64 (n,), see `row_col_kind`.
+
+    Returns
+    -------
+    tuple
+        int32 (n + 1,), where the arcs of each corner cell begin; int64 (m, 2), the cost of each
+        arc, and its head and class (see `pack`). With each arc there is its reverse.
+    """
+    begin, heads = _joined(tables, corners)
+    # What only one end finds has another corner cell on its way: two arcs make up for it.
+    is_kept = np.zeros(heads.size, np.bool_)
+    first = np.zeros(corners.size + 1, np.int32)
+    for corner in range(corners.size):
+        first[corner + 1] = first[corner]
+        for at in range(begin[corner], begin[corner + 1]):
+            other = heads[at]
+            for back in range(begin[other], begin[other + 1]):
+                if heads[back] == corner:
+                    is_kept[at] = True
+                    first[corner + 1] += 1
+                    break
+    arcs = np.empty((first[-1], 2), np.int64)
+    n_arcs = 0
+    for corner in range(corners.size):
+        row, col, _ = row_col_kind(places[corner])
+        for at in range(begin[corner], begin[corner + 1]):
+            if is_kept[at]:
+                to_row, to_col, _ = row_col_kind(places[heads[at]])
+                leg = class_of(to_row - row, to_col - col)
+                arcs[n_arcs, 0] = octile_cost(to_row - row, to_col - col)
+                arcs[n_arcs, 1] = pack(np.int64(heads[at]), leg, leg)
+                n_arcs += 1
+    return first, arcs
+
+
+@njit(cache=True, nogil=True)
+def components(first, arcs):
+    """Number the connected parts of a graph, int32 (n,) for its corner cells."""
+    part = np.full(first.size - 1, -1, np.int32)
+    waiting = np.empty(first.size, np.int32)
+    n_parts = 0
+    for corner in range(part.size):
+        if part[corner] >= 0:
+            continue
+        part[corner] = n_parts
+        waiting[0], n_waiting = corner, 1
+        while n_waiting > 0:
+            n_waiting -= 1
+            at = waiting[n_waiting]
+            for arc in range(first[at], first[at + 1]):
+                other = arcs[arc, 1] >> 8
+                if part[other] < 0:
+                    part[other] = n_parts
+                    waiting[n_waiting] = other
+                    n_waiting += 1
+        n_parts += 1
+    return part

@@ -1,0 +1,143 @@
+"""Kernels of the search on a graph of corner cells, contracted or not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import njit
+from hybridnav.jumps._heap_kernels import pop, push
+from hybridnav.jumps._join_kernels import is_direct, join
+from hybridnav.jumps._leg_kernels import FAR, class_of, row_col_kind
+from hybridnav.search._kernels import octile_cost
+
+FROM_START, FROM_GOAL = -2, -3
+"""What `shortest` returns for the corner cell where the path is one leg: free in the order of the
+start, the diagonal first, or in that of the goal."""
+NO_ARC = -1
+
+
+@njit(cache=True, nogil=True)
+def _begin(graph, ends, side, work, is_queued):
+    """Give the corner cells that an end is joined to their costs, on the side of this end.
+
+    Returns how many are queued, how many cells got their first cost, and their component, -1 where
+    the end is joined to none.
+    """
+    tables, places, component, _, _ = graph
+    number, _, width, n_corners = tables
+    records, heaps, touched, found = work
+    cell, aim = ends[side], ends[1 - side]
+    n_found = 1
+    if number[cell] < n_corners:
+        found[0] = number[cell]
+    else:
+        n_found = join(tables, cell, found)
+    row, col = cell // width, cell % width
+    aim_row, aim_col = aim // width, aim % width
+    n_touched = 0
+    for i in range(n_found):
+        node = np.int64(found[i])
+        to_row, to_col, _ = row_col_kind(places[node])
+        if records[node, 0] == FAR and records[node, 1] == FAR:
+            touched[n_touched] = node
+            n_touched += 1
+        cost = octile_cost(to_row - row, to_col - col)
+        records[node, side], records[node, 2 + side] = cost, NO_ARC
+        if is_queued:
+            push(heaps[side], i, cost + octile_cost(to_row - aim_row, to_col - aim_col), node)
+    part = component[found[0]] if n_found > 0 else -1
+    return (n_found if is_queued else 0), n_touched, part
+
+
+@njit(cache=True, nogil=True)
+def shortest(graph, ends, is_contracted, work):
+    """Search for a shortest path between two cells.
+
+    A* from the start; in a hierarchy from both ends, up to corner cells contracted later. A corner
+    cell that both sides reach makes a path, and whatever is no better need not be looked at any
+    more.
+
+    Parameters
+    ----------
+    graph
+        Tables (see `join`), int64 (n,) places, int32 (n,) components, which legs may follow, and
+        arcs: where those of each corner cell begin, int64 (m, 2) cost and head (see `arcs_of` and
+        `contract`).
+    ends
+        Flat cells of start and goal.
+    is_contracted
+        Whether the arcs are those of a hierarchy.
+    work
+        Records, int64 (n, 4), the first two columns `FAR`: costs from the start and from the goal,
+        and by what tail and arc each was reached; two heaps with room for n and m entries; room for
+        n corner cells, int64; the same, int32.
+
+    Returns
+    -------
+    tuple
+        Cost, `FAR` where there is no path; the corner cell where both sides meet, `FROM_START` or
+        `FROM_GOAL`; corner cells expanded; how many records must be cleared.
+    """
+    tables, places, _, follow, (first, arcs) = graph
+    records, heaps, touched, found = work
+    number, _, width, _ = tables
+    rows, cols = ends[1] // width - ends[0] // width, ends[1] % width - ends[0] % width
+    if is_direct(tables, ends[0], ends[1]):
+        return octile_cost(rows, cols), FROM_START, 0, 0
+    if is_direct(tables, ends[1], ends[0]):
+        return octile_cost(rows, cols), FROM_GOAL, 0, 0
+    to_goal, n_touched, goal_part = _begin(graph, ends, 1, work, is_contracted)
+    rest = records, heaps, touched[n_touched:], found
+    to_start, n_more, start_part = _begin(graph, ends, 0, rest, True)
+    n_touched += n_more
+    if start_part != goal_part or goal_part < 0:
+        return FAR, FROM_START, 0, n_touched
+    best, meeting, expanded = FAR, np.int64(FROM_START), 0
+    while True:
+        if to_start > 0 and heaps[0][0, 0] >= best:
+            to_start = 0
+        if to_goal > 0 and heaps[1][0, 0] >= best:
+            to_goal = 0
+        if to_start == 0 and to_goal == 0:
+            break
+        side = 0 if to_start > 0 and (to_goal == 0 or heaps[0][0, 0] <= heaps[1][0, 0]) else 1
+        heap, size, aim = heaps[side], (to_goal if side else to_start), ends[1 - side]
+        aim_row, aim_col = aim // width, aim % width
+        estimate = heap[0, 0]
+        node = pop(heap, size)
+        size -= 1
+        row, col, kind = row_col_kind(places[node])
+        cost = records[node, side]
+        if estimate == cost + octile_cost(row - aim_row, col - aim_col):
+            expanded += 1
+            if cost + records[node, 1 - side] < best:
+                best, meeting = cost + records[node, 1 - side], node
+            by = records[node, 2 + side]
+            if by != NO_ARC:
+                may_follow = follow[kind, arcs[by & 0xFFFFFFFF, 1] & 15]
+            elif number[ends[side]] == node:
+                may_follow = np.int64(65535)
+            else:
+                leg = class_of(row - ends[side] // width, col - ends[side] % width)
+                may_follow = follow[kind, leg]
+            for arc in range(first[node], first[node + 1]):
+                packed, further = arcs[arc, 1], cost + arcs[arc, 0]
+                other = packed >> 8
+                known = records[other, side]
+                if may_follow >> (packed >> 4 & 15) & 1 == 0 or known <= further:
+                    continue
+                row, col, _ = row_col_kind(places[other])
+                estimate = further + octile_cost(row - aim_row, col - aim_col)
+                if estimate >= best:
+                    continue
+                if known == FAR and records[other, 1 - side] == FAR:
+                    touched[n_touched] = other
+                    n_touched += 1
+                records[other, side], records[other, 2 + side] = further, node << 32 | arc
+                push(heap, size, estimate, other)
+                size += 1
+        if side:
+            to_goal = size
+        else:
+            to_start = size
+    return best, meeting, expanded, n_touched

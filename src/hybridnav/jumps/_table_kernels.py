@@ -1,0 +1,145 @@
+"""Kernels of the tables of a jump-point graph: corner cells, and what each cell sees where.
+
+Directions are those of `search._kernels`: 0 east (column + 1), 1 north-east, counter-clockwise, row
++ 1 being north. Cells lie in a frame of blocked ones, so that no neighbour is off the map; a flat
+cell is its place in the framed grid.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import njit
+
+BLOCKED = -1
+"""Number of cells that are not free."""
+
+
+@njit(cache=True, nogil=True)
+def number_cells(free):
+    """Number the free cells: corner cells first, then the others, each in the order of rows.
+
+    A corner cell has a blocked cell at one of its corners, and both cells beside that one are free:
+    there shortest paths turn.
+
+    Parameters
+    ----------
+    free
+        bool (rows, cols).
+
+    Returns
+    -------
+    tuple
+        int32 ((rows + 2) * (cols + 2),), the number of each cell of the framed grid, `BLOCKED` for
+        none; int32 (n,), flat corner cells by number; uint8 (n,), which of their corners are
+        blocked, bit k for direction 2 * k + 1.
+    """
+    rows, cols = free.shape
+    width = cols + 2
+    number = np.full((rows + 2) * width, BLOCKED, np.int32)
+    for row in range(rows):
+        at = (row + 1) * width + 1
+        for col in range(cols):
+            if free[row, col]:
+                number[at + col] = 0
+    n_corners = 0
+    for is_counted in (True, False):
+        if not is_counted:
+            corners, kinds = np.empty(n_corners, np.int32), np.empty(n_corners, np.uint8)
+            n_corners = 0
+        for row in range(1, rows + 1):
+            for cell in range(row * width + 1, row * width + cols + 1):
+                if number[cell] == BLOCKED:
+                    continue
+                kind = _kind(number, width, cell)
+                if kind == 0:
+                    continue
+                if not is_counted:
+                    corners[n_corners], kinds[n_corners] = cell, kind
+                n_corners += 1
+    for i in range(n_corners):
+        number[corners[i]] = i + 1
+    n_cells = n_corners
+    for cell in range(number.size):
+        if number[cell] == 0:
+            number[cell] = n_cells
+            n_cells += 1
+        elif number[cell] > 0:
+            number[cell] -= 1
+    return number, corners, kinds
+
+
+@njit(cache=True, nogil=True)
+def _kind(number, width, cell):
+    """Which corners of a free cell are blocked while both cells beside them are free."""
+    east, north = number[cell + 1] != BLOCKED, number[cell + width] != BLOCKED
+    west, south = number[cell - 1] != BLOCKED, number[cell - width] != BLOCKED
+    kind = 0
+    if north and east and number[cell + width + 1] == BLOCKED:
+        kind |= 1
+    if north and west and number[cell + width - 1] == BLOCKED:
+        kind |= 2
+    if south and west and number[cell - width - 1] == BLOCKED:
+        kind |= 4
+    if south and east and number[cell - width + 1] == BLOCKED:
+        kind |= 8
+    return kind
+
+
+@njit(cache=True, nogil=True)
+def look_ahead(number, width, n_corners, ahead):
+    """Fill in what each free cell sees in the eight directions.
+
+    Parameters
+    ----------
+    number
+        Of `number_cells`.
+    width
+        Columns of the framed grid.
+    n_corners
+        Number of corner cells.
+    ahead
+        int16 or int32 (n_free, 8), filled in. Along a side: the distance to the next corner cell,
+        or 0 or less, minus the free cells before a blocked one. Along a diagonal: the distance to
+        the next cell that is a corner cell or sees one along either side of that diagonal, or minus
+        the legal moves before there are none.
+    """
+    for flip in (1, -1):
+        first, last = (0, number.size) if flip == 1 else (number.size - 1, -1)
+        # Up the rows what lies west and south is known before, down them what lies north and east.
+        towards = ((4, -1), (6, -width)) if flip == 1 else ((0, 1), (2, width))
+        for cell in range(first, last, flip):
+            here = number[cell]
+            if here == BLOCKED:
+                continue
+            for k, step in towards:
+                there = number[cell + step]
+                if there == BLOCKED:
+                    ahead[here, k] = 0
+                elif there < n_corners:
+                    ahead[here, k] = 1
+                else:
+                    seen = ahead[there, k]
+                    ahead[here, k] = seen + 1 if seen > 0 else seen - 1
+    for flip in (1, -1):
+        first, last = (0, number.size) if flip == 1 else (number.size - 1, -1)
+        diagonals = (
+            ((5, -1, -width), (7, 1, -width)) if flip == 1 else ((1, 1, width), (3, -1, width))
+        )
+        for cell in range(first, last, flip):
+            here = number[cell]
+            if here == BLOCKED:
+                continue
+            for k, along_row, along_col in diagonals:
+                there = number[cell + along_row + along_col]
+                if (
+                    there == BLOCKED
+                    or number[cell + along_row] == BLOCKED
+                    or number[cell + along_col] == BLOCKED
+                ):
+                    ahead[here, k] = 0
+                elif there < n_corners or ahead[there, k - 1] > 0 or ahead[there, k + 1 & 7] > 0:
+                    ahead[here, k] = 1
+                else:
+                    seen = ahead[there, k]
+                    ahead[here, k] = seen + 1 if seen > 0 else seen - 1
