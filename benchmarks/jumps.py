@@ -10,7 +10,6 @@ and to its hierarchy before the next one; lengths must be equal, or the exit cod
 from __future__ import annotations
 
 import argparse
-import fnmatch
 import os
 import sys
 import time
@@ -118,9 +117,8 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.data is None:
         parser.error("the table needs --data or HYBRIDNAV_DATA")
-    globs = arguments.map or MAPS
     data = Path(arguments.data)
-    names = [name for name in maps_of(data) if any(fnmatch.fnmatch(name, glob) for glob in globs)]
+    names = maps_of(data, arguments.map or MAPS)
     if not names:
         parser.error("no map matches")
     row(data / names[0], 3)  # loads the kernels

@@ -22,7 +22,7 @@ from tests.strategies import MAX_SIDE, drawn
 if TYPE_CHECKING:
     from hybridnav.baselines import Method
 
-PRESETS = ["paper", "portals", "grid-astar"]
+PRESETS = ["paper", "portals", "octile", "grid-astar"]
 # Two free places that only a move between two blocked cells joins.
 PINCHED = drawn("..###", "..###", "##...", "##...")
 

@@ -142,6 +142,7 @@ def behaviour() -> dict[str, str]:
             "docs/index.md",
             {
                 "chooses the route on the places first": "chosen on places",
+                "finds the shortest path of cells": "read off the path",
                 "finds a shortest octile path by look-ups": "read off the path",
                 "finds the shortest path of a disc": "read off the path",
                 "searches the whole grid": "read off the path",
@@ -152,6 +153,7 @@ def behaviour() -> dict[str, str]:
             {
                 "| the places of the `TopologicalMap` |": "chosen on places",
                 "| portals between the fields of a second pyramid": "read off the path",
+                "| the corner cells at which shortest paths of cells turn |": "read off the path",
                 "| a convex mesh of free space": "read off the path",
                 "| the cells of the whole grid |": "read off the path",
             },

@@ -21,7 +21,7 @@ from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, length_of_points, recounted
 from tests.strategies import Scene, drawn, examples, scenes
 
-PRESETS = ("paper", "grid-astar", "portals")
+PRESETS = ("paper", "grid-astar", "octile", "portals")
 PLAIN = settings(max_examples=examples(25), deadline=None, derandomize=True)
 TWO_ROOMS = drawn(
     ".......#.......",
@@ -557,6 +557,8 @@ def test_what_cannot_be_closed_is_refused_in_one_line(preset: str, blocked: Any)
         ("grid-astar", "planner.epsilon=0", "epsilon needs refine: gates, or none"),
         ("paper", "planner.refine=gates", "coarse: max-distance goes with refine: grid-astar"),
         ("grid-astar", "planner.refine=stored-paths", "coarse: none goes with refine: grid-astar"),
+        ("octile", "planner.epsilon=0.1", "epsilon needs refine: gates, or none"),
+        ("octile", "planner.refine=grid-astar", "coarse: jumps goes with refine: none or ompl"),
         ("portals", "planner.coarse=none", "coarse: none goes with refine"),
         ("shortest", "planner.refine=grid-astar", "coarse: mesh goes with refine: none or ompl"),
         (

@@ -82,7 +82,7 @@ def test_the_files_state_both_sections_and_only_known_keys(name):
 
 def test_an_unknown_name_lists_the_names_there_are(monkeypatch, write):
     monkeypatch.chdir(write("planner: {}\n", "mine.yaml").parent)
-    with pytest.raises(hn.PresetNotFoundError, match=r"'mine'.*grid-astar, ompl-.*with \.yaml"):
+    with pytest.raises(hn.PresetNotFoundError, match=r"'mine'.*octile, ompl-.*with \.yaml"):
         hn.load_preset("mine")
     with pytest.raises(FileNotFoundError, match="''"):
         hn.load_preset("")
@@ -166,7 +166,7 @@ def test_a_preset_is_a_frozen_value(write):
         ("pyramid: {linkage: average}\n", ["pyramid.linkage", "'radius'", "got 'average'"]),
         (
             "planner: {coarse: fast}\n",
-            ["planner.coarse", "'max-distance', 'portals', 'mesh' or 'none'", "'fast'"],
+            ["planner.coarse", "'max-distance', 'portals', 'mesh', 'jumps' or 'none'", "'fast'"],
         ),
         ("planner: {refine: rrt}\n", ["planner.refine", "'grid-astar'", "got 'rrt'"]),
         ("planner: {allow_unexplored: maybe}\n", ["planner.allow_unexplored", "got 'maybe'"]),

@@ -39,6 +39,7 @@ _REFINED_BY = {
     "max-distance": ("grid-astar",),
     "portals": ("gates", "stored-paths"),
     "mesh": ("none",),
+    "jumps": ("none",),
     "none": ("grid-astar",),
 }
 """What refines each coarse search; OMPL refines them all."""
@@ -78,17 +79,18 @@ class PyramidSettings(_Section):
 class PlannerSettings(_Section):
     """Section `planner`: coarse search, corridor, refinement."""
 
-    coarse: Literal["max-distance", "portals", "mesh", "none"] = "max-distance"
+    coarse: Literal["max-distance", "portals", "mesh", "jumps", "none"] = "max-distance"
     """What is planned on: the places, by that attribute of their arcs, which chooses the route; or
-    portals between fields grown for planning alone, a mesh of convex polygons of free space, or
-    `none`, the cells of the whole map at once, so that the route is read off the path."""
+    portals between fields grown for planning alone, a mesh of convex polygons of free space, the
+    corner cells at which shortest paths of cells turn, or `none`, the cells of the whole map at
+    once, so that the route is read off the path."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields that `grid-astar` and `ompl` start from: those of the coarse way, or also their
     neighbours. Of no effect with `gates`, `stored-paths` and `coarse: none`."""
     refine: Literal["grid-astar", "gates", "stored-paths", "ompl", "none"] = "grid-astar"
     """How a path is found: cell by cell in the corridor; over portals, with exact costs between all
     border cells of the fields or by some stored paths alone; by a sampling-based planner; or
-    `none` where the search on the mesh has found it: the shortest any-angle path."""
+    `none` where the coarse search, on the mesh or the corner cells, has found it."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, section of its own; null elsewhere."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
@@ -128,7 +130,7 @@ class PlannerSettings(_Section):
                 "no_smooth",
                 "smooth shortens grid paths, with coarse: mesh they are any-angle: set it to none",
             )
-        if self.epsilon is not None and self.refine not in {"gates", "none"}:
+        if self.epsilon is not None and self.refine != "gates" and self.coarse != "mesh":
             raise PydanticCustomError(
                 "bounds_needed", "epsilon needs refine: gates, or none on the mesh"
             )

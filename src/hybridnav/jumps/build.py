@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.jumps._contract_kernels import contract
 from hybridnav.jumps._join_kernels import arcs_of, components
 from hybridnav.jumps._leg_kernels import COLUMN_BITS, KIND_BITS, legs_that_follow
@@ -21,6 +22,7 @@ _SHORT = 32_000
 """Longest side of a map whose distances fit 16 bits."""
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class JumpGraph:
     """Corner cells, arcs between those with no other one on their way, and what each cell sees.
@@ -63,6 +65,7 @@ class JumpGraph:
         return sum(array.nbytes for array in arrays)
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class JumpHierarchy:
     """The graph contracted: arcs from each corner cell to those that were contracted after it."""

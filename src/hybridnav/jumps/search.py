@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import os
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.jumps import _query_kernels as kernels
 from hybridnav.jumps._leg_kernels import FAR, legs_that_follow
 from hybridnav.jumps.build import contract_graph
@@ -26,7 +29,7 @@ Cell = tuple[int, int]
 CONTRACTED_AFTER = 64
 """Expansions for each corner cell after which the graph is contracted: they take about as long."""
 _BLOCK = 64
-"""Pairs that are asked at once while the graph is not contracted."""
+"""Pairs that are asked at once while the graph is not contracted, and that are worth a thread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +69,7 @@ class _Work:
         self.arrays = (records, heaps, touched, found), np.empty((n_corners + 2, 3), np.int64)
 
 
+@copies_alike
 class _Searched:
     """The graph as the kernel takes it, contracted or not, and work arrays of its size."""
 
@@ -80,6 +84,7 @@ class _Searched:
         self.works = Pool(partial(_Work, graph.n_corners, len(used.arcs)))
 
 
+@copies_alike
 class JumpSearch:
     """Exact shortest octile paths over the free cells of a graph; threads may share it.
 
@@ -123,10 +128,7 @@ class JumpSearch:
         return JumpPath(cells, straight + diagonal * math.sqrt(2.0), expanded)
 
     def many(self, starts: LongArray, goals: LongArray) -> JumpPaths:
-        """Find shortest paths between many pairs of free cells, int64 (n, 2) each.
-
-        The lock of Python is free meanwhile: threads that ask for a part each share the work.
-        """
+        """Find shortest paths between many pairs of free cells, int64 (n, 2) each, on all cores."""
         ends = np.ascontiguousarray(np.hstack([starts, goals]).reshape(-1, 4), dtype=np.int64)
         found = list(self._blocks(ends))
         counts = np.concatenate([block[2] for block in found])
@@ -138,12 +140,18 @@ class JumpSearch:
         return JumpPaths(length, path_start, cells, counts[:, 2])
 
     def _blocks(self, ends: LongArray) -> Iterator[tuple[LongArray, LongArray, LongArray]]:
-        """Answer pairs in blocks as long as the graph is not contracted, then all at once."""
+        """Answer pairs in blocks as long as the graph is not contracted, then a part a core."""
         at = 0
-        while at == 0 or at < len(ends):
-            size = len(ends) if self.hierarchy is not None else _BLOCK
-            yield self._paths(ends[at : at + size])
-            at += size
+        while self.hierarchy is None and (at == 0 or at < len(ends)):
+            yield self._paths(ends[at : at + _BLOCK])
+            at += _BLOCK
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        n_parts = min(cores or 1, (len(ends) - at) // _BLOCK)
+        if n_parts > 1:
+            with ThreadPoolExecutor(n_parts) as pool:
+                yield from pool.map(self._paths, np.array_split(ends[at:], n_parts))
+        elif at == 0 or at < len(ends):
+            yield self._paths(ends[at:])
 
     def _paths(self, ends: LongArray) -> tuple[Any, Any, Any]:
         """Return where the cells of each path begin, these, and moves and expansions of each."""

@@ -9,6 +9,7 @@ import numpy as np
 from hybridnav.grid import CellClass
 from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_plans import OverPortals
+from hybridnav.planner.jump_plans import OverJumps
 from hybridnav.planner.mesh_plans import OverMesh
 from hybridnav.result import PlanBatch, PlanStatus
 
@@ -53,7 +54,7 @@ def plan_many(
     found = None
     if len(asked) and isinstance(cell_planner, OverMesh):
         found = cell_planner.plan_many((first[asked], last[asked]), (starts[asked], goals[asked]))
-    elif len(asked) and smooth == "none" and isinstance(cell_planner, OverPortals):
+    elif len(asked) and smooth == "none" and isinstance(cell_planner, OverPortals | OverJumps):
         found = cell_planner.plan_many(first[asked], last[asked])
     if found is not None:
         kept = found.is_done

@@ -15,6 +15,7 @@ from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
 from hybridnav.planner.closed import ClosedCells
 from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
+from hybridnav.planner.jump_plans import OverJumps
 from hybridnav.planner.mesh_plans import OverMesh
 from hybridnav.planner.radius import check_radius
 from hybridnav.refine import GridRefiner, LineOfSight
@@ -71,6 +72,8 @@ class HybridPlanner:
             self._cells = OverPortals(topology, self._refiner, settings)
         elif settings.coarse == "mesh":
             self._cells = OverMesh(topology.grid, self._refiner, settings)
+        elif settings.coarse == "jumps":
+            self._cells = OverJumps(topology.grid, self._refiner, settings)
         else:
             self._cells = WholeMap(self._refiner)
         self._ompl: OmplPlanner | None = None

@@ -1,0 +1,90 @@
+"""How the preset `octile` plans: exact paths of cells on the jump-point graph of the map."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._copies import copies_alike
+from hybridnav.jumps import JumpSearch, build_jump_graph
+from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap
+
+if TYPE_CHECKING:
+    from hybridnav._typing import LongArray
+    from hybridnav.config import PlannerSettings
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.refine import GridRefiner
+
+Cell = tuple[int, int]
+
+
+@copies_alike
+class OverJumps:
+    """Shortest paths of cells; the graph is built when the first query needs it.
+
+    Where corners may be cut it does not know all moves: A* searches the whole map then.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    refiner
+        Finds paths where corners may be cut.
+    settings
+        Whether unexplored cells may be entered.
+    """
+
+    def __init__(
+        self, grid: OccupancyGrid, refiner: GridRefiner, settings: PlannerSettings
+    ) -> None:
+        self._grid = grid
+        self._allow_unexplored = settings.allow_unexplored
+        self._whole_map = WholeMap(refiner)
+        self._search: JumpSearch | None = None
+        self._building = threading.Lock()
+
+    def prepare(self) -> JumpSearch:
+        """Build the graph, once."""
+        if self._search is None:
+            with self._building:
+                if self._search is None:
+                    free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
+                    self._search = JumpSearch(build_jump_graph(free))
+        return self._search
+
+    def plan(self, start: Cell, goal: Cell) -> CellPlan:
+        """Find a shortest path between two cells; see `CellPlanner`."""
+        if self._grid.corner_cutting:
+            return self._whole_map.plan(start, goal)
+        began = time.perf_counter()
+        seconds = {}
+        if self._search is None:
+            self.prepare()
+            seconds["graph"] = time.perf_counter() - began
+        now = time.perf_counter()
+        found = self.prepare().path(start, goal)
+        seconds["jumps"] = time.perf_counter() - now
+        return CellPlan(
+            found.cells,
+            length_cells=found.length_cells,
+            bound_cells=found.length_cells,
+            expanded=found.expanded,
+            seconds=seconds,
+        )
+
+    def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
+        """Find a shortest path for each of many pairs of cells, int64 (n, 2) each, on all cores;
+        none where corners may be cut."""
+        n = len(starts)
+        if self._grid.corner_cutting:
+            none, nowhere = np.zeros(n, dtype=np.bool_), np.full(n, np.inf)
+            empty = np.zeros(n + 1, dtype=np.int64)
+            return CellPlans(none, "octile", nowhere, nowhere, empty, np.empty((0, 2)))
+        found = self.prepare().many(starts, goals)
+        cost_m = found.length_cells * self._grid.resolution_m
+        points = self._grid.frame.points_of(found.cells)
+        done = np.ones(n, dtype=np.bool_)
+        return CellPlans(done, "octile", cost_m, cost_m, found.path_start, points)
