@@ -171,3 +171,24 @@ def test_a_path_is_as_near_the_optimum_as_it_was_asked_to_be(
             assert found.gap <= epsilon + 1e-9
             assert found.lower_bound <= optimum * (1 + 1e-9)
             assert optimum <= found.cost * (1 + 1e-9)
+
+
+def test_a_query_whose_time_is_up_has_a_path_and_a_bound() -> None:
+    rng = np.random.default_rng(2)
+    topology = mapped((rng.random((60, 60)) > 0.25).astype(np.uint8))
+    exact, late = shortest(topology), shortest(topology, "planner.budget_s=0")
+    starts, goals = rng.uniform(0, 60, (2, 40, 2))
+    for is_prepared in (False, True):
+        if is_prepared:
+            late.prepare()
+        many = late.plan_many(starts, goals)
+        for query, ends in enumerate(zip(starts, goals, strict=True)):
+            optimum, found = exact.plan(*ends), late.plan(*ends)
+            assert many.status[query] == found.status == optimum.status
+            if found.path is not None:
+                assert found.lower_bound <= optimum.cost * (1 + 1e-9)
+                assert optimum.cost <= found.cost * (1 + 1e-9)
+                assert not segment_faults(topology.grid, found.path.points)
+                assert found.lower_bound >= math.dist(*ends) * (1 - 1e-9)
+    shut = {"cells": [(30, 30)]}
+    assert late.plan((1.5, 30.5), (58.5, 30.5), blocked=shut).gap >= 0

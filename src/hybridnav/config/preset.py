@@ -96,6 +96,10 @@ class PlannerSettings(_Section):
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
     """With `gates`, and on the mesh: the search ends once no path can be shorter by more than this
     part; null or 0 for the optimum."""
+    budget_s: Annotated[_Float, Field(ge=0)] | None = None
+    """On the mesh: seconds after which a query returns the best path so far, with the bound that is
+    proved by then; null for as long as the optimum takes. Until the planner is prepared, such
+    queries shorten a path of cells by line of sight."""
     smooth: Literal["none", "line-of-sight"] = "none"
     """Whether the path is shortened to an any-angle one."""
     allow_unexplored: bool = False
@@ -130,6 +134,8 @@ class PlannerSettings(_Section):
                 "no_smooth",
                 "smooth shortens grid paths, with coarse: mesh they are any-angle: set it to none",
             )
+        if self.budget_s is not None and (self.coarse, self.refine) != ("mesh", "none"):
+            raise PydanticCustomError("mesh_needed", "budget_s needs coarse: mesh, refine: none")
         if self.epsilon is not None and self.refine != "gates" and self.coarse != "mesh":
             raise PydanticCustomError(
                 "bounds_needed", "epsilon needs refine: gates, or none on the mesh"

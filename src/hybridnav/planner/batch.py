@@ -52,7 +52,7 @@ def plan_many(
     first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
     asked = np.flatnonzero(_are_free(planner, first) & _are_free(planner, last))
     found = None
-    if len(asked) and isinstance(cell_planner, OverMesh):
+    if len(asked) and isinstance(cell_planner, OverMesh) and not cell_planner.has_budget:
         found = cell_planner.plan_many((first[asked], last[asked]), (starts[asked], goals[asked]))
     elif len(asked) and smooth == "none" and isinstance(cell_planner, OverPortals | OverJumps):
         found = cell_planner.plan_many(first[asked], last[asked])

@@ -31,12 +31,11 @@ Position = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Query:
-    """Ends as cells and as (row, col) in grid units, what is closed, and the time there is."""
+    """Ends as cells and as (row, col) in grid units, and what is closed."""
 
     cells: tuple[Cell, Cell]
     positions: tuple[Position, Position]
     closed: ClosedCells | None
-    budget_s: float | None
 
 
 _KEPT = 4
@@ -74,11 +73,16 @@ class OverMesh:
         self._grid, self._frame = grid, grid.frame
         self._refiner = refiner
         self._allow_unexplored = settings.allow_unexplored
-        self._epsilon = settings.epsilon or 0.0
+        self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
         self._search: MeshSearch | None = None
         self._cut: OrderedDict[bytes, MeshSearch] = OrderedDict()
         self._building = threading.Lock()
+
+    @property
+    def has_budget(self) -> bool:
+        """Whether queries end when their time is up."""
+        return self._budget_s is not None
 
     def prepare(self) -> MeshSearch:
         """Build the mesh, once."""
@@ -98,10 +102,11 @@ class OverMesh:
         cells: tuple[Cell, Cell],
         ends: tuple[FloatArray, FloatArray],
         closed: ClosedCells | None,
-        *,
-        budget_s: float | None = None,
     ) -> CellPlan:
         """Find a shortest path between two points.
+
+        When the preset's time is up, and where it has one and the mesh is not built yet, a path of
+        cells that is shortened by line of sight is the answer, with the bound that is proved.
 
         Parameters
         ----------
@@ -111,19 +116,15 @@ class OverMesh:
             `(x, y)` in metres, map frame.
         closed
             What is closed for this query, the ends not; None for nothing.
-        budget_s
-            Seconds for the search of the mesh. When they are over, and where the mesh is not built
-            yet, a path of cells that is shortened by line of sight is the answer, with the bound
-            that the search has proved. None for as long as it takes.
         """
         began = time.perf_counter()
         seconds = {}
-        if self._search is None and budget_s is None:
+        if self._search is None and self._budget_s is None:
             self.prepare()
             seconds["mesh"] = time.perf_counter() - began
         row, col = self._frame.position_of(float(ends[0][0]), float(ends[0][1]))
         positions = (row, col), self._frame.position_of(float(ends[1][0]), float(ends[1][1]))
-        query = _Query(cells, positions, closed, budget_s)
+        query = _Query(cells, positions, closed)
         now = time.perf_counter()
         found, passed, expanded = self._found(query)
         seconds["shortest"] = time.perf_counter() - now
@@ -149,7 +150,7 @@ class OverMesh:
         if search is None:
             bound = math.dist(*query.positions)
             return MeshPath(None, math.inf, bound, 0), None, 0
-        effort: Any = {"epsilon": self._epsilon, "budget_s": query.budget_s}
+        effort: Any = {"epsilon": self._epsilon, "budget_s": self._budget_s}
         found = search.path(query.cells, query.positions, **effort)
         expanded = found.expanded
         passed = self._passed(free, query.cells, found)
