@@ -104,25 +104,38 @@ def test_a_plan_as_json(cli, rooms):
     assert keys <= answer.keys()
     assert not {"optimum_m", "loss", "grid_expanded"} & answer.keys()
     assert answer["status"] == "solved"
-    assert answer["metric"] == "octile"
-    # Two diagonals with the walls kept, four straight ones through the door.
-    assert answer["length_m"] == pytest.approx(5 + math.sqrt(2), abs=1e-12)
+    assert answer["metric"] == "any-angle"
+    # From the point to a corner of the door, and to the point.
     points = answer["points"]
-    assert (points[0], points[-1]) == ([1.5, 3.5], [7.5, 4.5])
+    assert (points[0], points[-1]) == ([1.5, 3.5], [7.2, 4.9])
+    assert 5 < answer["length_m"] < 5 + math.sqrt(2)
+    assert answer["gap"] == 0
     assert sum(map(math.dist, points, points[1:])) == pytest.approx(answer["length_m"])
     assert len(answer["arcs"]) == len(answer["places"]) - 1
-    assert "expanded_gates" in answer
+    assert answer["expanded_intervals"] > 0
     assert all(seconds >= 0 for seconds in answer["seconds"].values())
 
 
 def test_a_comparison_adds_the_figures_of_the_whole_grid(cli):
-    answer = cli("plan", *OFFICE_QUERY, "--compare", "--json").answer
+    answer = cli("plan", *OFFICE_QUERY, "--preset", "paper", "--compare", "--json").answer
     whole = cli("plan", *OFFICE_QUERY, "--preset", "grid-astar", "--json").answer
     assert answer["optimum_m"] == whole["length_m"]
     assert answer["grid_expanded"] == whole["expanded"]
     assert answer["loss"] == answer["length_m"] / whole["length_m"] - 1
     assert answer["loss"] >= 0
-    assert whole["places"] is whole["arcs"] is None
+    assert len(whole["places"]) == len(whole["arcs"]) + 1
+
+
+def test_a_comparison_mixes_no_metrics(cli):
+    query = (*OFFICE_QUERY, "--compare")
+    answer, told = cli("plan", *query, "--json").answer, cli("plan", *query).out
+    assert answer["metric"] == "any-angle"
+    assert answer["optimum_m"] is answer["loss"] is None
+    assert answer["length_m"] < answer["grid_length_m"]
+    assert f"grid       {answer['grid_length_m']:.2f} m (octile), " in told
+    assert "loss" not in told
+    assert "optimum  " not in told
+    assert f"expanded   {answer['expanded_intervals']:,} intervals\n" in told
 
 
 def test_the_summary_says_what_the_json_says(cli):
@@ -148,8 +161,9 @@ def test_the_summary_says_what_the_json_says(cli):
 def test_a_path_equal_to_its_bound_is_called_optimal(cli, rooms):
     done = cli("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--compare")
     assert "bound      0.00 m, the path is optimal" in done.out
-    assert "loss 0.00 %" in done.out
     assert "arcs       0\n" in done.out
+    query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--preset", "portals")
+    assert "loss 0.00 %" in cli(*query, "--compare").out
 
 
 def test_a_path_that_ends_short_of_the_goal_says_by_how_much():
@@ -231,13 +245,13 @@ def test_negative_coordinates_are_no_options(cli, draw):
         ["--goal", " -5e-1 , -1.5 ", "--start", "-2.5,-1.5"],
     ):
         answer = cli("plan", path, *ends, "--json").answer
-        assert answer["points"] == [[-2.5, -1.5], [-1.5, -1.5], [-0.5, -1.5]]
+        assert answer["points"] == [[-2.5, -1.5], [-0.5, -1.5]]
 
 
 def test_points_are_in_the_map_frame_of_a_turned_map(cli, draw):
     path = draw("...", "...", origin=[10, 20, math.pi / 2])
     done = cli("plan", path, "--start", "9.5,20.5", "--goal", "9.5,22.5", "--json")
-    assert done.answer["points"] == [[9.5, 20.5], [9.5, 21.5], [9.5, 22.5]]
+    assert done.answer["points"] == [[9.5, 20.5], [9.5, 22.5]]
     assert "extent     x 8.00 to 10.00 m, y 20.00 to 23.00 m\n" in cli("show", path).out
 
 

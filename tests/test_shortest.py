@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import math
+import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -192,3 +195,57 @@ def test_a_query_whose_time_is_up_has_a_path_and_a_bound() -> None:
                 assert found.lower_bound >= math.dist(*ends) * (1 - 1e-9)
     shut = {"cells": [(30, 30)]}
     assert late.plan((1.5, 30.5), (58.5, 30.5), blocked=shut).gap >= 0
+
+
+@pytest.mark.parametrize(
+    ("preset", "built"),
+    [("shortest", "mesh_plans.build_mesh"), ("portals", "cell_plans.PortalSearch")],
+)
+def test_a_planner_builds_at_its_first_query_and_once_for_all_threads(
+    preset: str, built: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = importlib.import_module(f"hybridnav.planner.{built.partition('.')[0]}")
+    name, calls = built.partition(".")[2], []
+    build = getattr(module, name)
+
+    def slowly(*args: Any, **kwargs: Any) -> Any:
+        calls.append(args)
+        time.sleep(0.05)
+        return build(*args, **kwargs)
+
+    monkeypatch.setattr(module, name, slowly)
+    topology = mapped(drawn(".....", ".###.", "....."))
+    planner = hn.HybridPlanner(topology, preset=preset)
+    assert planner.plan((2.5, 1.5), (0.5, 0.5)).status is hn.PlanStatus.START_OCCUPIED
+    assert not calls
+    with ThreadPoolExecutor(4) as threads:
+        costs = set(threads.map(lambda _: planner.plan((0.5, 0.5), (4.5, 2.5)).cost, range(4)))
+    assert len(costs) == len(calls) == 1
+    planner.prepare()
+    assert len(calls) == 1
+    other = hn.HybridPlanner(topology, preset=preset)
+    other.prepare()
+    assert len(calls) == 2
+    assert {other.plan((0.5, 0.5), (4.5, 2.5)).cost} == costs
+    assert len(calls) == 2
+
+
+def test_a_path_from_a_point_to_itself_is_that_point() -> None:
+    for smooth in (None, "none", "line-of-sight"):
+        result = shortest(mapped(drawn("..."))).plan((1.2, 0.3), (1.2, 0.3), smooth=smooth)
+        assert result.path is not None
+        assert result.path.points.tolist() == [[1.2, 0.3]]
+        assert (result.cost, result.lower_bound, result.gap) == (0, 0, 0)
+
+
+def test_counts_name_what_was_expanded() -> None:
+    topology = mapped(drawn(".....", ".###.", "....."))
+    stats = shortest(topology).plan((0.5, 0.5), (4.5, 2.5)).stats
+    assert stats.expanded_intervals > 0
+    assert stats.expanded == stats.expanded_gates == 0
+    assert (
+        hn.HybridPlanner(topology, preset="grid-astar")
+        .plan((0.5, 0.5), (4.5, 2.5))
+        .stats.expanded_intervals
+        == 0
+    )
