@@ -34,7 +34,7 @@ def are_free(corners, vertices, free):
 @guarded
 @njit(cache=True, nogil=True)
 def select_triangles(vertices, neighbours, is_kept):
-    """Select some triangles.
+    """Select some triangles, in the order of their first corners.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def select_triangles(vertices, neighbours, is_kept):
     n = len(vertices)
     number = np.full(n, WALL, np.int32)
     count = 0
-    for triangle in range(n):
+    for triangle in np.argsort(vertices[:, 0], kind="mergesort"):
         if is_kept[triangle]:
             number[triangle] = count
             count += 1
