@@ -184,7 +184,8 @@ class MeshSearch:
             Seconds after which the search ends with the best path so far, None for no end.
         known
             float64 (n, 2), a path from start to goal that is in free space: the answer until the
-            search finds a shorter one, and a bound that saves work.
+            search finds a shorter one. With epsilon the search ends as soon as that is proved good
+            enough; without, it saves next to nothing.
 
         Returns
         -------
