@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import itertools
 import math
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +93,36 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
             assert not segment_faults(grid, points)
         back = search.path((last, first), (goal, start))
         assert back.length_cells == pytest.approx(found.length_cells)
+
+
+def test_copies_of_a_search_answer_by_the_kernels_that_are_compiled() -> None:
+    cells = (0, 0), (3, 4)
+    centres = (0.5, 0.5), (3.5, 4.5)
+    for search in both_searches(build_mesh(drawn(".....", ".###.", ".###.", ".....") == 1)):
+        copied = copy.deepcopy(search)
+        assert (copied.graph is None) == (search.graph is None)
+        assert copied.path(cells, centres).length_cells == search.path(cells, centres).length_cells
+        # To numba an array that may be written is of another type.
+        for array in vars(copied.mesh).values():
+            assert not array.flags.writeable
+
+
+def test_threads_may_share_a_search_while_it_prepares_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("hybridnav.mesh.search._WORTH", 0)
+    free = np.random.default_rng(3).random((40, 40)) > 0.2
+    ends = [tuple(map(tuple, np.argwhere(free)[[k, -1 - k]].tolist())) for k in range(60)]
+    alone, shared = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(free))
+
+    def length(search: MeshSearch, cells: Any) -> float:
+        centres = tuple((row + 0.5, col + 0.5) for row, col in cells)
+        return search.path(cells, centres).length_cells  # type: ignore[arg-type]
+
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda cells: length(shared, cells), ends))
+    assert found == pytest.approx([length(alone, cells) for cells in ends])
+    assert shared.graph is not None
 
 
 def test_two_cells_that_meet_at_a_corner_are_not_connected() -> None:

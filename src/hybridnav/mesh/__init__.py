@@ -1,6 +1,8 @@
-"""Exact any-angle paths: the convex mesh of free space and the search of its intervals."""
+"""Exact any-angle paths: the convex mesh of free space, the search of its intervals, the graph of
+its corners."""
 
 from hybridnav.mesh.build import ConvexMesh, build_mesh
+from hybridnav.mesh.corner_graph import CornerGraph
 from hybridnav.mesh.cut import cut_mesh
 from hybridnav.mesh.many import MeshPaths, shortest_paths
 from hybridnav.mesh.search import MeshPath, MeshSearch
@@ -8,6 +10,7 @@ from hybridnav.mesh.trace import SearchTrace, trace_search
 
 __all__ = [
     "ConvexMesh",
+    "CornerGraph",
     "MeshPath",
     "MeshPaths",
     "MeshSearch",
