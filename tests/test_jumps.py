@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
-from hybridnav.jumps import JumpPaths, JumpSearch, build_jump_graph
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.jumps import JumpPaths, JumpSearch, build_jump_graph, contract_graph
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.strategies import MAX_SIDE, class_grids, drawn
 from tests.test_movingai_optima import problem_set, scenario_files
@@ -30,17 +29,12 @@ Cell = tuple[int, int]
 
 seeds = st.integers(0, 2**32 - 1)
 QUICK_FILES = 4
-ENOUGH = 60 * MAX_SIDE
-"""Pairs after which a speckled map's graph is contracted."""
 
 
 def searches(free: NDArray[np.bool_]) -> tuple[JumpSearch, JumpSearch]:
-    """One that never contracts its graph, and one that has done so."""
+    """One of the graph of free cells, and one of its hierarchy."""
     graph = build_jump_graph(free)
-    flat, contracted = JumpSearch(graph), JumpSearch(graph)
-    flat._left = 1 << 60
-    contracted.contract()
-    return flat, contracted
+    return JumpSearch(graph), JumpSearch(graph, contract_graph(graph))
 
 
 def assert_shortest(
@@ -167,42 +161,25 @@ def test_no_pairs_get_no_answers() -> None:
     assert found.path_start.tolist() == [0]
 
 
-def test_a_graph_is_contracted_once_queries_have_taken_as_long() -> None:
-    free = speckled(3)
-    starts, goals = pairs_of(free, ENOUGH)
-    search = JumpSearch(build_jump_graph(free))
-    before = search.many(starts[:50], goals[:50])
-    assert search.hierarchy is None
-    search.many(starts, goals)
-    assert search.hierarchy is not None
-    after = search.many(starts[:50], goals[:50])
-    assert after.length_cells.tolist() == before.length_cells.tolist()
-    assert after.expanded.sum() < before.expanded.sum()
+def test_a_hierarchy_expands_less() -> None:
+    starts, goals = pairs_of(speckled(3), 200)
+    flat, contracted = (search.many(starts, goals) for search in searches(speckled(3)))
+    assert contracted.length_cells.tolist() == flat.length_cells.tolist()
+    assert contracted.expanded.sum() < flat.expanded.sum()
 
 
 def test_threads_that_share_a_search_get_the_answers_of_one() -> None:
     free = speckled(4)
-    starts, goals = pairs_of(free, ENOUGH)
-    expected = JumpSearch(build_jump_graph(free)).many(starts, goals)
-    shared = JumpSearch(build_jump_graph(free))
-    halves: list[JumpPaths | None] = [None, None]
-
-    def work(half: int) -> None:
-        halves[half] = shared.many(starts[half::2], goals[half::2])
-
-    threads = [threading.Thread(target=work, args=(half,)) for half in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for half, found in enumerate(halves):
-        assert found is not None
-        assert found.length_cells.tolist() == expected.length_cells[half::2].tolist()
-        for i in range(0, ENOUGH // 2, 25):
-            if len(path_of(found, i)):
-                cells = np.array(path_of(found, i))
-                assert_legal(cells, free)
-                assert path_length_in_cells(cells) == found.length_cells[i]
+    starts, goals = pairs_of(free, 400)
+    for search in searches(free):
+        expected = search.many(starts, goals)
+        with ThreadPoolExecutor(4) as pool:
+            alone = list(
+                pool.map(search.path, map(tuple, starts.tolist()), map(tuple, goals.tolist()))
+            )
+        assert [path.length_cells for path in alone] == expected.length_cells.tolist()
+        for i, path in enumerate(alone):
+            assert path_of(expected, i) == ([] if path.cells is None else path.cells.tolist())
 
 
 @pytest.mark.full

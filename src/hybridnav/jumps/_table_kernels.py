@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 
 BLOCKED = -1
 """Number of cells that are not free."""
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def number_cells(free):
     """Number the free cells: corner cells first, then the others, each in the order of rows.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -15,21 +14,16 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.jumps import _query_kernels as kernels
 from hybridnav.jumps._leg_kernels import FAR, legs_that_follow
-from hybridnav.jumps.build import contract_graph
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from hybridnav._typing import FloatArray, IntArray, LongArray
+    from hybridnav._typing import FloatArray, LongArray
     from hybridnav.jumps.build import JumpGraph, JumpHierarchy
 
 Cell = tuple[int, int]
 
-CONTRACTED_AFTER = 64
-"""Expansions for each corner cell after which the graph is contracted: they take about as long."""
-_BLOCK = 64
-"""Pairs that are asked at once while the graph is not contracted, and that are worth a thread."""
+_LEAST = 64
+"""Queries that are worth a thread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,33 +64,19 @@ class _Work:
 
 
 @copies_alike
-class _Searched:
-    """The graph as the kernel takes it, contracted or not, and work arrays of its size."""
-
-    def __init__(self, graph: JumpGraph, hierarchy: JumpHierarchy | None) -> None:
-        used = hierarchy or graph
-        tables = graph.number, graph.ahead, graph.width, graph.n_corners
-        arcs = used.first, used.arcs
-        self.graph = tables, graph.places, graph.component, legs_that_follow(), arcs
-        self.middles: IntArray = np.empty(0, np.int32)
-        if hierarchy is not None:
-            self.middles = hierarchy.middles
-        self.works = Pool(partial(_Work, graph.n_corners, len(used.arcs)))
-
-
-@copies_alike
 class JumpSearch:
     """Exact shortest octile paths over the free cells of a graph; threads may share it.
 
-    Moves go to the 8 neighbours; a diagonal needs both side cells free (no corner cutting). The
-    graph is contracted once queries have taken about as long as that takes. From then on they are
-    faster by far where many corner cells lie between start and goal; where there are several
-    shortest paths it may be another one that they find.
+    Moves go to the 8 neighbours; a diagonal needs both side cells free (no corner cutting).
 
     Parameters
     ----------
     graph
         Of the map's free cells.
+    hierarchy
+        The graph contracted, which makes queries several times faster where many corner cells lie
+        between start and goal; None to search the graph itself. Where there are several shortest
+        paths each of the two may find another one.
 
     Notes
     -----
@@ -104,20 +84,14 @@ class JumpSearch:
     2019.
     """
 
-    def __init__(self, graph: JumpGraph) -> None:
-        self.graph = graph
-        self.hierarchy: JumpHierarchy | None = None
-        self._searched = _Searched(graph, None)
-        self._left = CONTRACTED_AFTER * graph.n_corners
-        self._contracting = threading.Lock()
-
-    def contract(self) -> None:
-        """Contract the graph now, rather than when it has paid off."""
-        with self._contracting:
-            if self.hierarchy is None:
-                hierarchy = contract_graph(self.graph)
-                self._searched = _Searched(self.graph, hierarchy)
-                self.hierarchy = hierarchy
+    def __init__(self, graph: JumpGraph, hierarchy: JumpHierarchy | None = None) -> None:
+        self.graph, self.hierarchy = graph, hierarchy
+        searched = graph if hierarchy is None else hierarchy
+        tables = graph.number, graph.ahead, graph.width, graph.n_corners
+        arcs = searched.first, searched.arcs
+        self._arrays = tables, graph.places, graph.component, legs_that_follow(), arcs
+        self._middles = np.empty(0, np.int32) if hierarchy is None else hierarchy.middles
+        self._works = Pool(partial(_Work, graph.n_corners, len(searched.arcs)))
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:
         """Find a shortest path between two free cells."""
@@ -130,39 +104,25 @@ class JumpSearch:
     def many(self, starts: LongArray, goals: LongArray) -> JumpPaths:
         """Find shortest paths between many pairs of free cells, int64 (n, 2) each, on all cores."""
         ends = np.ascontiguousarray(np.hstack([starts, goals]).reshape(-1, 4), dtype=np.int64)
-        found = list(self._blocks(ends))
-        counts = np.concatenate([block[2] for block in found])
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        n_parts = max(1, min(cores or 1, len(ends) // _LEAST))
+        if n_parts == 1:
+            found = [self._paths(ends)]
+        else:
+            with ThreadPoolExecutor(n_parts) as pool:
+                found = list(pool.map(self._paths, np.array_split(ends, n_parts)))
+        counts = np.concatenate([part[2] for part in found])
         length = counts[:, 0] + counts[:, 1] * math.sqrt(2.0)
         length[counts[:, 0] < 0] = np.inf
-        sizes = np.concatenate([np.diff(block[0]) for block in found])
+        sizes = np.concatenate([np.diff(part[0]) for part in found])
         path_start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        cells = np.concatenate([block[1] for block in found])
+        cells = np.concatenate([part[1] for part in found])
         return JumpPaths(length, path_start, cells, counts[:, 2])
-
-    def _blocks(self, ends: LongArray) -> Iterator[tuple[LongArray, LongArray, LongArray]]:
-        """Answer pairs in blocks as long as the graph is not contracted, then a part a core."""
-        at = 0
-        while self.hierarchy is None and (at == 0 or at < len(ends)):
-            yield self._paths(ends[at : at + _BLOCK])
-            at += _BLOCK
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-        n_parts = min(cores or 1, (len(ends) - at) // _BLOCK)
-        if n_parts > 1:
-            with ThreadPoolExecutor(n_parts) as pool:
-                yield from pool.map(self._paths, np.array_split(ends[at:], n_parts))
-        elif at == 0 or at < len(ends):
-            yield self._paths(ends[at:])
 
     def _paths(self, ends: LongArray) -> tuple[Any, Any, Any]:
         """Return where the cells of each path begin, these, and moves and expansions of each."""
-        searched = self._searched
-        with searched.works.lent() as work:
+        with self._works.lent() as work:
             found: tuple[Any, Any, Any] = kernels.paths(
-                searched.graph, searched.middles, self.graph.origin, ends, work.arrays
+                self._arrays, self._middles, self.graph.origin, ends, work.arrays
             )
-        if self.hierarchy is None:
-            self._left -= int(found[2][:, 2].sum())
-            # Another thread that contracts it is not waited for.
-            if self._left <= 0 and not self._contracting.locked():
-                self.contract()
         return found

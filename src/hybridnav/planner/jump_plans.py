@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -9,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
-from hybridnav.jumps import JumpSearch, build_jump_graph
+from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph
 from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap
+from hybridnav.route._portal_kernels import centres
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
@@ -20,10 +22,15 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 
+CONTRACTED_FROM = 2000
+"""Corner cells of a graph that is contracted: with fewer the search of the graph itself is as
+fast."""
+
 
 @copies_alike
 class OverJumps:
-    """Shortest paths of cells; the graph is built when the first query needs it.
+    """Shortest paths of cells; the graph is built when the first query needs it, and contracted at
+    once: later it could be another one of several shortest paths that a query gets.
 
     Where corners may be cut it does not know all moves: A* searches the whole map then.
 
@@ -45,6 +52,9 @@ class OverJumps:
         self._whole_map = WholeMap(refiner)
         self._search: JumpSearch | None = None
         self._building = threading.Lock()
+        frame = grid.frame
+        turned = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
+        self._frame = frame.resolution_m, *frame.origin_m, *turned
 
     def prepare(self) -> JumpSearch:
         """Build the graph, once."""
@@ -52,7 +62,10 @@ class OverJumps:
             with self._building:
                 if self._search is None:
                     free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
-                    self._search = JumpSearch(build_jump_graph(free))
+                    graph = build_jump_graph(free)
+                    is_contracted = graph.n_corners >= CONTRACTED_FROM
+                    hierarchy = contract_graph(graph) if is_contracted else None
+                    self._search = JumpSearch(graph, hierarchy)
         return self._search
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
@@ -69,6 +82,7 @@ class OverJumps:
         seconds["jumps"] = time.perf_counter() - now
         return CellPlan(
             found.cells,
+            points=None if found.cells is None else centres(found.cells, self._frame),
             length_cells=found.length_cells,
             bound_cells=found.length_cells,
             expanded=found.expanded,
@@ -85,6 +99,5 @@ class OverJumps:
             return CellPlans(none, "octile", nowhere, nowhere, empty, np.empty((0, 2)))
         found = self.prepare().many(starts, goals)
         cost_m = found.length_cells * self._grid.resolution_m
-        points = self._grid.frame.points_of(found.cells)
-        done = np.ones(n, dtype=np.bool_)
+        done, points = np.ones(n, dtype=np.bool_), centres(found.cells, self._frame)
         return CellPlans(done, "octile", cost_m, cost_m, found.path_start, points)
