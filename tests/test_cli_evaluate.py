@@ -84,7 +84,9 @@ def test_a_counter_example_is_an_exit_code(cli, rooms, tmp_path):  # noqa: F811
 @pytest.mark.usefixtures("here")
 def test_corner_cutting_is_a_counter_example(cli, tmp_path):  # noqa: F811
     path = write_map(tmp_path, ["...###", "...###", "###...", "###..."])
-    done = cli("evaluate", path, "--corner-cutting", "--pairs", 5, "-o", tmp_path / "run")
+    query = ("evaluate", path, "--corner-cutting", "--pairs", 5, "-o", tmp_path / "run")
+    assert cli(*query).refuses(2, "such as portals")
+    done = cli(*query, "--preset", "portals")
     assert done.code == 1
     assert "counter-examples" in done.err
 
