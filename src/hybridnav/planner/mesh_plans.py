@@ -85,7 +85,13 @@ class OverMesh:
         return self._budget_s is not None
 
     def prepare(self) -> MeshSearch:
-        """Build the mesh, once."""
+        """Build the mesh and the graph of its corners, once; see `CellPlanner`."""
+        search = self._on_mesh()
+        search.prepare()
+        return search
+
+    def _on_mesh(self) -> MeshSearch:
+        """The search of the mesh, which is built once."""
         if self._search is None:
             with self._building:
                 if self._search is None:
@@ -120,7 +126,7 @@ class OverMesh:
         began = time.perf_counter()
         seconds = {}
         if self._search is None and self._budget_s is None:
-            self.prepare()
+            self._on_mesh()
             seconds["mesh"] = time.perf_counter() - began
         row, col = self._frame.position_of(float(ends[0][0]), float(ends[0][1]))
         positions = (row, col), self._frame.position_of(float(ends[1][0]), float(ends[1][1]))
@@ -201,7 +207,7 @@ class OverMesh:
             float64 (n, 2), starts and goals, `(x, y)` in metres, map frame.
         """
         positions = self._frame.positions_of(points[0]), self._frame.positions_of(points[1])
-        found = shortest_paths(self.prepare(), cells, positions, epsilon=self._epsilon)
+        found = shortest_paths(self._on_mesh(), cells, positions, epsilon=self._epsilon)
         along = self._frame.points_of_grid(found.positions)
         solved = np.isfinite(found.length_cells)
         along[found.path_start[:-1][solved]] = points[0][solved]

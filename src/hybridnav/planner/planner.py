@@ -198,7 +198,8 @@ class HybridPlanner:
         return plan_many(self, cells, (first, last), finish, self.closed(blocked))
 
     def prepare(self) -> None:
-        """Build what the first query would build: the mesh, or the table of portals.
+        """Build now what queries would build when they need it: the mesh and the graph of its
+        corners, the jump-point graph, or the table of portals.
 
         Nothing happens where that is built already. Threads may call it, and plan meanwhile: what
         is built is built once.
