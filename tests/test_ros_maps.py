@@ -134,7 +134,7 @@ def compare(hybrid: hn.PlanResult, whole: hn.PlanResult, site: Site, pair: Cells
     assert whole.status is hybrid.status
     if whole.path is None:
         return
-    assert whole.route is None
+    assert whole.route is not None
     assert whole.path.cells[[0, -1]].tolist() == pair.tolist()
     assert_legal(whole.path.cells, site.enterable)
     assert whole.gap == 0

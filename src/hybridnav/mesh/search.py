@@ -151,6 +151,8 @@ class MeshSearch:
 
     def prepare(self) -> None:
         """Build the graph of corners now, if it is not there yet: some 0.5 microseconds a cell."""
+        if self._is_prepared:
+            return
         with self._lock:
             if not self._is_prepared:
                 graph = build_corner_graph(self.mesh, self.arrays)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections import OrderedDict
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -76,7 +75,7 @@ class OverMesh:
         self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
         self._search: MeshSearch | None = None
-        self._cut: OrderedDict[bytes, MeshSearch] = OrderedDict()
+        self._cut: dict[bytes, MeshSearch] = {}
         self._building = threading.Lock()
 
     @property
@@ -243,11 +242,10 @@ class OverMesh:
         free = self._free.copy()
         free.ravel()[closed.flat] = False
         key = closed.flat.tobytes()
-        with self._building:
-            search = self._cut.pop(key, None)
-            if search is None:
-                search = MeshSearch(cut_mesh(whole.mesh, free, closed.flat))
-            self._cut[key] = search
-            if len(self._cut) > _KEPT:
-                self._cut.popitem(last=False)
+        # Without a lock: two threads may cut the same, and what is interrupted leaves nothing held.
+        search = self._cut.get(key)
+        if search is None:
+            search = self._cut[key] = MeshSearch(cut_mesh(whole.mesh, free, closed.flat))
+            for old in list(self._cut)[:-_KEPT]:
+                self._cut.pop(old, None)
         return search, free
