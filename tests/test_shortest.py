@@ -132,7 +132,9 @@ def test_many_pairs_are_answered_as_one_by_one() -> None:
     planner = shortest(topology)
     starts, goals = rng.uniform(-1, 31, (2, 400, 2))
     closed = planner.closed({"cells": rng.choice(30, (5, 2))})
-    for shut in (None, closed):
+    for shut, is_prepared in ((None, False), (None, True), (closed, True)):
+        if is_prepared:
+            planner.prepare()
         many = planner.plan_many(starts, goals, blocked=shut)
         assert (many.status == "solved").sum() > 100
         for query, ends in enumerate(zip(starts, goals, strict=True)):

@@ -13,8 +13,8 @@ FULL = 3
 
 @guarded
 @njit(cache=True, nogil=True)
-def many(mesh, blocks, graph, place, asked, work, bounds, effort, answers, begin, n):
-    """Answer queries from one on, until all are answered or room is short.
+def many_by_intervals(mesh, blocks, place, asked, work, bounds, effort, answers, begin, n):
+    """Answer queries from one on by `query`, until all are answered or room is short.
 
     Parameters
     ----------
@@ -22,19 +22,16 @@ def many(mesh, blocks, graph, place, asked, work, bounds, effort, answers, begin
         See `successors`.
     blocks
         Block of each slot, and the tree, of `query`.
-    graph
-        Of `query_corners`; None for a search of intervals.
     place
         Component of polygons, and the polygon of each cell.
     asked
         int64 (q, 4) cells and float64 (q, 4) ends of all queries, as `query` takes them.
     work, effort
-        See `query`, or `query_corners`.
+        See `query`.
     bounds
         The last array of the work.
     answers
-        float64 (q,) lengths, float64 (q,) bounds, int64 (q + 1,) where the positions of each path
-        begin, float64 (room, 2) positions.
+        See `_kept`.
     begin
         The query to begin, or to go on with.
     n
@@ -46,22 +43,47 @@ def many(mesh, blocks, graph, place, asked, work, bounds, effort, answers, begin
         The query to go on with, positions written, and `DONE`, `NO_ROOM` or `FULL`.
     """
     cells, ends = asked
-    lengths, least, starts, positions = answers
     for k in range(begin, len(cells)):
         where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
         points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
-        if graph is None:
-            status, way = query(mesh, blocks[0], blocks[1], place[1], where, points, work, effort)
-        else:
-            found = (place[0], place[1], where)
-            status, way = query_corners(mesh, graph, found, points, work, effort)
+        status, way = query(mesh, blocks[0], blocks[1], place[1], where, points, work, effort)
         if status == NO_ROOM:
             return k, n, NO_ROOM
-        if n + len(way) > len(positions):
+        if not _kept(answers, k, n, way, bounds):
             return k, n, FULL  # and found once more
-        lengths[k], least[k] = bounds[UPPER], bounds[LOWER]
-        positions[n : n + len(way)] = way
-        starts[k] = n
         n += len(way)
-    starts[len(cells)] = n
     return len(cells), n, DONE
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def many_by_corners(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
+    """Answer queries from one on by `query_corners`; see `many_by_intervals`."""
+    cells, ends = asked
+    for k in range(begin, len(cells)):
+        where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
+        points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+        found = (place[0], place[1], where)
+        status, way = query_corners(mesh, graph, found, points, work, effort)
+        if status == NO_ROOM:
+            return k, n, NO_ROOM
+        if not _kept(answers, k, n, way, bounds):
+            return k, n, FULL  # and found once more
+        n += len(way)
+    return len(cells), n, DONE
+
+
+@njit(cache=True, nogil=True)
+def _kept(answers, k, n, way, bounds):
+    """Write an answer where there is room for its path, and return whether there was.
+
+    `answers` are float64 (q,) lengths, float64 (q,) bounds, int64 (q + 1,) where the positions of
+    each path begin, float64 (room, 2) positions.
+    """
+    lengths, least, starts, positions = answers
+    if n + len(way) > len(positions):
+        return False
+    lengths[k], least[k] = bounds[UPPER], bounds[LOWER]
+    positions[n : n + len(way)] = way
+    starts[k], starts[k + 1] = n, n + len(way)
+    return True

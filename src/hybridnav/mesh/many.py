@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.mesh._many_kernels import FULL, many
+from hybridnav.mesh._many_kernels import FULL, many_by_corners, many_by_intervals
 from hybridnav.mesh._polyanya_kernels import NO_ROOM
 from hybridnav.mesh.search import NO_LIMIT, rounded_into
 
@@ -96,16 +96,19 @@ def _one_by_one(
     starts = np.zeros(count + 1, dtype=np.int64)
     positions = np.empty((_ROOM * max(count, 4), 2))
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
-    graph = search.graph
-    edges = None if graph is None else (graph.first, graph.heads, graph.landmark_distances)
-    mesh = search.mesh
-    fixed = search.arrays, (mesh.block_of, search.tree), edges, (mesh.component, mesh.polygon_at)
+    mesh, graph = search.mesh, search.graph
+    place, asked = (mesh.component, mesh.polygon_at), (where, ends)
     at = n = 0
     with (search.works if graph is None else search.corner_works).lent() as work:
         while at < count:
-            found = length, bound, starts, positions
-            asked = (where, ends), work.arrays, work.bounds, effort
-            at, n, short = many(*fixed, *asked, found, at, n)
+            rest = place, asked, work.arrays, work.bounds, effort
+            found = (length, bound, starts, positions), at, n
+            if graph is None:
+                blocks = mesh.block_of, search.tree
+                at, n, short = many_by_intervals(search.arrays, blocks, *rest, *found)
+            else:
+                edges = graph.first, graph.heads, graph.landmark_distances
+                at, n, short = many_by_corners(search.arrays, edges, *rest, *found)
             if short == NO_ROOM:
                 work.make_room()
             elif short == FULL:
