@@ -63,6 +63,13 @@ class ConvexMesh:
     """int32 (p,), blocks between each polygon and the first one of its component."""
 
     @property
+    def stops(self) -> IntArray:
+        """int32 (s,), the corner at which each side ends."""
+        stops: IntArray = np.roll(self.begins, -1)
+        stops[self.first[1:] - 1] = self.begins[self.first[:-1]]
+        return stops
+
+    @property
     def n_polygons(self) -> int:
         """Number of polygons."""
         return len(self.first) - 1

@@ -108,9 +108,7 @@ def _joined(
     keys = begins[rim] * n + begins[after[rim]]
     # The slot on the far side of a door runs the other way.
     beyond = mesh.twins[doors]
-    polygon = mesh.polygon_of[beyond]
-    behind = np.where(beyond + 1 == mesh.first[polygon + 1], mesh.first[polygon], beyond + 1)
-    wanted = mesh.begins[behind] * n + mesh.begins[beyond]
+    wanted = mesh.stops[beyond] * n + mesh.begins[beyond]
     order = np.argsort(keys)
     place = np.searchsorted(keys, wanted, sorter=order)
     return beyond, rim[order[place]].astype(np.int64)

@@ -33,7 +33,7 @@ _FRACTION = float(1 << 24)
 _SLICE = 256
 """Nodes that a query with a budget expands before it looks at the clock, some 0.2 ms."""
 NO_LIMIT = 1 << 62
-"""Of nodes that a query expands."""
+"""More nodes than any query expands."""
 _WORTH = 20_000
 """Intervals that the queries of a mesh expand, at least, before its graph of corners is built."""
 
@@ -133,9 +133,7 @@ class MeshSearch:
     def __init__(self, mesh: ConvexMesh) -> None:
         self.mesh = mesh
         rows, cols = np.ascontiguousarray(mesh.corners.T, dtype=np.float64)
-        stops = np.roll(mesh.begins, -1)
-        stops[mesh.first[1:] - 1] = mesh.begins[mesh.first[:-1]]
-        sides = mesh.begins, stops, mesh.twins, mesh.polygon_of
+        sides = mesh.begins, mesh.stops, mesh.twins, mesh.polygon_of
         self.arrays = cols, rows, mesh.kinds, mesh.first, *sides
         self.tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
         self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))

@@ -106,11 +106,8 @@ def _nodes(
 
 def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
     """Return the corners of sides, float64 (n, 2, 2): the one on the left of who comes through."""
-    stops = np.roll(mesh.begins, -1)
-    stops[mesh.first[1:] - 1] = mesh.begins[mesh.first[:-1]]
-    pairs: FloatArray = mesh.corners[np.stack([mesh.begins, stops], axis=1)[slots]].astype(
-        np.float64
-    )
+    ends = np.stack([mesh.begins, mesh.stops], axis=1)[slots]
+    pairs: FloatArray = mesh.corners[ends].astype(np.float64)
     return pairs
 
 

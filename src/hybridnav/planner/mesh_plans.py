@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -160,9 +161,10 @@ class OverMesh:
         expanded = found.expanded
         passed = self._passed(free, query.cells, found)
         closed = query.closed
-        if closed is not None and (passed is None or closed.are_near(passed, free.shape)):
-            if passed is None and math.isinf(found.lower_bound_cells):
-                return found, None, expanded
+        is_cut_off = passed is None and math.isinf(found.lower_bound_cells)
+        if closed is None or is_cut_off:
+            return found, passed, expanded
+        if passed is None or closed.are_near(passed, free.shape):
             search, free = self._without(search, closed)
             found = search.path(query.cells, query.positions, **effort)
             expanded += found.expanded
@@ -178,8 +180,7 @@ class OverMesh:
         found = self._refiner.search.search(*query.cells, blocked=flat)
         points, cells = None, found.cells
         if cells is not None:
-            allowed = self._allow_unexplored
-            sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=flat)
+            sight = self._open_sight if flat is None else self._sight(flat)
             points = sight.shorten(cells, *ends)
         seconds = {**plan.seconds, "line-of-sight": time.perf_counter() - began}
         length = math.inf if points is None else polyline_length(points) / self._frame.resolution_m
@@ -192,6 +193,14 @@ class OverMesh:
             expanded=plan.expanded + found.expanded,
             seconds=seconds,
         )
+
+    @cached_property
+    def _open_sight(self) -> LineOfSight:
+        return self._sight(None)
+
+    def _sight(self, closed: LongArray | None) -> LineOfSight:
+        """What shortens paths of cells, with some flat cells closed."""
+        return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
     def plan_many(
         self, cells: tuple[LongArray, LongArray], points: tuple[FloatArray, FloatArray]
