@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
@@ -74,8 +74,28 @@ def length_of(way: NDArray[Any] | None) -> float:
     return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
+_ROUNDED = """
+1111111011
+1011101111
+1111110111
+1111111111
+0110111110
+1111010111
+1111111111
+1111110111
+1111011111
+1111011101
+"""
+"""Where a search is stopped one step before it ends, with a bound that rounding put above."""
+
+
 @settings(max_examples=40, deadline=None)
 @given(classes=class_grids(max_side=14), seed=seeds, is_prepared=st.booleans())
+@example(
+    classes=np.array([list(row) for row in _ROUNDED.split()], dtype=np.uint8),
+    seed=139,
+    is_prepared=False,
+)
 def test_bounds_rise_to_the_optimum_at_every_step(
     classes: Any, seed: int, *, is_prepared: bool
 ) -> None:
@@ -157,7 +177,7 @@ def test_a_search_out_of_time_without_a_path_still_bounds(
     assert len(found) > 10
     assert found[0].positions is None
     assert math.isinf(found[0].length_cells)
-    assert math.hypot(39, 39) <= found[0].lower_bound_cells < found[-1].length_cells
+    assert math.hypot(39, 39) - SLACK <= found[0].lower_bound_cells < found[-1].length_cells
 
 
 def test_a_search_prepares_itself_when_that_has_paid(monkeypatch: pytest.MonkeyPatch) -> None:

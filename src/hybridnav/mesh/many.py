@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridnav.mesh._many_kernels import FULL, many_by_corners, many_by_intervals
 from hybridnav.mesh._polyanya_kernels import NO_ROOM
-from hybridnav.mesh.search import NO_LIMIT, rounded_into
+from hybridnav.mesh.search import NO_LIMIT, SURE, rounded_into
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
@@ -113,4 +113,5 @@ def _one_by_one(
                 work.make_room()
             elif short == FULL:
                 positions = np.concatenate([positions, np.empty_like(positions)])
-    return MeshPaths(length, np.minimum(bound, length), starts, positions[:n])
+    bound = np.where(bound >= length, length, bound * SURE)
+    return MeshPaths(length, bound, starts, positions[:n])

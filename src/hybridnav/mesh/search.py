@@ -34,6 +34,8 @@ _SLICE = 256
 """Nodes that a query with a budget expands before it looks at the clock, some 0.2 ms."""
 NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
+SURE = 1.0 - 1e-12
+"""A search that is stopped takes its lower bound this many times: sums of lengths are rounded."""
 _WORTH = 20_000
 """Intervals that the queries of a mesh expand, at least, before its graph of corners is built."""
 
@@ -205,7 +207,7 @@ class MeshSearch:
         with (self.works if graph is None else self.corner_works).lent() as work:
             way = self._run(graph, (*cells[0], *cells[1]), points, work, (upper, epsilon, until))
             length, bound = work.bounds.tolist()
-            bound = min(bound, length)
+            bound = length if bound >= length else bound * SURE
             expanded = int(work.counts[polyanya.EXPANDED])
         if graph is None:
             self._expanded += expanded
