@@ -108,9 +108,10 @@ class Frame:
         rowcol = np.asarray(positions, dtype=np.float64) * self.resolution_m
         along_x, along_y = rowcol[..., 1], rowcol[..., 0]
         cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        x = self.origin_m[0] + cosine * along_x - sine * along_y
-        y = self.origin_m[1] + sine * along_x + cosine * along_y
-        return np.stack([x, y], axis=-1)
+        points = np.empty_like(rowcol)
+        points[..., 0] = self.origin_m[0] + cosine * along_x - sine * along_y
+        points[..., 1] = self.origin_m[1] + sine * along_x + cosine * along_y
+        return points
 
     def cells_of(self, points: ArrayLike) -> LongArray:
         """Cells that hold points of the map frame; they may lie outside the grid.

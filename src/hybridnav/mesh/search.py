@@ -253,10 +253,11 @@ def _doubled(arrays: tuple[Any, ...]) -> tuple[Any, ...]:
 def _inside(cell: Cell, position: Position) -> Position:
     """Round a position, and move it into the closed square of its cell."""
     row, col = (
-        min(max(round(along * _FRACTION) / _FRACTION, low), low + 1.0)
-        for along, low in zip(position, cell, strict=True)
+        round(position[0] * _FRACTION) / _FRACTION,
+        round(position[1] * _FRACTION) / _FRACTION,
     )
-    return row, col
+    top, left = float(cell[0]), float(cell[1])
+    return min(max(row, top), top + 1.0), min(max(col, left), left + 1.0)
 
 
 def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:

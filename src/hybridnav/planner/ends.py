@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 Points = tuple["FloatArray", "FloatArray"]
 
+_FREE, _UNEXPLORED = int(CellClass.FREE), int(CellClass.UNEXPLORED)
 _OUTSIDE = PlanStatus.START_OUTSIDE, PlanStatus.GOAL_OUTSIDE
 _REFUSED = (
     {
@@ -37,17 +38,19 @@ def cells_of_ends(
     grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
 ) -> tuple[Cell, Cell] | PlanStatus:
     """Find the cells that hold start and goal, or what is wrong with one of them."""
-    cells = [grid.frame.cell_of(float(x), float(y)) for x, y in points]
-    rows, cols = grid.shape
+    (x, y), (goal_x, goal_y) = points[0].tolist(), points[1].tolist()
+    cells = grid.frame.cell_of(x, y), grid.frame.cell_of(goal_x, goal_y)
+    classes = grid.classes
+    rows, cols = classes.shape
     for (row, col), outside in zip(cells, _OUTSIDE, strict=True):
         if not (0 <= row < rows and 0 <= col < cols):
             return outside
     for cell, refused in zip(cells, _REFUSED, strict=True):
-        of_class = int(grid.classes[cell])
-        may_enter = of_class == CellClass.UNEXPLORED and allow_unexplored
-        if of_class != CellClass.FREE and not may_enter:
+        of_class = classes[cell]
+        may_enter = of_class == _FREE or (allow_unexplored and of_class == _UNEXPLORED)
+        if not may_enter:
             return refused[CellClass(of_class)]
-    return cells[0], cells[1]
+    return cells
 
 
 def _numbers(given: ArrayLike) -> FloatArray:

@@ -133,21 +133,22 @@ class OverMesh:
         query = _Query(cells, positions, closed)
         now = time.perf_counter()
         found, passed, expanded = self._found(query)
+        points = None
+        if found.positions is not None:
+            points = self._frame.points_of_grid(found.positions)
+            points[0], points[-1] = ends
         seconds["shortest"] = time.perf_counter() - now
         plan = CellPlan(
             passed,
             metric="any-angle",
+            points=points,
             length_cells=found.length_cells,
             bound_cells=found.lower_bound_cells,
             expanded=expanded,
             seconds=seconds,
         )
-        if found.positions is not None:
-            points = self._frame.points_of_grid(found.positions)
-            points[0], points[-1] = ends
-            return replace(plan, points=points)
-        if math.isinf(found.lower_bound_cells):
-            return plan  # there is none
+        if points is not None or math.isinf(found.lower_bound_cells):
+            return plan  # a path, or none exists
         return self._in_sight(query, ends, plan)
 
     def _found(self, query: _Query) -> tuple[MeshPath, LongArray | None, int]:
@@ -241,10 +242,12 @@ class OverMesh:
             return None
         passed = cells_of_line(free, found.positions)
         # An end on a side may be named after the cell behind it.
-        ends = [np.array([cell]) for cell in cells]
-        before = ends[0] if (passed[0] != cells[0]).any() else passed[:0]
-        behind = ends[1] if (passed[-1] != cells[1]).any() else passed[:0]
-        return np.concatenate([before, passed, behind])
+        start, goal = tuple(passed[0].tolist()), tuple(passed[-1].tolist())
+        if (start, goal) == cells:
+            return passed
+        before = [] if start == cells[0] else [cells[0]]
+        behind = [] if goal == cells[1] else [cells[1]]
+        return np.array([*before, *passed.tolist(), *behind], dtype=np.int64)
 
     def _without(self, whole: MeshSearch, closed: ClosedCells) -> tuple[MeshSearch, BoolArray]:
         """The mesh without closed cells, and what is free of them."""

@@ -137,8 +137,7 @@ class HybridPlanner:
             blocked = self.closed(blocked)
             start, goal = stop_points(self, [start, goal], at=at, closed=blocked)
         poses = self._pose("start", start), self._pose("goal", goal)
-        result = self._between(poses, self._finish_asked_for(smooth), self.closed(blocked), began)
-        return replace(result, start=tuple(poses[0].tolist()), goal=tuple(poses[1].tolist()))
+        return self._between(poses, self._finish_asked_for(smooth), self.closed(blocked), began)
 
     def _between(
         self,
@@ -152,9 +151,9 @@ class HybridPlanner:
         grid, allowed = self.topology.grid, self.preset.planner.allow_unexplored
         cells = cells_of_ends(grid, ends, allow_unexplored=allowed)
         if isinstance(cells, PlanStatus):
-            return self._answer(cells)
+            return self._answer(cells, poses)
         if closed is not None and (refused := closed.refusal(cells, grid.shape)):
-            return self._answer(refused)
+            return self._answer(refused, poses)
         if isinstance(self._cells, OverMesh):
             plan = self._cells.between(cells, ends, closed)
         else:
@@ -163,7 +162,7 @@ class HybridPlanner:
                 plan = self._round(closed, plan, *cells)
         if self._ompl is not None and plan.cells is not None:
             return self._by_ompl(self._ompl, plan, poses, closed, began)
-        return self._result(plan, ends, finish, closed)
+        return self._result(plan, poses, finish, closed)
 
     def plan_many(
         self,
@@ -240,21 +239,22 @@ class HybridPlanner:
     def _result(
         self,
         plan: CellPlan,
-        ends: tuple[FloatArray, FloatArray],
+        poses: tuple[FloatArray, FloatArray],
         finish: Smooth,
         closed: ClosedCells | None,
     ) -> PlanResult:
+        """The result of a plan on cells or on the mesh, between two points."""
         stats = self._stats_of(plan)
         if plan.cells is None:
-            return self._answer(PlanStatus.NO_PATH, metric=plan.metric, stats=stats)
+            return self._answer(PlanStatus.NO_PATH, poses, metric=plan.metric, stats=stats)
         grid = self.topology.grid
         bound = plan.bound_cells * grid.resolution_m
         points, metric = plan.points, plan.metric
         if metric == "octile" and finish == "line-of-sight":
             began = time.perf_counter()
-            points, metric = self._sight(closed).shorten(plan.cells, *ends), "any-angle"
+            points, metric = self._sight(closed).shorten(plan.cells, *poses), "any-angle"
             stats.seconds["smooth"] = time.perf_counter() - began
-            bound = self._any_angle_bound(plan, ends)
+            bound = self._any_angle_bound(plan, poses)
         if points is None:
             points = grid.frame.points_of(plan.cells)
         if metric == "octile":
@@ -267,6 +267,7 @@ class HybridPlanner:
             bound = length_m * (plan.bound_cells / plan.length_cells)
         return self._answer(
             PlanStatus.SOLVED,
+            poses,
             metric=metric,
             path=Path(plan.cells, points, length_m),
             route_source=plan.route_source or partial(self._walked, plan.cells),
@@ -313,6 +314,7 @@ class HybridPlanner:
             bound = min(bound, found.weighted_cost or found.path.length_m)
         return self._answer(
             found.status,
+            poses,
             metric=found.metric,
             path=found.path,
             route_source=source,
@@ -374,14 +376,17 @@ class HybridPlanner:
             seconds=plan.seconds,
         )
 
-    def _answer(self, status: PlanStatus, **outcome: Any) -> PlanResult:
-        """A result that records the preset and how the pyramid was built."""
+    def _answer(
+        self, status: PlanStatus, poses: tuple[FloatArray, FloatArray], **outcome: Any
+    ) -> PlanResult:
+        """A result that records the ends, the preset and how the pyramid was built."""
         # Each result has its own: whoever changes one must not change the next.
         settings = {
             key: dict(value) if isinstance(value, dict) else value
             for key, value in self._settings.items()
         }
-        return PlanResult(status, settings=settings, **outcome)
+        start, goal = tuple(poses[0].tolist()), tuple(poses[1].tolist())
+        return PlanResult(status, settings=settings, start=start, goal=goal, **outcome)
 
     @cached_property
     def _settings(self) -> dict[str, Any]:
