@@ -120,7 +120,7 @@ def start_table(repeats: int) -> None:
     times = []
     for _ in range(repeats + 1):
         began = time.perf_counter()
-        subprocess.run(command, check=True, capture_output=True)  # noqa: S603 - our own command
+        subprocess.run(command, check=True, capture_output=True)
         times.append(time.perf_counter() - began)
     print("## Command line, whole process, `hybridnav plan maps/office/office.yaml`\n")
     print(f"first start {times[0]:.2f} s, later starts {statistics.median(times[1:]):.2f} s median")
