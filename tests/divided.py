@@ -26,13 +26,12 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.topology.portals import Portals
 
-NAMES = ("spacing_cells", "gate_spacing_cells", "path_spacing_cells")
 SIDE = min(MAX_SIDE, 20)
 KINDS = ("pyramid", "pieces", "pieces", "stairs", "grown", "grown", "one", "cells")
 SPACINGS = ((16, 4), (16, 4), (8, 2), (4, 4), (6, 3), (3, 1), (1, 1), (100, 100))
-"""Of portals, and of gates with stored paths where not all have some."""
-GATES = ("all", "few", "sparse")
-"""All border cells are gates with stored paths, few of them have some, few of them are gates."""
+"""Of portals where all border cells are gates, and of portals and gates elsewhere."""
+GATES = ("all", "sparse")
+"""All border cells are gates, or few of them."""
 
 
 @dataclass(frozen=True)
@@ -99,15 +98,14 @@ class Divided:
 
     def portals(self, gates: str = "all", **options: Any) -> Portals:
         """What is tested."""
-        spacing, path_spacing = self.spacings
-        spacings = {
-            "all": (spacing, 1, 1),
-            "few": (spacing, 1, path_spacing),
-            "sparse": (path_spacing,) * 3,
-        }[gates]
-        options = {**dict(zip(NAMES, spacings, strict=True)), **options}
+        spacing, sparse = self.spacings
+        spacings = {"spacing_cells": spacing, "gate_spacing_cells": 1}
+        if gates == "sparse":
+            spacings = dict.fromkeys(spacings, sparse)
         allowed = self.allow_unexplored
-        return build_portals(self.grid, self.field_of, allow_unexplored=allowed, **options)
+        return build_portals(
+            self.grid, self.field_of, allow_unexplored=allowed, **{**spacings, **options}
+        )
 
 
 def fields_of(starts: Any) -> Any:
@@ -124,7 +122,7 @@ def costs_from(graph: Any, cells: Any) -> Any:
 
 
 def gate_graph(portals: Portals) -> Any:
-    """Graph of the gates: paths inside fields as they are stored, and moves between fields."""
+    """Graph of the gates: paths inside fields, and moves between fields."""
     n = portals.n_gates
     tail = np.repeat(np.arange(n), np.diff(portals.exit_start))
     graph = sparse.coo_array((portals.exit_cost.astype(float), (tail, portals.exit_gate)), (n, n))
@@ -138,8 +136,8 @@ def with_rounding(patch: pytest.MonkeyPatch, bits: int) -> None:
     """Have tables made as if the longest path took so many bits more than there are; 0 for none."""
     exact = portal_table._tables
 
-    def long(portals: Portals, shift: int) -> Any:
-        route, between, greatest = exact(portals, shift)
+    def long(*given: Any) -> Any:
+        route, between, greatest = exact(*given)
         return route, between, max(greatest, (1 << 31 + bits) - 1 if bits else 0)
 
     patch.setattr(portal_table, "_tables", long)

@@ -12,20 +12,17 @@ import pytest
 from scipy import sparse
 
 from hybridnav.route import portal_search
-from hybridnav.route.portal_search import PAIRS, PortalSearch
+from hybridnav.route.portal_search import PortalSearch
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search.grid_search import GridSearch
 from tests.divided import Divided, costs_from, with_rounding
 from tests.oracle.grid import assert_legal, centre, moves, recounted
 
 if TYPE_CHECKING:
-    from hybridnav.route.portal_search import Effort, PortalAnswer, PortalAnswers
+    from hybridnav.route.portal_search import PortalAnswer
     from hybridnav.topology import TopologicalMap
 
-EFFORTS: tuple[Effort, ...] = ("stored", "exact")
 EPSILONS = (0.0, 0.0, 0.01, 0.1, 1.0)
-NEVER, ALWAYS = 0, 1 << 50
-"""Costs up to which ways are improved by a search of all cells, whatever they are."""
 
 
 def cost_of(cells: Any) -> int:
@@ -43,20 +40,16 @@ def length_of(cost: float) -> float:
 class Judge:
     """A search over portals and the searches that it is judged by.
 
-    Gates are those of `Divided.portals`; the table is rounded by some bits, None for
-    as many as it needs. Ways below `short`
-    are improved on the whole map: with `NEVER` the portals alone are judged.
+    Gates are those of `Divided.portals`; the table is rounded by some bits, None for as many as it
+    needs.
     """
 
-    def __init__(
-        self, divided: Divided, gates: str = "all", *, bits: int | None = 0, short: int = NEVER
-    ) -> None:
+    def __init__(self, divided: Divided, gates: str = "all", *, bits: int | None = 0) -> None:
         """Route on the very fields of a partition, with its spacings."""
         level = SimpleNamespace(field_of=divided.field_of)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(portal_search, "_routing_levels", lambda _: iter([level]))
             patch.setattr(portal_search, "SPACING", divided.spacings[0])
-            patch.setattr(portal_search, "PATH_SPACING", divided.spacings[1])
             limit = -1 if gates == "sparse" else math.inf
             patch.setattr(portal_search, "LEAST_BYTES", limit)
             if gates == "sparse":
@@ -67,7 +60,6 @@ class Judge:
                 with_rounding(patch, bits)
             self._set(divided, SimpleNamespace(grid=divided.grid), gates)
         assert bits in {None, self.search.tables.shift}
-        self.short = short
 
     @classmethod
     def of(cls, topology: TopologicalMap, gates: str = "all") -> Judge:
@@ -80,24 +72,21 @@ class Judge:
             judge._set(Divided(topology.grid, topology.level.field_of), topology, gates)
         judge.divided = replace(judge.divided, field_of=judge.search._field_of)
         judge.label = judge.search._field_of
-        judge.short = portal_search.SHORT
         return judge
 
     def _set(self, divided: Divided, topology: Any, gates: str) -> None:
         self.divided = divided
         corners, entered = divided.grid.corner_cutting, divided.allow_unexplored
         self.cell_search = GridSearch(divided.free, corner_cutting=corners)
-        self.search = PortalSearch(
-            topology, self.cell_search, all_gates=gates != "few", allow_unexplored=entered
-        )
+        self.search = PortalSearch(topology, self.cell_search, allow_unexplored=entered)
         assert self.search.is_exact == (gates == "all")
         self.is_rounded = self.search.tables.shift > 0
         self.free = np.argwhere(divided.free)
         self.label = divided.label.reshape(divided.grid.shape).astype(np.int32)
 
     @property
-    def kept_moves(self) -> Any:
-        """Graph of the moves inside fields, and of those between the gates that are left."""
+    def gate_moves(self) -> Any:
+        """Graph of the moves inside fields, and of those between gates."""
         portals, size = self.search.portals, self.divided.label.size
         tail = np.repeat(portals.gate_cell, np.diff(portals.exit_start))
         ends = tail, portals.gate_cell[portals.exit_gate]
@@ -108,42 +97,29 @@ class Judge:
         """Number of a cell, row by row."""
         return int(cell[0]) * self.divided.grid.shape[1] + int(cell[1])
 
-    def path(self, start: Any, goal: Any, effort: Effort, epsilon: float = 0.0) -> PortalAnswer:
+    def path(self, start: Any, goal: Any, epsilon: float = 0.0) -> PortalAnswer:
         """What is judged."""
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(portal_search, "SHORT", self.short)
-            patch.setattr(portal_search, "ENOUGH", 0.0)
-            return self.search.path(tuple(start), tuple(goal), effort=effort, epsilon=epsilon)
-
-    def many(self, starts: Any, goals: Any, effort: Effort, epsilon: float) -> PortalAnswers:
-        """The same for arrays."""
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(portal_search, "SHORT", self.short)
-            patch.setattr(portal_search, "ENOUGH", 0.0)
-            return self.search.many(starts, goals, effort=effort, epsilon=epsilon)
+        return self.search.path(tuple(start), tuple(goal), epsilon=epsilon)
 
     def judge(self, start: Any, goals: Any, rng: np.random.Generator) -> None:
-        """Judge ways from one cell to some others, with all efforts."""
+        """Judge ways from one cell to some others."""
         at = np.array([self.flat(start)])
-        costs, over_gates = (costs_from(g, at)[0] for g in (self.divided.moves, self.kept_moves))
+        costs = costs_from(self.divided.moves, at)[0]
         for goal in goals:
-            optimum, reachable = costs[self.flat(goal)], over_gates[self.flat(goal)]
+            optimum = costs[self.flat(goal)]
             epsilon = float(rng.choice(EPSILONS))
-            for effort in EFFORTS:
-                answer = self.path(start, goal, effort, epsilon)
-                cost = self.judge_answer(answer, start, goal, optimum)
-                if math.isfinite(optimum):
-                    self.judge_effort(answer, effort, epsilon, (start, goal))
-                    if not self.is_rounded:
-                        self.judge_way(cost, effort, epsilon, reachable, (start, goal))
+            answer = self.path(start, goal, epsilon)
+            self.judge_answer(answer, start, goal, optimum)
+            if math.isfinite(optimum):
+                self.judge_promise(answer, epsilon, (start, goal))
 
-    def judge_answer(self, answer: PortalAnswer, start: Any, goal: Any, optimum: float) -> float:
+    def judge_answer(self, answer: PortalAnswer, start: Any, goal: Any, optimum: float) -> None:
         """A legal path between the ends where there is one, its points, and its bound."""
         if math.isinf(optimum):
             assert answer.cells is None
             assert answer.points.shape == (0, 2)
             assert answer.length_cells == answer.lower_bound_cells == math.inf
-            return math.inf
+            return
         cells, grid, free = answer.cells, self.divided.grid, self.divided.free
         assert cells is not None, "a path was missed"
         assert (cells[0].tolist(), cells[-1].tolist()) == (list(start), list(goal))
@@ -157,35 +133,16 @@ class Judge:
         assert answer.lower_bound_cells >= (high - low + low * math.sqrt(2)) * (1 - 1e-9)
         if cost_of(cells) > optimum:
             assert answer.lower_bound_cells < answer.length_cells
-        return cost_of(cells)
 
-    def judge_effort(
-        self, answer: PortalAnswer, effort: Effort, epsilon: float, ends: tuple[Any, Any]
-    ) -> None:
+    def judge_promise(self, answer: PortalAnswer, epsilon: float, ends: tuple[Any, Any]) -> None:
         """What an answer promises of itself."""
-        cost = cost_of(answer.cells)
-        by_gates = self.search.is_exact and not self.is_rounded and effort != "stored"
+        by_gates = self.search.is_exact and not self.is_rounded
         share = self.label[tuple(ends[0])] == self.label[tuple(ends[1])]
         if by_gates and not share:
             assert answer.expanded == 0, "cells were searched for what gates know"
-        improved = self.short == ALWAYS or (effort == "stored" and cost < self.short)
-        if effort == "exact" or improved:
-            assert answer.length_cells <= (1 + epsilon) * answer.lower_bound_cells * (1 + 1e-9)
-            if epsilon == 0:
-                assert answer.lower_bound_cells == answer.length_cells
-
-    def judge_way(
-        self, cost: float, effort: Effort, epsilon: float, reachable: float, ends: tuple[Any, Any]
-    ) -> None:
-        """The way over gates, where the table is exact: `reachable` is the cost of the best."""
-        sides = np.diff(self.search.portals.side_start)
-        first, last = (sides[self.label[tuple(end)]] for end in ends)
-        if effort != "stored":
-            assert cost <= (1 + epsilon) * reachable
-        elif self.short == NEVER:
-            assert cost >= reachable
-            if first * last <= PAIRS:
-                assert cost <= (1 + epsilon) * reachable
+        assert answer.length_cells <= (1 + epsilon) * answer.lower_bound_cells * (1 + 1e-9)
+        if epsilon == 0:
+            assert answer.lower_bound_cells == answer.length_cells
 
     def ends(self, rng: np.random.Generator, count: int) -> Any:
         """Some starts, each with goals: any cells, itself, its field, beside it, over a border."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -21,7 +20,7 @@ from hybridnav.search._costs import STRAIGHT
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 from tests.divided import GATES, Divided, costs_from, partitions, pieces_of
-from tests.portal_judge import ALWAYS, EFFORTS, EPSILONS, NEVER, Judge
+from tests.portal_judge import EPSILONS, Judge, length_of
 from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid, scenes
 
 if TYPE_CHECKING:
@@ -31,37 +30,29 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 @settings(max_examples=examples(60), derandomize=True, deadline=None)
-@given(partitions(), st.sampled_from(GATES), st.sampled_from([NEVER, NEVER, ALWAYS]), seeds)
-def test_paths_and_bounds_on_random_fields(
-    divided: Divided, gates: str, short: int, seed: int
-) -> None:
+@given(partitions(), st.sampled_from(GATES), seeds)
+def test_paths_and_bounds_on_random_fields(divided: Divided, gates: str, seed: int) -> None:
     assume(divided.free.any())
-    Judge(divided, gates, short=short).run(seed)
+    Judge(divided, gates).run(seed)
 
 
 @settings(max_examples=examples(30), derandomize=True, deadline=None)
-@given(
-    partitions(),
-    st.sampled_from(GATES),
-    st.sampled_from([NEVER, ALWAYS]),
-    st.integers(1, 16),
-    seeds,
-)
+@given(partitions(), st.sampled_from(GATES), st.integers(1, 16), seeds)
 def test_paths_and_bounds_with_a_rounded_table(
-    divided: Divided, gates: str, short: int, bits: int, seed: int
-) -> None:
-    assume(divided.free.any())
-    Judge(divided, gates, bits=bits, short=short).run(seed)
-
-
-@settings(max_examples=examples(50), derandomize=True, deadline=None)
-@given(partitions(), st.sampled_from(["all", "few"]), st.sampled_from([0, 0, 3]), seeds)
-def test_ways_by_two_sides_cost_at_least_what_bounds_say(
     divided: Divided, gates: str, bits: int, seed: int
 ) -> None:
     assume(divided.free.any())
-    search, rng = Judge(divided, gates, bits=bits).search, np.random.default_rng(seed)
-    every, cols = divided.portals(), divided.grid.shape[1]
+    Judge(divided, gates, bits=bits).run(seed)
+
+
+@settings(max_examples=examples(50), derandomize=True, deadline=None)
+@given(partitions(), st.sampled_from([0, 0, 3]), seeds)
+def test_ways_by_two_sides_cost_at_least_what_bounds_say(
+    divided: Divided, bits: int, seed: int
+) -> None:
+    assume(divided.free.any())
+    search, rng = Judge(divided, bits=bits).search, np.random.default_rng(seed)
+    cols = divided.grid.shape[1]
     starts, cells = search.portals.side_start, np.flatnonzero(divided.free)
     for ends in rng.choice(cells, size=(6, 2)).tolist():
         fields = divided.label[ends].tolist()
@@ -71,24 +62,24 @@ def test_ways_by_two_sides_cost_at_least_what_bounds_say(
         assert bounds.shape == (starts[fields[0] + 1] - first, starts[fields[1] + 1] - last)
         inside = costs_from(divided.inside, np.array(ends))
         for (i, j), bound in np.ndenumerate(bounds):
-            cost = cost_by_sides(divided, every, (first + i, last + j), inside)
+            cost = cost_by_sides(divided, search.portals, (first + i, last + j), inside)
             assert bound <= cost
             assert (bound >= FAR) == (cost == math.inf)
 
 
-def cost_by_sides(divided: Divided, every: Any, sides: tuple[int, int], inside: Any) -> float:
+def cost_by_sides(divided: Divided, portals: Any, sides: tuple[int, int], inside: Any) -> float:
     """Least cost from the start to a gate of its side inside their field, to another field's cell
     beside a gate of the goal's side, into that gate, and inside its field to the goal."""
-    starts = every.side_gates_start
-    out, into = (every.side_gates[starts[side] : starts[side + 1]] for side in sides)
-    tails = every.gate_cell[out]
+    starts = portals.side_gates_start
+    out, into = (portals.side_gates[starts[side] : starts[side + 1]] for side in sides)
+    tails = portals.gate_cell[out]
     over = (inside[0][tails][:, None] + costs_from(divided.moves, tails)).min(axis=0)
     best = math.inf
     for gate in into.tolist():
-        exits = slice(*every.exit_start[gate : gate + 2])
-        beside = every.gate_cell[every.exit_gate[exits]]
-        entered = (over[beside] + every.exit_cost[exits]).min()
-        best = min(best, entered + inside[1][every.gate_cell[gate]])
+        exits = slice(*portals.exit_start[gate : gate + 2])
+        beside = portals.gate_cell[portals.exit_gate[exits]]
+        entered = (over[beside] + portals.exit_cost[exits]).min()
+        best = min(best, entered + inside[1][portals.gate_cell[gate]])
     return best
 
 
@@ -99,34 +90,38 @@ def test_many_answers_are_those_of_each_pair(
 ) -> None:
     assume(divided.free.any())
     rng = np.random.default_rng(seed)
-    judge = Judge(divided, gates, bits=bits, short=int(rng.choice([NEVER, ALWAYS])))
+    judge = Judge(divided, gates, bits=bits)
     free = judge.free
     starts, goals = free[rng.integers(len(free), size=(2, 12))]
-    for effort in EFFORTS:
-        epsilon = float(rng.choice(EPSILONS))
-        found = judge.many(starts, goals, effort, epsilon)
-        assert found.path_start[-1] == len(found.points)
-        for k, (start, goal) in enumerate(zip(starts.tolist(), goals.tolist(), strict=True)):
-            answer = judge.path(start, goal, effort, epsilon)
-            share = judge.label[tuple(start)] == judge.label[tuple(goal)]
-            by_gates = effort == "exact"
-            if by_gates and judge.search.is_exact and not (share or bits):
-                assert found.is_done[k]
-            if found.is_done[k]:
-                assert not share
-                assert answer.expanded == 0
-                assert found.length_cells[k] == answer.length_cells
-                assert found.lower_bound_cells[k] == answer.lower_bound_cells
-                points = found.points[slice(*found.path_start[k : k + 2])]
-                assert np.array_equal(points, answer.points)
+    epsilon = float(rng.choice(EPSILONS))
+    found = judge.search.many(starts, goals, epsilon=epsilon)
+    assert found.path_start[-1] == len(found.points)
+    for k, (start, goal) in enumerate(zip(starts.tolist(), goals.tolist(), strict=True)):
+        answer = judge.path(start, goal, epsilon)
+        share = judge.label[tuple(start)] == judge.label[tuple(goal)]
+        if judge.search.is_exact and not (share or bits):
+            assert found.is_done[k]
+        if not (share or bits):  # as short as a way over gates can be, within the part asked for
+            over_gates = costs_from(judge.gate_moves, np.array([judge.flat(start)]))[0]
+            best = over_gates[judge.flat(goal)]
+            assert (found.length_cells[k] == math.inf) == (best == math.inf)
+            if math.isfinite(best):
+                length = length_of(best)
+                assert length * (1 - 1e-9) <= found.length_cells[k]
+                assert found.length_cells[k] <= (1 + epsilon) * length * (1 + 1e-9)
+        if found.is_done[k]:
+            assert not share
+            assert answer.expanded == 0
+            assert found.length_cells[k] == answer.length_cells
+            assert found.lower_bound_cells[k] == answer.lower_bound_cells
+            points = found.points[slice(*found.path_start[k : k + 2])]
+            assert np.array_equal(points, answer.points)
 
 
 @settings(max_examples=examples(15), derandomize=True, deadline=None)
-@given(scenes(min(MAX_SIDE, 40)), st.sampled_from(["all", "few"]), seeds)
-def test_paths_and_bounds_on_the_fields_that_are_chosen(
-    scene: Scene, gates: str, seed: int
-) -> None:
-    judge = Judge.of(TopologicalMap(scene.pyramid("survivor")), gates)
+@given(scenes(min(MAX_SIDE, 40)), seeds)
+def test_paths_and_bounds_on_the_fields_that_are_chosen(scene: Scene, seed: int) -> None:
+    judge = Judge.of(TopologicalMap(scene.pyramid("survivor")))
     assume(len(judge.free))
     judge.run(seed)
 
@@ -136,7 +131,7 @@ def test_paths_and_bounds_on_the_fields_that_are_chosen(
     [
         ("figure1", 1.0, "all"),
         ("office", 4.0, "all"),
-        pytest.param("office", 2.0, "few", marks=pytest.mark.full),
+        pytest.param("office", 2.0, "all", marks=pytest.mark.full),
         ("office", math.inf, "sparse"),
     ],
 )
@@ -191,11 +186,10 @@ def test_all_pairs_of_little_maps(name: str, gates: str) -> None:
                 judge.judge(start, cells, rng)
 
 
-@pytest.mark.parametrize("gates", ["all", "few"])
 @pytest.mark.parametrize("drawing", [("#",), ("?",), ("#?", "??")])
-def test_a_map_without_free_cells_has_no_portals(drawing: tuple[str, ...], gates: str) -> None:
+def test_a_map_without_free_cells_has_no_portals(drawing: tuple[str, ...]) -> None:
     pyramid = DualGraphPyramid.build(occupancy_grid(drawn(*drawing)), merge_distance_m=3.0)
-    assert Judge.of(TopologicalMap(pyramid), gates).search.portals.n_gates == 0
+    assert Judge.of(TopologicalMap(pyramid)).search.portals.n_gates == 0
 
 
 @settings(max_examples=examples(15), derandomize=True, deadline=None)
@@ -205,16 +199,11 @@ def test_an_answer_depends_on_its_query_only(divided: Divided, gates: str, seed:
     rng = np.random.default_rng(seed)
     judge = Judge(divided, gates)
     free = judge.free
-    pairs = rng.integers(len(free), size=(6, 2))
-    queries = [
-        (tuple(free[i].tolist()), tuple(free[j].tolist()), effort)
-        for (i, j), effort in itertools.product(pairs.tolist(), EFFORTS)
-    ]
-    first = [judge.path(start, goal, effort) for start, goal, effort in queries]
+    queries = free[rng.integers(len(free), size=(6, 2))].tolist()
+    first = [judge.path(start, goal) for start, goal in queries]
     kept = [None if answer.cells is None else answer.cells.copy() for answer in first]
     for k in rng.permutation(len(queries)).tolist():
-        start, goal, effort = queries[k]
-        again, cells = judge.path(start, goal, effort), kept[k]
+        again, cells = judge.path(*queries[k]), kept[k]
         assert again.lower_bound_cells == first[k].lower_bound_cells
         assert again.length_cells == first[k].length_cells
         for other in (again.cells, first[k].cells):
@@ -227,7 +216,7 @@ def test_open_floors_find_a_level_whatever_the_merge_distance(merge_distance: fl
     grid = occupancy_grid(drawn(*["." * 300] * 300))
     pyramid = DualGraphPyramid.build(grid, merge_distance_m=merge_distance)
     search = GridSearch(grid.enterable())
-    found = PortalSearch(TopologicalMap(pyramid), search).path((3, 3), (290, 200), effort="exact")
+    found = PortalSearch(TopologicalMap(pyramid), search).path((3, 3), (290, 200))
     assert found.cells is not None
     assert len(found.cells) == 288
 
@@ -248,13 +237,8 @@ def test_ways_too_long_for_the_table_are_rounded_only_there() -> None:
     assert np.array_equal(tables.route, costs >> 2)
     along = np.argwhere(free)[np.argsort(step[free == 1])]
     for first, last in ((0, 55737), (55737, 0), (3, 53900), (1500, 1400), (999, 1000)):
-        for effort in EFFORTS:
-            answer = judge.path(along[first], along[last], effort)
-            onward = 1 if last > first else -1
-            assert answer.cells is not None
-            assert np.array_equal(answer.cells, along[np.arange(first, last + onward, onward)])
-            assert answer.length_cells == abs(first - last)
-            assert answer.lower_bound_cells <= abs(first - last)
-            assert answer.lower_bound_cells >= abs(first - last) - 4
-            if effort == "exact":
-                assert answer.lower_bound_cells == answer.length_cells
+        answer = judge.path(along[first], along[last])
+        onward = 1 if last > first else -1
+        assert answer.cells is not None
+        assert np.array_equal(answer.cells, along[np.arange(first, last + onward, onward)])
+        assert answer.length_cells == answer.lower_bound_cells == abs(first - last)

@@ -20,7 +20,7 @@ from hybridnav.topology.portals import (
     build_portals,
     compact_labels,
 )
-from tests.divided import GATES, NAMES, Divided, costs_from, fields_of, halves, partitions
+from tests.divided import GATES, Divided, costs_from, fields_of, halves, partitions
 from tests.strategies import drawn, occupancy_grid
 
 MOVES = 8
@@ -84,7 +84,7 @@ def middle_cells(divided: Divided, spacing: int) -> list[list[frozenset[int]]]:
 def test_every_move_between_gates_of_two_fields_is_an_exit(divided: Divided, gates: str) -> None:
     portals, label = divided.portals(gates), divided.label
     tail, head, cost = divided.crossings
-    if gates != "sparse":
+    if gates == "all":
         assert np.array_equal(np.sort(portals.gate_cell), np.unique(tail))
     kept = np.isin(tail, portals.gate_cell) & np.isin(head, portals.gate_cell)
     expected = zip(tail[kept].tolist(), head[kept].tolist(), cost[kept].tolist(), strict=True)
@@ -122,31 +122,19 @@ def test_the_sides_of_a_field_are_those_of_its_portals(divided: Divided, gates: 
 
 
 @ENOUGH
-@given(partitions(), st.sampled_from([(1, 1), (1, 2), (1, 4), (2, 4), (3, 8), (8, 8)]))
-def test_gates_and_paths_are_where_the_middles_are(
-    divided: Divided, spacings: tuple[int, int]
-) -> None:
+@given(partitions(), st.sampled_from([1, 2, 4, 8]))
+def test_gates_are_where_the_middles_are(divided: Divided, spacing: int) -> None:
     low, high, _ = lower_to_higher(divided)
-    portals = replace(divided, spacings=(8, 1)).portals(
-        gate_spacing_cells=spacings[0], path_spacing_cells=spacings[1]
-    )
-    has_paths = np.diff(portals.row_start) > 0
-    with_paths = set(portals.gate_cell[has_paths].tolist())
-    allowed: dict[int, set[int]] = {}
-    for spacing in {1, *spacings}:
-        border = middle_cells(divided, spacing)
-        ends = with_paths if spacing == spacings[1] else set(portals.gate_cell.tolist())
-        if spacing in spacings:
-            assert all(any(pair <= ends for pair in pairs) for pairs in border)
-        allowed[spacing] = set().union(*(pair for pairs in border for pair in pairs))
-    if spacings[1] == 1:
-        assert with_paths == {*low.tolist(), *high.tolist()}
+    portals = divided.portals(spacing_cells=8, gate_spacing_cells=spacing)
+    gates = set(portals.gate_cell.tolist())
+    border = middle_cells(divided, spacing)
+    assert all(any(pair <= gates for pair in pairs) for pairs in border)
+    if spacing == 1:
+        assert gates == {*low.tolist(), *high.tolist()}
     else:
-        assert with_paths <= allowed[spacings[1]]
-    if spacings[0] > 1:
-        assert set(portals.gate_cell.tolist()) <= allowed[spacings[0]] | with_paths
-    # Sources: from where such a move leads up to a higher field.
-    leads = np.isin(low, [*with_paths]) & np.isin(high, [*with_paths])
+        assert gates <= set().union(*(pair for pairs in border for pair in pairs))
+    # Sources: from where a move between gates leads up to a higher field.
+    leads = np.isin(low, portals.gate_cell) & np.isin(high, portals.gate_cell)
     assert np.array_equal(np.sort(portals.gate_cell[portals.source_gate]), np.unique(low[leads]))
     assert (np.diff(portals.source_gate) > 0).all()
 
@@ -165,9 +153,6 @@ def test_paths_inside_fields_are_those_that_dijkstra_finds(divided: Divided, gat
         place = positions[cells] - portals.field_start[field]
         assert np.array_equal(np.sort(place), np.arange(len(cells)))
         row = portals.rows[portals.row_start[gate] : portals.row_start[gate + 1]]
-        if not len(row):
-            assert gates == "few"
-            continue
         assert len(row) == -(-len(cells) // 2)
         code = row[place // 2] >> place % 2 * 4 & 15
         away = cells != portals.gate_cell[gate]
@@ -229,18 +214,15 @@ def test_fields_that_meet_at_a_point_only_have_a_portal_there() -> None:
 
 
 def test_the_gate_of_a_part_of_the_border_lies_in_its_middle() -> None:
-    for gates, every in (("sparse", 8), ("few", 4)):
-        divided = replace(halves(24, 6, 3), spacings=(8, every))
-        portals = divided.portals(gates)
-        has_paths = np.diff(portals.row_start) > 0
-        row, col = np.divmod(portals.gate_cell[has_paths], 6)
+    for every in (8, 4):
+        portals = halves(24, 6, 3).portals(gate_spacing_cells=every)
+        row, col = np.divmod(portals.gate_cell, 6)
         n = 24 // every
         assert col.tolist() == [2] * n + [3] * n, "no straight move across"
         middle = np.isin(row[:n] - np.arange(0, 24, every), [every // 2 - 1, every // 2])
         assert middle.all()
         assert np.array_equal(row[n:], row[:n])
-        assert np.array_equal(portals.source_gate, np.flatnonzero(has_paths)[:n])
-        assert portals.n_gates == (2 * n if gates == "sparse" else 48)
+        assert np.array_equal(portals.source_gate, np.arange(n))
         assert portals.n_sides == 2 * 3
 
 
@@ -285,11 +267,11 @@ def test_many_fields_are_numbered_in_32_bits() -> None:
     assert np.array_equal(few, np.where(names < 1000, names, -1))
 
 
-@pytest.mark.parametrize("spacings", [(0, 1, 1), (4, 0, 1), (4, 4, 0), (-8, -4, 1), (16, 1, 5)])
-def test_spacings_that_make_no_lattice_are_refused(spacings: tuple[int, int, int]) -> None:
+@pytest.mark.parametrize("spacings", [(0, 1), (4, 0), (-8, -4), (16, 5)])
+def test_spacings_that_make_no_lattice_are_refused(spacings: tuple[int, int]) -> None:
     divided = halves(3, 4, 2)
     with pytest.raises(InvalidValueError, match="spacings of at least one cell") as refused:
-        divided.portals("all", **dict(zip(NAMES, spacings, strict=True)))
+        divided.portals(spacing_cells=spacings[0], gate_spacing_cells=spacings[1])
     assert "\n" not in str(refused.value)
 
 
@@ -340,8 +322,6 @@ def test_portals_that_take_too_much_memory_are_refused(divided: Divided, gates: 
     cells, n_gates = np.diff(portals.field_start), np.diff(portals.gate_start)
     size = 0.5 * (cells * n_gates).sum() + portals.clique.nbytes + portals.steps.nbytes
     table = 4 * portals.n_gates * len(portals.source_gate)
-    if gates == "few":  # a table of all gates is made before some are dropped
-        table = 4 * portals.n_gates * len(np.unique(lower_to_higher(divided)[0]))
     divided.portals(gates, max_bytes=size + table)
     # Where gates are sparse, other moves between them than those that were chosen may add sources.
     most = size if gates == "sparse" else size + table

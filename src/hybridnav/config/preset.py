@@ -36,11 +36,11 @@ DEFAULT_ROBOT_RADIUS_M = 0.25
 """Radius of the robot in metres where nobody gives one: of presets and of every map."""
 
 _REFINED_BY = {
-    "max-distance": ("grid-astar",),
-    "portals": ("gates", "stored-paths"),
-    "mesh": ("none",),
-    "jumps": ("none",),
-    "none": ("grid-astar",),
+    "max-distance": "grid-astar",
+    "portals": "gates",
+    "mesh": "none",
+    "jumps": "none",
+    "none": "grid-astar",
 }
 """What refines each coarse search; OMPL refines them all."""
 
@@ -86,11 +86,11 @@ class PlannerSettings(_Section):
     once, so that the route is read off the path."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields that `grid-astar` and `ompl` start from: those of the coarse way, or also their
-    neighbours. Of no effect with `gates`, `stored-paths` and `coarse: none`."""
-    refine: Literal["grid-astar", "gates", "stored-paths", "ompl", "none"] = "grid-astar"
-    """How a path is found: cell by cell in the corridor; over portals, with exact costs between all
-    border cells of the fields or by some stored paths alone; by a sampling-based planner; or
-    `none` where the coarse search, on the mesh or the corner cells, has found it."""
+    neighbours. Of no effect with `gates` and `coarse: none`."""
+    refine: Literal["grid-astar", "gates", "ompl", "none"] = "grid-astar"
+    """How a path is found: cell by cell in the corridor; over portals, with exact costs between the
+    border cells of the fields; by a sampling-based planner; or `none` where the coarse search, on
+    the mesh or the corner cells, has found it."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, section of its own; null elsewhere."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
@@ -124,8 +124,8 @@ class PlannerSettings(_Section):
             if self.epsilon is not None:
                 raise PydanticCustomError("bounds_needed", "epsilon goes with no refine: ompl")
             return self
-        if self.refine not in _REFINED_BY[self.coarse]:
-            fitting = " or ".join((*_REFINED_BY[self.coarse], "ompl"))
+        if self.refine != _REFINED_BY[self.coarse]:
+            fitting = f"{_REFINED_BY[self.coarse]} or ompl"
             raise PydanticCustomError(
                 "refine_needed", f"coarse: {self.coarse} goes with refine: {fitting}"
             )

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from hybridnav.config import PlannerSettings
     from hybridnav.refine import GridRefiner
     from hybridnav.result import Metric
-    from hybridnav.route import Effort
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
@@ -155,8 +154,7 @@ def _route(place_ids: LongArray, arc_ids: LongArray, places: LongArray, arcs: Lo
 
 @copies_alike
 class OverPortals:
-    """The way by the portal table, improved as far as the preset asks for; the table is built when
-    the first query needs it."""
+    """The shortest path by the portal table, which is built when the first query needs it."""
 
     def __init__(
         self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
@@ -164,7 +162,6 @@ class OverPortals:
         self._topology = topology
         self._refiner = refiner
         self._settings = settings
-        self._effort: Effort = "exact" if settings.refine == "gates" else "stored"
         self._search: PortalSearch | None = None
         self._building = threading.Lock()
 
@@ -176,7 +173,6 @@ class OverPortals:
                     self._search = PortalSearch(
                         self._topology,
                         self._refiner.search,
-                        all_gates=self._settings.refine == "gates",
                         allow_unexplored=self._settings.allow_unexplored,
                     )
         return self._search
@@ -193,7 +189,7 @@ class OverPortals:
             self.prepare()
             seconds["table"] = time.perf_counter() - began
         now, epsilon = time.perf_counter(), self._settings.epsilon or 0.0
-        found = self.search.path(start, goal, effort=self._effort, epsilon=epsilon)
+        found = self.search.path(start, goal, epsilon=epsilon)
         seconds["portals"] = time.perf_counter() - now
         return CellPlan(
             found.cells,
@@ -208,7 +204,7 @@ class OverPortals:
     def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
         """The same for many pairs of cells, int64 (n, 2) each, as far as look-ups answer them."""
         epsilon = self._settings.epsilon or 0.0
-        found = self.search.many(starts, goals, effort=self._effort, epsilon=epsilon)
+        found = self.search.many(starts, goals, epsilon=epsilon)
         per_cell = self._topology.grid.resolution_m
         return CellPlans(
             found.is_done,

@@ -12,16 +12,15 @@ from hybridnav.route._side_kernels import best_gates, side_costs, ways_by_sides
 
 @guarded
 @njit(cache=True, nogil=True)
-def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon, frame):
+def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     """Path over gates between two cells that may be entered, if it costs less than `inside`, the
     cost of the shortest path inside one field where start and goal share it, else FAR.
 
     Pairs of sides, one of the start's field and one of the goal's, are looked at in the order of
-    what bounds their ways from below, until no other one can be better by more than `epsilon`, or
-    `pairs` of them were. With `is_exact` all border cells are gates, and what was looked at is no
-    bound any more. Gives the lower cost of the two, a lower bound on the ways over gates and
-    `inside`, how many stored paths were walked to find the ends, and the path's cells and points,
-    which are empty if it costs no less.
+    what bounds their ways from below, until no other one can be better by more than `epsilon`.
+    Gives the lower cost of the two, a lower bound on the ways over gates and `inside`, how many
+    stored paths were walked to find the ends, and the path's cells and points, which are empty if
+    it costs no less.
     """
     cells, points = np.empty((0, 2), np.int64), np.empty((0, 2), np.float64)
     side_start = portals.side_start
@@ -37,7 +36,6 @@ def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon,
     known_start = np.full(side_gates_start[side_start[fields[0] + 1]] - first_q, -1, np.int64)
     known_goal = np.full(side_gates_start[side_start[fields[1] + 1]] - last_q, -1, np.int64)
     upper = np.int64(inside)
-    lower = upper if is_exact or low.size == 0 else min(upper, low.min())
     gate, source, across, walked = np.int64(-1), np.int64(-1), np.int64(-1), 0
     while True:
         least, best_i, best_j = np.int64(FAR), 0, 0
@@ -45,10 +43,8 @@ def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon,
             for j in range(low_goal.size):
                 if low[i, j] < least:
                     least, best_i, best_j = low[i, j], i, j
-        if least * (1 + epsilon) >= upper or pairs == 0:
-            lower = min(lower, least)
+        if least * (1 + epsilon) >= upper:
             break
-        pairs -= 1
         low[best_i, best_j] = FAR
         sides = s0 + best_i, t0 + best_j
         over, x, s, w, more = best_gates(
@@ -59,7 +55,7 @@ def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon,
         walked += more
         if over < upper:
             upper, gate, source, across = over, x, s, w
-    lower = min(lower, upper)
+    lower = min(least, upper)
     if gate < 0:
         return inside, lower, walked, cells, points
     out, into, legs, crossings = descend(
@@ -74,21 +70,20 @@ def answer(portals, tables, cols, start, goal, inside, pairs, is_exact, epsilon,
 
 @guarded
 @njit(cache=True, nogil=True)
-def answers(portals, tables, cols, starts, goals, pairs, is_exact, epsilon, frame):
+def answers(portals, tables, cols, starts, goals, epsilon, frame):
     """`answer` for many pairs of flat cells, int64 (n,) each, as if no two shared a field.
 
-    Gives their costs, lower bounds and numbers of stored paths walked, where the points of each
-    path begin (n + 1), and the points of all, float64 (m, 2).
+    Gives their costs and lower bounds, where the points of each path begin (n + 1), and the points
+    of all, float64 (m, 2).
     """
     n = starts.size
     costs = np.empty(n, np.int64)
     lower = np.empty(n, np.int64)
-    walked = np.empty(n, np.int64)
     begin = np.zeros(n + 1, np.int64)
     points = np.empty((1024, 2), np.float64)
     for i in range(n):
-        costs[i], lower[i], walked[i], _, path = answer(
-            portals, tables, cols, starts[i], goals[i], FAR, pairs, is_exact, epsilon, frame
+        costs[i], lower[i], _, _, path = answer(
+            portals, tables, cols, starts[i], goals[i], FAR, epsilon, frame
         )
         begin[i + 1] = begin[i] + path.shape[0]
         if begin[i + 1] > points.shape[0]:
@@ -96,4 +91,4 @@ def answers(portals, tables, cols, starts, goals, pairs, is_exact, epsilon, fram
             larger[: begin[i]] = points[: begin[i]]
             points = larger
         points[begin[i] : begin[i + 1]] = path
-    return costs, lower, walked, begin, points[: begin[n]]
+    return costs, lower, begin, points[: begin[n]]

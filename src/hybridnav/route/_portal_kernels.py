@@ -29,8 +29,7 @@ class Tables(NamedTuple):
     """uint32 (S, G), costs of shortest paths over gates without their last `shift` bits,
     `UNREACHED` for none."""
     between: np.ndarray
-    """uint32 (R, R), the least cost between gates of two of the R sides, likewise: over all border
-    cells, if these were gates before some were dropped."""
+    """uint32 (R, R), the least cost between gates of two of the R sides, likewise."""
     shift: int
     """0, but on maps with paths of more than 53,000 cells."""
     gate_field: np.ndarray

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -40,12 +40,9 @@ if TYPE_CHECKING:
     from hybridnav.topology.portals import Portals
 
 Cell = tuple[int, int]
-Effort = Literal["stored", "exact"]
 
 SPACING = 16
 """Of portals, in cells, where every border cell can be a gate."""
-PATH_SPACING = 4
-"""Of gates to which paths are stored, where not all of them are."""
 SPARSE_SPACINGS = (16, 32, 64, 128, 256)
 """Of portals and gates where that would take too much memory: open floors have long borders."""
 ALL_GATES_LEVELS = 2
@@ -58,12 +55,6 @@ LEAST_FIELDS = 16
 """With fewer fields of the size asked for, half the size is tried: a field is searched cell by cell
 where start and goal share it."""
 
-PAIRS = 8
-"""Of sides by which the effort "stored" may leave and arrive, those that it looks at."""
-SHORT = 256 * STRAIGHT
-"""Up to this cost the choice of a few fields costs much, and a search of all cells little."""
-ENOUGH = 0.005
-"""What is proved to be so near the optimum is not searched for something shorter."""
 _SHORTEST = math.sqrt(2) * STRAIGHT / DIAGONAL
 """A path is as much shorter than its integer cost says at most: DIAGONAL / STRAIGHT > sqrt 2."""
 
@@ -111,8 +102,6 @@ class PortalSearch:
         The map; of it only the grid, the merge distance and the seed are used.
     cell_search
         Searches inside fields, over cells that paths may use.
-    all_gates
-        Whether paths may cross borders at all cells, if that takes not too much memory.
     allow_unexplored
         Whether unexplored cells may be entered; as in `cell_search`.
     """
@@ -122,18 +111,16 @@ class PortalSearch:
         topology: TopologicalMap,
         cell_search: GridSearch,
         *,
-        all_gates: bool = True,
         allow_unexplored: bool = False,
     ) -> None:
         grid = topology.grid
         self._cols = grid.shape[1]
         self._search = cell_search
         enterable = grid.enterable(allow_unexplored=allow_unexplored)
-        self._field_of, portals, self._has_all_gates = _portals_of(
-            topology, enterable, PATH_SPACING if not all_gates else 1, allow_unexplored
+        self._field_of, self.portals, self.is_exact = _portals_of(
+            topology, enterable, allow_unexplored
         )
-        self.portals, self.tables = build_tables(portals)
-        self.is_exact = all_gates and self._has_all_gates
+        self.tables = build_tables(self.portals)
         frame = grid.frame
         self._frame = (
             frame.resolution_m,
@@ -147,22 +134,18 @@ class PortalSearch:
         """int16 or int32 (rows, cols), the field of each cell, -1 for none."""
         return self._field_of
 
-    def path(
-        self, start: Cell, goal: Cell, *, effort: Effort, epsilon: float = 0.0
-    ) -> PortalAnswer:
-        """A short path between two cells, and a lower bound on the length of any.
+    def path(self, start: Cell, goal: Cell, *, epsilon: float = 0.0) -> PortalAnswer:
+        """A shortest path between two cells, and a lower bound on the length of any.
+
+        Where every border cell is a gate, look-ups find it; elsewhere a search of cells goes on
+        from the best way over gates.
 
         Parameters
         ----------
         start, goal
             Cells that may be entered.
-        effort
-            "stored" looks at the eight pairs of sides that may be best, and improves ways of less
-            than 256 cells that are not proved to be within 0.5 % by a search of cells. "exact"
-            looks at all pairs: where paths cross borders at all cells that finds a shortest one;
-            elsewhere a search of cells goes on from there.
         epsilon
-            "exact" stops once no path can be shorter by more than this part.
+            The search ends once no path can be shorter by more than this part.
         """
         cols, expanded = self._cols, 0
         upper, inside = FAR, None
@@ -174,14 +157,14 @@ class PortalSearch:
             upper = FAR if inside is None else cost_of(inside)
         cost, lower, walked, cells, points = kernels.answer(
             self.portals, self.tables, cols, start[0] * cols + start[1], goal[0] * cols + goal[1],
-            upper, PAIRS if effort == "stored" else -1, self.is_exact, epsilon, self._frame,
+            upper, epsilon, self._frame,
         )  # fmt: skip
         line = octile_cost(start[0] - goal[0], start[1] - goal[1])
-        lower = max(line, lower) if self._has_all_gates else line
+        lower = max(line, lower) if self.is_exact else line
         lower = min(lower, cost)
         if cost >= FAR:
             return PortalAnswer(None, np.empty((0, 2)), math.inf, math.inf, walked, expanded)
-        if _needs_search(effort, lower, cost, epsilon):
+        if lower * (1 + epsilon) < cost:
             found = self._search.search(start, goal, limit=cost)
             expanded += found.expanded
             cells = np.empty((0, 2), np.int64) if found.cells is not None else cells
@@ -193,28 +176,25 @@ class PortalSearch:
         bound = length if lower >= cost else lower / STRAIGHT * _SHORTEST
         return PortalAnswer(cells, points, length, bound, walked, expanded)
 
-    def many(
-        self, starts: LongArray, goals: LongArray, *, effort: Effort, epsilon: float = 0.0
-    ) -> PortalAnswers:
+    def many(self, starts: LongArray, goals: LongArray, *, epsilon: float = 0.0) -> PortalAnswers:
         """`path` for many pairs of cells, as far as look-ups answer them.
 
         Parameters
         ----------
         starts, goals
             int64 (n, 2), cells that may be entered.
-        effort, epsilon
+        epsilon
             As in `path`.
         """
         rows = np.array([self._cols, 1])
-        costs, lower, _, begin, points = kernels.answers(
-            self.portals, self.tables, self._cols, starts @ rows, goals @ rows,
-            PAIRS if effort == "stored" else -1, self.is_exact, epsilon, self._frame,
-        )  # fmt: skip
+        costs, lower, begin, points = kernels.answers(
+            self.portals, self.tables, self._cols, starts @ rows, goals @ rows, epsilon, self._frame
+        )
         away = np.abs(starts - goals)
         line = away.max(axis=1) * STRAIGHT + away.min(axis=1) * (DIAGONAL - STRAIGHT)
-        lower = np.minimum(np.maximum(line, lower) if self._has_all_gates else line, costs)
+        lower = np.minimum(np.maximum(line, lower) if self.is_exact else line, costs)
         share = self._field_of[tuple(starts.T)] == self._field_of[tuple(goals.T)]
-        is_done = ~_needs_search(effort, lower, costs, epsilon) & ~share
+        is_done = (lower * (1 + epsilon) >= costs) & ~share
         length, bound = length_in_cells(costs), lower / STRAIGHT * _SHORTEST
         unreached = costs >= FAR
         length[unreached] = bound[unreached] = math.inf
@@ -234,7 +214,7 @@ class PortalSearch:
             The points as (row, column) in grid units: cell (0, 0) spans [0, 1] x [0, 1].
         """
         fields = int(self._field_of[start]), int(self._field_of[goal])
-        if not self._has_all_gates:
+        if not self.is_exact:
             return math.dist(*positions)
         return self._any_angle_bound.of(*fields, *positions)
 
@@ -243,33 +223,24 @@ class PortalSearch:
         return AnyAngleBound(self.portals)
 
 
-def _needs_search(effort: Effort, lower: Any, cost: Any, epsilon: float) -> Any:
-    """Whether cells are searched for shorter paths: for one query, or elementwise."""
-    if effort == "exact":
-        return lower * (1 + epsilon) < cost
-    return (lower * (1 + ENOUGH) < cost) & (cost < SHORT)
-
-
 def _portals_of(
     topology: TopologicalMap,
     enterable: BoolArray,
-    path_spacing: int,
     allow_unexplored: bool,  # noqa: FBT001
 ) -> tuple[NDArray[np.int16 | np.int32], Portals, bool]:
     """Fields to route on and their portals, the first that fit into memory, and whether every
     border cell is a gate."""
     n_cells = max(int(enterable.sum()), 1)
-    for level, spacings in _choices(topology, path_spacing):
+    for level, spacing, gate_spacing in _choices(topology):
         field_of = compact_labels(level.field_of, enterable)
-        has_all_gates = spacings[1] == 1
+        has_all_gates = gate_spacing == 1
         limit = MAX_BYTES_PER_CELL if has_all_gates else MAX_SPARSE_BYTES_PER_CELL
         try:
             portals = build_portals(
                 topology.grid,
                 field_of,
-                spacing_cells=spacings[0],
-                gate_spacing_cells=spacings[1],
-                path_spacing_cells=spacings[2],
+                spacing_cells=spacing,
+                gate_spacing_cells=gate_spacing,
                 allow_unexplored=allow_unexplored,
                 max_bytes=max(limit * n_cells, LEAST_BYTES),
             )
@@ -279,17 +250,15 @@ def _portals_of(
     raise InvalidValueError("no level of the map makes portals of an acceptable size")
 
 
-def _choices(
-    topology: TopologicalMap, path_spacing: int
-) -> Iterator[tuple[Level, tuple[int, int, int]]]:
-    """Levels and spacings of portals, gates and paths: those with gates everywhere first."""
+def _choices(topology: TopologicalMap) -> Iterator[tuple[Level, int, int]]:
+    """Levels and spacings of portals and of gates: those with gates everywhere first."""
     levels = _routing_levels(topology)
     first = list(islice(levels, ALL_GATES_LEVELS))
     for level in first:
-        yield level, (SPACING, 1, path_spacing)
+        yield level, SPACING, 1
     for level in chain(first, levels):
         for spacing in SPARSE_SPACINGS:
-            yield level, (spacing,) * 3
+            yield level, spacing, spacing
 
 
 def _routing_levels(topology: TopologicalMap) -> Iterator[Level]:

@@ -10,7 +10,6 @@ from hybridnav.route import _table_kernels as kernels
 from hybridnav.route._portal_kernels import UNREACHED, Tables
 from hybridnav.search._costs import DIAGONAL
 from hybridnav.topology.portal_layout import offsets_of
-from hybridnav.topology.thin_portals import with_paths_only
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,8 +21,8 @@ AT_ONCE = 256
 """So many rows are worked on together, to keep what is thrown away small."""
 
 
-def build_tables(portals: Portals) -> tuple[Portals, Tables]:
-    """Compute the tables of some portals, and drop the gates to which no paths are stored.
+def build_tables(portals: Portals) -> Tables:
+    """Compute the tables of some portals.
 
     Parameters
     ----------
@@ -32,52 +31,39 @@ def build_tables(portals: Portals) -> tuple[Portals, Tables]:
 
     Returns
     -------
-    tuple
-        The portals with the gates that are left, and the tables: ways cross at these only, while
-        what is known between sides stays that of all gates.
+    Tables
+        Rounded by as many bits as the longest way needs.
     """
-    shift = 0
-    while True:
-        route, between, greatest = _tables(portals, shift)
-        if greatest + DIAGONAL >> shift < UNREACHED:
-            break
-        shift = greatest.bit_length() - 31
-    if route is None:
-        portals = with_paths_only(portals)
-        route = np.empty((len(portals.source_gate), portals.n_gates), dtype=np.uint32)
-        _fill(portals, portals.source_gate, shift, route)
     source_at = np.full(portals.n_gates, -1, dtype=np.int32)
     source_at[portals.source_gate] = np.arange(len(portals.source_gate))
-    return portals, Tables(route, between, shift, portals.gate_field, source_at)
+    shift = 0
+    while True:
+        route, between, greatest = _tables(portals, source_at, shift)
+        if greatest + DIAGONAL >> shift < UNREACHED:
+            return Tables(route, between, shift, portals.gate_field, source_at)
+        shift = greatest.bit_length() - 31
 
 
 def _tables(
-    portals: Portals, shift: int
-) -> tuple[NDArray[np.uint32] | None, NDArray[np.uint32], int]:
-    """The table of all gates, None if some of them will go, that between sides, the longest way."""
-    field_of = portals.gate_field
-    tail = np.repeat(np.arange(portals.n_gates), np.diff(portals.exit_start))
-    sources = np.unique(tail[field_of[tail] < field_of[portals.exit_gate]]).astype(np.int32)
-    keeps_all = bool((np.diff(portals.row_start) > 0).all())
-    height = len(sources) if keeps_all else min(AT_ONCE, len(sources))
-    table = np.empty((height, portals.n_gates), dtype=np.uint32)
+    portals: Portals, source_at: IntArray, shift: int
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32], int]:
+    """The table from sources to gates, that between sides, and the greatest cost in the first."""
+    sources = portals.source_gate
+    table = np.empty((len(sources), portals.n_gates), dtype=np.uint32)
     to_sides = np.empty((len(sources), portals.n_sides), dtype=np.uint32)
     greatest = 0
     for first in range(0, len(sources), AT_ONCE):
-        rows = slice(first, min(first + AT_ONCE, len(sources)))
-        part = table[rows] if keeps_all else table[: rows.stop - rows.start]
-        greatest = max(greatest, _fill(portals, sources[rows], shift, part))
-        of_sides = part[:, portals.side_gates]
+        rows = slice(first, first + AT_ONCE)
+        greatest = max(greatest, _fill(portals, sources[rows], shift, table[rows]))
+        of_sides = table[rows, portals.side_gates]
         np.minimum.reduceat(of_sides, portals.side_gates_start[:-1], axis=1, out=to_sides[rows])
-    return table if keeps_all else None, _between(portals, sources, to_sides, shift), greatest
+    return table, _between(portals, source_at, to_sides, shift), greatest
 
 
 def _between(
-    portals: Portals, sources: IntArray, to_sides: NDArray[np.uint32], shift: int
+    portals: Portals, source_at: IntArray, to_sides: NDArray[np.uint32], shift: int
 ) -> NDArray[np.uint32]:
     """Least costs from side to side, of ways that enter the second one's field over it."""
-    source_at = np.full(portals.n_gates, -1, dtype=np.int64)
-    source_at[sources] = np.arange(len(sources))
     gates = portals.side_gates.astype(np.int64)
     is_source = source_at[gates] >= 0
     n_entries = np.where(is_source, 1, np.diff(portals.exit_start)[gates])

@@ -200,11 +200,11 @@ def directions(near, far, n, cost, row, lanes, out):
 
 
 @njit(cache=True, nogil=True)
-def _pack(directions_of_lane, n, rows, begin):
+def _pack(directions_of_lane, n, row):
     for i in range(n // 2):
-        rows[begin + i] = directions_of_lane[2 * i] | directions_of_lane[2 * i + 1] << 4
+        row[i] = directions_of_lane[2 * i] | directions_of_lane[2 * i + 1] << 4
     if n & 1:
-        rows[begin + n // 2] = directions_of_lane[n - 1]
+        row[n // 2] = directions_of_lane[n - 1]
 
 
 @njit(cache=True, nogil=True)
@@ -228,13 +228,13 @@ def _lower_steps(cost, n, lanes, sides, count, shift, steps):
 
 
 @njit(cache=True, nogil=True)
-def fill_field(near, far, n, gates, row_start, rows, clique, begin, side, steps, scratch):
+def fill_field(near, far, n, gates, rows, clique, begin, side, steps, scratch):
     """Paths from all gates of a field.
 
-    `rows` gets their directions, two cells a byte, where there is room between two of `row_start`;
-    `clique` the costs from gate to gate; `steps` (n, R) those from each cell to the nearest gate of
-    each side: gate c is one of the sides `side[begin[c]:begin[c + 1]]`. Gates are local cells.
-    Gives the bits that `steps` lack, -1 where a path is too long.
+    `rows` gets their directions, a row a gate, two cells a byte; `clique` the costs from gate to
+    gate; `steps` (n, R) those from each cell to the nearest gate of each side: gate c is one of the
+    sides `side[begin[c]:begin[c + 1]]`. Gates are local cells. Gives the bits that `steps` lack, -1
+    where a path is too long.
     """
     cost, first_cost, ring, order, row, stale, heading, member, gate_at = scratch
     if wave(near, n, gates[0], first_cost, ring, order) < n:
@@ -269,22 +269,16 @@ def fill_field(near, far, n, gates, row_start, rows, clique, begin, side, steps,
         for lane in range(lanes):
             cost[np.int64(gates[member[lane]]) * LANES + lane] = 0
         relax(near, n, order, prefix, cost, row, stale, LANES)
-        is_stored = False
         count = 0
         for lane in range(lanes):
             c = member[lane]
-            is_stored |= row_start[c] < row_start[c + 1]
             for b in range(gates.size):
                 clique[c, b] = cost[np.int64(gates[b]) * LANES + lane]
             for q in range(begin[c], begin[c + 1]):
                 lane_of[count], side_of[count] = lane, side[q]
                 count += 1
         _lower_steps(cost, n, lane_of, side_of, count, shift, steps)
-        if not is_stored:
-            continue
         directions(near, far, n, cost, row, LANES, heading)
         for lane in range(lanes):
-            c = member[lane]
-            if row_start[c] < row_start[c + 1]:
-                _pack(heading[lane], n, rows, row_start[c])
+            _pack(heading[lane], n, rows[member[lane]])
     return shift

@@ -22,9 +22,7 @@ class Crossings(NamedTuple):
     diagonal: BoolArray
     portal: LongArray
     is_gate: BoolArray
-    """Whether both ends are gates."""
-    has_paths: BoolArray
-    """Whether both ends are gates with stored paths."""
+    """Whether its ends were chosen as gates."""
 
     @property
     def n_portals(self) -> int:
@@ -43,7 +41,7 @@ class Crossings(NamedTuple):
 
 
 def find_crossings(
-    moves: ByteArray, label: IntArray, cols: int, spacings: tuple[int, int, int]
+    moves: ByteArray, label: IntArray, cols: int, spacing: int, gate_spacing: int
 ) -> Crossings:
     """Find all legal moves between two fields, and group them.
 
@@ -55,9 +53,9 @@ def find_crossings(
         int32 (rows * cols,), the field of each cell, -1 where there is none.
     cols
         Columns of the map.
-    spacings
-        Sides of the lattice squares of portals, of gates, and of gates with stored paths, in cells.
-        With squares of one cell all moves are between gates.
+    spacing, gate_spacing
+        Sides of the lattice squares of portals and of gates, in cells: the move in the middle of
+        each square is between gates, with squares of one cell all moves are.
     """
     low, high, diagonal = _moves_between(moves, label, cols)
     position = np.stack([low // cols, low % cols])
@@ -72,17 +70,10 @@ def find_crossings(
         group[order] = np.cumsum(new) - 1
         return group
 
-    def middles(side: int) -> BoolArray:
-        if side == 1:
-            return np.ones(len(low), dtype=np.bool_)
-        chosen = np.zeros(len(low), dtype=np.bool_)
-        chosen[_middles(groups(side), position, diagonal)] = True
-        return chosen
-
-    has_paths = middles(spacings[2])
-    return Crossings(
-        low, high, diagonal, groups(spacings[0]), middles(spacings[1]) | has_paths, has_paths
-    )
+    is_gate = np.full(len(low), gate_spacing == 1)
+    if gate_spacing > 1:
+        is_gate[_middles(groups(gate_spacing), position, diagonal)] = True
+    return Crossings(low, high, diagonal, groups(spacing), is_gate)
 
 
 def _moves_between(

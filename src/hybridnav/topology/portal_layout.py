@@ -86,18 +86,10 @@ class Layout:
         return is_exit
 
     @cached_property
-    def has_paths(self) -> BoolArray:
-        """bool (G,), whether the paths to a gate are stored."""
-        gates = self.gate_of[self.crossings.ends[np.tile(self.crossings.has_paths, 2)]]
-        has_paths = np.zeros(len(self.gate_cell), dtype=np.bool_)
-        has_paths[gates] = True
-        return has_paths
-
-    @cached_property
     def row_start(self) -> LongArray:
         """int64 (G + 1,), first byte of each gate's row of directions."""
         sizes = np.diff(self.field_start)[self.label[self.gate_cell]]
-        return offsets_of(np.where(self.has_paths, (sizes + 1) // 2, 0))
+        return offsets_of((sizes + 1) // 2)
 
     @cached_property
     def side_order(self) -> LongArray:
@@ -153,9 +145,8 @@ class Layout:
 
     @cached_property
     def source_gate(self) -> IntArray:
-        """int32 (S,), the gates with paths in the lower field of a crossing between such gates."""
-        low, high = self.gate_of[self.crossings.ends].reshape(2, -1)[:, self.is_exit]
-        gates: IntArray = np.unique(low[self.has_paths[low] & self.has_paths[high]])
+        """int32 (S,), the gates in the lower field of a crossing between gates."""
+        gates: IntArray = np.unique(self.gate_of[self.crossings.low[self.is_exit]])
         return gates
 
     @property

@@ -2,8 +2,8 @@
 
 Every legal move between two fields, those that meet at a point only included, belongs to one
 portal: the moves between the same two fields whose lower cell lies in one square of a lattice. The
-cells at their ends are the *border cells* of a field; some or all of them are *gates*, from which
-the shortest paths to all cells of their field are stored.
+cells at their ends are the *border cells* of a field; some or all of them are *gates*, to which the
+shortest paths from all cells of their field are stored.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Portals(NamedTuple):
     gate_cell: IntArray
     """int32 (G,), flat cell of each gate."""
     row_start: LongArray
-    """int64 (G + 1,), first byte of each gate's row of `rows`; nothing where none is stored."""
+    """int64 (G + 1,), first byte of each gate's row of `rows`."""
     rows: ByteArray
     """uint8, for each cell of the gate's field four bits: direction of the path to the gate, 8 more
     where its next eight moves are that way; anything at the gate itself."""
@@ -80,8 +80,8 @@ class Portals(NamedTuple):
     """uint16, costs from each cell to the nearest gate of its field's sides, rounded down to so
     many bits."""
     source_gate: IntArray
-    """int32 (S,), gates with paths in the lower field of a move to another such gate: every such
-    move begins or ends at one."""
+    """int32 (S,), gates in the lower field of a move to another gate: every such move begins or
+    ends at one."""
     portal_sides: IntArray
     """int32 (P, 2), the two sides of each portal."""
     side_box: IntArray
@@ -114,7 +114,6 @@ def build_portals(  # noqa: PLR0913 - independent choices
     *,
     spacing_cells: int = 16,
     gate_spacing_cells: int = 1,
-    path_spacing_cells: int = 1,
     allow_unexplored: bool = False,
     max_bytes: float = math.inf,
 ) -> Portals:
@@ -131,8 +130,6 @@ def build_portals(  # noqa: PLR0913 - independent choices
     gate_spacing_cells
         1 makes every border cell a gate, so that nothing is lost; more keeps, of the moves in each
         square of this side, only the middle one.
-    path_spacing_cells
-        Likewise for the gates to which paths are stored, which are gates always.
     allow_unexplored
         Whether unexplored cells are entered too.
     max_bytes
@@ -152,17 +149,17 @@ def build_portals(  # noqa: PLR0913 - independent choices
     PathTooLongError
         When a path inside a field may be longer than 6,600 cells, or a field is not connected.
     """
-    spacings = spacing_cells, gate_spacing_cells, path_spacing_cells
-    if min(spacings) < 1 or spacing_cells % path_spacing_cells:
+    spacings = spacing_cells, gate_spacing_cells
+    if min(spacings) < 1 or spacing_cells % gate_spacing_cells:
         raise InvalidValueError(
-            "portals, gates and paths need spacings of at least one cell, the first a multiple of "
-            f"the last, got {spacings}"
+            "portals and gates need spacings of at least one cell, the first a multiple of the "
+            f"second, got {spacings}"
         )
     free = grid.enterable(allow_unexplored=allow_unexplored)
     label = compact_labels(field_of, free).astype(np.int32).ravel()
     cols = grid.shape[1]
     moves = legal_moves(np.ascontiguousarray(free), grid.corner_cutting).ravel()
-    layout = Layout(label, cols, find_crossings(moves, label, cols, spacings))
+    layout = Layout(label, cols, find_crossings(moves, label, cols, *spacings))
     if layout.n_bytes > max_bytes:
         raise PortalsTooLargeError(f"portals would take {layout.n_bytes / 1e6:.0f} MB")
     return _assembled(layout, _filled(layout, moves))
@@ -232,8 +229,7 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
             leaps,
             last - first,
             index[layout.gate_cell[gates]] - first,
-            layout.row_start[gates.start : gates.stop + 1],
-            rows,
+            rows[slice(*layout.row_start[[gates.start, gates.stop]])].reshape(n_gates, -1),
             clique[clique_start[f] : clique_start[f + 1]].reshape(n_gates, n_gates),
             starts_of(members[order], n_gates),
             side,
