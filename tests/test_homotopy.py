@@ -59,7 +59,8 @@ def test_faces_read_the_identity_and_holes_one_generator_each(
     for face in range(len(homotopy.areas_m2)):
         if face in homotopy.roots:
             continue
-        word = cyclically_reduced(homotopy.reading(face))
+        boundary = homotopy._round(int(np.flatnonzero(homotopy.face_of == face)[0]))
+        word = cyclically_reduced(homotopy.word_of_route(boundary))
         if homotopy.is_hole[face]:
             assert len(word) == 1
             generators.append(abs(word[0]))

@@ -129,11 +129,6 @@ class HomotopyClasses:
         """The word of dart 2a of each arc a; that of 2a + 1 is its inverse."""
         self._assign()
 
-    def word_of_dart(self, dart: int) -> Word:
-        """The word of a dart."""
-        word = self.words[dart >> 1]
-        return inverse(word) if dart & 1 else word
-
     def word_of_route(self, darts: Iterable[int]) -> Word:
         """The class of a route.
 
@@ -142,7 +137,8 @@ class HomotopyClasses:
         darts
             The darts passed: 2a along arc a, 2a + 1 against it, self-loops included.
         """
-        return product(*(self.word_of_dart(dart) for dart in darts))
+        words = self.words
+        return product(*(inverse(words[d >> 1]) if d & 1 else words[d >> 1] for d in darts))
 
     def word_of_path(self, cells: LongArray) -> Word:
         """The class of a path of cells.
@@ -166,11 +162,6 @@ class HomotopyClasses:
         return product(
             *(words[n] if n > 0 else inverse(words[-n]) for n in numbers[numbers != 0].tolist())
         )
-
-    def reading(self, face: int, *, first: int | None = None) -> Word:
-        """The word of a face's boundary, in rotation order from one of its darts."""
-        start = int(np.flatnonzero(self.face_of == face)[0]) if first is None else first
-        return self.word_of_route(self._round(start))
 
     @cached_property
     def cell_words(self) -> CellWords:
@@ -199,6 +190,7 @@ class HomotopyClasses:
         return CellWords(np.sign(of_edge) * renumbered[np.abs(of_edge)], distinct)
 
     def _round(self, start: int) -> list[int]:
+        """The darts of a face's boundary, in rotation order from one of them."""
         darts, dart = [start], int(self.phi[start])
         while dart != start:
             darts.append(dart)
@@ -245,8 +237,7 @@ class HomotopyClasses:
             if self.is_hole[face]:
                 generator += 1
                 target = (generator,)
-            rest = product(*(self.word_of_dart(other) for other in self._round(dart)[1:]))
-            word = product(target, inverse(rest))
+            word = product(target, inverse(self.word_of_route(self._round(dart)[1:])))
             self.words[dart >> 1] = inverse(word) if dart & 1 else word
 
 
