@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.route._portal_kernels import FAR, cost_to_gate
+from hybridnav.route._portal_kernels import FAR, costs_to_gates
 from hybridnav.search._kernels import grow
 
 
@@ -89,10 +89,7 @@ def with_ends(portals, gate_field, cols, start, goal, out, into, legs, over):
     n = out.size
     if n == 0 or over >= FAR:
         return np.int64(FAR)
-    first = field_start[gate_field[out[0]]]
-    legs[0] = cost_to_gate(index, rows, first, row_start[out[0]], gate_cell[out[0]], cols, start)
-    first = field_start[gate_field[into[n - 1]]]
-    legs[n] = cost_to_gate(
-        index, rows, first, row_start[into[n - 1]], gate_cell[into[n - 1]], cols, goal
-    )
+    for cell, gates, leg in ((start, out[:1], legs[:1]), (goal, into[n - 1 :], legs[n:])):
+        first = field_start[gate_field[gates[0]]]
+        costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, 1, cell, leg)
     return legs.sum() + over

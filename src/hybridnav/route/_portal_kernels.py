@@ -12,10 +12,9 @@ import numpy as np
 
 from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 from hybridnav.topology._gate_kernels import LEAP
 
-_ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
-_COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
 _INVERSE = DIAGONAL % STRAIGHT
 FAR = 1 << 60
 """More than any path costs."""
@@ -91,26 +90,6 @@ def costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count,
             row[i] += n * _ROW_STEP[k]
             col[i] += n * _COL_STEP[k]
             i += 1
-
-
-@njit(cache=True, nogil=True)
-def cost_to_gate(index, rows, first, begin, end, cols, cell):
-    """Cost of the stored path from a cell to a gate; `first` is where its field begins in the
-    order of cells, `begin` the gate's row, `end` its cell."""
-    row, col = cell // cols, cell % cols
-    width = np.uint64(cols + 7 >> 3)
-    cost = np.int64(0)
-    while row * cols + col != end:
-        r, c = np.uint64(row), np.uint64(col)
-        tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
-        inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
-        at = index[tile << np.uint64(6) | inside] - first
-        code = rows[np.uint64(begin + (at >> 1))] >> ((at & 1) << 2)
-        k, n = code & 7, 1 + (LEAP - 1) * (code >> 3 & 1)
-        cost += n * (STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT))
-        row += n * _ROW_STEP[k]
-        col += n * _COL_STEP[k]
-    return cost
 
 
 @njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.route._portal_kernels import FAR, UNREACHED, costs_to_gates, position_of
 from hybridnav.search._kernels import octile_cost
 
@@ -89,6 +89,7 @@ def _walk(portals, cols, cell, field, begin, end, is_wanted, known):
     return walked
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def entries_of(portals, source_at, begin, end):
     """Crossings by which paths enter a field over the gates `side_gates[begin:end]`.

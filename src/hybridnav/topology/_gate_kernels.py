@@ -10,9 +10,8 @@ import numpy as np
 
 from hybridnav._jit import njit
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 
-_ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
-_COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
 LANES = 16
 """Gates that are searched from together: one cache line of costs a cell."""
 FAR = 1 << 30
