@@ -37,8 +37,8 @@ def polygons_of_ends(mesh, component, polygon_at, cells, ends, starts, goals):
     last = _polygon_in(mesh, component, polygon_at, to_row, to_col)
     if component[inner] != component[last]:
         return APART, 0, 0
-    n_starts = _polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
-    n_goals = _polygons_with(mesh, last, to_row, to_col, tx, ty, goals)
+    n_starts = polygons_with(mesh, inner, from_row, from_col, sx, sy, starts)
+    n_goals = polygons_with(mesh, last, to_row, to_col, tx, ty, goals)
     for k in range(n_starts):
         for m in range(n_goals):
             if starts[k] == goals[m]:
@@ -64,7 +64,7 @@ def _polygon_in(mesh, component, polygon_at, row, col):
 
 
 @njit(cache=True, nogil=True)
-def _polygons_with(mesh, inner, row, col, x, y, found):
+def polygons_with(mesh, inner, row, col, x, y, found):
     """Polygons that hold a point of a free cell, also on their sides, and are reached inside it.
 
     Parameters

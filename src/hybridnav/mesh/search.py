@@ -36,6 +36,8 @@ NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
 SURE = 1.0 - 1e-12
 """A search that is stopped takes its lower bound this many times: sums of lengths are rounded."""
+MOST_MADE = 128
+"""Corners that closed cells may make, for a query to go round them in the graph of corners."""
 _WORTH = 20_000
 """Intervals that the queries of a mesh expand, at least, before its graph of corners is built."""
 
@@ -96,7 +98,7 @@ class _CornerWork(_Work):
 
     def __init__(self, mesh: ConvexMesh, n_landmarks: int) -> None:
         super().__init__(mesh)
-        n = len(mesh.corners)
+        n = len(mesh.corners) + MOST_MADE
         self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
         costs, to_goal = np.full(n, np.inf), np.full(n, np.inf)
         self.corners = costs, np.empty(n), np.empty(n, np.int32), to_goal, np.empty(n, np.int32)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.grid import CellClass
-from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_plans import OverPortals
 from hybridnav.planner.jump_plans import OverJumps
 from hybridnav.planner.mesh_plans import OverMesh
@@ -15,6 +14,7 @@ from hybridnav.result import PlanBatch, PlanStatus
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
     from hybridnav.planner.cell_plans import CellPlanner, CellPlans
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner, Smooth
@@ -53,13 +53,14 @@ def plan_many(
     asked = np.flatnonzero(_are_free(planner, first) & _are_free(planner, last))
     found = None
     if len(asked) and isinstance(cell_planner, OverMesh) and not cell_planner.has_budget:
-        found = cell_planner.plan_many((first[asked], last[asked]), (starts[asked], goals[asked]))
+        pairs = (first[asked], last[asked]), (starts[asked], goals[asked])
+        found = cell_planner.plan_many(*pairs, closed)
     elif len(asked) and smooth == "none" and isinstance(cell_planner, OverPortals | OverJumps):
         found = cell_planner.plan_many(first[asked], last[asked])
     if found is not None:
         kept = found.is_done
         if closed is not None:
-            kept = kept & ~_met(closed, found, (first[asked], last[asked]), planner)
+            kept = kept & ~_met(closed, found, (first[asked], last[asked]), grid)
         done = asked[kept]
         left[done] = False
         cost[done] = found.cost_m[kept]
@@ -88,22 +89,17 @@ def _met(
     closed: ClosedCells,
     found: CellPlans,
     ends: tuple[LongArray, LongArray],
-    planner: HybridPlanner,
+    grid: OccupancyGrid,
 ) -> BoolArray:
-    """Which answers meet what is closed, with an end or on the way; bool (n,)."""
-    grid = planner.topology.grid
-    free = grid.enterable(allow_unexplored=planner.preset.planner.allow_unexplored)
+    """Which answers meet what is closed, with an end or, where paths are of cells, on the way;
+    bool (n,)."""
     across = np.array([grid.shape[1], 1])
     met: BoolArray = closed.holds(ends[0] @ across) | closed.holds(ends[1] @ across)
+    if found.metric != "octile":
+        return met
     for k in np.flatnonzero(found.is_done & ~met).tolist():
         points = found.points[found.path_start[k] : found.path_start[k + 1]]
-        if not len(points):
-            continue
-        if found.metric == "octile":
-            met[k] = closed.meets(grid.frame.cells_of(points), grid)
-        else:
-            passed = cells_of_line(free, grid.frame.positions_of(points))
-            met[k] = closed.are_near(passed, grid.shape)
+        met[k] = len(points) and closed.meets(grid.frame.cells_of(points), grid)
     return met
 
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 
-_AROUND = np.array([(row, col) for row in (-1, 0, 1) for col in (-1, 0, 1)])
-
 
 @dataclass(frozen=True, eq=False)
 class ClosedCells:
@@ -49,25 +47,6 @@ class ClosedCells:
             sides = cells[:-1, 0] * cols + cells[1:, 1], cells[1:, 0] * cols + cells[:-1, 1]
             flat = np.concatenate([flat, *sides])
         return bool(self.holds(flat).any())
-
-    def are_near(self, cells: LongArray, shape: tuple[int, int]) -> bool:
-        """Whether something closed lies in cells, or beside one: an any-angle path that passes them
-        may touch it.
-
-        Parameters
-        ----------
-        cells
-            int64 (n, 2).
-        shape
-            Rows and columns of the map.
-        """
-        if not len(self.flat):
-            return False
-        first, last = self.flat[[0, -1]] // shape[1]
-        level = cells[(cells[:, 0] >= first - 1) & (cells[:, 0] <= last + 1)]
-        beside = (level[:, None, :] + _AROUND).reshape(-1, 2)
-        beside = beside[(beside[:, 1] >= 0) & (beside[:, 1] < shape[1])]
-        return bool(self.holds(beside[:, 0] * shape[1] + beside[:, 1]).any())
 
     def refusal(self, cells: tuple[Cell, Cell], shape: tuple[int, int]) -> PlanStatus | None:
         """Return the status of a query whose start or goal is closed, None where neither is."""

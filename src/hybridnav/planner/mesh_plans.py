@@ -7,19 +7,19 @@ import threading
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
-from hybridnav.mesh import MeshPath, MeshSearch, build_mesh, cut_mesh, shortest_paths
+from hybridnav.mesh import DetourSearch, MeshPath, MeshSearch, build_mesh, shortest_paths
 from hybridnav.planner.cell_plans import CellPlan, CellPlans
 from hybridnav.refine import LineOfSight
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
     from hybridnav.planner.closed import ClosedCells
@@ -37,9 +37,14 @@ class _Query:
     positions: tuple[Position, Position]
     closed: ClosedCells | None
 
+    @property
+    def ends(self) -> tuple[tuple[Cell, Cell], tuple[Position, Position]]:
+        """What a search asks for."""
+        return self.cells, self.positions
 
-_KEPT = 4
-"""Meshes with something closed that are kept for the next queries which close the same."""
+
+_KEPT = 8
+"""Searches round something closed that are kept for the next queries which close the same."""
 
 
 @copies_alike
@@ -76,7 +81,8 @@ class OverMesh:
         self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
         self._search: MeshSearch | None = None
-        self._cut: dict[bytes, MeshSearch] = {}
+        self._across = np.array([grid.shape[1], 1])
+        self._detours: dict[bytes, DetourSearch] = {}
         self._building = threading.Lock()
 
     @property
@@ -153,24 +159,28 @@ class OverMesh:
 
     def _found(self, query: _Query) -> tuple[MeshPath, LongArray | None, int]:
         """What the search of the mesh finds, the cells that it passes, and nodes expanded."""
-        search, free = self._search, self._free
+        search = self._search
         if search is None:
             bound = math.dist(*query.positions)
             return MeshPath(None, math.inf, bound, 0), None, 0
-        effort: Any = {"epsilon": self._epsilon, "budget_s": self._budget_s}
-        found = search.path(query.cells, query.positions, **effort)
-        expanded = found.expanded
-        passed = self._passed(free, query.cells, found)
-        closed = query.closed
-        is_cut_off = passed is None and math.isinf(found.lower_bound_cells)
+        began = time.perf_counter()
+        found = search.path(*query.ends, epsilon=self._epsilon, budget_s=self._budget_s)
+        closed, expanded = query.closed, found.expanded
+        is_cut_off = found.positions is None and math.isinf(found.lower_bound_cells)
         if closed is None or is_cut_off:
-            return found, passed, expanded
-        if passed is None or closed.are_near(passed, free.shape):
-            search, free = self._without(search, closed)
-            found = search.path(query.cells, query.positions, **effort)
+            return found, self._passed(query, found), expanded
+        detours = self._round(search, closed)
+        if found.positions is None or detours.is_met_by(found):
+            bound = found.lower_bound_cells
+            left_s = self._budget_s
+            if left_s is not None:
+                left_s = max(left_s - (time.perf_counter() - began), 0.0)
+            found = detours.path(*query.ends, epsilon=self._epsilon, budget_s=left_s)
             expanded += found.expanded
-            passed = self._passed(free, query.cells, found)
-        return found, passed, expanded
+            # Closing cells makes no path shorter.
+            bound = max(min(bound, found.length_cells), found.lower_bound_cells)
+            found = replace(found, lower_bound_cells=bound)
+        return found, self._passed(query, found), expanded
 
     def _in_sight(
         self, query: _Query, ends: tuple[FloatArray, FloatArray], plan: CellPlan
@@ -204,9 +214,14 @@ class OverMesh:
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
     def plan_many(
-        self, cells: tuple[LongArray, LongArray], points: tuple[FloatArray, FloatArray]
+        self,
+        cells: tuple[LongArray, LongArray],
+        points: tuple[FloatArray, FloatArray],
+        closed: ClosedCells | None = None,
     ) -> CellPlans:
         """Find a shortest path for each of many pairs of points, on all cores.
+
+        Paths that meet something closed are not done.
 
         Parameters
         ----------
@@ -214,9 +229,15 @@ class OverMesh:
             int64 (n, 2), those that hold the starts, and the goals; they may be entered.
         points
             float64 (n, 2), starts and goals, `(x, y)` in metres, map frame.
+        closed
+            What is closed; None for nothing.
         """
         positions = self._frame.positions_of(points[0]), self._frame.positions_of(points[1])
-        found = shortest_paths(self._on_mesh(), cells, positions, epsilon=self._epsilon)
+        search = self._on_mesh()
+        found = shortest_paths(search, cells, positions, epsilon=self._epsilon)
+        is_done = np.ones(len(cells[0]), dtype=np.bool_)
+        if closed is not None:
+            is_done = ~self._round(search, closed).are_met_by(found)
         along = self._frame.points_of_grid(found.positions)
         solved = np.isfinite(found.length_cells)
         along[found.path_start[:-1][solved]] = points[0][solved]
@@ -226,7 +247,7 @@ class OverMesh:
         moves = solved & (found.length_cells > 0)
         np.divide(found.lower_bound_cells, found.length_cells, out=share, where=moves)
         return CellPlans(
-            is_done=np.ones(len(cost_m), dtype=np.bool_),
+            is_done=is_done,
             metric="any-angle",
             cost_m=cost_m,
             lower_bound_m=cost_m * share,
@@ -234,14 +255,15 @@ class OverMesh:
             points=along,
         )
 
-    def _passed(
-        self, free: BoolArray, cells: tuple[Cell, Cell], found: MeshPath
-    ) -> LongArray | None:
+    def _passed(self, query: _Query, found: MeshPath) -> LongArray | None:
         """Cells that a path passes, from the start's to the goal's; None without a path."""
         if found.positions is None:
             return None
-        passed = cells_of_line(free, found.positions)
+        passed = cells_of_line(self._free, found.positions)
+        if query.closed is not None and query.closed.holds(passed @ self._across).any():
+            passed = self._passed_beside(query.closed, found.positions)
         # An end on a side may be named after the cell behind it.
+        cells = query.cells
         start, goal = tuple(passed[0].tolist()), tuple(passed[-1].tolist())
         if (start, goal) == cells:
             return passed
@@ -249,15 +271,22 @@ class OverMesh:
         behind = [] if goal == cells[1] else [cells[1]]
         return np.array([*before, *passed.tolist(), *behind], dtype=np.int64)
 
-    def _without(self, whole: MeshSearch, closed: ClosedCells) -> tuple[MeshSearch, BoolArray]:
-        """The mesh without closed cells, and what is free of them."""
-        free = self._free.copy()
-        free.ravel()[closed.flat] = False
+    def _passed_beside(self, closed: ClosedCells, positions: FloatArray) -> LongArray:
+        """Cells that a path passes along sides of closed ones, without these."""
+        low = np.maximum(positions.min(axis=0).astype(np.int64) - 1, 0)
+        high = positions.max(axis=0).astype(np.int64) + 2
+        free = self._free[low[0] : high[0], low[1] : high[1]].copy()
+        at = np.stack(np.divmod(closed.flat, self._free.shape[1]), axis=1) - low
+        free[tuple(at[((at >= 0) & (at < free.shape)).all(axis=1)].T)] = False
+        passed: LongArray = cells_of_line(free, positions - low) + low
+        return passed
+
+    def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
+        """The search round closed cells, which is kept for the next queries."""
         key = closed.flat.tobytes()
-        # Without a lock: two threads may cut the same, and what is interrupted leaves nothing held.
-        search = self._cut.get(key)
-        if search is None:
-            search = self._cut[key] = MeshSearch(cut_mesh(whole.mesh, free, closed.flat))
-            for old in list(self._cut)[:-_KEPT]:
-                self._cut.pop(old, None)
-        return search, free
+        found = self._detours.get(key)
+        if found is None:
+            found = self._detours[key] = DetourSearch(search, closed.flat)
+            for old in list(self._detours)[:-_KEPT]:
+                self._detours.pop(old, None)
+        return found

@@ -1,0 +1,157 @@
+"""Shortest any-angle paths round closed cells."""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from hybridnav._copies import copies_alike
+from hybridnav.mesh import _closure_kernels as closures
+from hybridnav.mesh import _detour_kernels as kernels
+from hybridnav.mesh._detour_search_kernels import UNSURE, query_round
+from hybridnav.mesh._polyanya_kernels import DONE, EXPANDED, NO_ROOM
+from hybridnav.mesh.cut import cut_mesh
+from hybridnav.mesh.search import (
+    _SLICE,
+    MOST_MADE,
+    NO_LIMIT,
+    SURE,
+    MeshPath,
+    MeshSearch,
+    _inside,
+)
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav.mesh.corner_graph import CornerGraph
+    from hybridnav.mesh.many import MeshPaths
+
+Cell = tuple[int, int]
+Position = tuple[float, float]
+
+_GROUPS = 16
+"""Groups of corners that closed cells make, at most: each costs a bound at every corner reached."""
+
+
+@copies_alike
+class DetourSearch:
+    """Exact shortest any-angle paths round closed cells; threads may share it.
+
+    Closing cells leaves of the graph of corners all edges that do not meet them, and adds corners
+    of closed cells. So nothing is built anew: edges are tested when the search comes upon them, and
+    the graph's landmarks still bound what is left. Where the mesh has no such graph, the closed
+    cells are cut out of it.
+
+    Parameters
+    ----------
+    search
+        Of the map with these cells open.
+    flat
+        int64 (m,), the closed cells, sorted, each once.
+    """
+
+    def __init__(self, search: MeshSearch, flat: LongArray) -> None:
+        self._search = search
+        self._flat = flat
+        self._closure = closures.closure_of(flat, search.mesh.polygon_at)
+        self._detour: tuple[Any, ...] | None = None
+        self._cut: MeshSearch | None = None
+
+    def is_met_by(self, path: MeshPath) -> bool:
+        """Return whether a shortest path between open cells is none with these cells closed.
+
+        True also where that takes more than the path to decide: where an end of it, or a bend, is a
+        corner of a closed cell.
+
+        Parameters
+        ----------
+        path
+            Of the search with these cells open, between ends that stay open.
+        """
+        if path.positions is None:
+            return False
+        at = self._search.mesh.polygon_at
+        return bool(closures.way_crosses(self._closure, at, path.positions))
+
+    def are_met_by(self, paths: MeshPaths) -> BoolArray:
+        """Return which of many shortest paths, bool (n,): see `is_met_by`."""
+        at = self._search.mesh.polygon_at
+        met: BoolArray = closures.ways_cross(self._closure, at, paths.positions, paths.path_start)
+        return met
+
+    def path(
+        self,
+        cells: tuple[Cell, Cell],
+        positions: tuple[Position, Position],
+        *,
+        epsilon: float = 0.0,
+        budget_s: float | None = None,
+    ) -> MeshPath:
+        """Find a shortest path between two positions, as `MeshSearch.path` does."""
+        until = math.inf if budget_s is None else perf_counter() + budget_s
+        found = self._round(cells, positions, 1.0 + epsilon, until)
+        if found is not None:
+            return found
+        # Without a lock: two threads may cut the same, and what is interrupted leaves nothing held.
+        if self._cut is None:
+            mesh = self._search.mesh
+            free = mesh.polygon_at >= 0
+            free.ravel()[self._flat] = False
+            self._cut = MeshSearch(cut_mesh(mesh, free, self._flat))
+        left_s = None if budget_s is None else max(until - perf_counter(), 0.0)
+        return self._cut.path(cells, positions, epsilon=epsilon, budget_s=left_s)
+
+    def _round(
+        self,
+        cells: tuple[Cell, Cell],
+        positions: tuple[Position, Position],
+        factor: float,
+        until: float,
+    ) -> MeshPath | None:
+        """A shortest path in the graph of corners; None where there is no such graph, where closed
+        cells make too many corners, or where an end lies at a corner of a cell that is not free."""
+        search = self._search
+        graph = search.graph
+        if graph is None:
+            return None
+        if self._detour is None:
+            self._detour = _detour_of(search, graph, self._closure)
+        if len(self._detour[1][0]) > MOST_MADE:
+            return None
+        limit = NO_LIMIT if math.isinf(until) else _SLICE
+        ends = tuple(_inside(*end) for end in zip(cells, positions, strict=True))
+        points = ends[0][1], ends[0][0], ends[1][1], ends[1][0]
+        mesh, edges = search.mesh, (graph.first, graph.heads, graph.landmark_distances)
+        where = mesh.component, mesh.polygon_at, (*cells[0], *cells[1])
+        with search.corner_works.lent() as work:
+            while True:
+                status, way = query_round(
+                    *(search.arrays, edges, self._detour, where, points, work.arrays),
+                    (math.inf, factor, limit),
+                )
+                if status in (DONE, UNSURE):
+                    break
+                if status == NO_ROOM:
+                    work.make_room()
+                else:
+                    limit = -1 if perf_counter() >= until else limit + _SLICE
+            length, bound = work.bounds.tolist()
+            expanded = int(work.counts[EXPANDED])
+        if status == UNSURE:
+            return None
+        bound = length if bound >= length else bound * SURE
+        return MeshPath(way if len(way) else None, length, bound, expanded)
+
+
+def _detour_of(search: MeshSearch, graph: CornerGraph, closure: Any) -> tuple[Any, ...]:
+    """What `query_round` needs of closed cells; without edges where they make too many corners."""
+    polygon_at, table = search.mesh.polygon_at, graph.landmark_distances
+    made = closures.corners_of_closure(closure, polygon_at)
+    if len(made[0]) > MOST_MADE:
+        return closure, made
+    edges = kernels.edges_of_closure(
+        search.arrays, polygon_at, (graph.first, graph.heads, table), closure, made
+    )
+    groups = kernels.groups_of_closure(search.arrays[:2], table, made, edges, _GROUPS)
+    return closure, made, edges, groups
