@@ -430,6 +430,27 @@ def test_a_door_of_another_map_is_refused() -> None:
             Blocked(doors=[other]).cells_of(topology)
 
 
+def test_what_is_closed_again_is_not_searched_for_again(
+    planners: dict[str, hn.HybridPlanner], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planner = planners["shortest"]
+    door = planner.topology.rooms.doors[0]
+    area = shapely.box(1.0, 1.0, 1.4, 1.4)
+    forms = ({"doors": [2]}, door, area, {"rooms": ["hall"], "doors": [door]}, {"cells": [(9, 3)]})
+
+    def closed(form: Any) -> list[int]:
+        cells = planner.closed(form)
+        assert cells is not None
+        return list(cells.flat)
+
+    cells = [closed(form) for form in forms]
+    monkeypatch.setattr(Blocked, "cells_of", None)
+    assert [closed(form) for form in forms] == cells
+    assert closed(shapely.box(1.0, 1.0, 1.4, 1.4)) == cells[2]
+    monkeypatch.undo()
+    assert closed(shapely.box(1.0, 1.0, 1.9, 1.9)) != cells[2]
+
+
 def test_a_map_without_rooms_has_no_doors_to_close() -> None:
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(HOUSE)))
     for closed in (Blocked(doors=[1]), Blocked(rooms=["hall"])):

@@ -99,6 +99,13 @@ class Blocked:
         cells = np.concatenate([np.asarray(self.cells), np.asarray(other.cells)])
         return Blocked(**both, cells=cells)
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What is equal where the same is closed, to look things up by."""
+        areas = tuple(area.wkb for area in cast("Sequence[BaseGeometry]", self.polygons))
+        cells = np.asarray(self.cells).tobytes()
+        return tuple(self.arcs), tuple(self.places), cells, areas, self.doors, self.rooms
+
     def cells_of(self, topology: TopologicalMap) -> LongArray:
         """Find the cells that may not be entered; occupied ones may be among them.
 

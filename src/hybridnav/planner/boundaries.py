@@ -59,7 +59,8 @@ def cells_on_boundaries(level: Level, arcs: LongArray) -> list[LongArray]:
             level.boundary(other) @ np.array([cols, 1]) for other in np.flatnonzero(beside).tolist()
         ]
         choices = _choices(pairs, others)
-        costs = [_cost_of(level, ends.tolist(), choice, others) for choice in choices]
+        fields = [_Field(level, vertex) for vertex in ends.tolist()]
+        costs = [_cost_of(fields, choice, others) for choice in choices]
         closed.append(choices[costs.index(min(costs))])
     return closed
 
@@ -76,21 +77,42 @@ def _choices(pairs: LongArray, others: list[LongArray]) -> list[LongArray]:
     return [np.unique(side) for side in (pairs[:, 0], pairs[:, 1], spared)]
 
 
+class _Field:
+    """The cells of one vertex in the window that they span."""
+
+    def __init__(self, level: Level, vertex: int) -> None:
+        rows, cols = level.receptive_field(vertex).T
+        self.kind = CellClass(level.classes[vertex])
+        self._corner = int(rows.min()), int(cols.min())
+        self._n_cols = level.grid.shape[1]
+        shape = int(rows.max()) + 1 - self._corner[0], int(cols.max()) + 1 - self._corner[1]
+        self._cells = np.zeros(shape, dtype=np.bool_)
+        self._cells[rows - self._corner[0], cols - self._corner[1]] = True
+        self._size = len(rows)
+
+    def lost(self, closed: LongArray) -> int:
+        """Cells that are closed, or cut off from most of the field by closed ones."""
+        from scipy import ndimage  # noqa: PLC0415 - half a second that areas and cells do not need
+
+        rows, cols = closed // self._n_cols - self._corner[0], closed % self._n_cols
+        cols -= self._corner[1]
+        shape = self._cells.shape
+        inside = (rows >= 0) & (rows < shape[0]) & (cols >= 0) & (cols < shape[1])
+        is_open = self._cells.copy()
+        is_open[rows[inside], cols[inside]] = False
+        pieces, _ = ndimage.label(is_open)
+        return self._size - int(np.bincount(pieces.ravel())[1:].max(initial=0))
+
+
 def _cost_of(
-    level: Level, vertices: list[int], closed: LongArray, others: list[LongArray]
+    fields: list[_Field], closed: LongArray, others: list[LongArray]
 ) -> tuple[int, int, int]:
     """Other arcs closed as well; free cells, and all cells, closed or cut off from their field."""
-    from scipy import ndimage  # noqa: PLC0415 - half a second that areas and cells do not need
-
-    arcs = sum(bool(np.isin(other, closed).any(axis=1).all()) for other in others)
+    pairs = np.concatenate([closed[:0].reshape(0, 2), *others])
+    of_arc = np.repeat(np.arange(len(others)), [len(other) for other in others])
+    is_shut = np.isin(pairs, closed).any(axis=1)
+    arcs = len(others) - len(np.unique(of_arc[~is_shut]))
     lost = {CellClass.FREE: 0, CellClass.UNEXPLORED: 0}
-    for vertex in vertices:
-        field = level.receptive_field(vertex)
-        corner = field.min(axis=0)
-        is_open = np.zeros(field.max(axis=0) - corner + 1, dtype=np.bool_)
-        flat = field @ np.array([level.grid.shape[1], 1])
-        is_open[tuple((field - corner).T)] = ~np.isin(flat, closed)
-        pieces, _ = ndimage.label(is_open)
-        largest = np.bincount(pieces.ravel())[1:].max(initial=0)
-        lost[CellClass(level.classes[vertex])] += len(field) - int(largest)
+    for field in fields:
+        lost[field.kind] += field.lost(closed)
     return arcs, lost[CellClass.FREE], sum(lost.values())

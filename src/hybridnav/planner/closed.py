@@ -7,13 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, LongArray
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.blocked import Closable
+    from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
+
+_KEPT = 16
+"""Closures whose cells are kept: those of a door of a large room take some 10 ms to find."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,3 +60,33 @@ class ClosedCells:
         if not shut.any():
             return None
         return PlanStatus.START_BLOCKED if shut[0] else PlanStatus.GOAL_BLOCKED
+
+
+@copies_alike
+class Closures:
+    """The cells that were closed for the last queries, so that the next ones need not find them.
+
+    Parameters
+    ----------
+    topology
+        The map that they are closed on.
+    """
+
+    def __init__(self, topology: TopologicalMap) -> None:
+        self._topology = topology
+        self._known: dict[object, ClosedCells] = {}
+
+    def of(self, blocked: Closable) -> ClosedCells:
+        """Return the cells that may not be entered when this is closed."""
+        # Loads shapely, which most queries can do without.
+        from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
+
+        closed = as_blocked(blocked)
+        key = closed.key
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = ClosedCells(closed.cells_of(self._topology))
+            # Without a lock: threads may find the same twice.
+            for old in list(self._known)[:-_KEPT]:
+                self._known.pop(old, None)
+        return found

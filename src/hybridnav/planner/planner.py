@@ -13,7 +13,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
-from hybridnav.planner.closed import ClosedCells
+from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
 from hybridnav.planner.jump_plans import OverJumps
 from hybridnav.planner.mesh_plans import OverMesh
@@ -76,6 +76,7 @@ class HybridPlanner:
             self._cells = OverJumps(topology.grid, self._refiner, settings)
         else:
             self._cells = WholeMap(self._refiner)
+        self._closures = Closures(topology)
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
             # Loads what only these presets need, and says what to install where it is missing.
@@ -360,10 +361,7 @@ class HybridPlanner:
         """Return the cells that may not be entered when this is closed, None where nothing is."""
         if blocked is None or isinstance(blocked, ClosedCells):
             return blocked
-        # Loads shapely, which most queries can do without.
-        from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
-
-        return ClosedCells(as_blocked(blocked).cells_of(self.topology))
+        return self._closures.of(blocked)
 
     def _stats_of(self, plan: CellPlan) -> PlanStats:
         on_mesh = isinstance(self._cells, OverMesh)
