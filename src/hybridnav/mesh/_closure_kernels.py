@@ -185,7 +185,7 @@ def crosses(closure, polygon_at, ax, ay, bx, by):
         The segment. Its ends are not looked at: a way that goes on in another direction must be
         tested there.
     """
-    box, _, cols = closure
+    box, starts, cols = closure
     if not is_beside(box, ax, ay, bx, by) or (ax == bx and ay == by):
         return False
     segment = (ax, ay, bx, by)
@@ -193,6 +193,9 @@ def crosses(closure, polygon_at, ax, ay, bx, by):
     last = min(box[1], math.floor(max(ay, by)))
     for row in range(first, last + 1):
         low, high = _columns(segment, row)
+        at, end = starts[row - box[0]], starts[row - box[0] + 1]
+        if at == end or cols[at] > high or cols[end - 1] < low:
+            continue
         at, end = _first_from(closure, row, low)
         while at < end and cols[at] <= high:
             if _meets_cell(closure, polygon_at, segment, row, cols[at]):
@@ -269,11 +272,16 @@ def corners_of_closure(closure, polygon_at):
     kinds, cells = np.empty(n_most, np.uint8), np.empty((n_most, 2), np.int64)
     n = 0
     for row in range(box[0], box[1] + 1):
-        for at in range(starts[row - box[0]], starts[row - box[0] + 1]):
+        low, high = starts[row - box[0]], starts[row - box[0] + 1]
+        for at in range(low, high):
             col = cols[at]
+            is_left = at > low and cols[at - 1] == col - 1
+            is_right = at + 1 < high and cols[at + 1] == col + 1
             for k in range(4):
-                down, across = row + 2 * (k >> 1) - 1, col + 2 * (k & 1) - 1
                 # Most closed cells have closed ones beside them.
+                if is_right if k & 1 else is_left:
+                    continue
+                down, across = row + 2 * (k >> 1) - 1, col + 2 * (k & 1) - 1
                 if (
                     is_shut(closure, polygon_at, row, across)
                     or is_shut(closure, polygon_at, down, col)

@@ -105,7 +105,9 @@ def edges_of_closure(mesh, polygon_at, graph, closure, made):
         for corner in room[2][:seen]:
             if not touches(kinds_made[i], cx[corner] - x, cy[corner] - y):
                 continue
-            head = still_there(mesh, graph, closure, x, y, corner)
+            head = corner
+            if is_at_closed(closure, cx[corner], cy[corner]):
+                head = still_there(mesh, graph, closure, x, y, corner)
             if head >= 0 and not crosses(closure, polygon_at, x, y, cx[head], cy[head]):
                 heads[m] = head
                 m += 1
@@ -113,6 +115,8 @@ def edges_of_closure(mesh, polygon_at, graph, closure, made):
             dx, dy = xs[j] - x, ys[j] - y
             if i == j or not touches(kinds_made[i], dx, dy) or not touches(kinds_made[j], dx, dy):
                 continue
+            if crosses(closure, polygon_at, x, y, xs[j], ys[j]):
+                continue  # soon found out, for corners of one area
             if is_clear(closure, polygon_at, x, y, xs[j], ys[j]):
                 heads[m] = n + j
                 m += 1

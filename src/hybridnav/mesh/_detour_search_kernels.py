@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.mesh._closure_kernels import crosses, is_at_shut, is_beside
+from hybridnav.mesh._closure_kernels import crosses, is_at_closed, is_at_shut, is_beside
 from hybridnav.mesh._detour_bound_kernels import bounds_of_goal, estimate, left_behind
 from hybridnav.mesh._detour_kernels import is_in_sight, still_there
 from hybridnav.mesh._end_kernels import APART, polygons_of_ends
@@ -126,7 +126,8 @@ def _begin(mesh, graph, detour, where, ends, work):
     for corner in seen[:n_seen]:
         head = corner
         if is_beside(closure[0], tx, ty, cx[corner], cy[corner]):
-            head = still_there(mesh, graph, closure, tx, ty, corner)
+            if is_at_closed(closure, cx[corner], cy[corner]):
+                head = still_there(mesh, graph, closure, tx, ty, corner)
             if head < 0 or crosses(closure, polygon_at, tx, ty, cx[head], cy[head]):
                 continue
         to_goal[head] = distance(tx, ty, cx[head], cy[head])
@@ -213,7 +214,7 @@ def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
             if head < n:
                 wx, wy = cx[head], cy[head]
                 is_near = here < n and is_beside(box, x, y, wx, wy)
-                if is_near:
+                if is_near and is_at_closed(closure, wx, wy):
                     head = still_there(mesh, graph, closure, x, y, head)
                     if head < 0:
                         continue
@@ -303,7 +304,8 @@ def _flood(mesh, graph, detour, polygon_at, work, most):
             if is_seen[head]:
                 continue
             if is_beside(box, x, y, cx[head], cy[head]):
-                head = still_there(mesh, graph, closure, x, y, head)
+                if is_at_closed(closure, cx[head], cy[head]):
+                    head = still_there(mesh, graph, closure, x, y, head)
                 if head < 0 or crosses(closure, polygon_at, x, y, cx[head], cy[head]):
                     continue
             size = _wait(is_seen, waiting, size, head)

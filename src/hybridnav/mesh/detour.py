@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 Position = tuple[float, float]
 
-_GROUPS = 16
+_GROUPS = 4
 """Groups of corners that closed cells make, at most: each costs a bound at every corner reached."""
 
 
