@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from hybridnav.mesh._merge_kernels import are_free, merge_triangles, select_tria
 from hybridnav.mesh.build import ConvexMesh, triangulate
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
 
 
 def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh:
@@ -42,58 +43,100 @@ def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh
         return mesh
     sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
     is_cut, cut = kernels.touched_polygons(mesh.corners, sides, mesh.polygon_at, closed)
-    rim = kernels.rim_of(sides, is_cut, cut)
+    hole = _Hole(cut, kernels.rim_of(sides, is_cut, cut))
     slots = np.concatenate([np.arange(*mesh.first[number : number + 2]) for number in cut])
-    wide = free.shape[1] + 1
-    point_of = mesh.corners[:, 0].astype(np.int64) * wide + mesh.corners[:, 1]
-
-    # Vertices: the corners of the polygons, and where walls turn now.
-    old = np.unique(mesh.begins[slots])
-    old = old[np.argsort(point_of[old])]
-    at, kinds_at = kernels.corners_of_cells(free, closed)
-    turning = at[kinds_at != NO_CORNER]
-    made = np.setdiff1d(turning, point_of[old])
-    points = np.union1d(point_of[old], made)
-    number_of = np.empty(len(points), np.int32)
-    number_of[np.searchsorted(points, point_of[old])] = old
-    number_of[np.searchsorted(points, made)] = len(mesh.corners) + np.arange(len(made))
-    corners = np.concatenate([mesh.corners, np.stack(np.divmod(made, wide), axis=1)])
-    corners = corners.astype(np.int32)
-    kinds = np.concatenate([mesh.kinds, np.full(len(made), MANY, np.uint8)])
-    known = np.isin(at, points)
-    kinds[number_of[np.searchsorted(points, at[known])]] = np.minimum(kinds_at[known], MANY)
-
-    local = corners[number_of]
-    walls = np.concatenate(
-        [
-            kernels.pieces_of_rim(sides, rim, point_of, points, wide),
-            kernels.walls_of_closed(free, closed, points),
-        ]
-    )
-
-    vertices, neighbours = triangulate(local, walls)
-    kept = are_free(local, vertices, free)
-    triples = local[vertices[kept]].sum(axis=1, dtype=np.int64)
-    kept[kept] = kernels.are_inside(mesh.corners, mesh.first, mesh.begins, cut, triples)
-    anew = merge_triangles(local, *select_triangles(vertices, neighbours, kept))
-    first, begins, twins, polygon_of = anew[0], number_of[anew[1]], anew[2], anew[3]
-    count, n_slots = mesh.n_polygons, len(mesh.begins)
-    all_twins = np.concatenate([mesh.twins, np.where(twins >= 0, twins + n_slots, -1)])
-    all_twins[slots] = -1
-    joined = _joined(mesh, rim[mesh.twins[rim] >= 0], (first, begins, twins))
-    all_twins[joined[0]], all_twins[n_slots + joined[1]] = n_slots + joined[1], joined[0]
-    polygons = (
-        np.concatenate([mesh.first, n_slots + first[1:]]),
-        np.concatenate([mesh.begins, begins]),
-        all_twins.astype(np.int32),
-        np.concatenate([mesh.polygon_of, count + polygon_of]).astype(np.int32),
-    )
+    vertices = _vertices_of(mesh, slots, free, closed)
+    anew = _polygons_in(mesh, hole, vertices, free, closed)
+    polygons = _with_hole_filled(mesh, hole, slots, anew)
     blocks = blocks_of(polygons[0], *polygons[2:])
     blocks[3][cut] = -1  # of no component
-    arrays = (corners, kinds, *polygons, mesh.polygon_at, *blocks)
+    arrays = (vertices.corners, vertices.kinds, *polygons, mesh.polygon_at, *blocks)
     for array in arrays:
         array.flags.writeable = False
     return ConvexMesh(*arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class _Hole:
+    """Polygons that are taken out, and the slots of them round the hole that they leave."""
+
+    polygons: IntArray
+    rim: LongArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Vertices:
+    """Vertices of the polygons in a hole: flat lattice points, sorted, and their corners; and all
+    corners of the mesh with their kinds, new ones last."""
+
+    points: LongArray
+    number_of: IntArray
+    corners: IntArray
+    kinds: ByteArray
+
+
+def _vertices_of(
+    mesh: ConvexMesh, slots: LongArray, free: BoolArray, closed: LongArray
+) -> _Vertices:
+    """The corners of polygons that are taken out, and where walls turn now."""
+    wide = free.shape[1] + 1
+    old = np.unique(mesh.begins[slots])
+    known = mesh.corners[old] @ np.array([wide, 1], dtype=np.int64)
+    order = np.argsort(known)
+    old, known = old[order], known[order]
+    at, kinds_at = kernels.corners_of_cells(free, closed)
+    made = np.setdiff1d(at[kinds_at != NO_CORNER], known)
+    points = np.union1d(known, made)
+    number_of = np.empty(len(points), np.int32)
+    number_of[np.searchsorted(points, known)] = old
+    number_of[np.searchsorted(points, made)] = len(mesh.corners) + np.arange(len(made))
+    corners = np.concatenate([mesh.corners, np.stack(np.divmod(made, wide), axis=1)])
+    kinds = np.concatenate([mesh.kinds, np.full(len(made), MANY, np.uint8)])
+    is_one = np.isin(at, points)
+    kinds[number_of[np.searchsorted(points, at[is_one])]] = np.minimum(kinds_at[is_one], MANY)
+    return _Vertices(points, number_of, corners.astype(np.int32), kinds)
+
+
+def _polygons_in(
+    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray, closed: LongArray
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Fill a hole: first slots, corners, twins and polygons of slots of the new polygons."""
+    sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
+    wide = free.shape[1] + 1
+    around = mesh.corners @ np.array([wide, 1], dtype=np.int64)
+    rim = kernels.pieces_of_rim(sides, hole.rim, around, vertices.points, wide)
+    walls = np.concatenate([rim, kernels.walls_of_closed(free, closed, vertices.points)])
+    local = vertices.corners[vertices.number_of]
+    triangles, neighbours = triangulate(local, walls)
+    kept = are_free(local, triangles, free)
+    triples = local[triangles[kept]].sum(axis=1, dtype=np.int64)
+    kept[kept] = kernels.are_inside(mesh.corners, mesh.first, mesh.begins, hole.polygons, triples)
+    first, begins, twins, polygon_of = merge_triangles(
+        local, *select_triangles(triangles, neighbours, kept)
+    )
+    return first, vertices.number_of[begins], twins, polygon_of
+
+
+def _with_hole_filled(
+    mesh: ConvexMesh,
+    hole: _Hole,
+    slots: LongArray,
+    anew: tuple[IntArray, IntArray, IntArray, IntArray],
+) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """The polygons of a mesh, those in a hole behind the others; those taken out are walled in."""
+    first, begins, twins, polygon_of = anew
+    n_slots = len(mesh.begins)
+    all_twins = np.concatenate([mesh.twins, np.where(twins >= 0, twins + n_slots, -1)])
+    all_twins[slots] = -1
+    doors = hole.rim[mesh.twins[hole.rim] >= 0]
+    behind, before = _joined(mesh, doors, (first, begins, twins))
+    all_twins[behind], all_twins[n_slots + before] = n_slots + before, behind
+    return (
+        np.concatenate([mesh.first, n_slots + first[1:]]),
+        np.concatenate([mesh.begins, begins]),
+        all_twins.astype(np.int32),
+        np.concatenate([mesh.polygon_of, mesh.n_polygons + polygon_of]).astype(np.int32),
+    )
 
 
 def _joined(
