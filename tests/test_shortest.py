@@ -122,6 +122,12 @@ def test_unexplored_cells_are_entered_where_that_is_allowed() -> None:
     allowed = shortest(topology, "planner.allow_unexplored=true")
     assert allowed.plan(*ends).cost == pytest.approx(1 + 2 * math.hypot(0.5, 0.5))
     assert allowed.plan((1.5, 1.5), ends[1]).solved
+    allowed.prepare()
+    row = allowed.topology.grid.frame.cell_of(1.5, 1.5)[0]
+    for column, status in ((1, hn.PlanStatus.NO_PATH), (0, hn.PlanStatus.START_BLOCKED)):
+        closed = {"cells": [(row, column)], "polygons": []}
+        start = (0.5, 1.5) if column == 0 else ends[0]
+        assert allowed.plan(start, ends[1], blocked=closed).status is status
 
 
 def test_a_map_whose_corners_may_be_cut_is_refused() -> None:

@@ -82,7 +82,7 @@ class OverMesh:
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
         self._search: MeshSearch | None = None
         self._across = np.array([grid.shape[1], 1])
-        self._detours: dict[bytes, DetourSearch] = {}
+        self._detours: dict[ClosedCells, DetourSearch] = {}
         self._building = threading.Lock()
 
     @property
@@ -283,10 +283,10 @@ class OverMesh:
 
     def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
         """The search round closed cells, which is kept for the next queries."""
-        key = closed.flat.tobytes()
-        found = self._detours.get(key)
+        # By identity: `Closures` returns the same for what is closed again.
+        found = self._detours.get(closed)
         if found is None:
-            found = self._detours[key] = DetourSearch(search, closed.flat)
+            found = self._detours[closed] = DetourSearch(search, closed.flat)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)
         return found
