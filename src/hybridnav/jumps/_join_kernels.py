@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.jumps._leg_kernels import class_of, pack, row_col_kind
+from hybridnav.jumps._leg_kernels import class_of, reverse, row_col_kind
+from hybridnav.search._contract_kernels import pack
 from hybridnav.search._kernels import grow, octile_cost
 
 
@@ -158,7 +159,7 @@ def arcs_of(tables, corners, places):
     -------
     tuple
         int32 (n + 1,), where the arcs of each corner cell begin; int64 (m, 2), the cost of each
-        arc, and its head and class (see `pack`). With each arc there is its reverse.
+        arc, and its head and classes (see `pack`). With each arc there is its reverse.
     """
     begin, heads = _joined(tables, corners)
     # What only one end finds has another corner cell on its way: two arcs make up for it.
@@ -182,7 +183,7 @@ def arcs_of(tables, corners, places):
                 to_row, to_col, _ = row_col_kind(places[heads[at]])
                 leg = class_of(to_row - row, to_col - col)
                 arcs[n_arcs, 0] = octile_cost(to_row - row, to_col - col)
-                arcs[n_arcs, 1] = pack(np.int64(heads[at]), leg, leg)
+                arcs[n_arcs, 1] = pack(np.int64(heads[at]), leg, reverse(leg))
                 n_arcs += 1
     return first, arcs
 
@@ -202,7 +203,7 @@ def components(first, arcs):
             n_waiting -= 1
             at = waiting[n_waiting]
             for arc in range(first[at], first[at + 1]):
-                other = arcs[arc, 1] >> 8
+                other = arcs[arc, 1] >> 12
                 if part[other] < 0:
                     part[other] = n_parts
                     waiting[n_waiting] = other

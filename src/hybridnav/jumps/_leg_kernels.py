@@ -51,7 +51,7 @@ def legs_that_follow():
     -------
     numpy.ndarray
         int64 (16, 16), by the blocked corners of the cell (see `number_cells`) and the class of the
-        leg that ends there: bit c is set where a leg of class c may follow.
+        leg that ends there, walked backwards: bit c is set where a leg of class c may follow.
     """
     table = np.zeros((16, 16), np.int64)
     for kind in range(16):
@@ -67,14 +67,8 @@ def legs_that_follow():
             for other in range(16):
                 moves = 1 << other // 2 | (1 << (other // 2 + 1 & 7) if other & 1 else 0)
                 if may & moves == moves:
-                    table[kind, leg] |= 1 << other
+                    table[kind, reverse(leg)] |= 1 << other
     return table
-
-
-@njit(cache=True, nogil=True)
-def pack(head, leg, last):
-    """Return an arc's head and the classes of its first and its last leg in one number."""
-    return head << 8 | leg << 4 | last
 
 
 @njit(cache=True, nogil=True)

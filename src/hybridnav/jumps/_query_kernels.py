@@ -6,83 +6,8 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.jumps._leg_kernels import FAR, row_col_kind
-from hybridnav.jumps._search_kernels import FROM_START, NO_ARC, shortest
-
-
-@njit(cache=True, nogil=True)
-def _arc_between(arcs, tail, head):
-    """Return the arc of a hierarchy from a corner cell to one contracted later."""
-    first, table, _ = arcs
-    for arc in range(first[tail], first[tail + 1]):
-        if table[arc, 1] >> 8 == head:
-            return arc
-    return NO_ARC
-
-
-@njit(cache=True, nogil=True)
-def _unpack(arcs, tail, head, arc, stack, nodes, count):
-    """Append what follows its tail on the way of an arc to the corner cells of a path.
-
-    Returns the corner cells, another array where there was no room, and their number.
-    """
-    middles = arcs[2]
-    stack[0, 0], stack[0, 1], stack[0, 2] = tail, head, arc
-    depth = 1
-    while depth > 0:
-        depth -= 1
-        tail, head, arc = stack[depth, 0], stack[depth, 1], stack[depth, 2]
-        middle = np.int64(middles[arc]) if middles.size > 0 else np.int64(-1)
-        if middle < 0:
-            if count == nodes.size:
-                larger = np.empty(2 * count, np.int64)
-                larger[:count] = nodes
-                nodes = larger
-            nodes[count] = head
-            count += 1
-            continue
-        after, before = _arc_between(arcs, middle, head), _arc_between(arcs, middle, tail)
-        stack[depth, 0], stack[depth, 1], stack[depth, 2] = middle, head, after
-        depth += 1
-        stack[depth, 0], stack[depth, 1], stack[depth, 2] = tail, middle, before
-        depth += 1
-    return nodes, count
-
-
-@njit(cache=True, nogil=True)
-def _corner_cells(arcs, meeting, records, chain, stack):
-    """Return the corner cells that a path passes, from the start to the goal.
-
-    Parameters
-    ----------
-    arcs
-        Where the arcs of each corner cell begin, the arcs, their middles, none in a graph that is
-        not contracted.
-    meeting, records
-        What the search left behind.
-    chain
-        Room for as many as there are corner cells.
-    stack
-        int64 (n + 2, 3), room for arcs to unpack.
-    """
-    n_chain = 0
-    node = meeting
-    while records[node, 2] != NO_ARC:
-        chain[n_chain] = node
-        n_chain += 1
-        node = records[node, 2] >> 32
-    nodes = np.empty(64, np.int64)
-    nodes[0] = node
-    count = 1
-    for i in range(n_chain - 1, -1, -1):
-        head = np.int64(chain[i])
-        by = records[head, 2]
-        nodes, count = _unpack(arcs, by >> 32, head, by & 0xFFFFFFFF, stack, nodes, count)
-    node = meeting
-    while records[node, 3] != NO_ARC:
-        by = records[node, 3]
-        nodes, count = _unpack(arcs, node, by >> 32, by & 0xFFFFFFFF, stack, nodes, count)
-        node = by >> 32
-    return nodes[:count]
+from hybridnav.jumps._search_kernels import FROM_START, shortest
+from hybridnav.search._unpack_kernels import corners_between
 
 
 @njit(cache=True, nogil=True)
@@ -166,7 +91,7 @@ def paths(graph, middles, origin, ends, work):
     ends
         int64 (k, 4), row and column of the start, then of the goal; free cells.
     work
-        See `shortest`, and a stack of int64 (n + 2, 3).
+        See `shortest`.
 
     Returns
     -------
@@ -176,8 +101,7 @@ def paths(graph, middles, origin, ends, work):
         and corner cells expanded.
     """
     width, (first, table) = graph[0][2], graph[4]
-    work_of_search, stack = work
-    records, _, touched, found = work_of_search
+    records, _, touched, _ = work
     n = ends.shape[0]
     begin = np.zeros(n + 1, np.int64)
     counts = np.full((n, 3), np.int64(-1))
@@ -188,13 +112,11 @@ def paths(graph, middles, origin, ends, work):
             (ends[i, 0] - origin[0]) * width + ends[i, 1] - origin[1],
             (ends[i, 2] - origin[0]) * width + ends[i, 3] - origin[1],
         )
-        cost, meeting, counts[i, 2], n_touched = shortest(
-            graph, pair, middles.size > 0, work_of_search
-        )
+        cost, meeting, counts[i, 2], n_touched = shortest(graph, pair, middles.size > 0, work)
         if cost < FAR:
             nodes = touched[:0]
             if meeting >= 0:
-                nodes = _corner_cells((first, table, middles), meeting, records, found, stack)
+                nodes = corners_between((first, table, middles), meeting, records)
             cells, n_cells, counts[i, 0], counts[i, 1] = _cells_of(
                 graph, pair, meeting, nodes, origin, cells, n_cells
             )

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.jumps._heap_kernels import pop, push
 from hybridnav.jumps._join_kernels import is_direct, join
 from hybridnav.jumps._leg_kernels import FAR, class_of, row_col_kind
+from hybridnav.search._heap_kernels import pop, push
 from hybridnav.search._kernels import octile_cost
+from hybridnav.search._unpack_kernels import NO_ARC
 
 FROM_START, FROM_GOAL = -2, -3
 """What `shortest` returns for the corner cell where the path is one leg: free in the order of the
 start, the diagonal first, or in that of the goal."""
-NO_ARC = -1
 
 
 @njit(cache=True, nogil=True)
@@ -114,17 +114,17 @@ def shortest(graph, ends, is_contracted, work):
                 best, meeting = cost + records[node, 1 - side], node
             by = records[node, 2 + side]
             if by != NO_ARC:
-                may_follow = follow[kind, arcs[by & 0xFFFFFFFF, 1] & 15]
+                may_follow = follow[kind, arcs[by & 0xFFFFFFFF, 1] & 63]
             elif number[ends[side]] == node:
-                may_follow = np.int64(65535)
+                may_follow = np.int64(-1)
             else:
-                leg = class_of(row - ends[side] // width, col - ends[side] % width)
+                leg = class_of(ends[side] // width - row, ends[side] % width - col)
                 may_follow = follow[kind, leg]
             for arc in range(first[node], first[node + 1]):
                 packed, further = arcs[arc, 1], cost + arcs[arc, 0]
-                other = packed >> 8
+                other = packed >> 12
                 known = records[other, side]
-                if may_follow >> (packed >> 4 & 15) & 1 == 0 or known <= further:
+                if may_follow >> (packed >> 6 & 63) & 1 == 0 or known <= further:
                     continue
                 row, col, _ = row_col_kind(places[other])
                 estimate = further + octile_cost(row - aim_row, col - aim_col)

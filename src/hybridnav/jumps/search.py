@@ -60,7 +60,7 @@ class _Work:
         # A corner cell is expanded once at most, so that each arc is queued once at most.
         heaps = tuple(np.empty((n_corners + n_arcs + 1, 2), dtype=np.int64) for _ in range(2))
         touched, found = np.empty(n_corners, np.int64), np.empty(n_corners, np.int32)
-        self.arrays = (records, heaps, touched, found), np.empty((n_corners + 2, 3), np.int64)
+        self.arrays = records, heaps, touched, found
 
 
 @copies_alike

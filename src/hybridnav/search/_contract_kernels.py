@@ -1,12 +1,15 @@
-"""Kernels that contract a graph of corner cells into a hierarchy.
+"""Kernels that contract a graph of corners into a hierarchy.
 
-R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. One corner cell
-after the other is taken out, and a shortcut put in between two of its neighbours where the way past
-it may be the only shortest one.
+R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. One corner after
+the other is taken out, and a shortcut put in between two of its neighbours where the way past it
+may be the only shortest one.
 
-The arcs that lead from one corner cell stand beside each other in a pool, int64 (n, 3): the cost;
-the head and the classes of the first and the last leg (see `pack`); the middle, which is the corner
-cell that a shortcut leads past or -1, and the number of legs. With each arc there is its reverse.
+The arcs that lead from one corner stand beside each other in a pool, int64 (n, 3): the cost; the
+head and the classes at both ends (see `pack`); the middle, which is the corner that a shortcut
+leads past or -1, and the number of legs. With each arc there is its reverse.
+
+A *class* sorts the ways that arcs lead away from a corner, and a table states which two a shortest
+path may join there: what bends the wrong way is never on one.
 """
 
 from __future__ import annotations
@@ -14,21 +17,26 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.jumps._heap_kernels import pop, push
-from hybridnav.jumps._leg_kernels import pack, reverse
+from hybridnav.search._heap_kernels import pop, push
 
-SETTLED = 10
-"""Corner cells that a search for another way settles at most. With 80 there are 1 to 3 % fewer
-shortcuts, and it takes four times as long."""
 SLACK = 6000
-"""How much later than it should come a corner cell is still contracted, in thousandths of a level.
+"""How much later than it should come a corner is still contracted, in thousandths of a level.
 With 0 there are 3 % fewer shortcuts, and it takes twice as long."""
 _UNKNOWN = -(1 << 40)
 
 
 @njit(cache=True, nogil=True)
+def pack(head, near, far):
+    """Return an arc's head, its class at its tail, and its class at its head, in one number.
+
+    Classes are below 64, and those of the ways that lead away from the corner.
+    """
+    return head << 12 | near << 6 | far
+
+
+@njit(cache=True, nogil=True)
 def _pool_of(first, arcs):
-    """Return a pool of the arcs of a graph, with room: begin, size and room of each corner cell's
+    """Return a pool of the arcs of a graph, with room: begin, size and room of each corner's
     part, the pool, and how much of it is used."""
     n = first.size - 1
     begin, size, room = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
@@ -47,13 +55,13 @@ def _pool_of(first, arcs):
 
 @njit(cache=True, nogil=True)
 def _search(graph, node, source, limit, n_wanted, stamp, work):
-    """Search for ways from a neighbour of a corner cell that do without it.
+    """Search for ways from a neighbour of a corner that do without it.
 
     Parameters
     ----------
     graph
-        Begin and size of parts of the pool, the pool, blocked corners of the cells, which legs may
-        follow.
+        Begin and size of parts of the pool, the pool, kinds of corners, which classes may follow:
+        see `contract`.
     node
         What ways must do without.
     source
@@ -61,21 +69,22 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
     limit
         What a way may cost.
     n_wanted
-        Number of corner cells whose record has the stamp in column 2: the search ends when it has
+        Number of corners whose record has the stamp in column 2: the search ends when it has
         settled them.
     stamp
         Of this search.
     work
-        Records, int64 (n, 3): distance, stamp and class of the leg that led there, stamp of those
-        wanted; a heap with room for `SETTLED` times the greatest number of arcs from a cell.
+        Records, int64 (n, 3): distance, stamp and class of the way back, stamp of those wanted; a
+        heap; corners that it settles at most. The heap has room for that many times the greatest
+        number of arcs from a corner.
     """
     begin, size, pool, kinds, follow = graph
-    records, heap = work
+    records, heap, most_settled = work
     records[node, 0], records[node, 1] = -1, stamp << 8
     records[source, 0], records[source, 1] = 0, stamp << 8 | 255
     heap[0, 0], heap[0, 1] = 0, source
     waiting, settled = 1, 0
-    while waiting > 0 and settled < SETTLED and n_wanted > 0:
+    while waiting > 0 and settled < most_settled and n_wanted > 0:
         cost = heap[0, 0]
         at = pop(heap, waiting)
         waiting -= 1
@@ -84,29 +93,29 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
         settled += 1
         n_wanted -= records[at, 2] == stamp
         last = records[at, 1] & 255
-        may_follow = np.int64(65535) if last == 255 else follow[kinds[at], last]
+        may_follow = np.int64(-1) if last == 255 else follow[kinds[at], last]
         for arc in range(begin[at], begin[at] + size[at]):
             packed = pool[arc, 1]
             further = cost + pool[arc, 0]
-            if further > limit or may_follow >> (packed >> 4 & 15) & 1 == 0:
+            if further > limit or may_follow >> (packed >> 6 & 63) & 1 == 0:
                 continue
-            there = packed >> 8
+            there = packed >> 12
             if records[there, 1] >> 8 != stamp or further < records[there, 0]:
-                records[there, 0], records[there, 1] = further, stamp << 8 | packed & 15
+                records[there, 0], records[there, 1] = further, stamp << 8 | packed & 63
                 push(heap, waiting, further, there)
                 waiting += 1
 
 
 @njit(cache=True, nogil=True)
 def _shortcuts(graph, node, stamp, work, pairs):
-    """Find the shortcuts that taking a corner cell out asks for.
+    """Find the shortcuts that taking a corner out asks for.
 
     Parameters
     ----------
     graph, work
         See `_search`.
     node
-        The corner cell.
+        The corner.
     stamp
         Of the last search.
     pairs
@@ -124,21 +133,21 @@ def _shortcuts(graph, node, stamp, work, pairs):
     end = begin[node] + size[node]
     for one in range(begin[node], end - 1):
         cost, packed = pool[one, 0], pool[one, 1]
-        may_follow = follow[kinds[node], reverse(packed >> 4 & 15)]
+        may_follow = follow[kinds[node], packed >> 6 & 63]
         stamp += 1
         n_wanted, limit = 0, np.int64(0)
         for two in range(one + 1, end):
-            if may_follow >> (pool[two, 1] >> 4 & 15) & 1:
-                records[pool[two, 1] >> 8, 2] = stamp
+            if may_follow >> (pool[two, 1] >> 6 & 63) & 1:
+                records[pool[two, 1] >> 12, 2] = stamp
                 limit = max(limit, cost + pool[two, 0])
                 n_wanted += 1
         if n_wanted == 0:
             continue
-        _search(graph, node, packed >> 8, limit, n_wanted, stamp, work)
+        _search(graph, node, packed >> 12, limit, n_wanted, stamp, work)
         for two in range(one + 1, end):
-            if may_follow >> (pool[two, 1] >> 4 & 15) & 1 == 0:
+            if may_follow >> (pool[two, 1] >> 6 & 63) & 1 == 0:
                 continue
-            there = pool[two, 1] >> 8
+            there = pool[two, 1] >> 12
             if records[there, 1] >> 8 != stamp or records[there, 0] > cost + pool[two, 0]:
                 pairs[n_pairs, 0], pairs[n_pairs, 1] = one, two
                 n_pairs += 1
@@ -148,12 +157,12 @@ def _shortcuts(graph, node, stamp, work, pairs):
 
 @njit(cache=True, nogil=True)
 def _take_out(begin, size, pool, node):
-    """Take the arcs to a corner cell out of the parts of its neighbours."""
+    """Take the arcs to a corner out of the parts of its neighbours."""
     for arc in range(begin[node], begin[node] + size[node]):
-        other = pool[arc, 1] >> 8
+        other = pool[arc, 1] >> 12
         last = begin[other] + size[other] - 1
         at = begin[other]
-        while pool[at, 1] >> 8 != node:
+        while pool[at, 1] >> 12 != node:
             at += 1
         for k in range(3):
             pool[at, k] = pool[last, k]
@@ -162,14 +171,14 @@ def _take_out(begin, size, pool, node):
 
 @njit(cache=True, nogil=True)
 def _put_in(parts, pool, used, tail, arc):
-    """Put an arc into a corner cell's part of the pool, or improve the one that has its head.
+    """Put an arc into a corner's part of the pool, or improve the one that has its head.
 
     Returns the pool, which is another one where there was no room, and how much of it is used.
     """
     begin, size, room = parts
     cost, packed, past = arc
     for at in range(begin[tail], begin[tail] + size[tail]):
-        if pool[at, 1] >> 8 == packed >> 8:
+        if pool[at, 1] >> 12 == packed >> 12:
             if cost < pool[at, 0]:
                 pool[at, 0], pool[at, 1], pool[at, 2] = cost, packed, past
             return pool, used
@@ -190,7 +199,7 @@ def _put_in(parts, pool, used, tail, arc):
 
 @njit(cache=True, nogil=True)
 def _packed_arcs(begin, size, pool):
-    """Return what is left in the pool without the room: where the arcs of each corner cell begin,
+    """Return what is left in the pool without the room: where the arcs of each corner begin,
     their costs and heads, their middles."""
     n = begin.size
     first = np.zeros(n + 1, np.int32)
@@ -207,25 +216,33 @@ def _packed_arcs(begin, size, pool):
 
 @guarded
 @njit(cache=True, nogil=True)
-def contract(kinds, first, arcs, follow):
-    """Contract all corner cells of a graph, those first that leave few and short shortcuts.
+def contract(kinds, first, arcs, follow, effort):
+    """Contract all corners of a graph, those first that leave few and short shortcuts.
 
     Parameters
     ----------
     kinds
-        uint8 (n,), blocked corners of the corner cells.
+        uint8 (n,), kinds of corners.
     first, arcs
-        The graph: where the arcs of each corner cell begin, int64 (m, 2) arcs.
+        The graph: where the arcs of each corner begin; int64 (m, 2), the cost of each, and what
+        `pack` returns. With each arc there is its reverse.
     follow
-        Of `legs_that_follow`.
+        int64 (kinds, classes): bit c is set where a shortest path that passes a corner of this kind
+        along an arc of the one class may go on along one of class c. What is not set must cost
+        more than another way, and by more than costs are rounded.
+    effort
+        Corners that a search for another way settles at most; arcs that are looked at before it is
+        given up.
 
     Returns
     -------
     tuple
-        int32 (n + 1,), where the arcs of each corner cell to those contracted after it begin; int64
-        (u, 2), these arcs; int32 (u,), the corner cell that each leads past, -1 for none.
+        int32 (n + 1,), where the arcs of each corner to those contracted after it begin; int64
+        (u, 2), these arcs; int32 (u,), the corner that each leads past, -1 for none. No arc at all
+        where it is given up.
     """
-    n = kinds.size
+    n = first.size - 1
+    most_settled, most_looked = effort
     begin, size, room, pool, used = _pool_of(first, arcs)
     level = np.zeros(n, np.int64)
     queue = np.empty((n, 2), np.int64)
@@ -234,25 +251,28 @@ def contract(kinds, first, arcs, follow):
         push(queue, node, _UNKNOWN + size[node], node)
         most = max(most, size[node])
     records = np.zeros((n, 3), np.int64)
-    heap = np.empty((SETTLED * most + 1, 2), np.int64)
+    heap = np.empty((most_settled * most + 1, 2), np.int64)
     pairs = np.empty((most, 2), np.int64)
-    stamp = np.int64(0)
+    stamp = looked = np.int64(0)
     waiting = n
     while waiting > 0:
         node = pop(queue, waiting)
         waiting -= 1
-        if SETTLED * most >= heap.shape[0]:
-            heap = np.empty((2 * SETTLED * most + 1, 2), np.int64)
+        if most_settled * most >= heap.shape[0]:
+            heap = np.empty((2 * most_settled * most + 1, 2), np.int64)
         if size[node] * size[node] > pairs.shape[0]:
             pairs = np.empty((2 * size[node] * size[node], 2), np.int64)
-        n_pairs, n_legs, stamp = _shortcuts(
-            (begin, size, pool, kinds, follow), node, stamp, (records, heap), pairs
-        )
+        graph, work = (begin, size, pool, kinds, follow), (records, heap, most_settled)
+        n_pairs, n_legs, stamp = _shortcuts(graph, node, stamp, work, pairs)
         key = 1000 * level[node]
         if size[node] > 0:
             legs = np.int64(0)
             for arc in range(begin[node], begin[node] + size[node]):
                 legs += pool[arc, 2] & 0xFFFFFFFF
+                looked += size[node] + most_settled * size[pool[arc, 1] >> 12]
+            if looked > most_looked:
+                size[:] = 0
+                return _packed_arcs(begin, size, pool)
             key += 1000 * n_pairs // size[node] + 1000 * n_legs // legs
         if waiting > 0 and key > queue[0, 0] + SLACK:
             push(queue, waiting, key, node)
@@ -260,15 +280,15 @@ def contract(kinds, first, arcs, follow):
             continue
         _take_out(begin, size, pool, node)
         for arc in range(begin[node], begin[node] + size[node]):
-            other = pool[arc, 1] >> 8
+            other = pool[arc, 1] >> 12
             level[other] = max(level[other], level[node] + 1)
         for i in range(n_pairs):
             one, two = pairs[i, 0], pairs[i, 1]
             cost = pool[one, 0] + pool[two, 0]
             past = node << 32 | (pool[one, 2] & 0xFFFFFFFF) + (pool[two, 2] & 0xFFFFFFFF)
             for there, back in ((one, two), (two, one)):
-                tail, head = pool[there, 1] >> 8, pool[back, 1] >> 8
-                packed = pack(head, reverse(pool[there, 1] & 15), pool[back, 1] & 15)
+                tail, head = pool[there, 1] >> 12, pool[back, 1] >> 12
+                packed = pack(head, pool[there, 1] & 63, pool[back, 1] & 63)
                 arc = cost, packed, past
                 pool, used = _put_in((begin, size, room), pool, used, tail, arc)
                 most = max(most, size[tail])
