@@ -18,10 +18,25 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from hybridnav.grid import CellClass
-from hybridnav.mesh import ConvexMesh, MeshSearch, build_mesh
+from hybridnav.grid.worlds import office_world
+from hybridnav.mesh import (
+    ConvexMesh,
+    CornerGraph,
+    CornerHierarchy,
+    MeshSearch,
+    build_mesh,
+    shortest_paths,
+)
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from tests.oracle.any_angle import by_visibility, some_positions
-from tests.oracle.mesh import assert_sides_agree, ends_of_sides, polygon, twice_the_area
+from tests.oracle.mesh import (
+    KINDS,
+    assert_sides_agree,
+    ends_of_sides,
+    polygon,
+    search_of,
+    twice_the_area,
+)
 from tests.strategies import class_grids, drawn, occupancy_grid
 
 seeds = st.integers(0, 2**32 - 1)
@@ -66,11 +81,9 @@ def test_each_free_cell_knows_a_polygon_round_its_centre(classes: Any) -> None:
     assert len(np.unique(np.stack([labels[free], component]), axis=1).T) == labels.max(initial=0)
 
 
-def both_searches(mesh: ConvexMesh) -> tuple[MeshSearch, MeshSearch]:
-    """A search of intervals, and one that has prepared its graph of corners."""
-    prepared = MeshSearch(mesh)
-    prepared.prepare()
-    return MeshSearch(mesh), prepared
+def searches(mesh: ConvexMesh) -> list[MeshSearch]:
+    """A search of each kind."""
+    return [search_of(mesh, kind) for kind in KINDS]
 
 
 @settings(max_examples=60, deadline=None)
@@ -82,7 +95,7 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
     graph, mesh = VisibilityGraph(grid), build_mesh(free)
     ends = some_positions(free, seed)
     for search, ((first, start), (last, goal)) in itertools.product(
-        both_searches(mesh), itertools.pairwise(ends)
+        searches(mesh), itertools.pairwise(ends)
     ):
         found = search.path((first, last), (start, goal))
         assert found.length_cells == pytest.approx(by_visibility(grid, graph, start, goal))
@@ -98,7 +111,7 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
 def test_copies_of_a_search_answer_by_the_kernels_that_are_compiled() -> None:
     cells = (0, 0), (3, 4)
     centres = (0.5, 0.5), (3.5, 4.5)
-    for search in both_searches(build_mesh(drawn(".....", ".###.", ".###.", ".....") == 1)):
+    for search in searches(build_mesh(drawn(".....", ".###.", ".###.", ".....") == 1)):
         copied = copy.deepcopy(search)
         assert (copied.graph is None) == (search.graph is None)
         assert copied.path(cells, centres).length_cells == search.path(cells, centres).length_cells
@@ -125,16 +138,49 @@ def test_threads_may_share_a_search_while_it_prepares_itself(
     assert shared.graph is not None
 
 
+def test_all_kinds_of_search_agree_on_a_building() -> None:
+    free = office_world().grid(robot_radius_m=0.25).classes == CellClass.FREE
+    cells = np.argwhere(free)[np.random.default_rng(6).integers(int(free.sum()), size=(60, 2))]
+    plain, landmarks, hierarchy = searches(build_mesh(free))
+    assert isinstance(landmarks.graph, CornerGraph)
+    assert isinstance(hierarchy.graph, CornerHierarchy)
+    expanded = 0
+    for (a, b), (c, d) in cells.tolist():
+        ends = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
+        found = [search.path(*ends) for search in (plain, landmarks, hierarchy)]
+        assert found[1].length_cells == pytest.approx(found[0].length_cells, abs=1e-9)
+        assert found[2].length_cells == pytest.approx(found[0].length_cells, abs=1e-9)
+        assert found[2].lower_bound_cells == found[2].length_cells
+        expanded += found[1].expanded - found[2].expanded
+    assert expanded > 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_queries_get_the_answers_of_each_alone(kind: str) -> None:
+    free = np.random.default_rng(3).random((30, 30)) > 0.25
+    search = search_of(build_mesh(free), kind)
+    cells = np.argwhere(free)[np.random.default_rng(4).integers(int(free.sum()), size=(2, 300))]
+    many = shortest_paths(search, (cells[0], cells[1]), (cells[0] + 0.5, cells[1] + 0.25))
+    for query, (start, goal) in enumerate(zip(*cells.tolist(), strict=True)):
+        ends = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.25, goal[1] + 0.25)
+        alone = search.path((tuple(start), tuple(goal)), ends)
+        assert many.length_cells[query] == alone.length_cells
+        assert many.lower_bound_cells[query] == alone.lower_bound_cells
+        found = many.positions[slice(*many.path_start[query : query + 2])]
+        expected = np.empty((0, 2)) if alone.positions is None else alone.positions
+        np.testing.assert_array_equal(found, expected)
+
+
 def test_two_cells_that_meet_at_a_corner_are_not_connected() -> None:
     free = drawn(".#", "#.") == CellClass.FREE
-    for search in both_searches(build_mesh(free)):
+    for search in searches(build_mesh(free)):
         assert search.path(((0, 1), (1, 0)), ((1.0, 1.0), (1.0, 1.0))).positions is None
         assert search.path(((0, 1), (0, 1)), ((1.0, 1.0), (0.0, 2.0))).length_cells == math.sqrt(2)
 
 
 def test_a_path_may_turn_at_a_corner_and_follow_walls() -> None:
     classes = drawn(".....", ".###.", ".###.", ".....")
-    for search in both_searches(build_mesh(classes == CellClass.FREE)):
+    for search in searches(build_mesh(classes == CellClass.FREE)):
         found = search.path(((0, 0), (3, 4)), ((1.0, 0.5), (3.0, 4.5)))
         assert found.positions is not None
         assert found.positions.tolist() in (
@@ -147,7 +193,7 @@ def test_a_path_may_turn_at_a_corner_and_follow_walls() -> None:
 
 def test_maps_of_one_kind_of_cell() -> None:
     assert build_mesh(np.zeros((3, 4), np.bool_)).n_polygons == 0
-    for search in both_searches(build_mesh(np.ones((3, 4), np.bool_))):
+    for search in searches(build_mesh(np.ones((3, 4), np.bool_))):
         assert search.mesh.n_polygons == 1
         assert search.path(((0, 0), (2, 3)), ((0.0, 0.0), (3.0, 4.0))).length_cells == 5.0
 
@@ -160,7 +206,7 @@ def test_a_search_finds_room_for_its_nodes(monkeypatch: pytest.MonkeyPatch) -> N
     ends = ((0, 0), (39, 39)), ((0.5, 0.5), (39.5, 39.5))
     graph = VisibilityGraph(occupancy_grid(np.where(free, np.uint8(1), np.uint8(0))))
     expected = graph.shortest((0, 0), (39, 39)).length_m
-    for search in both_searches(build_mesh(free)):
+    for search in searches(build_mesh(free)):
         assert search.path(*ends).length_cells == pytest.approx(expected)
 
 
@@ -169,12 +215,12 @@ def test_a_search_finds_room_for_its_nodes(monkeypatch: pytest.MonkeyPatch) -> N
 def test_lengths_are_the_stated_optima(name: str) -> None:
     lines = (DATA / f"{name}.map").read_text().split("\n")[4:]
     free = np.array([[letter == "." for letter in line] for line in lines if line])
-    searches = both_searches(build_mesh(free))
+    every = searches(build_mesh(free))
     with (DATA / f"{name}.csv").open() as file:
         problems = np.array([list(map(float, row)) for row in list(csv.reader(file))[1:]])
     assert len(problems) == 200
     for sx, sy, gx, gy, length in problems.tolist():
         cells = (int(sy), int(sx)), (int(gy), int(gx))
-        for search in searches:
+        for search in every:
             found = search.path(cells, ((sy, sx), (gy, gx)))
             assert abs(found.length_cells - length) < 1e-6

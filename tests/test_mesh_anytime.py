@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
 from hybridnav.mesh import MeshPath, MeshSearch, build_mesh
+from tests.oracle.mesh import KINDS, search_of
 from tests.strategies import class_grids
 
 if TYPE_CHECKING:
@@ -37,14 +38,6 @@ def scattered() -> NDArray[np.bool_]:
     free = np.random.default_rng(3).random((40, 40)) > 0.2
     free[0, 0] = free[-1, -1] = True
     return free
-
-
-def a_search(free: NDArray[np.bool_], *, is_prepared: bool) -> MeshSearch:
-    """A search of intervals, or one that has prepared its graph of corners."""
-    search = MeshSearch(build_mesh(free))
-    if is_prepared:
-        search.prepare()
-    return search
 
 
 def between(search: MeshSearch, start: Cell, goal: Cell, **effort: Any) -> MeshPath:
@@ -90,18 +83,16 @@ _ROUNDED = """
 
 
 @settings(max_examples=40, deadline=None)
-@given(classes=class_grids(max_side=14), seed=seeds, is_prepared=st.booleans())
+@given(classes=class_grids(max_side=14), seed=seeds, kind=st.sampled_from(KINDS))
 @example(
     classes=np.array([list(row) for row in _ROUNDED.split()], dtype=np.uint8),
     seed=139,
-    is_prepared=False,
+    kind="intervals",
 )
-def test_bounds_rise_to_the_optimum_at_every_step(
-    classes: Any, seed: int, *, is_prepared: bool
-) -> None:
+def test_bounds_rise_to_the_optimum_at_every_step(classes: Any, seed: int, kind: str) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
-    search = a_search(free, is_prepared=is_prepared)
+    search = search_of(build_mesh(free), kind)
     start, goal = some_cells(free, seed, 2)
     optimum = between(search, start, goal).length_cells
     with pytest.MonkeyPatch.context() as patch:
@@ -120,13 +111,13 @@ def test_bounds_rise_to_the_optimum_at_every_step(
 
 
 @settings(max_examples=40, deadline=None)
-@given(classes=class_grids(max_side=14), seed=seeds, is_prepared=st.booleans())
+@given(classes=class_grids(max_side=14), seed=seeds, kind=st.sampled_from(KINDS))
 def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(
-    classes: Any, seed: int, *, is_prepared: bool
+    classes: Any, seed: int, kind: str
 ) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
-    search = a_search(free, is_prepared=is_prepared)
+    search = search_of(build_mesh(free), kind)
     start, middle, goal = some_cells(free, seed, 3)
     halves = between(search, start, middle).positions, between(search, middle, goal).positions
     first, then = (np.empty((0, 2)) if half is None else half for half in halves)
@@ -148,14 +139,14 @@ def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(
     classes=class_grids(max_side=14),
     seed=seeds,
     epsilon=st.sampled_from([0.01, 0.1, 1.0]),
-    is_prepared=st.booleans(),
+    kind=st.sampled_from(KINDS),
 )
 def test_epsilon_bounds_the_ratio_of_length_and_bound(
-    classes: Any, seed: int, epsilon: float, *, is_prepared: bool
+    classes: Any, seed: int, epsilon: float, kind: str
 ) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
-    search = a_search(free, is_prepared=is_prepared)
+    search = search_of(build_mesh(free), kind)
     start, goal = some_cells(free, seed, 2)
     plain = between(search, start, goal)
     found = between(search, start, goal, epsilon=epsilon)
@@ -168,11 +159,11 @@ def test_epsilon_bounds_the_ratio_of_length_and_bound(
         assert found.length_cells <= (1 + epsilon) * found.lower_bound_cells + SLACK
 
 
-@pytest.mark.parametrize("is_prepared", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_search_out_of_time_without_a_path_still_bounds(
-    monkeypatch: pytest.MonkeyPatch, *, is_prepared: bool
+    monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    search = a_search(scattered(), is_prepared=is_prepared)
+    search = search_of(build_mesh(scattered()), kind)
     found = list(interrupted(search, (0, 0), (39, 39), monkeypatch))
     assert len(found) > 10
     assert found[0].positions is None

@@ -5,11 +5,28 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
+
+from hybridnav.mesh import MeshSearch
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav.mesh import ConvexMesh
+
+KINDS = "intervals", "landmarks", "hierarchy"
+"""What a search of a mesh may search."""
+
+
+def search_of(mesh: ConvexMesh, kind: str) -> MeshSearch:
+    """A search of intervals, or one that has prepared its graph of corners, contracted or not."""
+    search = MeshSearch(mesh)
+    if kind == "intervals":
+        return search
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hybridnav.mesh.hierarchy._MOST_LOOKED", 0 if kind == "landmarks" else 10**6)
+        search.prepare()
+    return search
 
 
 def polygon(mesh: ConvexMesh, number: int) -> NDArray[Any]:

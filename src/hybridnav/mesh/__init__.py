@@ -5,6 +5,7 @@ from hybridnav.mesh.build import ConvexMesh, build_mesh
 from hybridnav.mesh.corner_graph import CornerGraph
 from hybridnav.mesh.cut import cut_mesh
 from hybridnav.mesh.detour import DetourSearch
+from hybridnav.mesh.hierarchy import CornerHierarchy
 from hybridnav.mesh.many import MeshPaths, shortest_paths
 from hybridnav.mesh.search import MeshPath, MeshSearch
 from hybridnav.mesh.trace import SearchTrace, trace_search
@@ -12,6 +13,7 @@ from hybridnav.mesh.trace import SearchTrace, trace_search
 __all__ = [
     "ConvexMesh",
     "CornerGraph",
+    "CornerHierarchy",
     "DetourSearch",
     "MeshPath",
     "MeshPaths",

@@ -6,12 +6,10 @@ A. V. Goldberg, C. Harrelson: Computing the shortest path: A* search meets graph
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.mesh._end_kernels import APART, MET, polygons_of_ends
+from hybridnav.mesh._end_kernels import look_from_ends
 from hybridnav.mesh._heap_kernels import pop, push
 from hybridnav.mesh._polyanya_kernels import (
     BEGUN,
@@ -27,7 +25,7 @@ from hybridnav.mesh._polyanya_kernels import (
     UPPER,
     put_corner,
 )
-from hybridnav.mesh._view_kernels import distance, lobe_of, see_from_point
+from hybridnav.mesh._view_kernels import distance, lobe_of
 from hybridnav.search._exact_kernels import turn_of
 
 _SLACK = 1e-9
@@ -46,7 +44,7 @@ def query_corners(mesh, graph, where, ends, work, effort):
     graph
         int64 (2 n + 1,) and int32 (m,) of `edges_of`, float64 (n, landmarks) of `landmarks_of`.
     where
-        Component of polygons, the polygon of each cell, and `cells`: of `polygons_of_ends`.
+        See `look_from_ends`.
     work
         Of one query: room for the polygons of the ends; room of `see_from_point`; cost of corners
         (infinite), estimate, corner before, way to the goal (infinite), corners touched; keys and
@@ -62,32 +60,18 @@ def query_corners(mesh, graph, where, ends, work, effort):
     starts, goals, room, corners, heap, _, counts, bounds = work
     costs, _, _, to_goal, touched = corners
     upper, factor, limit = effort
-    sx, sy, tx, ty = ends
     none = np.empty((0, 2))
     if not counts[BEGUN]:
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
-        component, polygon_at, cells = where
-        how, n_starts, n_goals = polygons_of_ends(
-            mesh, component, polygon_at, cells, ends, starts, goals
-        )
-        if how == APART:
-            bounds[:] = np.inf
-            return DONE, none
-        is_seen = how == MET
-        if not is_seen:
-            nowhere = (0.0, 0.0, starts[:0])
-            n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, room, 0)
-            if n < 0:
-                return NO_ROOM, none
-            target = (tx, ty, goals[:n_goals])
-            n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, room, n)
-            if n_all < 0 or n_all - n > len(heap[0]):
-                return NO_ROOM, none
-        if is_seen:
-            bounds[:] = math.hypot(tx - sx, ty - sy)
-            return DONE, _way(mesh, ends, corners[2], -1)
+        status, n, n_all = look_from_ends(mesh, where, ends, (starts, goals, room), bounds)
+        if n_all - n > len(heap[0]):
+            status = NO_ROOM
+        if status == NO_ROOM:
+            return NO_ROOM, none
+        if status == DONE:
+            return DONE, none if bounds[UPPER] == np.inf else _way(mesh, ends, corners[2], -1)
         _seed(mesh, graph, ends, (room[2][:n], room[2][n:n_all]), work)
         counts[BEGUN], counts[MARKED] = 1, n
     status = _advance(mesh, graph, ends, work, factor, limit) if limit >= 0 else DONE

@@ -1,12 +1,64 @@
-"""Kernels of the ends of a query: the polygons that hold them."""
+"""Kernels of the ends of a query: the polygons that hold them, the corners that they see."""
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from hybridnav._jit import njit
+from hybridnav.mesh._polyanya_kernels import DONE, NO_ROOM, PAUSED
+from hybridnav.mesh._view_kernels import see_from_point
 from hybridnav.search._exact_kernels import turn_of
 
 APART, MET, SPLIT = -1, 1, 0
 """How the ends of a query lie: not connected, in one polygon, in several."""
+
+
+@njit(cache=True, nogil=True)
+def look_from_ends(mesh, where, ends, rooms, bounds):
+    """Find the corners that the ends of a query see, or the answer where that needs none.
+
+    Parameters
+    ----------
+    mesh, ends
+        See `successors`.
+    where
+        Component of polygons, the polygon of each cell, and `cells`: of `polygons_of_ends`.
+    rooms
+        int32 room for the polygons of start and goal, room of `see_from_point`.
+    bounds
+        Becomes the answer's length and lower bound: infinite where the ends are not connected,
+        their distance where they see each other.
+
+    Returns
+    -------
+    tuple
+        `DONE` with the answer, `NO_ROOM`, or `PAUSED`; then the room holds the corners that the
+        goal sees, and then those that the start sees: where either end.
+    """
+    sx, sy, tx, ty = ends
+    component, polygon_at, cells = where
+    starts, goals, room = rooms
+    how, n_starts, n_goals = polygons_of_ends(
+        mesh, component, polygon_at, cells, ends, starts, goals
+    )
+    if how == APART:
+        bounds[:] = np.inf
+        return DONE, 0, 0
+    if how == SPLIT:
+        nowhere = (0.0, 0.0, starts[:0])
+        n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, room, 0)
+        if n < 0:
+            return NO_ROOM, 0, 0
+        target = (tx, ty, goals[:n_goals])
+        n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, room, n)
+        if n_all < 0:
+            return NO_ROOM, 0, 0
+        if not is_seen:
+            return PAUSED, n, n_all
+    bounds[:] = math.hypot(tx - sx, ty - sy)
+    return DONE, 0, 0
 
 
 @njit(cache=True, nogil=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hybridnav._jit import guarded, njit
 from hybridnav.mesh._corner_search_kernels import query_corners
+from hybridnav.mesh._hierarchy_search_kernels import query_hierarchy
 from hybridnav.mesh._polyanya_kernels import DONE, LOWER, NO_ROOM, UPPER
 from hybridnav.mesh._query_kernels import query
 
@@ -65,6 +66,24 @@ def many_by_corners(mesh, graph, place, asked, work, bounds, effort, answers, be
         points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
         found = (place[0], place[1], where)
         status, way = query_corners(mesh, graph, found, points, work, effort)
+        if status == NO_ROOM:
+            return k, n, NO_ROOM
+        if not _kept(answers, k, n, way, bounds):
+            return k, n, FULL  # and found once more
+        n += len(way)
+    return len(cells), n, DONE
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def many_by_hierarchy(mesh, hierarchy, place, asked, work, bounds, effort, answers, begin, n):
+    """Answer queries from one on by `query_hierarchy`; see `many_by_intervals`."""
+    cells, ends = asked
+    for k in range(begin, len(cells)):
+        where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
+        points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+        found = (place[0], place[1], where)
+        status, way = query_hierarchy(mesh, hierarchy, found, points, work, effort)
         if status == NO_ROOM:
             return k, n, NO_ROOM
         if not _kept(answers, k, n, way, bounds):

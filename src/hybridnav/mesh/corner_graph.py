@@ -9,10 +9,12 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.mesh import _corner_graph_kernels as kernels
+from hybridnav.mesh.hierarchy import contract_corners
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, IntArray
     from hybridnav.mesh.build import ConvexMesh
+    from hybridnav.mesh.hierarchy import CornerHierarchy
 
 _LANDMARKS, _MORE_LANDMARKS, _MANY_CORNERS = 8, 32, 200_000
 """Landmarks of a map, and of one with many corners. On 49 offices side by side, queries expand 40 %
@@ -40,9 +42,16 @@ class CornerGraph:
     landmark_distances: FloatArray
     """float64 (n, landmarks), distances in the graph in cells, infinite where there is no way."""
 
+    @property
+    def arrays(self) -> tuple[IntArray, IntArray, FloatArray]:
+        """The arrays in the order of the kernels."""
+        return self.first, self.heads, self.landmark_distances
 
-def build_corner_graph(mesh: ConvexMesh, arrays: tuple[object, ...]) -> CornerGraph | None:
-    """Build the graph of corners of a mesh.
+
+def build_corner_graph(
+    mesh: ConvexMesh, arrays: tuple[object, ...]
+) -> CornerGraph | CornerHierarchy | None:
+    """Build the graph of corners of a mesh, and contract it where that is done soon.
 
     Parameters
     ----------
@@ -53,8 +62,9 @@ def build_corner_graph(mesh: ConvexMesh, arrays: tuple[object, ...]) -> CornerGr
 
     Returns
     -------
-    CornerGraph or None
-        None where sights are so far and free that there are too many edges.
+    CornerGraph, CornerHierarchy or None
+        The graph with landmarks where contracting it takes too long. None where sights are so far
+        and free that there are too many edges.
 
     Notes
     -----
@@ -67,6 +77,9 @@ def build_corner_graph(mesh: ConvexMesh, arrays: tuple[object, ...]) -> CornerGr
     first, heads = kernels.edges_of(arrays, mesh.component, _MOST_EDGES * n)
     if first[-1] < 0:
         return None
+    hierarchy = contract_corners(mesh, arrays, (first, heads))
+    if hierarchy is not None:
+        return hierarchy
     degrees = first[2::2] - first[:-2:2]
     number = _LANDMARKS if n < _MANY_CORNERS else _MORE_LANDMARKS
     table = np.empty((n, number if len(heads) else 0))

@@ -10,8 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.mesh._many_kernels import FULL, many_by_corners, many_by_intervals
+from hybridnav.mesh._many_kernels import (
+    FULL,
+    many_by_corners,
+    many_by_hierarchy,
+    many_by_intervals,
+)
 from hybridnav.mesh._polyanya_kernels import NO_ROOM
+from hybridnav.mesh.hierarchy import CornerHierarchy
 from hybridnav.mesh.search import NO_LIMIT, SURE, rounded_into
 
 if TYPE_CHECKING:
@@ -107,8 +113,9 @@ def _one_by_one(
                 blocks = mesh.block_of, search.tree
                 at, n, short = many_by_intervals(search.arrays, blocks, *rest, *found)
             else:
-                edges = graph.first, graph.heads, graph.landmark_distances
-                at, n, short = many_by_corners(search.arrays, edges, *rest, *found)
+                is_contracted = isinstance(graph, CornerHierarchy)
+                answer = many_by_hierarchy if is_contracted else many_by_corners
+                at, n, short = answer(search.arrays, graph.arrays, *rest, *found)
             if short == NO_ROOM:
                 work.make_room()
             elif short == FULL:

@@ -14,8 +14,10 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.mesh import _polyanya_kernels as polyanya
 from hybridnav.mesh._corner_search_kernels import query_corners
+from hybridnav.mesh._hierarchy_search_kernels import FAR, query_hierarchy
 from hybridnav.mesh._query_kernels import query
 from hybridnav.mesh.corner_graph import build_corner_graph
+from hybridnav.mesh.hierarchy import CornerHierarchy
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
@@ -59,7 +61,7 @@ class MeshPath:
 
 
 class _Work:
-    """Work arrays of one query, of either kind."""
+    """Work arrays of one query, of any kind."""
 
     def __init__(self, mesh: ConvexMesh) -> None:
         self.ends = np.empty(mesh.n_polygons, np.int32), np.empty(mesh.n_polygons, np.int32)
@@ -115,12 +117,33 @@ class _CornerWork(_Work):
         return *self.ends, self.views, self.corners, self.heap, *tail
 
 
+class _HierarchyWork(_Work):
+    """Work arrays of a query of the hierarchy of corners."""
+
+    def __init__(self, mesh: ConvexMesh) -> None:
+        super().__init__(mesh)
+        n = len(mesh.corners)
+        self.views = np.empty((_ROOM, 2), np.int32), np.empty((_ROOM, 4)), np.empty(_ROOM, np.int32)
+        self.records, self.touched = np.full((n, 4), FAR), np.empty(n, np.int32)
+        self.heaps = np.empty((_ROOM, 2), np.int64), np.empty((_ROOM, 2), np.int64)
+
+    def make_room(self) -> None:
+        self.heaps, self.views = _doubled(self.heaps), _doubled(self.views)
+
+    @property
+    def arrays(self) -> tuple[object, ...]:
+        """The arrays in the order of `query_hierarchy`."""
+        tail = self.heaps, self.counts, self.bounds
+        return *self.ends, self.views, self.records, self.touched, *tail
+
+
 @copies_alike
 class MeshSearch:
     """Exact shortest any-angle paths on a mesh; threads may share it.
 
     The first queries search intervals of the mesh (Polyanya). Once these have taken about as long,
-    the graph of corners is built, in which all later queries are answered, up to ten times as fast.
+    the graph of corners is built, and contracted where that is soon done: all later queries are
+    answered in there, up to ten times as fast, and in large buildings far more than that.
     Which of several paths of one length is found may differ between the two.
 
     Parameters
@@ -141,24 +164,27 @@ class MeshSearch:
         self.arrays = cols, rows, mesh.kinds, mesh.first, *sides
         self.tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
         self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))
-        self._graph: CornerGraph | None = None
+        self.corner_works: Pool[Any]
+        self._graph: CornerGraph | CornerHierarchy | None = None
         self._is_prepared = False
         self._lock = threading.Lock()
         self._expanded = 0
 
     @property
-    def graph(self) -> CornerGraph | None:
-        """The graph of corners, None until it is built."""
+    def graph(self) -> CornerGraph | CornerHierarchy | None:
+        """The graph of corners, contracted or not; None until it is built."""
         return self._graph
 
     def prepare(self) -> None:
-        """Build the graph of corners now, if it is not there yet: some 0.5 microseconds a cell."""
+        """Build the graph of corners now, if it is not there yet: up to a microsecond a cell."""
         if self._is_prepared:
             return
         with self._lock:
             if not self._is_prepared:
                 graph = build_corner_graph(self.mesh, self.arrays)
-                if graph is not None:
+                if isinstance(graph, CornerHierarchy):
+                    self.corner_works = Pool(partial(_HierarchyWork, self.mesh))
+                elif graph is not None:
                     n_landmarks = graph.landmark_distances.shape[1]
                     self.corner_works = Pool(partial(_CornerWork, self.mesh, n_landmarks))
                 self._graph = graph
@@ -217,7 +243,7 @@ class MeshSearch:
 
     def _run(
         self,
-        graph: CornerGraph | None,
+        graph: CornerGraph | CornerHierarchy | None,
         where: tuple[int, ...],
         points: tuple[float, ...],
         work: Any,
@@ -233,9 +259,9 @@ class MeshSearch:
                 blocks = self.mesh.block_of, self.tree, at
                 found = query(self.arrays, *blocks, where, points, work.arrays, left)
             else:
-                edges = graph.first, graph.heads, graph.landmark_distances
+                answer = query_hierarchy if isinstance(graph, CornerHierarchy) else query_corners
                 place = self.mesh.component, at, where
-                found = query_corners(self.arrays, edges, place, points, work.arrays, left)
+                found = answer(self.arrays, graph.arrays, place, points, work.arrays, left)
             status, way = found
             if status == polyanya.DONE:
                 return cast("FloatArray", way)

@@ -1,0 +1,85 @@
+"""Kernels of the hierarchy of corners: the arcs that are contracted, and which may follow which.
+
+Costs are whole numbers, distances in `UNIT`, rounded down: so sums of them are exact, and never
+exceed the distance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import guarded, njit
+from hybridnav.mesh._view_kernels import distance, lobe_of
+from hybridnav.search._contract_kernels import pack
+
+UNITS = float(1 << 34)
+"""Parts of a cell in which costs are counted: a path of 100,000 segments is right to 1e-5 cells,
+and one of 5e8 cells fits."""
+_SECTORS = 32
+"""Parts of a quadrant that directions are sorted into."""
+
+
+@njit(cache=True, nogil=True)
+def cost_of(ax, ay, bx, by):
+    """Cost of the segment between two points."""
+    return np.int64(distance(ax, ay, bx, by) * UNITS)
+
+
+@njit(cache=True, nogil=True)
+def class_of(kind, dx, dy):
+    """Class of a direction that leads away from a corner and touches its blocked cell: its quadrant
+    (see `lobe_of`), and in there its sector by slope."""
+    across = abs(dy)
+    sector = min(int(across / (abs(dx) + across) * _SECTORS), _SECTORS - 1)
+    return lobe_of(kind, dx, dy) * _SECTORS + sector
+
+
+@njit(cache=True, nogil=True)
+def ways_that_follow():
+    """Return which classes may follow which at a corner on a shortest path, see `contract`.
+
+    A path goes from one quadrant beside the blocked cell to the other, and does not bend away from
+    that cell. Of two neighbouring sectors it is not said that it does: then what is left out is
+    longer than the shortest way by more than costs are rounded.
+
+    Returns
+    -------
+    numpy.ndarray
+        int64 (4, 64).
+    """
+    table = np.zeros((4, 2 * _SECTORS), np.int64)
+    for one in range(_SECTORS):
+        for two in range(max(one - 1, 0), _SECTORS):
+            table[:, one] |= np.int64(1) << _SECTORS + two
+            table[:, _SECTORS + two] |= np.int64(1) << one
+    return table
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def arcs_of(mesh, first, heads):
+    """Build the arcs of the graph of corners, as `contract` takes them.
+
+    Parameters
+    ----------
+    mesh
+        See `successors`.
+    first, heads
+        Of `edges_of`.
+
+    Returns
+    -------
+    tuple
+        int64 (n + 1,), where the arcs of each corner begin; int64 (m, 2), these arcs.
+    """
+    cx, cy, kinds = mesh[0], mesh[1], mesh[2]
+    arcs = np.empty((len(heads), 2), np.int64)
+    for corner in range(len(kinds)):
+        x, y = cx[corner], cy[corner]
+        for k in range(first[2 * corner], first[2 * corner + 2]):
+            other = np.int64(heads[k])
+            dx, dy = cx[other] - x, cy[other] - y
+            near, far = class_of(kinds[corner], dx, dy), class_of(kinds[other], -dx, -dy)
+            arcs[k, 0] = cost_of(x, y, cx[other], cy[other])
+            arcs[k, 1] = pack(other, near, far)
+    return first[::2].copy(), arcs
