@@ -1,7 +1,10 @@
 """One building tiled to many millions of cells: what structures cost there, and what queries take.
 
 Structures are asked directly, without a planner: the topological map, which a planner is made from
-for the sake of its routes, is a matter of `benchmarks.pyramid`.
+for the sake of its routes, is a matter of `benchmarks.pyramid`. Preparation includes all that
+`planner.prepare()` builds for paths. Some lengths of `shortest` are compared with those of the
+search of intervals, which shares no more than the mesh with what is measured: column `differ`
+counts those that are not equal to 1e-6 cells, of `compared`.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ import os
 import resource
 import sys
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import ndimage
@@ -38,6 +41,8 @@ if TYPE_CHECKING:
 
 DOOR_CELLS = 9
 """Width of the doors between tiles."""
+COMPARED = 20
+"""Queries that are put to the search of intervals, too."""
 
 
 def scale(file: Path, millions: list[float], *, pairs: int, seed: int) -> str:
@@ -77,13 +82,14 @@ def _rows_of(free: BoolArray, *, pairs: int, seed: int) -> list[Row]:
     queries = list(zip(cells[::2], cells[1::2], strict=True))
     makers = {YARDSTICK: _by_cells, "shortest": _by_mesh}
     asked: dict[str, Ask] = {}
+    structures: dict[str, Any] = {}
     rows: dict[str, Row] = {}
     load = os.getloadavg()[0]
     n_free = int(free.sum())
     for name, make in makers.items():
         gc.collect()
         began = time.perf_counter()
-        structure, asked[name] = make(free)
+        structures[name], asked[name] = make(free)
         seconds = time.perf_counter() - began
         asked[name](*queries[0])
         rows[name] = {
@@ -92,7 +98,7 @@ def _rows_of(free: BoolArray, *, pairs: int, seed: int) -> list[Row]:
             "structure": name,
             "preparation s": seconds,
             "us/cell": 1e6 * seconds / n_free,
-            "B/cell": _nbytes(structure, set()) / n_free,
+            "B/cell": _nbytes(structures[name], set()) / n_free,
         }
     sys.stderr.write(f"{free.size / 1e6:.1f} M cells: prepared, load {os.getloadavg()[0]:.1f}\n")
     times, lengths = _ask(asked, queries, seed)
@@ -103,6 +109,13 @@ def _rows_of(free: BoolArray, *, pairs: int, seed: int) -> list[Row]:
         row |= {f"ms {word}": nanquantile(ms, share) for word, share in shares}
         row["times A*"] = nanquantile(times[YARDSTICK] / times[name], 0.5)
         row |= {"load": load, "peak GB": peak}
+    compared = queries[:COMPARED]
+    found = lengths["shortest"][: len(compared)]
+    expected = np.array(_by_intervals(structures["shortest"], compared))
+    differ = (found != expected) & ~(np.abs(found - expected) < 1e-6)
+    rows["shortest"] |= {"compared": len(compared), "differ": int(differ.sum())}
+    if differ.any():
+        sys.stderr.write(f"broken promise: {int(differ.sum())} paths are not the shortest\n")
     too_long = lengths["shortest"] > lengths[YARDSTICK] * (1 + SLACK)
     if too_long.any() or not np.isfinite(lengths["shortest"]).all():
         sys.stderr.write(f"broken promise: {int(too_long.sum())} paths longer than A*'s\n")
@@ -123,12 +136,23 @@ def _by_cells(free: BoolArray) -> tuple[object, Ask]:
 def _by_mesh(free: BoolArray) -> tuple[object, Ask]:
     """The search of the convex mesh."""
     search = MeshSearch(build_mesh(free))
+    search.prepare()
 
     def ask(start: Cell, goal: Cell) -> float:
-        centres = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.5, goal[1] + 0.5)
-        return search.path((start, goal), centres).length_cells
+        return search.path((start, goal), _centres(start, goal)).length_cells
 
     return search, ask
+
+
+def _by_intervals(prepared: MeshSearch, queries: list[tuple[Cell, Cell]]) -> list[float]:
+    """Lengths by the search of intervals: with a budget a search does not prepare itself."""
+    plain = MeshSearch(prepared.mesh)
+    return [plain.path(ends, _centres(*ends), budget_s=math.inf).length_cells for ends in queries]
+
+
+def _centres(start: Cell, goal: Cell) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The centres of two cells, (row, col) in grid units."""
+    return (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.5, goal[1] + 0.5)
 
 
 def _ask(

@@ -40,7 +40,7 @@ Cell = tuple[int, int]
 LEAST_CELLS = 300_000
 WARM = np.random.default_rng(0).random((60, 60)) > 0.2
 HEAD = (
-    "| map | free cells | corners | edges | mesh, graph: us a free cell | bytes a free cell |"
+    "| map | free cells | corners | edges or arcs | mesh, graph: us a free cell | bytes |"
     " intervals | corners expanded | intervals: ms | corners: ms | 1 %: ms |\n" + "|---" * 11 + "|"
 )
 
@@ -125,7 +125,7 @@ def measure(name: str, free: BoolArray, *, pairs: int, seed: int) -> bool:
     graph = prepared.graph
     costs = f"{mesh_ms / n_free * 1e3:.2f}, {graph_ms / n_free * 1e3:.2f}"
     sizes = f"{nbytes(plain) / n_free:.0f}, {nbytes(graph) / n_free:.0f}"
-    edges = 0 if graph is None else len(graph.heads)
+    edges = 0 if graph is None else len(graph.arrays[1])
     cells_of = [name, f"{n_free / 1e6:.2f} M", str(len(mesh.corners)), str(edges), costs, sizes]
     print("| " + " | ".join(cells_of + counts + times) + " |", flush=True)
     return agree

@@ -100,3 +100,17 @@ def test_a_tiled_building_is_connected() -> None:
     whole = _queries_scale._tiled(free, 1000)
     assert whole.size >= 1000
     assert ndimage.label(whole)[1] == 1
+
+
+def test_the_scale_table_counts_paths_that_are_not_the_shortest(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    free = np.zeros((9, 14), np.bool_)
+    free[2:7, 3:9] = free[4, 9:13] = True
+    whole = _queries_scale._tiled(free, 1000)
+    _, row = _queries_scale._rows_of(whole, pairs=4, seed=0)
+    assert (row["structure"], row["compared"], row["differ"]) == ("shortest", 4, 0)
+    monkeypatch.setattr(_queries_scale, "_by_intervals", lambda _, queries: [0.5] * len(queries))
+    _, row = _queries_scale._rows_of(whole, pairs=4, seed=0)
+    assert row["differ"] == 4
+    assert "4 paths are not the shortest" in capsys.readouterr().err
