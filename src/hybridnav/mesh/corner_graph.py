@@ -9,12 +9,10 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.mesh import _corner_graph_kernels as kernels
-from hybridnav.mesh.hierarchy import contract_corners
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, IntArray
+    from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.mesh.build import ConvexMesh
-    from hybridnav.mesh.hierarchy import CornerHierarchy
 
 _LANDMARKS, _MORE_LANDMARKS, _MANY_CORNERS = 8, 32, 200_000
 """Landmarks of a map, and of one with many corners. On 49 offices side by side, queries expand 40 %
@@ -33,7 +31,7 @@ class CornerGraph:
     edge, or several on one line.
     """
 
-    first: IntArray
+    first: LongArray
     """int64 (2 n + 1,), the edges of corner i into one of the two quadrants beside its blocked cell
     are `first[2 i]` to `first[2 i + 1]`, those into the other `first[2 i + 1]` to
     `first[2 i + 2]`."""
@@ -43,15 +41,13 @@ class CornerGraph:
     """float64 (n, landmarks), distances in the graph in cells, infinite where there is no way."""
 
     @property
-    def arrays(self) -> tuple[IntArray, IntArray, FloatArray]:
+    def arrays(self) -> tuple[LongArray, IntArray, FloatArray]:
         """The arrays in the order of the kernels."""
         return self.first, self.heads, self.landmark_distances
 
 
-def build_corner_graph(
-    mesh: ConvexMesh, arrays: tuple[object, ...]
-) -> CornerGraph | CornerHierarchy | None:
-    """Build the graph of corners of a mesh, and contract it where that is done soon.
+def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray, IntArray] | None:
+    """Find the edges between the corners of a mesh.
 
     Parameters
     ----------
@@ -62,24 +58,42 @@ def build_corner_graph(
 
     Returns
     -------
-    CornerGraph, CornerHierarchy or None
-        The graph with landmarks where contracting it takes too long. None where sights are so far
-        and free that there are too many edges.
+    tuple or None
+        See `CornerGraph`. None where sights are so far and free that there are too many edges.
 
     Notes
     -----
     S. Oh, H. W. Leong: Edge N-level sparse visibility graphs: fast optimal any-angle pathfinding
-    using hierarchical taut paths, 2017 (the edges). A. V. Goldberg, C. Harrelson: Computing the
-    shortest path: A* search meets graph theory, 2005 (landmarks, each the corner farthest from
-    those before).
+    using hierarchical taut paths, 2017.
     """
-    n = len(mesh.corners)
-    first, heads = kernels.edges_of(arrays, mesh.component, _MOST_EDGES * n)
+    first, heads = kernels.edges_of(arrays, mesh.component, _MOST_EDGES * len(mesh.corners))
     if first[-1] < 0:
         return None
-    hierarchy = contract_corners(mesh, arrays, (first, heads))
-    if hierarchy is not None:
-        return hierarchy
+    for array in (first, heads):
+        array.flags.writeable = False
+    return first, heads
+
+
+def add_landmarks(
+    mesh: ConvexMesh, arrays: tuple[object, ...], edges: tuple[LongArray, IntArray]
+) -> CornerGraph:
+    """Add landmarks to the edges between the corners of a mesh.
+
+    Parameters
+    ----------
+    mesh
+        The mesh.
+    arrays
+        Of the kernel `successors`.
+    edges
+        Of `find_edges`.
+
+    Notes
+    -----
+    A. V. Goldberg, C. Harrelson: Computing the shortest path: A* search meets graph theory, 2005
+    (each landmark is the corner farthest from those before).
+    """
+    (first, heads), n = edges, len(mesh.corners)
     degrees = first[2::2] - first[:-2:2]
     number = _LANDMARKS if n < _MANY_CORNERS else _MORE_LANDMARKS
     table = np.empty((n, number if len(heads) else 0))
@@ -91,6 +105,5 @@ def build_corner_graph(
         inside = part == np.bincount(part, weights=degrees).argmax()
         source = int(np.where(inside, degrees, -1).argmax())
         kernels.landmarks_of(arrays[:2], (first, heads), source, table)
-    for array in (first, heads, table):
-        array.flags.writeable = False
+    table.flags.writeable = False
     return CornerGraph(first, heads, table)

@@ -112,9 +112,10 @@ class DetourSearch:
         """A shortest path in the graph of corners; None where there is no such graph, where closed
         cells make too many corners, or where an end lies at a corner of a cell that is not free."""
         search = self._search
-        graph = search.graph
-        if graph is None:
+        landmarked = search.landmarked()
+        if landmarked is None:
             return None
+        graph, works = landmarked
         if self._detour is None:
             self._detour = _detour_of(search, graph, self._closure)
         if len(self._detour[1][0]) > MOST_MADE:
@@ -122,9 +123,9 @@ class DetourSearch:
         limit = NO_LIMIT if math.isinf(until) else _SLICE
         ends = tuple(_inside(*end) for end in zip(cells, positions, strict=True))
         points = ends[0][1], ends[0][0], ends[1][1], ends[1][0]
-        mesh, edges = search.mesh, (graph.first, graph.heads, graph.landmark_distances)
+        mesh, edges = search.mesh, graph.arrays
         where = mesh.component, mesh.polygon_at, (*cells[0], *cells[1])
-        with search.corner_works.lent() as work:
+        with works.lent() as work:
             while True:
                 status, way = query_round(
                     *(search.arrays, edges, self._detour, where, points, work.arrays),
@@ -150,8 +151,6 @@ def _detour_of(search: MeshSearch, graph: CornerGraph, closure: Any) -> tuple[An
     made = closures.corners_of_closure(closure, polygon_at)
     if len(made[0]) > MOST_MADE:
         return closure, made
-    edges = kernels.edges_of_closure(
-        search.arrays, polygon_at, (graph.first, graph.heads, table), closure, made
-    )
+    edges = kernels.edges_of_closure(search.arrays, polygon_at, graph.arrays, closure, made)
     groups = kernels.groups_of_closure(search.arrays[:2], table, made, edges, _GROUPS)
     return closure, made, edges, groups

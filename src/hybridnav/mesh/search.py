@@ -16,12 +16,12 @@ from hybridnav.mesh import _polyanya_kernels as polyanya
 from hybridnav.mesh._corner_search_kernels import query_corners
 from hybridnav.mesh._hierarchy_search_kernels import FAR, query_hierarchy
 from hybridnav.mesh._query_kernels import query
-from hybridnav.mesh.corner_graph import build_corner_graph
-from hybridnav.mesh.hierarchy import CornerHierarchy
+from hybridnav.mesh.corner_graph import add_landmarks, find_edges
+from hybridnav.mesh.hierarchy import CornerHierarchy, contract_corners
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.mesh.build import ConvexMesh
     from hybridnav.mesh.corner_graph import CornerGraph
 
@@ -166,6 +166,8 @@ class MeshSearch:
         self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))
         self.corner_works: Pool[Any]
         self._graph: CornerGraph | CornerHierarchy | None = None
+        self._edges: tuple[LongArray, IntArray] | None = None
+        self._landmarked: tuple[CornerGraph, Pool[Any]] | None = None
         self._is_prepared = False
         self._lock = threading.Lock()
         self._expanded = 0
@@ -180,15 +182,36 @@ class MeshSearch:
         if self._is_prepared:
             return
         with self._lock:
-            if not self._is_prepared:
-                graph = build_corner_graph(self.mesh, self.arrays)
-                if isinstance(graph, CornerHierarchy):
+            if self._is_prepared:
+                return
+            self._edges = find_edges(self.mesh, self.arrays)
+            if self._edges is not None:
+                hierarchy = contract_corners(self.mesh, self.arrays, self._edges)
+                if hierarchy is None:
+                    graph, self.corner_works = self._with_landmarks(self._edges)
+                    self._graph = graph
+                else:
                     self.corner_works = Pool(partial(_HierarchyWork, self.mesh))
-                elif graph is not None:
-                    n_landmarks = graph.landmark_distances.shape[1]
-                    self.corner_works = Pool(partial(_CornerWork, self.mesh, n_landmarks))
-                self._graph = graph
-                self._is_prepared = True
+                    self._graph = hierarchy
+            self._is_prepared = True
+
+    def landmarked(self) -> tuple[CornerGraph, Pool[Any]] | None:
+        """Return the graph of corners with landmarks, and work arrays for it: what searches round
+        closed cells need. It is built when the first asks; None until the graph of corners is."""
+        if self._edges is None:
+            return None
+        if self._landmarked is None:
+            with self._lock:
+                if self._landmarked is None:
+                    self._with_landmarks(self._edges)
+        return self._landmarked
+
+    def _with_landmarks(self, edges: tuple[LongArray, IntArray]) -> tuple[CornerGraph, Pool[Any]]:
+        """Build what `landmarked` returns; the caller holds the lock."""
+        graph = add_landmarks(self.mesh, self.arrays, edges)
+        works = Pool(partial(_CornerWork, self.mesh, graph.landmark_distances.shape[1]))
+        self._landmarked = graph, works
+        return graph, works
 
     def path(
         self,
