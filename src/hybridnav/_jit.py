@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import warnings
-from functools import cache
+from functools import cache, cached_property
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
+from numba.core import types
 from numba.core.registry import CPUDispatcher
 
 from hybridnav.errors import CacheWarning
@@ -42,14 +44,22 @@ def njit(**options: Any) -> Callable[[Any], Any]:
 
     def decorate(function: Any) -> Any:
         try:
-            return numba.njit(**options)(function)
+            return _kernel(function, options)
         except RuntimeError as error:
             if "no locator available" not in str(error):
                 raise
         _tell()
-        return numba.njit(**{**options, "cache": False})(function)
+        return _kernel(function, {**options, "cache": False})
 
     return decorate
+
+
+def _kernel(function: Any, options: dict[str, Any]) -> Any:
+    """Compile a function for Python and for other kernels; as it is with the compiler off."""
+    kernel = numba.njit(**{**options, "no_cfunc_wrapper": True})(function)  # nobody calls it from C
+    if isinstance(kernel, CPUDispatcher):
+        kernel.__class__ = _Kernel
+    return kernel
 
 
 @cache
@@ -65,7 +75,50 @@ def _tell() -> None:
         )
 
 
-class _Guarded(CPUDispatcher):
+class _Inner(CPUDispatcher):
+    """What other kernels call in place of a kernel.
+
+    A first plan spends more time in the compiler than in all else, and there a quarter of it went
+    into what Python needs to call the kernels that it never calls, and into one version of each for
+    every whole number that they are called with.
+    """
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile for the types of the arguments, not for their values."""
+        return super().get_call_template(tuple(map(_type_of, args)), kws)
+
+    def add_overload(self, cres: Any) -> None:
+        """Keep what was compiled from Python, which cannot call it."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
+
+def _type_of(argument: Any) -> Any:
+    """Return the type of an argument whose value may be known."""
+    return types.unliteral(argument)  # type: ignore[no-untyped-call]
+
+
+class _Kernel(CPUDispatcher):
+    """A kernel that Python calls; other kernels call its twin."""
+
+    @cached_property
+    def inner(self) -> _Inner:
+        """The twin, under another name in the cache."""
+        code = self.py_func
+        twin = FunctionType(code.__code__, code.__globals__, code.__name__, code.__defaults__)
+        twin.__qualname__ = f"{code.__qualname__}_inner"
+        is_kept = self.stats.cache_path is not None
+        options = {**self.targetoptions, "no_cpython_wrapper": True, "cache": is_kept}
+        kernel: Any = numba.jit(**options)(twin)
+        kernel.__class__ = _Inner
+        inner: _Inner = kernel
+        return inner
+
+    @property
+    def _numba_type_(self) -> Any:
+        return types.Dispatcher(self.inner)
+
+
+class _Guarded(_Kernel):
     """A kernel that raises what was raised while its results became objects of Python."""
 
     def __call__(self, *arguments: Any) -> Any:
@@ -87,6 +140,6 @@ def guarded(kernel: Kernel) -> Kernel:
     several results numba goes on to the next one: it returns a broken tuple with the exception set,
     which Python turns into a SystemError whose cause is the exception.
     """
-    if isinstance(kernel, CPUDispatcher):  # with the compiler off it is a plain function
+    if isinstance(kernel, CPUDispatcher):
         kernel.__class__ = _Guarded  # type: ignore[assignment]
     return kernel
