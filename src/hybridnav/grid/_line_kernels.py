@@ -47,10 +47,10 @@ def passed_cells(free, positions):
         for axis in range(2):
             room += int(abs(positions[k + 1, axis] - positions[k, axis])) + 2
     cells = np.empty((room, 2), np.int64)
-    cells[0] = _free_cell_at(free, positions[0, 0], positions[0, 1])
+    cells[0, 0], cells[0, 1] = _free_cell_at(free, positions[0, 0], positions[0, 1])
     n = 1
     for k in range(len(positions) - 1):
-        row, col = positions[k]
+        row, col = positions[k, 0], positions[k, 1]
         down, across = positions[k + 1, 0] - row, positions[k + 1, 1] - col
         length = math.hypot(down, across)
         # The next line of the lattice in each direction, and where the segment meets it.
@@ -65,7 +65,7 @@ def passed_cells(free, positions):
                 middle = (here + there) / 2
                 cell = _free_cell_at(free, row + middle * down, col + middle * across)
                 if cell[0] != cells[n - 1, 0] or cell[1] != cells[n - 1, 1]:
-                    cells[n] = cell
+                    cells[n, 0], cells[n, 1] = cell
                     n += 1
             if by_row <= there:
                 line_row += down_step
@@ -76,7 +76,7 @@ def passed_cells(free, positions):
             here = there
     cell = _free_cell_at(free, positions[-1, 0], positions[-1, 1])
     if cell[0] != cells[n - 1, 0] or cell[1] != cells[n - 1, 1]:
-        cells[n] = cell
+        cells[n, 0], cells[n, 1] = cell
         n += 1
     return cells[:n].copy()
 
