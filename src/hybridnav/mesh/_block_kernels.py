@@ -91,7 +91,9 @@ def blocks_of(first, twins, polygon_of):
                 n_blocks += 1
         n_components += 1
     # Parents come earlier in the order of visits.
-    order = np.argsort(number)
+    order = np.empty(n, np.int32)
+    for polygon in range(n):
+        order[number[polygon]] = polygon
     for polygon in order:
         if up[polygon] >= 0:
             depth[polygon] = depth[head_of[up[polygon]]] + 1

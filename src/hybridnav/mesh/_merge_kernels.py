@@ -33,47 +33,8 @@ def are_free(corners, vertices, free):
 
 @guarded
 @njit(cache=True, nogil=True)
-def select_triangles(vertices, neighbours, is_kept):
-    """Select some triangles, in the order of their first corners.
-
-    Parameters
-    ----------
-    vertices, neighbours
-        (m, 3) corners of all triangles, and the triangle across the side from corner k to k + 1,
-        none where there are not so many.
-    is_kept
-        bool (m,); a wall parts those that are from those that are not.
-
-    Returns
-    -------
-    tuple
-        int32 (f, 3) corners, int32 (f, 3) the triangle across each side, `WALL` for none.
-    """
-    n = len(vertices)
-    number = np.full(n, WALL, np.int32)
-    count = 0
-    for triangle in np.argsort(vertices[:, 0], kind="mergesort"):
-        if is_kept[triangle]:
-            number[triangle] = count
-            count += 1
-    kept, across = np.empty((count, 3), np.int32), np.full((count, 3), WALL, np.int32)
-    for triangle in range(n):
-        place = number[triangle]
-        if place < 0:
-            continue
-        for k in range(3):
-            kept[place, k] = vertices[triangle, k]
-            other = neighbours[triangle, k]
-            if other < n:
-                across[place, k] = number[other]
-    return kept, across
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def merge_triangles(corners, triangles, neighbours):
-    """Merge triangles into convex polygons, as long as a union is convex (S. Hertel, K. Mehlhorn,
-    1983), longest common sides first.
+def sides_of_triangles(corners, triangles, neighbours):
+    """Link the sides of triangles, side 3 t + k from corner k of triangle t to the next one.
 
     Parameters
     ----------
@@ -87,37 +48,57 @@ def merge_triangles(corners, triangles, neighbours):
     Returns
     -------
     tuple
-        int32 (p + 1,) first slot of each polygon; int32 (s,) corner at which each slot's side
-        begins; int32 (s,) twin slot, -1 for a wall; int32 (s,) polygon of each slot.
+        int32 (3 n,) twin of each side, the side after it and the one before it; int64 (3 n,) the
+        squared lengths of common sides at one of each twins, else 0.
     """
     n = len(triangles)
-    twin = np.full(3 * n, WALL, np.int32)
+    twin = np.empty(3 * n, np.int32)
     following = np.empty(3 * n, np.int32)
     before = np.empty(3 * n, np.int32)
+    squared = np.zeros(3 * n, np.int64)
     for t in range(n):
         for k in range(3):
             side = 3 * t + k
             following[side] = 3 * t + (k + 1) % 3
             before[side] = 3 * t + (k + 2) % 3
+            twin[side] = WALL
             other = neighbours[t, k]
             if other < 0:
                 continue
+            a, b = triangles[t, k], triangles[t, (k + 1) % 3]
             for m in range(3):
-                if triangles[other, m] == triangles[t, (k + 1) % 3] and (
-                    triangles[other, (m + 1) % 3] == triangles[t, k]
-                ):
+                if triangles[other, m] == b and triangles[other, (m + 1) % 3] == a:
                     twin[side] = 3 * other + m
-    tail = triangles.ravel()
-    length = np.zeros(3 * n)
-    for side in range(3 * n):
-        if twin[side] > side:
-            a, b = tail[side], tail[following[side]]
-            rows, cols = corners[a, 0] - corners[b, 0], corners[a, 1] - corners[b, 1]
-            length[side] = -float(rows * rows + cols * cols)
-    is_gone = np.zeros(3 * n, np.bool_)
-    for side in np.argsort(length, kind="mergesort"):
-        if length[side] == 0.0:
-            break
+            if twin[side] > side:
+                rows, cols = corners[a, 0] - corners[b, 0], corners[a, 1] - corners[b, 1]
+                squared[side] = rows * rows + cols * cols
+    return twin, following, before, squared
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def merge_across(corners, tail, sides, order):
+    """Merge triangles across some sides, in their order, where the union is convex.
+
+    Parameters
+    ----------
+    corners
+        int32 (n, 2).
+    tail
+        int32 (s,), the corner at which each side begins.
+    sides
+        Of `sides_of_triangles`; this changes what comes after and before a side.
+    order
+        int64, the sides.
+
+    Returns
+    -------
+    tuple
+        See `merge_triangles`.
+    """
+    twin, following, before = sides
+    is_gone = np.zeros(len(tail), np.bool_)
+    for side in order:
         other = twin[side]
         # The corners that see their angles add up: before the side and behind its twin, and back.
         if _is_left(corners, tail, before[side], following[other]) and _is_left(
@@ -135,22 +116,17 @@ def merge_triangles(corners, triangles, neighbours):
 def _is_left(corners, tail, incoming, outgoing):
     """Whether the path along two sides, the second beginning where the first ends, turns left or
     goes straight on."""
-    a, b = corners[tail[incoming]], corners[tail[outgoing]]
-    return incoming >= 0 and _turn(a, b, corners[_head(tail, outgoing)]) >= 0
+    a, b, c = tail[incoming], tail[outgoing], _head(tail, outgoing)
+    rows = np.int64(corners[b, 0]) - corners[a, 0]
+    cols = np.int64(corners[b, 1]) - corners[a, 1]
+    down, across = np.int64(corners[c, 0]) - corners[b, 0], np.int64(corners[c, 1]) - corners[b, 1]
+    return incoming >= 0 and cols * down >= rows * across
 
 
 @njit(cache=True, nogil=True)
 def _head(tail, side):
     """Corner at which a side of a triangle ends: sides are not moved when triangles merge."""
     return tail[side - 2] if side % 3 == 2 else tail[side + 1]
-
-
-@njit(cache=True, nogil=True)
-def _turn(a, b, c):
-    """Sign of the turn from a over b to c; points (row, col), whole numbers."""
-    rows, cols = np.int64(b[0]) - a[0], np.int64(b[1]) - a[1]
-    cross = cols * (np.int64(c[0]) - b[0]) - rows * (np.int64(c[1]) - b[1])
-    return int(cross > 0) - int(cross < 0)
 
 
 @njit(cache=True, nogil=True)
@@ -181,7 +157,8 @@ def _compact(tail, following, twin, is_gone):
             if twin[side] >= 0:
                 twins[slot] = slot_of[twin[side]]
     for polygon in range(n_polygons):
-        polygon_of[first[polygon] : first[polygon + 1]] = polygon
+        for slot in range(first[polygon], first[polygon + 1]):
+            polygon_of[slot] = polygon
     return first[: n_polygons + 1].copy(), begins, twins, polygon_of
 
 

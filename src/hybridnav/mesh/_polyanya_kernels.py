@@ -125,7 +125,7 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
     heap = (keys, values)
     size, status = counts[SIZE], DONE
     while size and status == DONE:
-        top, key = values[0], keys[0]
+        top, key = np.int64(values[0]), keys[0]
         root = whole[top, ROOT]
         if root >= 0 and real[top, G] > best[root] + _SAME:
             size = pop(heap, size)

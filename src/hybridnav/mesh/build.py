@@ -11,12 +11,8 @@ import pythoncdt
 from hybridnav._copies import copies_alike
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import NO_CORNER, kinds_of, walls_of
-from hybridnav.mesh._merge_kernels import (
-    are_free,
-    merge_triangles,
-    polygons_of_cells,
-    select_triangles,
-)
+from hybridnav.mesh._merge_kernels import are_free, polygons_of_cells
+from hybridnav.mesh.merge import merge_triangles, select_triangles
 
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, BoolArray, ByteArray, IntArray

@@ -10,8 +10,9 @@ import numpy as np
 from hybridnav.mesh import _cut_kernels as kernels
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import MANY, NO_CORNER
-from hybridnav.mesh._merge_kernels import are_free, merge_triangles, select_triangles
+from hybridnav.mesh._merge_kernels import are_free
 from hybridnav.mesh.build import ConvexMesh, triangulate
+from hybridnav.mesh.merge import merge_triangles, select_triangles
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
