@@ -40,27 +40,18 @@ def amid_its_class(halves, row, col):
 
 
 @njit(cache=True, nogil=True)
-def block_powers(classes, largest):
-    """Power of the block of every aligned 2x2 cells, 0 where they are in none.
+def raise_powers(power, squares, halves, p):
+    """Put the cells of squares of power p that are amid their class into blocks of that power.
 
-    The array has one row and column more than there are whole squares, for the cells beyond.
+    `squares` and `halves` are `uniform_squares` of this power and of the one below.
     """
-    power = np.zeros((classes.shape[0] // 2 + 1, classes.shape[1] // 2 + 1), np.uint8)
-    if largest == 0:
-        return power
-    squares = uniform_squares(classes)
+    side = 1 << (p - 1)
     for row in range(squares.shape[0]):
         for col in range(squares.shape[1]):
-            power[row, col] = squares[row, col] != 0
-    for p in range(2, largest + 1):
-        halves = squares
-        squares = uniform_squares(halves)
-        side = 1 << (p - 1)
-        for row in range(squares.shape[0]):
-            for col in range(squares.shape[1]):
-                if squares[row, col] != 0 and amid_its_class(halves, row, col):
-                    power[row * side : (row + 1) * side, col * side : (col + 1) * side] = p
-    return power
+            if squares[row, col] != 0 and (p == 1 or amid_its_class(halves, row, col)):
+                for i in range(row * side, (row + 1) * side):
+                    for j in range(col * side, (col + 1) * side):
+                        power[i, j] = p
 
 
 @guarded
@@ -68,9 +59,8 @@ def block_powers(classes, largest):
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record as if there were only the blocks; gives the numbers of their vertices and
     edges. `new_edge` takes the numbers of the edges that stay."""
-    ends, parent_rows, parent_cols, inside_east, inside_north, across_east, across_north = templates
+    ends, offset, inside_east, inside_north, across_east, across_north = templates
     rows, cols = classes.shape
-    offset = parent_rows * cols + parent_cols
     n_vertices = 0
     n_edges = 0
     for row in range(rows):
@@ -209,8 +199,11 @@ def protect_faces(sigma, protected):
 
 @njit(cache=True, nogil=True)
 def count_bytes(values):
-    """How often each of the 256 values occurs."""
-    count = np.zeros((2, 256), np.int64)  # two, for runs of equal values wait for each other
+    """How often each of the 256 values occurs at even and at odd places, int64 (2, 256).
+
+    Two counts, for runs of equal values wait for each other.
+    """
+    count = np.zeros((2, 256), np.int64)
     for i in range(values.size):
         count[i & 1, values[i]] += 1
-    return count[0] + count[1]
+    return count

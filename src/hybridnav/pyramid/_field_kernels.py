@@ -1,4 +1,4 @@
-"""Kernels on receptive fields: labels, hulls, boundaries, and the darts of any level.
+"""Kernels on receptive fields: labels, boundaries, and the darts of any level.
 
 A level is rebuilt from the record of the decimation: `vertex_end` (0: no vertex, 255: survives to
 the apex, else the level at which the cell stops being a surviving cell), `vertex_parent` (the
@@ -58,115 +58,6 @@ def field_extents(field_of, cols, n_vertices):
 
 
 @njit(cache=True, nogil=True)
-def turn(points, i, j, row, col):
-    """Cross product of the steps i -> j and j -> (row, col); positive is counter-clockwise."""
-    ax = np.int64(points[j, 1] - points[i, 1])
-    ay = np.int64(points[j, 0] - points[i, 0])
-    bx = np.int64(col - points[j, 1])
-    by = np.int64(row - points[j, 0])
-    return ax * by - ay * bx
-
-
-@njit(cache=True, nogil=True)
-def chain(rows, cols, count, side, points, start):
-    """Append one side of the hull of points sorted by row (monotone chain, Andrew 1979)."""
-    end = start
-    for i in range(count):
-        while end - start >= 2 and side * turn(points, end - 2, end - 1, rows[i], cols[i]) <= 0:
-            end -= 1
-        points[end, 0] = rows[i]
-        points[end, 1] = cols[i]
-        end += 1
-    return end
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def field_hulls(field_of, cols, boxes):
-    """Convex hulls of connected fields, from the first and last cell of each of their rows."""
-    n_vertices = boxes.shape[0]
-    first_row = np.zeros(n_vertices + 1, np.int64)
-    for v in range(n_vertices):
-        first_row[v + 1] = first_row[v] + boxes[v, 2] - boxes[v, 0] + 1
-    left = np.full(first_row[n_vertices], np.int32(-1), np.int32)
-    right = np.empty(first_row[n_vertices], np.int32)
-    for cell in range(field_of.size):
-        v = field_of[cell]
-        if v >= 0:
-            at = first_row[v] + cell // cols - boxes[v, 0]
-            if left[at] < 0:
-                left[at] = cell % cols
-            right[at] = cell % cols
-    start = np.zeros(n_vertices + 1, np.int64)
-    points = np.empty((2 * first_row[n_vertices], 2), np.int32)
-    end = 0
-    for v in range(n_vertices):
-        low, high = first_row[v], first_row[v + 1]
-        rows = np.arange(boxes[v, 0], boxes[v, 2] + 1)
-        end = chain(rows, left[low:high], high - low, -1, points, end)
-        end = chain(rows, right[low:high], high - low, 1, points, end)
-        start[v + 1] = end
-    return start, points[:end].copy()
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def merge_hulls(start, points, parent, new_vertex, n_survivors):
-    """Hulls of the next level from those of the stars that were contracted."""
-    size = np.zeros(n_survivors + 1, np.int64)
-    for v in range(parent.size):
-        size[new_vertex[parent[v]] + 1] += start[v + 1] - start[v]
-    offset = np.cumsum(size)
-    filled = offset[:-1].copy()
-    order = np.empty(points.shape[0], np.int64)
-    for v in range(parent.size):
-        w = new_vertex[parent[v]]
-        for i in range(start[v], start[v + 1]):
-            order[filled[w]] = i
-            filled[w] += 1
-    merged_start = np.zeros(n_survivors + 1, np.int64)
-    merged = np.empty((2 * points.shape[0], 2), np.int32)
-    end = 0
-    for w in range(n_survivors):
-        members = order[offset[w] : offset[w + 1]]
-        key = np.empty(members.size, np.int64)
-        for i in range(members.size):
-            key[i] = np.int64(points[members[i], 0]) << 32 | np.int64(points[members[i], 1])
-        key.sort()
-        rows, cols = key >> 32, key & 0xFFFFFFFF
-        count = members.size
-        # Only the first and the last point of a row belong to the left and the right chain.
-        first = np.empty(count, np.int64)
-        n_first = n_last = 0
-        last = np.empty(count, np.int64)
-        for i in range(count):
-            if i == 0 or rows[i] != rows[i - 1]:
-                first[n_first] = i
-                n_first += 1
-            if i == count - 1 or rows[i] != rows[i + 1]:
-                last[n_last] = i
-                n_last += 1
-        end = chain(rows[first[:n_first]], cols[first[:n_first]], n_first, -1, merged, end)
-        end = chain(rows[last[:n_last]], cols[last[:n_last]], n_last, 1, merged, end)
-        merged_start[w + 1] = end
-    return merged_start, merged[:end].copy()
-
-
-@njit(cache=True, nogil=True)
-def hull_distances(start, points, arcs):
-    """Largest squared distance between a cell of one field and a cell of the other, per arc."""
-    squared = np.zeros(arcs.shape[0], np.int64)
-    for a in range(arcs.shape[0]):
-        u, v = arcs[a, 0], arcs[a, 1]
-        for i in range(start[u], start[u + 1]):
-            for j in range(start[v], start[v + 1]):
-                rows = np.int64(points[i, 0] - points[j, 0])
-                cols = np.int64(points[i, 1] - points[j, 1])
-                squared[a] = max(squared[a], rows * rows + cols * cols)
-    return squared
-
-
-@njit(cache=True, nogil=True)
 def find(root, i):
     """Representative of i in a union-find forest, halving the path."""
     while root[i] != i:
@@ -199,6 +90,19 @@ def other_crack(field_of, cols, corner, base_edge):
     return other if count == 2 else -1
 
 
+@njit(cache=True, nogil=True)
+def place_of(edges, edge):
+    """Index of an edge among ascending ones that hold it."""
+    low, high = 0, edges.size - 1
+    while low < high:
+        middle = (low + high) >> 1
+        if edges[middle] < edge:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def find_cracks(field_of, rows, cols):
@@ -227,7 +131,9 @@ def find_cracks(field_of, rows, cols):
                     if pass_ == 1:
                         cracks[count] = 2 * cell + 1
                     count += 1
-    root = np.arange(count)
+    root = np.empty(count, np.int64)
+    for i in range(count):
+        root[i] = i
     for i in range(count):
         cell = cracks[i] >> 1
         # The blocks whose lower-left cell is this one see every pair of cracks at least once.
@@ -246,8 +152,7 @@ def find_cracks(field_of, rows, cols):
                 continue
             other = other_crack(field_of, cols, corner, cracks[i])
             if other >= 0:
-                j = np.searchsorted(cracks, other)
-                a, b = find(root, i), find(root, j)
+                a, b = find(root, i), find(root, place_of(cracks, other))
                 root[max(a, b)] = min(a, b)
     for i in range(count):
         root[i] = find(root, i)
@@ -338,7 +243,7 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
                     break
                 if end & 1 == 0:
                     dart ^= 1
-            sigma[2 * e + side] = 2 * np.searchsorted(edges, dart >> 1) + (dart & 1)
+            sigma[2 * e + side] = 2 * place_of(edges, dart >> 1) + (dart & 1)
             if is_protected:
                 protected[2 * e + (1 - side)] = True
     for d in range(2 * n_edges):
@@ -350,59 +255,65 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
 
 
 @njit(cache=True, nogil=True)
-def loop_line(base_edge, field_of, edge_end, level, rows, cols):
-    """Base edges of the line that the dual edge of a self-loop takes through its field.
+def way_to_rim(start, inside, field_of, edge_end, level, cols, came):
+    """Base edges that lead from a face in a field to the nearest block that is no ordinary face or
+    that holds a crack, int64, the last one first.
 
-    From the face on either side of the edge the search follows removed edges inside the field to
-    the nearest block that is no ordinary face or that holds a crack.
+    The search follows removed edges inside the field. A face is named by the cell of its lower
+    left; `came`, uint8 (n_cells + cols,) and zero, is scratch.
     """
-    n_cells = rows * cols
-    inside = field_of[base_edge >> 1]
-    line = np.empty(0, np.int64)
-    for side in range(2):
-        corner = base_edge >> 1
-        if side == 1:
-            corner -= 1 if base_edge & 1 else cols
-        parent_edge = {corner: np.int64(base_edge)}
-        parent_corner = {corner: np.int64(-1)}
-        queue = [corner]
-        at = 0
-        while at < len(queue):
-            corner = queue[at]
-            at += 1
-            a, b, c, d = corner, corner + 1, corner + cols, corner + cols + 1
-            ordinary = corner >= 0 and b % cols != 0 and c < n_cells
-            if not ordinary:
-                break
-            if not (
-                field_of[a] == inside
-                and field_of[b] == inside
-                and field_of[c] == inside
-                and field_of[d] == inside
-            ):
-                break
-            for k in range(4):
-                if k == 0:
-                    edge, beyond = 2 * a, corner - cols
-                elif k == 1:
-                    edge, beyond = 2 * c, corner + cols
-                elif k == 2:
-                    edge, beyond = 2 * a + 1, corner - 1
-                else:
-                    edge, beyond = 2 * b + 1, corner + 1
-                end = edge_end[edge]
-                if end & 1 and end < 2 * level + 2 and beyond not in parent_edge:
-                    parent_edge[beyond] = np.int64(edge)
-                    parent_corner[beyond] = np.int64(corner)
-                    queue.append(beyond)
-        steps = np.empty(len(queue), np.int64)
-        count = 0
-        while parent_corner[corner] >= 0:
-            steps[count] = parent_edge[corner]
-            count += 1
-            corner = parent_corner[corner]
-        line = np.concatenate((line, steps[:count]))
-    return np.concatenate((line, np.array([base_edge], np.int64)))
+    n_cells = field_of.size
+    queue = np.empty(64, np.int64)
+    queue[0], came[start + cols] = start, 5
+    at, size = 0, 1
+    corner = start
+    while at < size:
+        corner = queue[at]
+        at += 1
+        a, b, c, d = corner, corner + 1, corner + cols, corner + cols + 1
+        if corner < 0 or b % cols == 0 or c >= n_cells:
+            break
+        if (
+            field_of[a] != inside
+            or field_of[b] != inside
+            or field_of[c] != inside
+            or field_of[d] != inside
+        ):
+            break
+        if size + 4 > queue.size:
+            wider = np.empty(2 * queue.size, np.int64)
+            for i in range(size):
+                wider[i] = queue[i]
+            queue = wider
+        for k in range(4):
+            edge, beyond = edge_and_face_beyond(corner, k, cols)
+            end = edge_end[edge]
+            if end & 1 and end < 2 * level + 2 and came[beyond + cols] == 0:
+                came[beyond + cols] = k + 1
+                queue[size] = beyond
+                size += 1
+    steps = np.empty(size, np.int64)
+    count = 0
+    while came[corner + cols] < 5:
+        # Against the step that led here, south for north.
+        edge, corner = edge_and_face_beyond(corner, (came[corner + cols] - 1) ^ 1, cols)
+        steps[count] = edge
+        count += 1
+    for i in range(size):
+        came[queue[i] + cols] = 0
+    return steps[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def edge_and_face_beyond(corner, k, cols):
+    """Base edge between a face and one beside it, 0 south to 3 east, and that face."""
+    if k == 0:
+        return 2 * corner, corner - cols
+    if k == 1:
+        return 2 * (corner + cols), corner + cols
+    if k == 2:
+        return 2 * corner + 1, corner - 1
+    return 2 * (corner + 1) + 1, corner + 1
 
 
 @njit(cache=True, nogil=True)
@@ -423,5 +334,5 @@ def darts_at_corners(cells, direction, edges, edge_end, level, cols):
             if dart == first:
                 dart = -1
         if dart >= 0:
-            found[i] = 2 * np.searchsorted(edges, dart >> 1) + (dart & 1)
+            found[i] = 2 * place_of(edges, dart >> 1) + (dart & 1)
     return found

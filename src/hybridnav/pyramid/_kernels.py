@@ -287,13 +287,13 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
     for v in range(matched.size):
         if parent[v] != v:
             has_leaf[np.uint32(parent[v])] = True
-    for u in range(matched.size):
-        if matched[u] < 0:
+    for end in range(matched.size):
+        if matched[end] < 0:
             continue
-        edge = np.uint32(matched[u])
-        if darts_origin[2 * edge] != u:
+        edge = np.uint32(matched[end])
+        u, v = np.uint32(darts_origin[2 * edge]), np.uint32(darts_origin[2 * edge + 1])
+        if u != end:
             continue
-        v = np.uint32(darts_origin[2 * edge + 1])
         way = ways[edge]
         if has_leaf[u] and has_leaf[v]:
             continue

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hybridnav.pyramid import _base_kernels
 from hybridnav.pyramid.record import SURVIVES
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, LongArray
+    from hybridnav._typing import AnyArray, ByteArray, LongArray
 
 MAX_POWER = 3
 """The largest block has 2^3 cells a side: larger ones gain no time."""
@@ -137,3 +138,33 @@ def max_power(limit: int) -> int:
     squared distance in cells.
     """
     return sum(4 << 2 * power <= limit for power in range(1, MAX_POWER + 1))
+
+
+def steps_to_parents(cols: int) -> LongArray:
+    """Steps from a cell to the one it is contracted into, as flat cells of a map with so many
+    columns: int64, by power and place as `Templates.parent_rows`."""
+    return TEMPLATES.parent_rows * cols + TEMPLATES.parent_cols
+
+
+def block_powers(kinds: AnyArray, largest: int) -> ByteArray:
+    """Return the power of the block of every aligned 2x2 cells, 0 where they are in none.
+
+    Parameters
+    ----------
+    kinds
+        The kind of each cell, (rows, cols), read-only; 0 for no vertex.
+    largest
+        Power of the largest blocks.
+
+    Returns
+    -------
+    ByteArray
+        uint8, with one row and column more than there are whole squares, for the cells beyond.
+    """
+    power = np.zeros((kinds.shape[0] // 2 + 1, kinds.shape[1] // 2 + 1), np.uint8)
+    squares = kinds
+    for p in range(1, largest + 1):
+        halves, squares = squares, _base_kernels.uniform_squares(squares)
+        squares.flags.writeable = False  # as the kinds are: another type is compiled once more
+        _base_kernels.raise_powers(power, squares, halves, p)
+    return power

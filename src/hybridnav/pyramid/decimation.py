@@ -16,8 +16,9 @@ import numpy as np
 
 from hybridnav.combinatorial import _kernels as dart_kernels
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid import _base_kernels, _field_kernels, _kernels
-from hybridnav.pyramid.blocks import TEMPLATES, max_power
+from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _kernels
+from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents
+from hybridnav.pyramid.hulls import merge_hulls
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Record
 from hybridnav.pyramid.resistance import Steering
 
@@ -195,12 +196,12 @@ class _Decimation:
 
     def _base(self, kinds: KindArray) -> tuple[dart_kernels.Darts, _kernels.Vertices]:
         record = self.record
-        power = _base_kernels.block_powers(kinds, max_power(self._limit))
+        power = block_powers(kinds, max_power(self._limit))
         new_edge = np.empty(2 * kinds.size, np.int32)
         n_vertices, n_edges = _base_kernels.mark_base(
             kinds,
             power,
-            TEMPLATES,
+            (TEMPLATES[0], steps_to_parents(kinds.shape[1]), *TEMPLATES[3:]),
             record.vertex_end,
             record.vertex_parent,
             record.edge_end,
@@ -338,7 +339,7 @@ class _Decimation:
     def _start_hulls(self) -> None:
         """Give every vertex its hull: bounding boxes have stopped deciding every edge."""
         self._hulls = _kernels.Hulls(
-            *_field_kernels.field_hulls(self._field_of(), self._cols, self._vertices.boxes)
+            *_hull_kernels.field_hulls(self._field_of(), self._cols, self._vertices.boxes)
         )
         self._lap("hulls")
 
@@ -362,11 +363,8 @@ class _Decimation:
             record.vertex_parent,
         )
         if len(self._hulls.start):
-            self._hulls = _kernels.Hulls(
-                *_field_kernels.merge_hulls(
-                    *self._hulls, scratch.parent, scratch.new_vertex, n_vertices
-                )
-            )
+            merged_into = scratch.new_vertex[scratch.parent]
+            self._hulls = merge_hulls(self._hulls, merged_into, n_vertices)
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))
 
     def _close_gaps(self, scratch: _Scratch) -> None:
@@ -388,8 +386,8 @@ class _Decimation:
 
     def finish(self) -> None:
         """Take down the sizes of all levels."""
-        vertex_ends = _base_kernels.count_bytes(self.record.vertex_end)
-        edge_ends = _base_kernels.count_bytes(self.record.edge_end).reshape(-1, 2).sum(axis=1)
+        vertex_ends = _base_kernels.count_bytes(self.record.vertex_end).sum(axis=0)
+        edge_ends = _base_kernels.count_bytes(self.record.edge_end).reshape(2, -1, 2).sum((0, 2))
         vertices, edges = (
             ends[::-1].cumsum()[::-1][1:].tolist() for ends in (vertex_ends, edge_ends)
         )

@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid import _field_kernels
+from hybridnav.pyramid import _field_kernels, _hull_kernels
 from hybridnav.pyramid.cracks import cell_pairs, ends_of, middles_of, sides_of
 from hybridnav.pyramid.dual import DualGraph
 from hybridnav.pyramid.record import SURVIVES
@@ -265,10 +265,10 @@ class Level:
     def max_distance_m(self) -> FloatArray:
         """float64 (n_arcs,), largest distance between the centre of a cell of one field and the
         centre of a cell of the other; for a self-loop the diameter of its field. In metres."""
-        start, points = _field_kernels.field_hulls(
+        start, points = _hull_kernels.field_hulls(
             self._labels[0], self._grid.shape[1], self._extents[1]
         )
-        squared = _field_kernels.hull_distances(start, points, self.arcs)
+        squared = _hull_kernels.hull_distances(start, points, self.arcs)
         return _frozen(np.sqrt(squared) * self._grid.resolution_m)
 
     @cached_property
@@ -341,20 +341,25 @@ class Level:
         plain = np.flatnonzero(~self.is_self_loop)
         arc_of_class[classes[np.searchsorted(cracks, self.base_edges[plain])]] = plain
         edges, arcs = [cracks], [arc_of_class[classes]]
-        for loop in np.flatnonzero(self.is_self_loop):
-            line = _field_kernels.loop_line(
-                self.base_edges[loop],
-                self._labels[0],
-                self._record.edge_end,
-                self.index,
-                rows,
-                cols,
-            )
+        loops = np.flatnonzero(self.is_self_loop)
+        came = np.zeros(rows * cols + cols if len(loops) else 0, np.uint8)
+        for loop in loops:
+            line = self._line_of_loop(int(self.base_edges[loop]), came)
             edges.append(line)
             arcs.append(np.full(len(line), loop))
         edge, arc = np.concatenate(edges), np.concatenate(arcs)
         order = np.lexsort((edge, arc))
         return edge[order], arc[order]
+
+    def _line_of_loop(self, base_edge: int, came: ByteArray) -> LongArray:
+        """Base edges of the line that the dual edge of a self-loop takes through its field, from
+        the face on either side of it; `came` is scratch."""
+        field_of, cols = self._labels[0], self._grid.shape[1]
+        cell = base_edge >> 1
+        where = field_of[cell], field_of, self._record.edge_end, self.index, cols, came
+        faces = cell, cell - (1 if base_edge & 1 else cols)
+        ways = [_field_kernels.way_to_rim(face, *where) for face in faces]
+        return np.concatenate([*ways, [base_edge]])
 
 
 def _frozen(array: _Array) -> _Array:
