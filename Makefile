@@ -52,10 +52,12 @@ setup: $(READY)
 
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'hybridnav needs Python 3.11 or newer')"
-	@echo "setting up $(VENV): two or three minutes the first time"
+	@echo "setting up $(VENV): about three minutes the first time"
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@echo "compiling kernels: about a minute"
+	$(BIN)/python -m hybridnav.cli.compiling
 	touch $(READY)
 
 maps: setup

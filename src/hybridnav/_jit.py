@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
+import time
 import warnings
 from functools import cache, cached_property
 from types import FunctionType
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 Kernel = TypeVar("Kernel")
+
+_LOG = logging.getLogger("hybridnav.kernels")
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
@@ -98,7 +102,21 @@ def _type_of(argument: Any) -> Any:
 
 
 class _Kernel(CPUDispatcher):
-    """A kernel that Python calls; other kernels call its twin."""
+    """A kernel that Python calls; other kernels call its twin. It logs what takes the compiler
+    long."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature, or load what is kept."""
+        began, n_missed = time.perf_counter(), self._n_missed()
+        entry = super().compile(sig)
+        if self._n_missed() > n_missed:
+            seconds, name = time.perf_counter() - began, self.py_func.__name__
+            _LOG.info("compiled %s in %.1f s", name, seconds, extra={"seconds": seconds})
+        return entry
+
+    def _n_missed(self) -> int:
+        """How often there was nothing in the cache to load."""
+        return sum(self.stats.cache_misses.values())
 
     @cached_property
     def inner(self) -> _Inner:

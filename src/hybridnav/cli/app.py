@@ -10,6 +10,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav.cli.common import answer, complain
+from hybridnav.cli.compiling import told_of_compiling
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
 from hybridnav.cli.evaluate import compare, evaluate
 from hybridnav.cli.plan import plan
@@ -71,7 +72,7 @@ def run(arguments: list[str]) -> int:
         0 solved, 1 not solved, 2 wrong usage, 3 unreadable input.
     """
     command = typer.main.get_command(app)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), told_of_compiling():
         warnings.showwarning = _show_warning
         try:
             code = command.main(arguments, prog_name="hybridnav", standalone_mode=False)

@@ -26,6 +26,7 @@ from hybridnav.cli.common import (
     timings,
     told_bound,
 )
+from hybridnav.cli.compiling import compiling_beside
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import (
     FreeOption,
@@ -194,7 +195,9 @@ def plan(
         figures |= _whole_grid(refused, None, asked=compare)
         _answer(grid, ends, figures, as_json=as_json)
         raise typer.Exit(EXIT_NOT_SOLVED)
-    topology = grow_topology(grid, settings, seconds)
+    with compiling_beside(settings) as compiled:
+        topology = grow_topology(grid, settings, seconds)
+        compiled()
     with stage("preparing the planner", seconds, "prepare"):
         planner = hn.HybridPlanner(topology, preset=settings)
     with stage("planning", {}, "plan"):  # the result has the seconds of its stages
