@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         MapError,
         MapNotFoundError,
         MapWarning,
+        ModelError,
         OmplError,
         PlanError,
         PresetError,
@@ -33,7 +34,16 @@ if TYPE_CHECKING:
         RoomLabels,
         drop_islands,
     )
-    from hybridnav.io import example_map, load_blocked, load_map, load_rooms, save_rooms
+    from hybridnav.io import (
+        Model,
+        example_map,
+        load,
+        load_blocked,
+        load_map,
+        load_rooms,
+        save,
+        save_rooms,
+    )
     from hybridnav.planner import (
         Alternative,
         Alternatives,
@@ -67,6 +77,8 @@ _HOME_OF = {
     "MapError": "errors",
     "MapNotFoundError": "errors",
     "MapWarning": "errors",
+    "Model": "io",
+    "ModelError": "errors",
     "OccupancyGrid": "grid",
     "OmplError": "errors",
     "Path": "result",
@@ -87,6 +99,7 @@ _HOME_OF = {
     "drop_islands": "grid",
     "example_map": "io",
     "find_rooms": "topology",
+    "load": "io",
     "load_blocked": "io",
     "load_map": "io",
     "load_preset": "config",
@@ -94,6 +107,7 @@ _HOME_OF = {
     "plan_alternatives": "planner",
     "plan_tour": "planner",
     "preset_names": "config",
+    "save": "io",
     "save_rooms": "io",
 }
 
@@ -115,6 +129,8 @@ __all__ = [
     "MapError",
     "MapNotFoundError",
     "MapWarning",
+    "Model",
+    "ModelError",
     "OccupancyGrid",
     "OmplError",
     "Path",
@@ -135,6 +151,7 @@ __all__ = [
     "drop_islands",
     "example_map",
     "find_rooms",
+    "load",
     "load_blocked",
     "load_map",
     "load_preset",
@@ -142,6 +159,7 @@ __all__ = [
     "plan_alternatives",
     "plan_tour",
     "preset_names",
+    "save",
     "save_rooms",
 ]
 

@@ -10,13 +10,16 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
+
+MODEL_SUFFIX = ".hnm"
+"""What the name of a model ends in."""
 
 _unfinished: set[Path] = set()
 
 
-def replace_file(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
     """Write a file whole or not at all: what was there outlives an interrupt and a full disc.
 
     Parameters
@@ -24,22 +27,32 @@ def replace_file(path: Path, content: bytes) -> None:
     path
         The file; an existing one is replaced and keeps its mode, a link stays a link.
     content
-        All of it.
+        All of it, at once or in pieces.
 
     Raises
     ------
     OSError
         When it cannot be written.
     """
+    pieces = [content] if isinstance(content, bytes) else content
     if _is_no_file(path):
-        path.write_bytes(content)
+        _write(path, pieces)
         return
     path = path.resolve()
     with _beside(path) as beside:
-        beside.write_bytes(content)
+        _write(beside, pieces)
         if path.exists():
             shutil.copymode(path, beside)
         beside.replace(path)
+
+
+def _write(path: Path, pieces: Iterable[bytes | memoryview]) -> None:
+    with path.open("wb") as file:
+        for piece in pieces:
+            file.write(piece)
+        if file.seekable():  # a pipe has no disc to reach
+            file.flush()
+            os.fsync(file.fileno())
 
 
 def check_replaceable(path: Path) -> None:

@@ -18,6 +18,10 @@ class MapNotFoundError(MapError, FileNotFoundError):
     """A map file, the image it names, or a file of what is closed, is not there."""
 
 
+class ModelError(MapError):
+    """A model cannot be read: it is none, not whole, altered, or of another version."""
+
+
 class RoomsError(MapError):
     """A file of rooms cannot be read, or does not fit its map; the text names the room."""
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 import hybridnav as hn
+from hybridnav.cli.build import build
 from hybridnav.cli.common import answer, complain
 from hybridnav.cli.compiling import told_of_compiling
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
@@ -51,6 +52,7 @@ def _options(version: VersionOption = False) -> None:
 
 
 app.command()(plan)
+app.command()(build)
 app.command()(show)
 app.command()(rooms)
 app.command()(evaluate)

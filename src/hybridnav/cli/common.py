@@ -12,12 +12,12 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav._files import check_replaceable
+from hybridnav._files import MODEL_SUFFIX, check_replaceable
 from hybridnav.cli.errors import UsageError
 from hybridnav.config import load_preset
 from hybridnav.config.preset import is_preset_name
 from hybridnav.config.yaml_file import printable
-from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -79,18 +79,39 @@ def read_preset(source: str) -> Preset:
 
 
 def read_settings(
-    preset: str,
+    preset: str | None,
+    overrides: list[str] | None,
+    radius_m: float | None,
+    seed: int | None,
+    *,
+    smooth: str | None = None,
+    map_file: Path | None = None,
+) -> Preset:
+    """A preset with the settings of the command line, which win over it, and over a model in which
+    the map's pyramid is built already.
+
+    An error in a preset file is the file's; one in an override is the caller's.
+    """
+    if map_file is not None and is_model_file(map_file):
+        # Loads numba, which help and wrong usage can do without.
+        from hybridnav.io.models import open_model  # noqa: PLC0415
+
+        given = None if preset is None else read_preset(preset)
+        plain = open_model(map_file, max_cells=MAX_CELLS).fitted(given)
+    else:
+        plain = read_preset("shortest" if preset is None else preset)
+    return overridden(plain, overrides, radius_m, seed, smooth=smooth)
+
+
+def overridden(
+    plain: Preset,
     overrides: list[str] | None,
     radius_m: float | None,
     seed: int | None,
     *,
     smooth: str | None = None,
 ) -> Preset:
-    """A preset with the settings of the command line, which win over it.
-
-    An error in a preset file is the file's; one in an override is the caller's.
-    """
-    plain = read_preset(preset)
+    """Return a preset with the settings of the command line."""
     settings = list(overrides or ())
     if radius_m is not None:
         settings.append(f"pyramid.robot_radius_m={radius_m!r}")
@@ -141,29 +162,36 @@ class Reading:
     max_cells: int = DEFAULT_MAX_CELLS
 
 
-def load_grid(
-    path: Path, preset: Preset, seconds: dict[str, float], reading: Reading
-) -> hn.OccupancyGrid:
-    """Load a map, inflated as a preset states, without the islands that were not asked for."""
+def load_model(path: Path, preset: Preset, seconds: dict[str, float], reading: Reading) -> hn.Model:
+    """Load a model or a map, inflated as a preset states, without the islands that were not asked
+    for."""
     with stage(f"reading {path}", seconds, "load"):
-        grid = hn.load_map(
+        model = hn.load(
             path,
             robot_radius_m=preset.pyramid.robot_radius_m,
             free_threshold=reading.free_threshold,
             occupied_threshold=reading.occupied_threshold,
             max_cells=reading.max_cells,
         )
-        if reading.least_island_m2 == 0:
-            return grid
         allowed = preset.planner.allow_unexplored
-        whole, grid = grid, hn.drop_islands(grid, reading.least_island_m2)
-    before, after = (each.enterable(allow_unexplored=allowed).any() for each in (whole, grid))
+        whole, model = model, model.remade(least_island_m2=reading.least_island_m2 or None)
+        grid = model.grid
+    if is_model_file(path) and not model.is_filed:
+        complain(f"{printable(path)} was made with other settings: of it the map alone is used")
+    if model is whole:
+        return model
+    before, after = (each.enterable(allow_unexplored=allowed).any() for each in (whole.grid, grid))
     if before and not after:
         raise UsageError(
             f"--least-island {reading.least_island_m2:g} leaves no free cell on "
             f"{printable(grid.name)}: give a smaller area"
         )
-    return grid
+    return model
+
+
+def is_model_file(path: Path) -> bool:
+    """Return whether a path names a model, without loading what reads it."""
+    return path.suffix.lower() == MODEL_SUFFIX
 
 
 def islands_line(grid: hn.OccupancyGrid) -> list[str]:
@@ -194,7 +222,7 @@ def check_room_to_be(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) 
 
 
 def grow_topology(
-    grid: hn.OccupancyGrid,
+    model: hn.Model,
     preset: Preset,
     seconds: dict[str, float],
     *,
@@ -203,15 +231,14 @@ def grow_topology(
     stops: Sequence[str | tuple[float, ...]] = (),
     closing: Closing | None = None,
 ) -> hn.TopologicalMap:
-    """Build the pyramid of a map with the settings of a preset, and the rooms of a file or, if
-    asked for, those that are found. Refuse names of stops and closed rooms that these lack before,
-    and numbers of closed doors after."""
-    settings = preset.pyramid
-    rooms = None
+    """Build the pyramid of a map with the settings of a preset, unless the model has it, and the
+    rooms of a file, of the model or, if asked for, those that are found. Refuse names of stops and
+    closed rooms that these lack before, and numbers of closed doors after."""
+    grid, rooms = model.grid, model.rooms
     if rooms_file is not None:
         with stage(f"reading {rooms_file}", seconds, "rooms"):
             rooms = hn.load_rooms(rooms_file, grid)
-    elif find_rooms:
+    elif find_rooms and rooms is None:
         with stage("finding rooms", seconds, "rooms"):
             rooms = hn.find_rooms(grid)
     if rooms is not None:
@@ -221,14 +248,7 @@ def grow_topology(
         for name in closing.rooms if closing is not None else ():
             rooms.index(name)
     with stage("building the pyramid", seconds, "pyramid"):
-        pyramid = hn.DualGraphPyramid.build(
-            grid,
-            merge_distance_m=settings.merge_distance_m,
-            linkage=settings.linkage,
-            seed=settings.seed,
-            rooms=rooms,
-        )
-    topology = hn.TopologicalMap(pyramid)
+        topology = model.grown(preset.pyramid, rooms)
     for number in closing.doors if closing is not None else ():
         topology.rooms.door(number)
     return topology

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from hybridnav.harness.yardstick import Yardstick
 
 MapsArgument = Annotated[
-    list[Path], typer.Argument(metavar="MAP...", help="ROS maps (.yaml) or MovingAI maps (.map).")
+    list[Path],
+    typer.Argument(
+        metavar="MAP...", help="ROS maps (.yaml), MovingAI maps (.map) or models (.hnm)."
+    ),
 ]
 PresetsOption = Annotated[
     list[str] | None,
@@ -57,7 +60,9 @@ OutOption = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Whe
 RadiusOption = Annotated[
     float | None,
     typer.Option(
-        "--robot-radius", metavar="R", help="In metres; else 0.25, and 0 for MovingAI maps."
+        "--robot-radius",
+        metavar="R",
+        help="In metres; else 0.25, 0 for MovingAI maps, and a model's own.",
     ),
 ]
 DistanceOption = Annotated[

@@ -6,10 +6,17 @@ from typing import Annotated
 import typer
 
 MapArgument = Annotated[
-    Path, typer.Argument(metavar="MAP", help="ROS map (.yaml) or MovingAI map (.map).")
+    Path,
+    typer.Argument(metavar="MAP", help="ROS map (.yaml), MovingAI map (.map) or model (.hnm)."),
 ]
 PresetOption = Annotated[
-    str, typer.Option("--preset", metavar="NAME|FILE", help="A preset's name or its YAML file.")
+    str | None,
+    typer.Option(
+        "--preset",
+        metavar="NAME|FILE",
+        help="A preset's name or its YAML file; else the model's.",
+        show_default="shortest",
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
@@ -19,10 +26,15 @@ SetOption = Annotated[
 ]
 RadiusOption = Annotated[
     float | None,
-    typer.Option("--robot-radius", metavar="R", help="Robot radius in metres; else the preset's."),
+    typer.Option(
+        "--robot-radius", metavar="R", help="Robot radius in metres; else the model's or preset's."
+    ),
 ]
 SeedOption = Annotated[
-    int | None, typer.Option("--seed", metavar="N", help="Seed of the pyramid; else the preset's.")
+    int | None,
+    typer.Option(
+        "--seed", metavar="N", help="Seed of the pyramid; else the model's or the preset's."
+    ),
 ]
 PlotOption = Annotated[
     Path | None, typer.Option("--plot", metavar="FILE", help="Draw a picture: .png, .pdf or .svg.")

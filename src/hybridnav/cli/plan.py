@@ -18,7 +18,7 @@ from hybridnav.cli.common import (
     grow_topology,
     islands_figures,
     islands_line,
-    load_grid,
+    load_model,
     outside,
     read_settings,
     refused_result,
@@ -129,7 +129,7 @@ def plan(
     alternatives: AlternativesOption = 1,
     least_hole_m2: LeastHoleOption = 1.0,
     blocked: BlockedOption = None,
-    preset: PresetOption = "shortest",
+    preset: PresetOption = None,
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,
@@ -149,7 +149,9 @@ def plan(
     check_picture(plot)
     where = _checked_at(at, alternatives)
     _check_least_hole(least_hole_m2)
-    settings = read_settings(preset, overrides, robot_radius_m, seed, smooth=smooth)
+    settings = read_settings(
+        preset, overrides, robot_radius_m, seed, smooth=smooth, map_file=map_file
+    )
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     closing = parsed_closing(blocked)
     ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
@@ -185,7 +187,8 @@ def plan(
         return
     start, goal = ends
     seconds: dict[str, float] = {}
-    grid = load_grid(map_file, settings, seconds, reading)
+    model = load_model(map_file, settings, seconds, reading)
+    grid = model.grid
     check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
     closed = closing.read(grid)
     status = outside(grid, ends) if plot is None else None
@@ -196,10 +199,10 @@ def plan(
         _answer(grid, ends, figures, as_json=as_json)
         raise typer.Exit(EXIT_NOT_SOLVED)
     with compiling_beside(settings) as compiled:
-        topology = grow_topology(grid, settings, seconds)
+        topology = grow_topology(model, settings, seconds)
         compiled()
     with stage("preparing the planner", seconds, "prepare"):
-        planner = hn.HybridPlanner(topology, preset=settings)
+        planner = model.planner(settings, topology=topology)
     with stage("planning", {}, "plan"):  # the result has the seconds of its stages
         result = planner.plan(start, goal, blocked=closed)
     figures = _figures(map_file, result, seconds) | islands_figures(grid) | closing.to_dict()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 import typer
 
@@ -16,7 +16,7 @@ from hybridnav.cli.common import (
     check_room_to_be,
     check_writable,
     islands_line,
-    load_grid,
+    load_model,
     read_settings,
     stage,
     timings,
@@ -73,7 +73,7 @@ def rooms(
     method: MethodOption = None,
     least_area_m2: LeastAreaOption = None,
     rooms_file: RoomsOption = None,
-    preset: PresetOption = "shortest",
+    preset: PresetOption = None,
     robot_radius_m: RadiusOption = None,
     free_threshold: FreeOption = None,
     occupied_threshold: OccupiedOption = None,
@@ -89,30 +89,24 @@ def rooms(
         raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
     if out is not None:
         check_writable(out, "--out")
-    if rooms_file is not None:
-        for option, given in (("--method", method), ("--least-area", least_area_m2)):
-            if given is not None:
-                raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
-    method = "walls" if method is None else method
-    checked = next((known for known in get_args(Segmentation) if known == method), None)
-    if checked is None:
-        known = ", ".join(get_args(Segmentation))
-        raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
-    settings = read_settings(preset, None, robot_radius_m, None)
+    finds = method is not None or least_area_m2 is not None
+    if rooms_file is not None and finds:
+        option = "--least-area" if method is None else "--method"
+        raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
+    checked = _checked_method("walls" if method is None else method)
+    area_m2 = 1.0 if least_area_m2 is None else least_area_m2
+    settings = read_settings(preset, None, robot_radius_m, None, map_file=map_file)
     seconds: dict[str, float] = {}
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
-    grid = load_grid(map_file, settings, seconds, reading)
+    model = load_model(map_file, settings, seconds, reading)
+    grid = model.grid
     check_room_to_be(grid)
     with stage("finding rooms", seconds, "rooms"):
-        labels = (
-            hn.find_rooms(
-                grid,
-                method=checked,
-                least_area_m2=1.0 if least_area_m2 is None else least_area_m2,
-            )
-            if rooms_file is None
-            else hn.load_rooms(rooms_file, grid)
-        )
+        labels = None if finds else model.rooms
+        if rooms_file is not None:
+            labels = hn.load_rooms(rooms_file, grid)
+        elif labels is None:
+            labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
     # Loads numba, which help and wrong usage can do without.
     from hybridnav.topology.rooms import room_areas_m2  # noqa: PLC0415
 
@@ -123,15 +117,7 @@ def rooms(
             hn.save_rooms(out, labels, grid)
             labels = hn.load_rooms(out, grid)
     with stage("building the pyramid", seconds, "pyramid"):
-        built = settings.pyramid
-        pyramid = hn.DualGraphPyramid.build(
-            grid,
-            merge_distance_m=built.merge_distance_m,
-            linkage=built.linkage,
-            seed=built.seed,
-            rooms=labels,
-        )
-    topology = hn.TopologicalMap(pyramid)
+        topology = model.grown(settings.pyramid, labels)
     figures = _figures(topology.rooms, areas_m2) | {"map": str(map_file), "seconds": seconds}
     answer(
         json.dumps(figures, allow_nan=False) + "\n"
@@ -143,6 +129,14 @@ def rooms(
         from hybridnav.viz import plot_rooms, save_figure  # noqa: PLC0415 - matplotlib on demand
 
         save_figure(plot_rooms(topology), plot)
+
+
+def _checked_method(method: str) -> Segmentation:
+    for known in get_args(Segmentation):
+        if known == method:
+            return cast("Segmentation", known)
+    known = ", ".join(get_args(Segmentation))
+    raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
 
 
 def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:

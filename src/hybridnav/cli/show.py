@@ -13,7 +13,7 @@ from hybridnav.cli.common import (
     check_picture,
     grow_topology,
     islands_line,
-    load_grid,
+    load_model,
     read_settings,
     timings,
 )
@@ -48,7 +48,7 @@ LevelOption = Annotated[
 def show(
     map_file: MapArgument,
     level: LevelOption = -1,
-    preset: PresetOption = "shortest",
+    preset: PresetOption = None,
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
     seed: SeedOption = None,
@@ -60,14 +60,15 @@ def show(
 ) -> None:
     """Show the classes of MAP's cells and the levels of its pyramid."""
     check_picture(plot)
-    settings = read_settings(preset, overrides, robot_radius_m, seed)
+    settings = read_settings(preset, overrides, robot_radius_m, seed, map_file=map_file)
     seconds: dict[str, float] = {}
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
-    grid = load_grid(map_file, settings, seconds, reading)
-    pyramid = grow_topology(grid, settings, seconds).pyramid
+    model = load_model(map_file, settings, seconds, reading)
+    pyramid = grow_topology(model, settings, seconds).pyramid
     if not -len(pyramid) <= level < len(pyramid):
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
-    seconds = {"load": seconds["load"], **pyramid.stats.seconds}
+    if not model.is_filed:
+        seconds = {"load": seconds["load"], **pyramid.stats.seconds}
     shown = pyramid[level]
     parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), _describe_level(shown)]
     answer("\n\n".join(parts) + f"\nseconds    {timings(seconds)}\n")

@@ -19,7 +19,7 @@ from hybridnav.cli.common import (
     grow_topology,
     islands_figures,
     islands_line,
-    load_grid,
+    load_model,
     outside,
     refused_result,
     stage,
@@ -57,7 +57,8 @@ class Errand:
 def run_errand(errand: Errand) -> bool:
     """Plan a way between rooms and points, print it, and return whether it is solved."""
     seconds: dict[str, float] = {}
-    grid = load_grid(errand.map_file, errand.settings, seconds, errand.reading)
+    model = load_model(errand.map_file, errand.settings, seconds, errand.reading)
+    grid = model.grid
     check_room_to_be(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
     closed = errand.closing.read(grid)
     status = outside(grid, errand.stops) if errand.plot is None else None
@@ -68,17 +69,20 @@ def run_errand(errand: Errand) -> bool:
             figures |= {"alternatives": [], "alternatives_complete": True}
         _answer(errand, grid, figures, seconds)
         return False
+    rooms_file = errand.rooms_file
+    if rooms_file is None and model.rooms is None:
+        rooms_file = beside(errand.map_file)
     topology = grow_topology(
-        grid,
+        model,
         errand.settings,
         seconds,
-        rooms_file=errand.rooms_file or beside(errand.map_file),
+        rooms_file=rooms_file,
         find_rooms=True,
         stops=errand.stops,
         closing=errand.closing,
     )
     with stage("preparing the planner", seconds, "prepare"):
-        planner = hn.HybridPlanner(topology, preset=errand.settings)
+        planner = model.planner(errand.settings, topology=topology)
     with stage("planning", seconds, "plan"):
         tour = hn.plan_tour(planner, errand.stops, at=errand.at, blocked=closed)
     figures, found = _figures(errand, tour), None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -167,6 +167,22 @@ class OccupancyGrid:
         ):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+
+    @classmethod
+    def restored(cls, **attributes: Any) -> OccupancyGrid:
+        """Make a grid of the attributes of another one: nothing is computed, nothing checked.
+
+        Parameters
+        ----------
+        attributes
+            Attributes of the class by name; arrays are frozen, not copied.
+        """
+        grid = cls.__new__(cls)
+        for name, value in attributes.items():
+            object.__setattr__(grid, name, value)
+        for array in (grid.probability, grid.measured, grid.classes):
+            array.flags.writeable = False
+        return grid
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hybridnav._files import MODEL_SUFFIX
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import DEFAULT_MAX_CELLS
@@ -149,9 +150,10 @@ def _new_ids(task: Task, there: set[str]) -> set[str]:
 
 def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
     """Tasks of one map, the reference's first."""
-    ros = Path(name).suffix.lower() != ".map"
+    suffix = Path(name).suffix.lower()
+    ros = suffix != ".map"
     radius_m = settings.robot_radius_m
-    if radius_m is None:
+    if radius_m is None and suffix != MODEL_SUFFIX:
         radius_m = DEFAULT_ROBOT_RADIUS_M if ros else 0.0
     merge_distance_m = settings.merge_distance_m
     if merge_distance_m is None and not ros:

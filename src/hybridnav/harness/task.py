@@ -34,7 +34,8 @@ class MapSpec:
     """A map file and how it is read."""
 
     path: str
-    robot_radius_m: float
+    robot_radius_m: float | None
+    """None for that of a model."""
     corner_cutting: bool = False
     max_cells: int = DEFAULT_MAX_CELLS
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hybridnav._files import MODEL_SUFFIX
 from hybridnav.config.yaml_file import printable
 from hybridnav.errors import MapError
 from hybridnav.grid import DEFAULT_MAX_CELLS
@@ -32,10 +33,12 @@ def load_map(
     Parameters
     ----------
     path
-        A ROS map (.yaml or .yml, beside its image) or a MovingAI map (.map, cells of 1 m).
+        A ROS map (.yaml or .yml, beside its image), a MovingAI map (.map, cells of 1 m), or the
+        map of a model (.hnm).
     robot_radius_m
         Radius in metres: a cell is blocked when its centre lies within it of the centre of an
-        occupied cell. 0 for a robot that is a point; None is the default, 0.25 m.
+        occupied cell. 0 for a robot that is a point; None is the default, 0.25 m, and with a model
+        that of the model.
     free_threshold, occupied_threshold
         U1 and U2: occupancy up to U1 is free, from U2 on occupied. By default what the file says.
     max_cells
@@ -64,12 +67,22 @@ def load_map(
         When the thresholds of a ROS map call grey 205, the usual mark of unknown cells, free.
     """
     suffix = Path(path).suffix.lower()
+    if suffix == MODEL_SUFFIX:
+        from hybridnav.io.models import load  # noqa: PLC0415 - loads numba
+
+        return load(
+            path,
+            robot_radius_m=robot_radius_m,
+            free_threshold=free_threshold,
+            occupied_threshold=occupied_threshold,
+            max_cells=max_cells,
+        ).grid
     loader = _LOADERS.get(suffix)
     if loader is None:
         hint = (
             "pass the YAML file that names this image"
             if suffix in _IMAGES
-            else ("expected .yaml or .yml (ROS map_server) or .map (MovingAI)")
+            else "expected .yaml or .yml (ROS map_server), .map (MovingAI) or .hnm (a model)"
         )
         raise MapError(f"map {printable(path)}: {hint}")
     return loader(

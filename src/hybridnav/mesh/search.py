@@ -165,12 +165,15 @@ class MeshSearch:
         self.tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
         self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))
         self.corner_works: Pool[Any]
+        self.edges: tuple[LongArray, IntArray] | None = None
+        """The edges between corners (see `CornerGraph`); None until they are found."""
         self._graph: CornerGraph | CornerHierarchy | None = None
-        self._edges: tuple[LongArray, IntArray] | None = None
         self._landmarked: tuple[CornerGraph, Pool[Any]] | None = None
-        self._is_prepared = False
+        self.is_prepared = False
+        """Whether the graph of corners is built, or found not to be worth its memory."""
         self._lock = threading.Lock()
-        self._expanded = 0
+        self.expanded = 0
+        """Intervals that its queries have expanded so far."""
 
     @property
     def graph(self) -> CornerGraph | CornerHierarchy | None:
@@ -179,39 +182,49 @@ class MeshSearch:
 
     def prepare(self) -> None:
         """Build the graph of corners now, if it is not there yet: up to a microsecond a cell."""
-        if self._is_prepared:
+        if self.is_prepared:
             return
         with self._lock:
-            if self._is_prepared:
+            if self.is_prepared:
                 return
-            self._edges = find_edges(self.mesh, self.arrays)
-            if self._edges is not None:
-                hierarchy = contract_corners(self.mesh, self.arrays, self._edges)
-                if hierarchy is None:
-                    graph, self.corner_works = self._with_landmarks(self._edges)
-                    self._graph = graph
-                else:
-                    self.corner_works = Pool(partial(_HierarchyWork, self.mesh))
-                    self._graph = hierarchy
-            self._is_prepared = True
+            edges = find_edges(self.mesh, self.arrays)
+            graph: CornerGraph | CornerHierarchy | None = None
+            if edges is not None:
+                graph = contract_corners(self.mesh, self.arrays, edges)
+                if graph is None:
+                    graph = add_landmarks(self.mesh, self.arrays, edges)
+            self.adopt(edges, graph)
+
+    def adopt(
+        self,
+        edges: tuple[LongArray, IntArray] | None,
+        graph: CornerGraph | CornerHierarchy | None,
+    ) -> None:
+        """Answer queries from now on in a graph of corners that was built of the same mesh, with
+        these edges; None where it was found not to be worth its memory."""
+        if isinstance(graph, CornerHierarchy):
+            self.corner_works = Pool(partial(_HierarchyWork, self.mesh))
+        elif graph is not None:
+            self._landmarked = self._with_works(graph)
+            self.corner_works = self._landmarked[1]
+        self.edges, self._graph = edges, graph
+        self.is_prepared = True
 
     def landmarked(self) -> tuple[CornerGraph, Pool[Any]] | None:
         """Return the graph of corners with landmarks, and work arrays for it: what searches round
         closed cells need. It is built when the first asks; None until the graph of corners is."""
-        if self._edges is None:
+        if self.edges is None:
             return None
         if self._landmarked is None:
             with self._lock:
                 if self._landmarked is None:
-                    self._with_landmarks(self._edges)
+                    graph = add_landmarks(self.mesh, self.arrays, self.edges)
+                    self._landmarked = self._with_works(graph)
         return self._landmarked
 
-    def _with_landmarks(self, edges: tuple[LongArray, IntArray]) -> tuple[CornerGraph, Pool[Any]]:
-        """Build what `landmarked` returns; the caller holds the lock."""
-        graph = add_landmarks(self.mesh, self.arrays, edges)
-        works = Pool(partial(_CornerWork, self.mesh, graph.landmark_distances.shape[1]))
-        self._landmarked = graph, works
-        return graph, works
+    def _with_works(self, graph: CornerGraph) -> tuple[CornerGraph, Pool[Any]]:
+        n_landmarks = graph.landmark_distances.shape[1]
+        return graph, Pool(partial(_CornerWork, self.mesh, n_landmarks))
 
     def path(
         self,
@@ -246,7 +259,7 @@ class MeshSearch:
             A shortest path, but for epsilon and budget.
         """
         until = math.inf if budget_s is None else perf_counter() + budget_s
-        if budget_s is None and self._expanded >= max(_WORTH, len(self.mesh.corners)):
+        if budget_s is None and self.expanded >= max(_WORTH, len(self.mesh.corners)):
             self.prepare()
         ends = tuple(_inside(*end) for end in zip(cells, positions, strict=True))
         upper = math.inf
@@ -261,7 +274,7 @@ class MeshSearch:
             bound = length if bound >= length else bound * SURE
             expanded = int(work.counts[polyanya.EXPANDED])
         if graph is None:
-            self._expanded += expanded
+            self.expanded += expanded
         return MeshPath(way if len(way) else known, length, bound, expanded)
 
     def _run(

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav.jumps import JumpSearch
+from hybridnav.mesh import MeshSearch
 from hybridnav.result import Route
-from hybridnav.route import MaxDistanceSearch, PortalSearch, corridor_of
+from hybridnav.route import BuiltPortals, MaxDistanceSearch, PortalSearch, corridor_of
 from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
+Prepared = MeshSearch | JumpSearch | BuiltPortals
+"""What planners of cell paths build of a map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,11 @@ class CellPlans:
 class CellPlanner(Protocol):
     """Plans between two cells that may be entered."""
 
+    @property
+    def prepared(self) -> Prepared | None:
+        """What is built for queries and worth to be kept, None while there is nothing."""
+        ...
+
     def prepare(self) -> object:
         """Build what queries need, once; the first query does it otherwise."""
         ...
@@ -80,6 +89,11 @@ class WholeMap:
 
     def __init__(self, refiner: GridRefiner) -> None:
         self._refiner = refiner
+
+    @property
+    def prepared(self) -> None:
+        """Nothing: the legal moves of cells are found in no time; see `CellPlanner`."""
+        return
 
     def prepare(self) -> object:
         """Build the search of cells; see `CellPlanner`."""
@@ -110,6 +124,11 @@ class MaxDistance:
         self._settings = settings
         self._search: MaxDistanceSearch | None = None
         self._building = threading.Lock()
+
+    @property
+    def prepared(self) -> None:
+        """Nothing: what it searches belongs to the topological map; see `CellPlanner`."""
+        return
 
     def prepare(self) -> MaxDistanceSearch:
         """Compute the attributes of the arcs; see `CellPlanner`."""
@@ -157,13 +176,23 @@ class OverPortals:
     """The shortest path by the portal table, which is built when the first query needs it."""
 
     def __init__(
-        self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
+        self,
+        topology: TopologicalMap,
+        refiner: GridRefiner,
+        settings: PlannerSettings,
+        built: BuiltPortals | None = None,
     ) -> None:
         self._topology = topology
         self._refiner = refiner
         self._settings = settings
+        self._built = built
         self._search: PortalSearch | None = None
         self._building = threading.Lock()
+
+    @property
+    def prepared(self) -> BuiltPortals | None:
+        """Portals and tables, None until they are built."""
+        return self._built if self._search is None else self._search.built
 
     def prepare(self) -> PortalSearch:
         """Build portals and table, once."""
@@ -174,6 +203,7 @@ class OverPortals:
                         self._topology,
                         self._refiner.search,
                         allow_unexplored=self._settings.allow_unexplored,
+                        built=self._built,
                     )
         return self._search
 

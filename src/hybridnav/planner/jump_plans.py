@@ -42,19 +42,30 @@ class OverJumps:
         Finds paths where corners may be cut.
     settings
         Whether unexplored cells may be entered.
+    search
+        Of the graph of the same cells, where it is built already.
     """
 
     def __init__(
-        self, grid: OccupancyGrid, refiner: GridRefiner, settings: PlannerSettings
+        self,
+        grid: OccupancyGrid,
+        refiner: GridRefiner,
+        settings: PlannerSettings,
+        search: JumpSearch | None = None,
     ) -> None:
         self._grid = grid
         self._allow_unexplored = settings.allow_unexplored
         self._whole_map = WholeMap(refiner)
-        self._search: JumpSearch | None = None
+        self._search = search
         self._building = threading.Lock()
         frame = grid.frame
         turned = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
         self._frame = frame.resolution_m, *frame.origin_m, *turned
+
+    @property
+    def prepared(self) -> JumpSearch | None:
+        """The search of the graph, None until it is built."""
+        return self._search
 
     def prepare(self) -> JumpSearch:
         """Build the graph, once."""

@@ -59,6 +59,8 @@ class OverMesh:
         Finds paths of cells, for queries whose time is up before the search of the mesh has one.
     settings
         Whether unexplored cells may be entered, and how near the optimum is near enough.
+    search
+        Of the mesh of the same cells, where it is built already.
 
     Raises
     ------
@@ -67,7 +69,11 @@ class OverMesh:
     """
 
     def __init__(
-        self, grid: OccupancyGrid, refiner: GridRefiner, settings: PlannerSettings
+        self,
+        grid: OccupancyGrid,
+        refiner: GridRefiner,
+        settings: PlannerSettings,
+        search: MeshSearch | None = None,
     ) -> None:
         if grid.corner_cutting:
             raise InvalidValueError(
@@ -80,7 +86,7 @@ class OverMesh:
         self._allow_unexplored = settings.allow_unexplored
         self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
-        self._search: MeshSearch | None = None
+        self._search = search
         self._across = np.array([grid.shape[1], 1])
         self._detours: dict[ClosedCells, DetourSearch] = {}
         self._building = threading.Lock()
@@ -89,6 +95,11 @@ class OverMesh:
     def has_budget(self) -> bool:
         """Whether queries end when their time is up."""
         return self._budget_s is not None
+
+    @property
+    def prepared(self) -> MeshSearch | None:
+        """The search of the mesh, None until it is built."""
+        return self._search
 
     def prepare(self) -> MeshSearch:
         """Build the mesh and the graph of its corners, once; see `CellPlanner`."""

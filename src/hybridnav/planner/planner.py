@@ -12,10 +12,10 @@ from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
-from hybridnav.planner.cell_plans import CellPlan, MaxDistance, OverPortals, WholeMap
+from hybridnav.planner.cell_planner import cell_planner
+from hybridnav.planner.cell_plans import CellPlan, OverPortals
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
-from hybridnav.planner.jump_plans import OverJumps
 from hybridnav.planner.mesh_plans import OverMesh
 from hybridnav.planner.radius import check_radius
 from hybridnav.refine import GridRefiner, LineOfSight
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray, LongArray, PathLike
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.cell_plans import Prepared
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import PlanBatch
@@ -50,6 +50,9 @@ class HybridPlanner:
         preset's `pyramid` section says: results record how it was.
     preset
         Name of a preset, path to a preset file, or a `Preset`.
+    prepared
+        `prepared` of another planner of the same map and preset, which is used instead of building
+        it; None to build it.
 
     Raises
     ------
@@ -59,23 +62,19 @@ class HybridPlanner:
         When nobody gave the map's radius, so that it has the default, and the preset names another.
     """
 
-    def __init__(self, topology: TopologicalMap, *, preset: PathLike | Preset = "shortest") -> None:
+    def __init__(
+        self,
+        topology: TopologicalMap,
+        *,
+        preset: PathLike | Preset = "shortest",
+        prepared: Prepared | None = None,
+    ) -> None:
         self.topology = topology
         self.preset = load_preset(preset)
         check_radius(topology.grid, self.preset)
         settings = self.preset.planner
         self._refiner = GridRefiner(topology.grid, allow_unexplored=settings.allow_unexplored)
-        self._cells: CellPlanner
-        if settings.coarse == "max-distance":
-            self._cells = MaxDistance(topology, self._refiner, settings)
-        elif settings.coarse == "portals":
-            self._cells = OverPortals(topology, self._refiner, settings)
-        elif settings.coarse == "mesh":
-            self._cells = OverMesh(topology.grid, self._refiner, settings)
-        elif settings.coarse == "jumps":
-            self._cells = OverJumps(topology.grid, self._refiner, settings)
-        else:
-            self._cells = WholeMap(self._refiner)
+        self._cells = cell_planner(topology, self._refiner, settings, prepared)
         self._closures = Closures(topology)
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
@@ -83,6 +82,12 @@ class HybridPlanner:
             from hybridnav.planner.ompl_plans import ompl_planner  # noqa: PLC0415
 
             self._ompl = ompl_planner(topology, self._cells, settings)
+
+    @property
+    def prepared(self) -> Prepared | None:
+        """What is built of the map for queries: a mesh, a jump-point graph or portals; None before
+        that is built, and with presets that build nothing."""
+        return self._cells.prepared
 
     @property
     def needs_headings(self) -> bool:

@@ -129,6 +129,11 @@ class DualGraphPyramid:
         return cls(grid, float(merge_distance_m), linkage, seed, stats, rooms, record)
 
     @property
+    def record(self) -> Record:
+        """When and how each vertex and edge of the base goes, from which all levels are rebuilt."""
+        return self._record
+
+    @property
     def place_level(self) -> int:
         """Index of the level of the places: the apex, unless contraction went on above it."""
         return self.stats.tops[0]

@@ -2,11 +2,12 @@
 
 from hybridnav.route.coarse import CoarseRoute, MaxDistanceSearch
 from hybridnav.route.corridor import Corridor, corridor_of
-from hybridnav.route.portal_search import PortalAnswers, PortalSearch
+from hybridnav.route.portal_search import BuiltPortals, PortalAnswers, PortalSearch
 from hybridnav.route.rooms import RoomRoute, RoomSearch
 from hybridnav.route.walk import Walks
 
 __all__ = [
+    "BuiltPortals",
     "CoarseRoute",
     "Corridor",
     "MaxDistanceSearch",

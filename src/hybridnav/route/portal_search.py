@@ -14,7 +14,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.route import _answer_kernels as kernels
-from hybridnav.route._portal_kernels import FAR, centres
+from hybridnav.route._portal_kernels import FAR, Tables, centres
 from hybridnav.route.any_angle_bound import AnyAngleBound
 from hybridnav.route.portal_table import build_tables
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
@@ -90,6 +90,18 @@ class PortalAnswers:
     """float64 (m, 2), centres of cells in the map frame."""
 
 
+@dataclass(frozen=True, eq=False)
+class BuiltPortals:
+    """What is built of a map before paths are found over its portals."""
+
+    field_of: NDArray[np.int16 | np.int32]
+    """int16 or int32 (rows, cols), the field of each cell, -1 for none."""
+    portals: Portals
+    tables: Tables
+    has_all_gates: bool
+    """Whether every border cell was a gate."""
+
+
 class PortalSearch:
     """Paths over portals, and lower bounds on all paths.
 
@@ -104,6 +116,8 @@ class PortalSearch:
         Searches inside fields, over cells that paths may use.
     allow_unexplored
         Whether unexplored cells may be entered; as in `cell_search`.
+    built
+        What another search has built of the same map with the same settings, None to build it.
     """
 
     def __init__(
@@ -112,15 +126,18 @@ class PortalSearch:
         cell_search: GridSearch,
         *,
         allow_unexplored: bool = False,
+        built: BuiltPortals | None = None,
     ) -> None:
         grid = topology.grid
         self._cols = grid.shape[1]
         self._search = cell_search
-        enterable = grid.enterable(allow_unexplored=allow_unexplored)
-        self._field_of, self.portals, self.is_exact = _portals_of(
-            topology, enterable, allow_unexplored
-        )
-        self.tables = build_tables(self.portals)
+        if built is None:
+            enterable = grid.enterable(allow_unexplored=allow_unexplored)
+            field_of, portals, has_all_gates = _portals_of(topology, enterable, allow_unexplored)
+            built = BuiltPortals(field_of, portals, build_tables(portals), has_all_gates)
+        self.built = built
+        self._field_of, self.is_exact = built.field_of, built.has_all_gates
+        self.portals, self.tables = built.portals, built.tables
         frame = grid.frame
         self._frame = (
             frame.resolution_m,

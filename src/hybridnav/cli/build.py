@@ -1,0 +1,126 @@
+"""`hybridnav build`: from a map file to a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import hybridnav as hn
+from hybridnav._files import MODEL_SUFFIX
+from hybridnav.cli.common import (
+    Reading,
+    answer,
+    check_room_to_be,
+    check_writable,
+    grow_topology,
+    is_model_file,
+    load_model,
+    overridden,
+    read_settings,
+    stage,
+    timings,
+)
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import (
+    FreeOption,
+    LeastIslandOption,
+    MapArgument,
+    MaxCellsOption,
+    OccupiedOption,
+    RadiusOption,
+    SeedOption,
+    SetOption,
+)
+from hybridnav.config.yaml_file import printable
+from hybridnav.grid import DEFAULT_MAX_CELLS
+
+OutOption = Annotated[
+    Path, typer.Option("-o", "--out", metavar="MODEL", help=f"The file, ending in {MODEL_SUFFIX}.")
+]
+PresetsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--preset",
+        metavar="NAME|FILE",
+        help="What to prepare; may be given several times, the first is the model's own.",
+        show_default="shortest",
+    ),
+]
+RoomsOption = Annotated[
+    Path | None, typer.Option("--rooms", metavar="FILE", help="Rooms as YAML, kept in the model.")
+]
+FindRoomsOption = Annotated[
+    bool, typer.Option("--find-rooms", help="Find rooms, and keep them in the model.")
+]
+CompressOption = Annotated[
+    bool, typer.Option("--compress", help="Write a small file, which loads more slowly.")
+]
+
+
+def build(
+    map_file: MapArgument,
+    out: OutOption,
+    preset: PresetsOption = None,
+    overrides: SetOption = None,
+    rooms_file: RoomsOption = None,
+    find_rooms: FindRoomsOption = False,
+    robot_radius_m: RadiusOption = None,
+    seed: SeedOption = None,
+    free_threshold: FreeOption = None,
+    occupied_threshold: OccupiedOption = None,
+    least_island_m2: LeastIslandOption = 0.0,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    compress: CompressOption = False,
+) -> None:
+    """Prepare MAP for planning, and write it to a model, which other commands take as MAP."""
+    if not is_model_file(out):
+        raise UsageError(f"--out must end in {MODEL_SUFFIX}, got {str(out)!r}")
+    if rooms_file is not None and find_rooms:
+        raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")
+    check_writable(out, "--out")
+    settings = [
+        read_settings(name, overrides, robot_radius_m, seed, map_file=map_file)
+        for name in preset or (None,)
+    ]
+    seconds: dict[str, float] = {}
+    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
+    model = load_model(map_file, settings[0], seconds, reading)
+    if preset is None:  # all that a model was built for
+        settings += [
+            overridden(model.fitted(other), overrides, robot_radius_m, seed)
+            for other in model.presets[1:]
+        ]
+    for each in settings:
+        check_room_to_be(model.grid, allow_unexplored=each.planner.allow_unexplored)
+    topology = grow_topology(
+        model, settings[0], seconds, rooms_file=rooms_file, find_rooms=find_rooms
+    )
+    with stage("preparing the planners", seconds, "prepare"):
+        planners = [model.planner(each, topology=topology) for each in settings]
+        for planner in planners:
+            planner.prepare()
+            planner.close()
+    with stage(f"writing {out}", seconds, "write"):
+        hn.save(planners, out, compress=compress)
+    answer(_summary(out, topology, settings, seconds))
+
+
+def _summary(
+    out: Path, topology: hn.TopologicalMap, presets: list[hn.Preset], seconds: dict[str, float]
+) -> str:
+    grid, size, rooms = topology.grid, out.stat().st_size, topology.pyramid.rooms
+    rows, cols = grid.shape
+    per_cell = f"{size / (rows * cols):.1f} bytes a cell"
+    cells = f"{cols} x {rows} cells of {grid.resolution_m:g} m"
+    held = [f"{topology.n_places:,} places"]
+    held += [] if rooms is None else [f"{len(rooms.names):,} rooms"]
+    held.append(f"what {', '.join(each.name for each in presets)} plans on")
+    lines = [
+        f"model      {printable(out)}, {size / 1e6:.2f} MB, {per_cell}",
+        f"map        {printable(grid.name)}, {cells}, robot radius {grid.robot_radius_m:g} m",
+        f"holds      {', '.join(held)}",
+        f"seconds    {timings(seconds)}",
+    ]
+    return "\n".join(lines) + "\n"

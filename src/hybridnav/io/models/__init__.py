@@ -1,0 +1,5 @@
+"""Models: a map with all that planners have prepared on it, in one file."""
+
+from hybridnav.io.models.model import Model, is_model, load, open_model, save
+
+__all__ = ["Model", "is_model", "load", "open_model", "save"]

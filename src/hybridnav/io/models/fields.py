@@ -1,0 +1,188 @@
+"""What a structure of a model is made of: fields, with the shapes and values that they may have.
+
+A structure is written and read through one description. What is added to a class is added to its
+description, whose version then goes up.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.config.yaml_file import printable
+from hybridnav.errors import ModelError
+from hybridnav.io.models.container import Part
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from hybridnav._typing import AnyArray
+    from hybridnav.io.models.container import FiledPart
+
+_TERM = re.compile(r"(?:(\d+)\*)?([a-z_]+)([+-]\d+)?")
+_Size = int | str
+
+MOST = "1000*cells+100000000"
+"""Bytes that a structure may have: portals, the largest, take 640 a cell, and 16 MB on any map."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One array of a structure."""
+
+    name: str
+    """The attribute of the class."""
+    dtypes: str
+    """One or several, such as "int16 int32"."""
+    shape: tuple[_Size, ...]
+    """Numbers, or terms of sizes such as "2*corners+1"."""
+    least: float = -math.inf
+    """No value is less, nor NaN; minus infinity for no check."""
+    below: _Size | None = None
+    """Every value is less: an index of so many things; None for no check."""
+    is_offsets: bool = False
+    """Whether values begin with 0, never fall, and end with `below`."""
+    frozen: bool = True
+    """Whether the array is read-only in the class; to numba that is another type."""
+
+    def check_shape(self, part: FiledPart, sizes: Mapping[str, int]) -> None:
+        """Refuse another shape, or another type of numbers.
+
+        Raises
+        ------
+        ModelError
+            When the header describes the array otherwise, or not at all.
+        """
+        at = part.part.arrays.get(self.name)
+        if at is None:
+            raise refusal(part, f"{self.name} is missing")
+        wanted = [evaluated(size, sizes) for size in self.shape]
+        if at.shape != wanted or at.dtype not in self.dtypes.split():
+            raise refusal(
+                part,
+                f"{self.name} is {at.dtype} {at.shape}, expected {self.dtypes} {wanted}",
+            )
+
+    def check_values(self, part: FiledPart, sizes: Mapping[str, int], array: AnyArray) -> None:
+        """Refuse values that would lead kernels out of their arrays.
+
+        Raises
+        ------
+        ModelError
+            When a value is out of range.
+        """
+        if not array.size:
+            return
+        if self.is_offsets:
+            end = evaluated(self.below or 0, sizes)
+            if array[0] != 0 or array[-1] != end or bool((array[1:] < array[:-1]).any()):
+                raise refusal(part, f"{self.name} holds no offsets from 0 to {end}")
+            return
+        if self.least > -math.inf and not array.min() >= self.least:
+            raise refusal(part, f"{self.name} has {array.min()}, expected at least {self.least}")
+        limit = None if self.below is None else evaluated(self.below, sizes)
+        if limit is not None and not array.max() < limit:
+            raise refusal(part, f"{self.name} has {array.max()}, expected less than {limit}")
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The description of one structure."""
+
+    kind: str
+    version: int
+    """Goes up with every change of the fields."""
+    fields: tuple[Field, ...]
+    most: Mapping[str, _Size]
+    """The sizes, and the most that each may be: a number, or a term of those before."""
+
+    def part(self, thing: Any, sizes: dict[str, int], values: dict[str, Any] | None = None) -> Part:
+        """Describe an object of the class.
+
+        Parameters
+        ----------
+        thing
+            Has an attribute, or an item, for each field.
+        sizes, values
+            Numbers that shapes are made of, and others.
+        """
+        read = thing.__getitem__ if isinstance(thing, dict) else lambda name: getattr(thing, name)
+        arrays = {field.name: read(field.name) for field in self.fields}
+        return Part(self.kind, self.version, sizes, values or {}, arrays)
+
+    def read(self, filed: FiledPart, known: Mapping[str, int]) -> dict[str, AnyArray]:
+        """Read the arrays of an object by name, checked: shapes before anything is read, then
+        checksums, then values.
+
+        Parameters
+        ----------
+        filed
+            The part.
+        known
+            Sizes of the map: `rows`, `cols` and `cells`.
+
+        Raises
+        ------
+        ModelError
+            When it is of another version, or an array is not as the description states.
+        """
+        self.check_version(filed)
+        sizes = self._checked_sizes(filed, known)
+        for field in self.fields:
+            field.check_shape(filed, sizes)
+        # What a file of a few kilobytes could ask for by being deflated.
+        size, most = sum(at.nbytes for at in filed.part.arrays.values()), evaluated(MOST, sizes)
+        if size > most:
+            raise refusal(filed, f"its arrays have {size} bytes, expected at most {most}")
+        if len(filed.part.arrays) > len(self.fields):
+            extra = sorted(filed.part.arrays.keys() - {field.name for field in self.fields})
+            raise refusal(filed, f"{extra[0]:.40} is not known")
+        arrays = filed.read().arrays
+        for field in self.fields:
+            field.check_values(filed, sizes, arrays[field.name])
+            arrays[field.name].flags.writeable = not field.frozen
+        return arrays
+
+    def check_version(self, filed: FiledPart) -> None:
+        """Refuse a part that another version has written.
+
+        Raises
+        ------
+        ModelError
+            When it is of another version.
+        """
+        version = filed.part.version
+        if version != self.version:
+            age = "a newer" if version > self.version else "an older"
+            raise refusal(
+                filed, f"version {version}, expected {self.version}: made by {age} hybridnav"
+            )
+
+    def _checked_sizes(self, filed: FiledPart, known: Mapping[str, int]) -> dict[str, int]:
+        """All sizes that shapes are made of."""
+        sizes = filed.part.sizes
+        if sizes.keys() != self.most.keys():
+            raise refusal(filed, f"its sizes are {', '.join(sizes) or 'none'}")
+        found = {**sizes, **known}
+        for name, most in self.most.items():
+            limit = evaluated(most, found)
+            if sizes[name] > limit:
+                raise refusal(filed, f"{name} is {sizes[name]}, expected at most {limit}")
+        return found
+
+
+def evaluated(size: _Size, sizes: Mapping[str, int]) -> int:
+    """Return the number that a term of sizes stands for."""
+    if isinstance(size, int):
+        return size
+    match = _TERM.fullmatch(size)
+    assert match is not None, size  # noqa: S101 - terms are written in this package
+    factor, name, more = match.groups()
+    return int(factor or 1) * sizes[name] + int(more or 0)
+
+
+def refusal(part: FiledPart, what: str) -> ModelError:
+    """Return the error of a part that is not as its description states."""
+    return ModelError(f"{part.where}: {part.kind}: {printable(what):.200}: build the model anew")

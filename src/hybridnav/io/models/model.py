@@ -1,0 +1,387 @@
+"""Models: a map with what planners have prepared on it, in one file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridnav._files import MODEL_SUFFIX
+from hybridnav.config import Preset, PyramidSettings, load_preset
+from hybridnav.config.yaml_file import printable
+from hybridnav.errors import InvalidValueError, ModelError
+from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
+from hybridnav.io.maps import load_map
+from hybridnav.io.models import parts
+from hybridnav.io.models.container import read_parts, write_parts
+from hybridnav.io.models.fields import refusal
+from hybridnav.io.models.structures import GRID, KINDS, PRESET, PYRAMID, ROOMS
+from hybridnav.io.size import check_max_cells
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from hybridnav._typing import PathLike
+    from hybridnav.grid import RoomLabels
+    from hybridnav.io.models.container import FiledPart, Part
+    from hybridnav.planner import HybridPlanner
+
+
+class Model:
+    """A map, and what planners have prepared on it; made by `load`.
+
+    What a file holds is mapped into memory and read when it is first needed. The checksum of every
+    array is compared then.
+
+    Parameters
+    ----------
+    grid
+        The map; None where the parts hold it.
+    filed
+        The parts of a file.
+    max_cells
+        The most cells that the map may have.
+
+    Raises
+    ------
+    ModelError
+        When the parts are not those of one map.
+    MapError
+        When the map has more cells.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid | None,
+        filed: Sequence[FiledPart] = (),
+        max_cells: int = DEFAULT_MAX_CELLS,
+    ) -> None:
+        self._grid, self._filed = grid, tuple(filed)
+        self._sizes = {}
+        if filed:
+            self._sizes = parts.sizes_of(self._of_kind(GRID.kind)[0], max_cells=max_cells)
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(dict.fromkeys(part.kind for part in self._filed))
+        return f"Model({kinds or 'grid'})"
+
+    @property
+    def is_filed(self) -> bool:
+        """Whether a file holds it, rather than that only a map was read."""
+        return bool(self._filed)
+
+    @cached_property
+    def grid(self) -> OccupancyGrid:
+        """The map."""
+        if self._grid is not None:
+            return self._grid
+        return parts.grid_of(self._of_kind(GRID.kind)[0], self._sizes)
+
+    @cached_property
+    def presets(self) -> tuple[Preset, ...]:
+        """Presets of the planners that it was saved with; none for a map that was only loaded."""
+        return tuple(map(parts.preset_of, self._of_kind(PRESET.kind)))
+
+    @cached_property
+    def rooms(self) -> RoomLabels | None:
+        """The rooms that its places were grown with, None without."""
+        found = self._of_kind(ROOMS.kind)
+        return parts.rooms_of(found[0], self._sizes) if found else None
+
+    @cached_property
+    def topology(self) -> TopologicalMap:
+        """The topological map: as it was saved, or else grown as the first preset states, or as
+        `shortest` does."""
+        found = self._of_kind(PYRAMID.kind)
+        if found:
+            pyramid = parts.pyramid_of(found[0], self._sizes, self.grid, self.rooms)
+            return TopologicalMap(pyramid)
+        return self._grown(self.fitted(None).pyramid, self.rooms)
+
+    def planner(
+        self, preset: PathLike | Preset | None = None, *, topology: TopologicalMap | None = None
+    ) -> HybridPlanner:
+        """Make a planner, with all that the model holds for its preset; the rest is built when it
+        is needed.
+
+        Parameters
+        ----------
+        preset
+            Name of a preset, path to a preset file, or a `Preset`; None for the first of `presets`,
+            or `shortest` where there is none.
+        topology
+            A topological map of `grid`; None for that of the model.
+
+        Returns
+        -------
+        HybridPlanner
+            Its answers are those of the planner that was saved, bit by bit.
+
+        Raises
+        ------
+        ModelError
+            When what the file holds is not what was written.
+        PresetError
+            When the preset does not exist or is not valid.
+        InvalidValueError
+            When the map does not suit the preset.
+        """
+        # Loads numba, which a grid alone can do without.
+        from hybridnav.io.models.searches import made_for, search_of  # noqa: PLC0415
+        from hybridnav.planner import HybridPlanner  # noqa: PLC0415
+
+        preset = self._own_preset if preset is None else load_preset(preset)
+        topology = self.topology if topology is None else topology
+        prepared = None
+        if topology.grid is self.grid:
+            key = made_for(preset.planner, topology)
+            prepared = search_of(self._filed, preset.planner.coarse, key, self._sizes)
+        return HybridPlanner(topology, preset=preset, prepared=prepared)
+
+    def grown(self, settings: PyramidSettings, rooms: RoomLabels | None) -> TopologicalMap:
+        """Return the topological map of some settings and rooms: that of the model where these are
+        its own, else one that is built.
+
+        Parameters
+        ----------
+        settings
+            Section `pyramid` of a preset.
+        rooms
+            `rooms`, others, or None for none.
+        """
+        found = self._of_kind(PYRAMID.kind)
+        own = parts.pyramid_settings(found[0]) if found else {}
+        if rooms is self.rooms and own.items() <= settings.model_dump().items() and found:
+            return self.topology
+        return self._grown(settings, rooms)
+
+    def fitted(self, preset: Preset | None) -> Preset:
+        """Return a preset whose section `pyramid` states how the model was made, as far as it is.
+
+        Parameters
+        ----------
+        preset
+            None for the first of `presets`, or `shortest` where there is none.
+        """
+        preset = self._own_preset if preset is None else preset
+        made = {}
+        if self._filed:
+            values = parts.grid_settings(self._of_kind(GRID.kind)[0])
+            made["robot_radius_m"] = values["robot_radius_m"]
+        elif self._grid is not None:
+            made["robot_radius_m"] = self._grid.robot_radius_m
+        for found in self._of_kind(PYRAMID.kind):
+            made |= parts.pyramid_settings(found)
+        pyramid = preset.pyramid.model_copy(update=made)
+        return preset.model_copy(update={"pyramid": pyramid})
+
+    def remade(
+        self,
+        *,
+        robot_radius_m: float | None = None,
+        free_threshold: float | None = None,
+        occupied_threshold: float | None = None,
+        least_island_m2: float | None = None,
+    ) -> Model:
+        """Return the model itself where its grid was made so, else one of the same map made anew,
+        with nothing prepared.
+
+        Parameters
+        ----------
+        robot_radius_m, free_threshold, occupied_threshold, least_island_m2
+            As of `OccupancyGrid`; None for that of the model.
+
+        Raises
+        ------
+        InvalidValueError
+            When one is out of range.
+        """
+        wanted: dict[str, Any] = {
+            "robot_radius_m": robot_radius_m,
+            "free_threshold": free_threshold,
+            "occupied_threshold": occupied_threshold,
+            "least_island_m2": least_island_m2,
+        }
+        given = {name: value for name, value in wanted.items() if value is not None}
+        if all(getattr(self.grid, name) == value for name, value in given.items()):
+            return self
+        if robot_radius_m is not None:
+            given["radius_is_default"] = False
+        return Model(replace(self.grid, **given))
+
+    def parts(self) -> list[Part]:
+        """Return all that it holds, as it is written to a file."""
+        if self._filed:
+            return [filed.read() for filed in self._filed]
+        return [parts.grid_part(self.grid)]
+
+    @property
+    def _own_preset(self) -> Preset:
+        return self.presets[0] if self.presets else load_preset("shortest")
+
+    def _of_kind(self, kind: str) -> list[FiledPart]:
+        return [filed for filed in self._filed if filed.kind == kind]
+
+    def _grown(self, settings: PyramidSettings, rooms: RoomLabels | None) -> TopologicalMap:
+        pyramid = DualGraphPyramid.build(
+            self.grid,
+            merge_distance_m=settings.merge_distance_m,
+            linkage=settings.linkage,
+            seed=settings.seed,
+            rooms=rooms,
+        )
+        return TopologicalMap(pyramid)
+
+
+def is_model(path: PathLike) -> bool:
+    """Return whether a path names a model: whether it ends in `.hnm`."""
+    return Path(path).suffix.lower() == MODEL_SUFFIX
+
+
+def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
+    """Open a model; see `load`."""
+    check_max_cells(max_cells)
+    filed = read_parts(path)
+    for part in filed:
+        if part.kind not in KINDS:
+            raise refusal(part, "no such part is known: a newer hybridnav has made it")
+    kinds = [part.kind for part in filed]
+    for kind in (GRID.kind, PYRAMID.kind, ROOMS.kind):
+        if kinds.count(kind) > 1 or (kind == GRID.kind and kind not in kinds):
+            raise ModelError(
+                f"model {printable(path)}: {kinds.count(kind)} parts {kind}, expected one: build "
+                "the model anew"
+            )
+    return Model(None, filed, max_cells)
+
+
+def save(
+    thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
+    path: PathLike,
+    *,
+    compress: bool = False,
+) -> None:
+    """Write a model: a map with all that was prepared on it.
+
+    Parameters
+    ----------
+    thing
+        A planner, with its grid, its topological map, and what it has prepared so far: call
+        `HybridPlanner.prepare` before, to have all of it. Or several planners on one topological
+        map, such as those of several presets. Or such a map, a grid or a `Model` alone.
+    path
+        The file, which must end in `.hnm`. It is written whole or not at all; who has loaded the
+        one that it replaces keeps that.
+    compress
+        Whether arrays are deflated: the file is some eight times as small, and loads more slowly,
+        into memory of its own.
+
+    Raises
+    ------
+    InvalidValueError
+        When the path ends otherwise, or the planners are not on one topological map.
+    ModelError
+        When the file cannot be written.
+    """
+    if not is_model(path):
+        raise InvalidValueError(
+            f"the name of a model must end in {MODEL_SUFFIX}, got {printable(path)}"
+        )
+    try:
+        write_parts(Path(path), _parts_of(thing), compress=compress)
+    except OSError as error:
+        raise ModelError(f"model {printable(path)}: cannot be written: {error.strerror}") from None
+
+
+def load(
+    path: PathLike,
+    *,
+    robot_radius_m: float | None = None,
+    free_threshold: float | None = None,
+    occupied_threshold: float | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> Model:
+    """Load a model, or a map that has none.
+
+    Parameters
+    ----------
+    path
+        A model (.hnm), or a map as `load_map` reads it: a model without anything prepared.
+    robot_radius_m, free_threshold, occupied_threshold, max_cells
+        As of `load_map`. A model whose grid was made with others is a map like any other: the grid
+        is made anew and nothing of the rest is used.
+
+    Returns
+    -------
+    Model
+        Its `planner` plans at once.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the file is not there.
+    ModelError
+        When a model is none, not whole, altered, or of another version; one line.
+    MapError
+        When a map cannot be read, or has more than `max_cells`.
+    InvalidValueError
+        When the radius, a threshold or the limit is out of range.
+    """
+    if is_model(path):
+        return open_model(path, max_cells=max_cells).remade(
+            robot_radius_m=robot_radius_m,
+            free_threshold=free_threshold,
+            occupied_threshold=occupied_threshold,
+        )
+    grid = load_map(
+        path,
+        robot_radius_m=robot_radius_m,
+        free_threshold=free_threshold,
+        occupied_threshold=occupied_threshold,
+        max_cells=max_cells,
+    )
+    return Model(grid)
+
+
+def _parts_of(
+    thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
+) -> list[Part]:
+    if isinstance(thing, Model):
+        return thing.parts()
+    if isinstance(thing, OccupancyGrid):
+        return [parts.grid_part(thing)]
+    if isinstance(thing, TopologicalMap):
+        return _parts_of_map(thing)
+    from hybridnav.planner import HybridPlanner  # noqa: PLC0415 - loads numba
+
+    planners = [thing] if isinstance(thing, HybridPlanner) else list(thing)
+    if not planners or not all(isinstance(planner, HybridPlanner) for planner in planners):
+        raise InvalidValueError(
+            "a model is saved of a planner, several planners, a topological map or a grid, "
+            f"got {thing!r:.80}"
+        )
+    topology = planners[0].topology
+    if any(planner.topology is not topology for planner in planners):
+        raise InvalidValueError(
+            "planners are saved together when they are on one topological map, these are on several"
+        )
+    from hybridnav.io.models.searches import made_for, search_parts  # noqa: PLC0415
+
+    found, keys = _parts_of_map(topology), []
+    found += [parts.preset_part(planner.preset) for planner in planners]
+    for planner in planners:
+        settings, prepared = planner.preset.planner, planner.prepared
+        key = made_for(settings, topology)
+        if prepared is not None and (settings.coarse, key) not in keys:
+            keys.append((settings.coarse, key))
+            found += search_parts(prepared, key)
+    return found
+
+
+def _parts_of_map(topology: TopologicalMap) -> list[Part]:
+    pyramid = topology.pyramid
+    rooms = [] if pyramid.rooms is None else [parts.rooms_part(pyramid.rooms)]
+    return [parts.grid_part(topology.grid), *rooms, parts.pyramid_part(pyramid)]

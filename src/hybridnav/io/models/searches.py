@@ -1,0 +1,226 @@
+"""What planners prepare, as parts of a model and back: meshes, graphs, portals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict
+
+from hybridnav.io.models.fields import refusal
+from hybridnav.io.models.parts import plain, values_of
+from hybridnav.io.models.structures import (
+    CORNER_GRAPH,
+    JUMP_GRAPH,
+    JUMP_HIERARCHY,
+    MESH,
+    PORTALS,
+    TABLES,
+)
+from hybridnav.jumps import JumpSearch
+from hybridnav.jumps.build import JumpGraph, JumpHierarchy
+from hybridnav.mesh import ConvexMesh, CornerGraph, MeshSearch
+from hybridnav.route import BuiltPortals
+from hybridnav.route._portal_kernels import Tables
+from hybridnav.topology.portals import Portals
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav.config import PlannerSettings
+    from hybridnav.io.models.container import FiledPart, Part
+    from hybridnav.planner.cell_plans import Prepared
+    from hybridnav.topology import TopologicalMap
+
+
+_FRAME = 2
+"""Rows and columns of the frame of blocked cells round a jump-point graph."""
+
+
+class _Values(BaseModel):
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class _MeshValues(_Values):
+    is_prepared: bool
+    expanded: int
+
+
+class _JumpValues(_Values):
+    origin: tuple[int, int]
+    width: int
+
+
+class _PortalValues(_Values):
+    has_all_gates: bool
+    shift: int
+
+
+def made_for(settings: PlannerSettings, topology: TopologicalMap) -> dict[str, Any]:
+    """Return the settings on which what a planner prepares depends, beside the grid."""
+    key: dict[str, Any] = {"allow_unexplored": settings.allow_unexplored}
+    if settings.coarse == "portals":
+        key |= {
+            "all_gates": settings.refine == "gates",
+            "merge_distance_m": plain(topology.pyramid.merge_distance_m),
+            "seed": topology.pyramid.seed,
+        }
+    return {"made_for": key}
+
+
+def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
+    """Describe what a planner has prepared.
+
+    Parameters
+    ----------
+    prepared
+        `HybridPlanner.prepared`.
+    key
+        Of `made_for`.
+    """
+    if isinstance(prepared, MeshSearch):
+        return _mesh_parts(prepared, key)
+    if isinstance(prepared, JumpSearch):
+        return _jump_parts(prepared, key)
+    return _portal_parts(prepared, key)
+
+
+def search_of(
+    filed: Sequence[FiledPart], coarse: str, key: dict[str, Any], known: dict[str, int]
+) -> Prepared | None:
+    """Read what a planner of some settings needs, None where the model does not hold it.
+
+    Parameters
+    ----------
+    filed
+        All parts of the model.
+    coarse
+        The setting `planner.coarse`.
+    key
+        Of `made_for`.
+    known
+        Sizes of the map.
+
+    Raises
+    ------
+    ModelError
+        When a part is not as it was written.
+    """
+    fitting = {part.kind: part for part in filed if part.values.get("made_for") == key["made_for"]}
+    if coarse == "mesh" and MESH.kind in fitting:
+        return _mesh_of(fitting, known)
+    if coarse == "jumps" and JUMP_GRAPH.kind in fitting:
+        return _jumps_of(fitting, known)
+    if coarse == "portals" and PORTALS.kind in fitting:
+        return _portals_of(fitting, known)
+    return None
+
+
+def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
+    mesh, graph = search.mesh, search.graph
+    sizes = {
+        "corners": len(mesh.corners),
+        "polygons": mesh.n_polygons,
+        "slots": len(mesh.begins),
+        "blocks": len(mesh.block_head),
+    }
+    values = key | {"is_prepared": search.is_prepared, "expanded": search.expanded}
+    parts = [MESH.part(mesh, sizes, values)]
+    if graph is not None:
+        sizes = {
+            "corners": len(mesh.corners),
+            "edges": len(graph.heads),
+            "landmarks": graph.landmark_distances.shape[1],
+        }
+        parts.append(CORNER_GRAPH.part(graph, sizes, key))
+    return parts
+
+
+def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch:
+    values = values_of(_MeshValues, fitting[MESH.kind])
+    search = MeshSearch(ConvexMesh(**MESH.read(fitting[MESH.kind], known)))
+    search.expanded = values.expanded
+    if values.is_prepared:
+        filed = fitting.get(CORNER_GRAPH.kind)
+        graph = None
+        if filed is not None:
+            _check_same(filed, "corners", len(search.mesh.corners))
+            graph = CornerGraph(**CORNER_GRAPH.read(filed, known))
+        search.adopt(graph)
+    return search
+
+
+def _jump_parts(search: JumpSearch, key: dict[str, Any]) -> list[Part]:
+    graph, hierarchy = search.graph, search.hierarchy
+    sizes = {
+        "framed": len(graph.number),
+        "free": len(graph.ahead),
+        "corners": graph.n_corners,
+        "arcs": len(graph.arcs),
+    }
+    parts = [
+        JUMP_GRAPH.part(graph, sizes, key | {"origin": list(graph.origin), "width": graph.width})
+    ]
+    if hierarchy is not None:
+        sizes = {"corners": graph.n_corners, "arcs": len(hierarchy.arcs)}
+        parts.append(JUMP_HIERARCHY.part(hierarchy, sizes, key))
+    return parts
+
+
+def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearch:
+    filed = fitting[JUMP_GRAPH.kind]
+    values = values_of(_JumpValues, filed)
+    sizes, width = filed.part.sizes, values.width
+    arrays = JUMP_GRAPH.read(filed, known)
+    row, col = values.origin
+    height = sizes["framed"] // max(width, 1)
+    inside = -1 <= row <= known["rows"] + 1 - height and -1 <= col <= known["cols"] + 1 - width
+    if not inside or min(height, width) < _FRAME or height * width != sizes["framed"]:
+        raise refusal(filed, f"a frame at {values.origin}, {width} wide, of {sizes['framed']}")
+    hierarchy = None
+    if JUMP_HIERARCHY.kind in fitting:
+        other = fitting[JUMP_HIERARCHY.kind]
+        _check_same(other, "corners", sizes["corners"])
+        hierarchy = JumpHierarchy(**JUMP_HIERARCHY.read(other, known))
+    return JumpSearch(JumpGraph(values.origin, width, **arrays), hierarchy)
+
+
+def _portal_parts(built: BuiltPortals, key: dict[str, Any]) -> list[Part]:
+    portals, tables = built.portals, built.tables
+    sizes = {
+        "fields": portals.n_fields,
+        "positions": len(portals.position),
+        "entered": int(portals.field_start[-1]),
+        "gates": portals.n_gates,
+        "bytes": len(portals.rows),
+        "costs": len(portals.clique),
+        "exits": len(portals.exit_gate),
+        "sides": portals.n_sides,
+        "members": len(portals.side_gates),
+        "steps": len(portals.steps),
+        "sources": len(portals.source_gate),
+        "portals": len(portals.portal_sides),
+    }
+    values = key | {"has_all_gates": built.has_all_gates, "shift": int(tables.shift)}
+    arrays = {"field_of": built.field_of, **portals._asdict()}
+    of_tables = {name: sizes[name] for name in TABLES.most}
+    return [PORTALS.part(arrays, sizes, values), TABLES.part(tables, of_tables, key)]
+
+
+def _portals_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> BuiltPortals:
+    filed = fitting[PORTALS.kind]
+    values = values_of(_PortalValues, filed)
+    arrays = PORTALS.read(filed, known)
+    tables = fitting.get(TABLES.kind)
+    if tables is None:
+        raise refusal(filed, f"the {TABLES.kind} are missing")
+    for name in TABLES.most:
+        _check_same(tables, name, filed.part.sizes[name])
+    field_of = arrays.pop("field_of")
+    made = Tables(shift=values.shift, **TABLES.read(tables, known))
+    return BuiltPortals(field_of, Portals(**arrays), made, values.has_all_gates)
+
+
+def _check_same(filed: FiledPart, name: str, wanted: int) -> None:
+    """Refuse a part of another mesh or graph than it belongs to."""
+    if filed.part.sizes.get(name) != wanted:
+        raise refusal(filed, f"{name} is {filed.part.sizes.get(name)}, expected {wanted}")

@@ -1,0 +1,169 @@
+"""The descriptions of all structures that a model may hold.
+
+Limits of sizes are generous bounds of what the builders make: they keep an altered header from
+asking for memory.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from hybridnav.grid.occupancy import MAX_CELLS
+from hybridnav.io.models.fields import MOST, Field, Structure
+
+GRID = Structure(
+    "grid",
+    1,
+    (
+        Field("palette", "float32", ("levels",)),
+        Field("probability", "uint8 float32", ("rows", "cols")),
+        Field("measured", "uint8", ("rows", "cols"), below=3),
+        Field("classes", "uint8", ("rows", "cols"), below=3),
+    ),
+    {"rows": MAX_CELLS, "cols": MAX_CELLS, "levels": 256},
+)
+"""Occupancy as an index into a palette where it has few values, as that of an image has."""
+
+ROOMS = Structure("rooms", 1, (Field("label_of", "int32", ("rows", "cols"), least=-1),), {})
+
+PYRAMID = Structure(
+    "pyramid",
+    1,
+    (
+        Field("vertex_end", "uint8", ("cells",), frozen=False),
+        Field("vertex_parent", "int32", ("cells",), least=-1, below="cells", frozen=False),
+        Field("edge_end", "uint8", ("2*cells",), frozen=False),
+    ),
+    {},
+)
+
+MESH = Structure(
+    "mesh",
+    1,
+    (
+        Field("corners", "int32", ("corners", 2), least=0, below="cells+1"),
+        Field("kinds", "uint8", ("corners",), below=5),
+        Field("first", "int32", ("polygons+1",), below="slots", is_offsets=True),
+        Field("begins", "int32", ("slots",), least=0, below="corners"),
+        Field("twins", "int32", ("slots",), least=-1, below="slots"),
+        Field("polygon_of", "int32", ("slots",), least=0, below="polygons"),
+        Field("polygon_at", "int32", ("rows", "cols"), least=-1, below="polygons"),
+        Field("block_of", "int32", ("slots",), least=-1, below="blocks"),
+        Field("block_head", "int32", ("blocks",), least=0, below="polygons"),
+        Field("block_up", "int32", ("polygons",), least=-1, below="blocks"),
+        Field("component", "int32", ("polygons",), least=0, below="polygons"),
+        Field("depth", "int32", ("polygons",), least=0, below="polygons"),
+    ),
+    {"corners": "4*cells", "polygons": "2*corners", "slots": "6*corners", "blocks": "polygons"},
+)
+
+CORNER_GRAPH = Structure(
+    "corner graph",
+    1,
+    (
+        Field("first", "int64", ("2*corners+1",), below="edges", is_offsets=True),
+        Field("heads", "int32", ("edges",), least=0, below="corners"),
+        Field("landmark_distances", "float64", ("corners", "landmarks"), least=0),
+    ),
+    {"corners": "4*cells", "edges": "200*corners", "landmarks": 256},
+)
+
+JUMP_GRAPH = Structure(
+    "jump graph",
+    1,
+    (
+        Field("number", "int32", ("framed",), least=-1, below="free"),
+        Field("ahead", "int16 int32", ("free", 8)),
+        Field("places", "int64", ("corners",), least=0),
+        Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
+        Field("arcs", "int64", ("arcs", 2), least=0),
+        Field("component", "int32", ("corners",), least=0, below="corners"),
+    ),
+    {"framed": "9*cells", "free": "cells", "corners": "cells", "arcs": "2000*corners"},
+)
+
+JUMP_HIERARCHY = Structure(
+    "jump hierarchy",
+    1,
+    (
+        Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
+        Field("arcs", "int64", ("arcs", 2), least=0),
+        Field("middles", "int32", ("arcs",), least=-1, below="corners"),
+    ),
+    {"corners": "cells", "arcs": "2000*corners"},
+)
+
+_Open = partial(Field, frozen=False)
+
+PORTALS = Structure(
+    "portals",
+    1,
+    (
+        _Open("field_of", "int16 int32", ("rows", "cols"), least=-1, below="fields"),
+        _Open("position", "int32", ("positions",), least=-1, below="cells"),
+        _Open("field_start", "int64", ("fields+1",), below="entered", is_offsets=True),
+        _Open("gate_start", "int64", ("fields+1",), below="gates", is_offsets=True),
+        _Open("gate_cell", "int32", ("gates",), least=0, below="cells"),
+        _Open("row_start", "int64", ("gates+1",), below="bytes", is_offsets=True),
+        _Open("rows", "uint8", ("bytes",)),
+        _Open("clique_start", "int64", ("fields+1",), below="costs", is_offsets=True),
+        _Open("clique", "int32", ("costs",), least=0),
+        _Open("exit_start", "int64", ("gates+1",), below="exits", is_offsets=True),
+        _Open("exit_gate", "int32", ("exits",), least=0, below="gates"),
+        _Open("exit_cost", "int32", ("exits",), least=0),
+        _Open("side_start", "int64", ("fields+1",), below="sides", is_offsets=True),
+        _Open("side_gates_start", "int64", ("sides+1",), below="members", is_offsets=True),
+        _Open("side_gates", "int32", ("members",), least=0, below="gates"),
+        _Open("steps_start", "int64", ("fields+1",), below="steps", is_offsets=True),
+        _Open("steps_shift", "int64", ("fields",), least=0, below=64),
+        _Open("steps", "uint16", ("steps",)),
+        _Open("source_gate", "int32", ("sources",), least=0, below="gates"),
+        _Open("portal_sides", "int32", ("portals", 2), least=0, below="sides"),
+        _Open("side_box", "int32", ("sides", 4), least=0, below="cells"),
+    ),
+    {
+        "fields": "cells",
+        "positions": "64*cells",
+        "entered": "cells",
+        "gates": "cells",
+        "bytes": MOST,
+        "costs": MOST,
+        "exits": "8*cells",
+        "sides": "8*cells",
+        "members": "64*cells",
+        "steps": MOST,
+        "sources": "gates",
+        "portals": "sides",
+    },
+)
+
+TABLES = Structure(
+    "portal tables",
+    1,
+    (
+        _Open("route", "uint32", ("sources", "gates")),
+        _Open("between", "uint32", ("sides", "sides")),
+        _Open("gate_field", "int32", ("gates",), least=0, below="cells"),
+        _Open("source_at", "int32", ("gates",), least=-1, below="sources"),
+    ),
+    {"gates": "cells", "sources": "gates", "sides": "8*cells"},
+)
+
+PRESET = Structure("preset", 1, (), {})
+
+KINDS = frozenset(
+    structure.kind
+    for structure in (
+        GRID,
+        ROOMS,
+        PYRAMID,
+        PRESET,
+        MESH,
+        CORNER_GRAPH,
+        JUMP_GRAPH,
+        JUMP_HIERARCHY,
+        PORTALS,
+        TABLES,
+    )
+)
+"""The kinds of all parts of a model."""

@@ -1,0 +1,66 @@
+"""Which planner of cell paths a preset asks for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.jumps import JumpSearch
+from hybridnav.mesh import MeshSearch
+from hybridnav.planner.cell_plans import MaxDistance, OverPortals, WholeMap
+from hybridnav.planner.jump_plans import OverJumps
+from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav.route import BuiltPortals
+
+if TYPE_CHECKING:
+    from hybridnav.config import PlannerSettings
+    from hybridnav.planner.cell_plans import CellPlanner, Prepared
+    from hybridnav.refine import GridRefiner
+    from hybridnav.topology import TopologicalMap
+
+_T = TypeVar("_T")
+
+
+def cell_planner(
+    topology: TopologicalMap,
+    refiner: GridRefiner,
+    settings: PlannerSettings,
+    prepared: Prepared | None,
+) -> CellPlanner:
+    """Make the planner of cell paths that settings ask for.
+
+    Parameters
+    ----------
+    topology
+        The map.
+    refiner
+        Finds paths of cells.
+    settings
+        Section `planner` of a preset.
+    prepared
+        What another planner of the same map and settings has built; None for nothing.
+
+    Raises
+    ------
+    InvalidValueError
+        When these settings use nothing of the kind that is given.
+    """
+    grid, coarse = topology.grid, settings.coarse
+    if coarse == "portals":
+        built = _taken(BuiltPortals, prepared, coarse)
+        return OverPortals(topology, refiner, settings, built)
+    if coarse == "mesh":
+        return OverMesh(grid, refiner, settings, _taken(MeshSearch, prepared, coarse))
+    if coarse == "jumps":
+        return OverJumps(grid, refiner, settings, _taken(JumpSearch, prepared, coarse))
+    _taken(type(None), prepared, coarse)
+    return MaxDistance(topology, refiner, settings) if coarse != "none" else WholeMap(refiner)
+
+
+def _taken(kind: type[_T], prepared: Prepared | None, coarse: str) -> _T | None:
+    if prepared is None or isinstance(prepared, kind):
+        return prepared
+    raise InvalidValueError(
+        f"coarse: {coarse} plans on nothing like a {type(prepared).__name__}: prepared must come "
+        "from a planner of the same preset"
+    )
