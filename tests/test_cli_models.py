@@ -48,10 +48,14 @@ def test_what_the_command_line_states_wins_over_a_model(cli, model):  # noqa: F8
     assert done.err == ""
 
 
-def test_show_and_evaluate_take_a_model(cli, model, tmp_path):  # noqa: F811
+def test_show_takes_a_model(cli, model):  # noqa: F811
     shown = cli("show", model)
     assert shown.code == 0
     assert shown.out.split("seconds")[0] == cli("show", FIGURE, *SMALL).out.split("seconds")[0]
+
+
+@pytest.mark.full
+def test_evaluate_takes_a_model(cli, model, tmp_path):  # noqa: F811
     done = cli("evaluate", model, "-o", tmp_path / "run", "--pairs", "3", "--preset", "shortest")
     assert done.code == 0
     radius = {record["robot_radius_m"] for record in _records(tmp_path / "run", "preparation")}

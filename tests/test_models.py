@@ -74,6 +74,7 @@ def test_a_planner_comes_back_bit_by_bit(preset: str, tmp_path: Path, *, compres
     same_answers(saved, pickle.loads(pickle.dumps(came_back)))  # noqa: S301 - our own
 
 
+@pytest.mark.full
 def test_presets_with_ompl_find_their_mesh_in_a_model(tmp_path: Path) -> None:
     pytest.importorskip("ompl")
     preset = hn.load_preset("ompl-rrtconnect", overrides=["pyramid.robot_radius_m=0.05"])

@@ -34,21 +34,23 @@ def replace_file(path: Path, content: bytes | Iterable[bytes | memoryview]) -> N
     OSError
         When it cannot be written.
     """
-    pieces = [content] if isinstance(content, bytes) else content
     if _is_no_file(path):
-        _write(path, pieces)
+        _write(path, content)
         return
     path = path.resolve()
     with _beside(path) as beside:
-        _write(beside, pieces)
+        _write(beside, content)
         if path.exists():
             shutil.copymode(path, beside)
         beside.replace(path)
 
 
-def _write(path: Path, pieces: Iterable[bytes | memoryview]) -> None:
+def _write(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+        return
     with path.open("wb") as file:
-        for piece in pieces:
+        for piece in content:
             file.write(piece)
         if file.seekable():  # a pipe has no disc to reach
             file.flush()

@@ -7,12 +7,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hybridnav import io
 from hybridnav._files import MODEL_SUFFIX
 from hybridnav.config import Preset, PyramidSettings, load_preset
 from hybridnav.config.yaml_file import printable
 from hybridnav.errors import InvalidValueError, ModelError
 from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
-from hybridnav.io.maps import load_map
 from hybridnav.io.models import parts
 from hybridnav.io.models.container import read_parts, write_parts
 from hybridnav.io.models.fields import refusal
@@ -248,12 +248,13 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
     for part in filed:
         if part.kind not in KINDS:
             raise refusal(part, "no such part is known: a newer hybridnav has made it")
-    kinds = [part.kind for part in filed]
-    for kind in (GRID.kind, PYRAMID.kind, ROOMS.kind):
-        if kinds.count(kind) > 1 or (kind == GRID.kind and kind not in kinds):
+    # Meshes and graphs are there once for each kind of planner that they were made for.
+    made = [(part.kind, part.values.get("made_for")) for part in filed if part.kind != PRESET.kind]
+    for kind, key in [*made, (GRID.kind, None)]:
+        if made.count((kind, key)) != 1:
             raise ModelError(
-                f"model {printable(path)}: {kinds.count(kind)} parts {kind}, expected one: build "
-                "the model anew"
+                f"model {printable(path)}: {made.count((kind, key))} parts {kind}, expected one: "
+                "build the model anew"
             )
     return Model(None, filed, max_cells)
 
@@ -336,7 +337,7 @@ def load(
             free_threshold=free_threshold,
             occupied_threshold=occupied_threshold,
         )
-    grid = load_map(
+    grid = io.load_map(
         path,
         robot_radius_m=robot_radius_m,
         free_threshold=free_threshold,
