@@ -18,7 +18,6 @@ from hybridnav.cli.common import (
     grow_topology,
     islands_figures,
     islands_line,
-    load_model,
     outside,
     read_settings,
     refused_result,
@@ -28,6 +27,7 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.compiling import compiling_beside
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
+from hybridnav.cli.keep import KeepInOption, KeepOption, Source
 from hybridnav.cli.options import (
     FreeOption,
     JsonOption,
@@ -138,6 +138,8 @@ def plan(
     occupied_threshold: OccupiedOption = None,
     least_island_m2: LeastIslandOption = 0.0,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    keep: KeepOption = False,
+    keep_in: KeepInOption = None,
     compare: CompareOption = False,
     plot: PlotOption = None,
     as_json: JsonOption = False,
@@ -153,6 +155,7 @@ def plan(
         preset, overrides, robot_radius_m, seed, smooth=smooth, map_file=map_file
     )
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
+    source = Source(map_file, settings, reading, keep, keep_in)
     closing = parsed_closing(blocked)
     ends = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
@@ -170,14 +173,12 @@ def plan(
             raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
         stops = [ends[0], *map(parsed_stop, via or ()), ends[1]]
         errand = Errand(
-            map_file,
+            source,
             rooms_file,
             stops,
             where,
-            settings,
             plot,
             as_json,
-            reading,
             alternatives,
             least_hole_m2,
             closing,
@@ -187,7 +188,7 @@ def plan(
         return
     start, goal = ends
     seconds: dict[str, float] = {}
-    model = load_model(map_file, settings, seconds, reading)
+    model, key = source.load(seconds)
     grid = model.grid
     check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
     closed = closing.read(grid)
@@ -205,6 +206,7 @@ def plan(
         planner = model.planner(settings, topology=topology)
     with stage("planning", {}, "plan"):  # the result has the seconds of its stages
         result = planner.plan(start, goal, blocked=closed)
+    source.keep(planner, key)
     figures = _figures(map_file, result, seconds) | islands_figures(grid) | closing.to_dict()
     if compare:
         figures |= _compare(topology, settings, (start, goal), result, closed)

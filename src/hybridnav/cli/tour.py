@@ -12,14 +12,12 @@ import numpy as np
 import hybridnav as hn
 from hybridnav.cli.blocked import Closing, told_closing
 from hybridnav.cli.common import (
-    Reading,
     answer,
     check_room_to_be,
     complain,
     grow_topology,
     islands_figures,
     islands_line,
-    load_model,
     outside,
     refused_result,
     stage,
@@ -27,6 +25,7 @@ from hybridnav.cli.common import (
     told_bound,
 )
 from hybridnav.cli.errors import UsageError
+from hybridnav.cli.keep import Source
 from hybridnav.config.yaml_file import printable
 from hybridnav.grid.occupancy import extent
 from hybridnav.grid.rooms import read_point
@@ -41,23 +40,27 @@ Stop = str | tuple[float, ...]
 class Errand:
     """What a command line asks for."""
 
-    map_file: Path
+    source: Source
     rooms_file: Path | None
     stops: list[Stop]
     at: At
-    settings: hn.Preset
     plot: Path | None
     as_json: bool
-    reading: Reading
     alternatives: int = 1
     least_hole_m2: float = 1.0
     closing: Closing = field(default_factory=Closing)
+
+    @property
+    def settings(self) -> hn.Preset:
+        """The preset."""
+        return self.source.settings
 
 
 def run_errand(errand: Errand) -> bool:
     """Plan a way between rooms and points, print it, and return whether it is solved."""
     seconds: dict[str, float] = {}
-    model = load_model(errand.map_file, errand.settings, seconds, errand.reading)
+    rooms_file = errand.rooms_file or _beside(errand.source.map_file)
+    model, key = errand.source.load(seconds, rooms_file=rooms_file, needs_rooms=True)
     grid = model.grid
     check_room_to_be(grid, allow_unexplored=errand.settings.planner.allow_unexplored)
     closed = errand.closing.read(grid)
@@ -69,9 +72,12 @@ def run_errand(errand: Errand) -> bool:
             figures |= {"alternatives": [], "alternatives_complete": True}
         _answer(errand, grid, figures, seconds)
         return False
-    rooms_file = errand.rooms_file
-    if rooms_file is None and model.rooms is None:
-        rooms_file = beside(errand.map_file)
+    if model.rooms is not None and (errand.rooms_file is None or model.key is not None):
+        rooms_file = None  # the model has them
+    elif rooms_file is None:
+        complain(
+            "no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help"
+        )
     topology = grow_topology(
         model,
         errand.settings,
@@ -85,6 +91,7 @@ def run_errand(errand: Errand) -> bool:
         planner = model.planner(errand.settings, topology=topology)
     with stage("planning", seconds, "plan"):
         tour = hn.plan_tour(planner, errand.stops, at=errand.at, blocked=closed)
+    errand.source.keep(planner, key)
     figures, found = _figures(errand, tour), None
     counted = sum(figures["seconds"].values())
     seconds["plan"] = round(max(seconds["plan"] - counted, 0.0), 6)  # what no stage below counts
@@ -110,13 +117,10 @@ def _answer(
     answer(whole if errand.as_json else _summary(grid, figures))
 
 
-def beside(map_file: Path) -> Path | None:
+def _beside(map_file: Path) -> Path | None:
     """The file of rooms in the map's folder, None where there is none."""
     path = map_file.parent / "rooms.yaml"
-    if path.is_file():
-        return path
-    complain("no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help")
-    return None
+    return path if path.is_file() else None
 
 
 def parsed_stop(text: str) -> Stop:
@@ -135,7 +139,7 @@ def _told(stop: Stop) -> str:
 
 def _figures(errand: Errand, tour: hn.Tour) -> dict[str, Any]:
     return tour.to_dict() | {
-        "map": str(errand.map_file),
+        "map": str(errand.source.map_file),
         "stops": [stop if isinstance(stop, str) else list(stop) for stop in errand.stops],
         "query": " via ".join(map(_told, errand.stops[:-1])) + " to " + _told(errand.stops[-1]),
         **errand.closing.to_dict(),

@@ -109,6 +109,21 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         raise RoomsError(f"{where}: {error}") from None
 
 
+def files_of(path: Path) -> list[Path]:
+    """Return a file of rooms and the image that it names, if it names one.
+
+    Raises
+    ------
+    RoomsError
+        When the file cannot be read.
+    """
+    values = read_yaml(
+        path, what="rooms", error=RoomsError, missing=RoomsNotFoundError, limits=LIMITS
+    )
+    data = values.get("data")
+    return [path, path.parent / data] if isinstance(data, str) else [path]
+
+
 def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
     """The form with rooms."""
     read = _Read(where)

@@ -109,6 +109,17 @@ def load_ros_map(
     return grid
 
 
+def files_of(path: Path) -> list[Path]:
+    """Return the YAML file of a map and the image that it names.
+
+    Raises
+    ------
+    MapError
+        When the YAML file cannot be read.
+    """
+    return [path, _read_description(path, None, None).image]
+
+
 @dataclass(frozen=True)
 class _Description:
     """What the YAML file says, after overrides."""

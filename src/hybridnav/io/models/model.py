@@ -16,7 +16,7 @@ from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.io.models import parts
 from hybridnav.io.models.container import read_parts, write_parts
 from hybridnav.io.models.fields import refusal
-from hybridnav.io.models.structures import GRID, KINDS, PRESET, PYRAMID, ROOMS
+from hybridnav.io.models.structures import GRID, KEY, KINDS, PRESET, PYRAMID, ROOMS
 from hybridnav.io.size import check_max_cells
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
@@ -212,10 +212,16 @@ class Model:
             given["radius_is_default"] = False
         return Model(replace(self.grid, **given))
 
+    @property
+    def key(self) -> str | None:
+        """What it is found by where it is kept, None for other models."""
+        found = self._of_kind(KEY.kind)
+        return str(found[0].values.get("key")) if found else None
+
     def parts(self) -> list[Part]:
-        """Return all that it holds, as it is written to a file."""
+        """Return all that it holds, as it is written to a file; every checksum is compared."""
         if self._filed:
-            return [filed.read() for filed in self._filed]
+            return [filed.read() for filed in self._filed if filed.kind != KEY.kind]
         return [parts.grid_part(self.grid)]
 
     @property
@@ -292,7 +298,7 @@ def save(
             f"the name of a model must end in {MODEL_SUFFIX}, got {printable(path)}"
         )
     try:
-        write_parts(Path(path), _parts_of(thing), compress=compress)
+        write_parts(Path(path), parts_of(thing), compress=compress)
     except OSError as error:
         raise ModelError(f"model {printable(path)}: cannot be written: {error.strerror}") from None
 
@@ -347,9 +353,10 @@ def load(
     return Model(grid)
 
 
-def _parts_of(
+def parts_of(
     thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
 ) -> list[Part]:
+    """Describe what `save` writes."""
     if isinstance(thing, Model):
         return thing.parts()
     if isinstance(thing, OccupancyGrid):

@@ -151,6 +151,9 @@ TABLES = Structure(
 
 PRESET = Structure("preset", 1, (), {})
 
+KEY = Structure("key", 1, (), {})
+"""What a kept model is found by."""
+
 KINDS = frozenset(
     structure.kind
     for structure in (
@@ -158,6 +161,7 @@ KINDS = frozenset(
         ROOMS,
         PYRAMID,
         PRESET,
+        KEY,
         MESH,
         CORNER_GRAPH,
         JUMP_GRAPH,
