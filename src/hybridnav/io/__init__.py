@@ -1,20 +1,23 @@
-"""Maps in: ROS maps, MovingAI benchmarks, examples, rooms, what is closed; rooms out; models."""
+"""Maps in: ROS maps, MovingAI benchmarks, examples, rooms, what is closed; rooms out; models.
+
+Names load on first use: rooms need scipy, models and what is closed numba, a map file neither.
+"""
 
 from __future__ import annotations
 
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.io.examples import example_map
 from hybridnav.io.maps import load_map
-from hybridnav.io.movingai import Scenario, load_movingai_map, read_scenarios
-from hybridnav.io.rooms import load_rooms
-from hybridnav.io.rooms_out import save_rooms
-from hybridnav.io.ros import load_ros_map
 
 if TYPE_CHECKING:
     from hybridnav.io.blocked import load_blocked
+    from hybridnav.io.examples import example_map
     from hybridnav.io.models import Model, load, save
+    from hybridnav.io.movingai import Scenario, load_movingai_map, read_scenarios
+    from hybridnav.io.rooms import load_rooms
+    from hybridnav.io.rooms_out import save_rooms
+    from hybridnav.io.ros import load_ros_map
 
 __all__ = [
     "Model",
@@ -31,11 +34,22 @@ __all__ = [
     "save_rooms",
 ]
 
-_LATE = {"load_blocked": "blocked", "Model": "models", "load": "models", "save": "models"}
-"""Names whose modules load numba."""
+_HOME_OF = {
+    "Model": "models",
+    "Scenario": "movingai",
+    "example_map": "examples",
+    "load": "models",
+    "load_blocked": "blocked",
+    "load_movingai_map": "movingai",
+    "load_rooms": "rooms",
+    "load_ros_map": "ros",
+    "read_scenarios": "movingai",
+    "save": "models",
+    "save_rooms": "rooms_out",
+}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LATE:
+    if name not in _HOME_OF:
         raise AttributeError(f"module 'hybridnav.io' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"hybridnav.io.{_LATE[name]}"), name)
+    return getattr(importlib.import_module(f"hybridnav.io.{_HOME_OF[name]}"), name)

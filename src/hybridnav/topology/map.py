@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 
 from hybridnav._copies import copies_alike
@@ -15,6 +14,8 @@ from hybridnav.grid import CellClass
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import networkx as nx
 
     from hybridnav._typing import ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
@@ -217,6 +218,8 @@ class TopologicalMap:
     def _check_connected(self, places: Sequence[int]) -> None:
         inside = np.zeros(self.n_places, dtype=np.bool_)
         inside[list(places)] = True
+        import networkx as nx  # noqa: PLC0415 - on demand
+
         graph: nx.Graph[int] = nx.Graph(self.arcs[inside[self.arcs].all(axis=1)].tolist())
         graph.add_nodes_from(places)
         if not nx.is_connected(graph):
@@ -224,6 +227,8 @@ class TopologicalMap:
 
     def unexplored_islands(self) -> list[tuple[int, ...]]:
         """Sets of connected unexplored places that other places enclose, as dense indices."""
+        import networkx as nx  # noqa: PLC0415 - on demand
+
         unexplored = self.classes == CellClass.UNEXPLORED
         kept = self.arcs[unexplored[self.arcs].all(axis=1)]
         graph: nx.Graph[int] = nx.Graph(kept.tolist())
