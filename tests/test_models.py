@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +58,16 @@ def same_answers(one: hn.HybridPlanner, other: hn.HybridPlanner) -> None:
         assert second.path is not None
         np.testing.assert_array_equal(first.path.points, second.path.points)
         np.testing.assert_array_equal(first.path.cells, second.path.cells)
+
+
+def test_threads_may_share_a_model(tmp_path: Path) -> None:
+    saved = hn.HybridPlanner(topology())
+    saved.prepare()
+    model = loaded(saved, tmp_path / "m.hnm")
+    with ThreadPoolExecutor(8) as pool:
+        planners = list(pool.map(lambda _: model.planner(), range(16)))
+    assert all(planner.topology is model.topology for planner in planners)
+    assert all(planner.prepared is not None for planner in planners)
 
 
 @WAYS

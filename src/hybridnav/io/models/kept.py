@@ -16,8 +16,9 @@ from hybridnav.errors import MapError, ModelError
 from hybridnav.grid import MAX_CELLS
 from hybridnav.io import rooms, ros
 from hybridnav.io.models.container import FORMAT, write_parts
-from hybridnav.io.models.model import open_model, parts_of
+from hybridnav.io.models.model import open_model
 from hybridnav.io.models.parts import plain
+from hybridnav.io.models.saving import parts_of
 from hybridnav.io.models.structures import KEY
 
 if TYPE_CHECKING:

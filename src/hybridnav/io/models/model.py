@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,10 @@ from hybridnav import io
 from hybridnav._files import MODEL_SUFFIX
 from hybridnav.config import Preset, PyramidSettings, load_preset
 from hybridnav.config.yaml_file import printable
-from hybridnav.errors import InvalidValueError, ModelError
+from hybridnav.errors import ModelError
 from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.io.models import parts
-from hybridnav.io.models.container import read_parts, write_parts
+from hybridnav.io.models.container import read_parts
 from hybridnav.io.models.fields import refusal
 from hybridnav.io.models.structures import GRID, KEY, KINDS, PRESET, PYRAMID, ROOMS
 from hybridnav.io.size import check_max_cells
@@ -22,7 +22,7 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from hybridnav._typing import PathLike
     from hybridnav.grid import RoomLabels
@@ -60,7 +60,9 @@ class Model:
         max_cells: int = DEFAULT_MAX_CELLS,
     ) -> None:
         self._grid, self._filed = grid, tuple(filed)
-        self._sizes = {}
+        self._sizes: dict[str, int] = {}
+        self._read: dict[str, Any] = {}
+        self._reading = threading.RLock()
         if filed:
             self._sizes = parts.sizes_of(self._of_kind(GRID.kind)[0], max_cells=max_cells)
 
@@ -73,28 +75,48 @@ class Model:
         """Whether a file holds it, rather than that only a map was read."""
         return bool(self._filed)
 
-    @cached_property
+    @property
     def grid(self) -> OccupancyGrid:
         """The map."""
-        if self._grid is not None:
-            return self._grid
-        return parts.grid_of(self._of_kind(GRID.kind)[0], self._sizes)
+        grid: OccupancyGrid = self._once("grid", self._read_grid)
+        return grid
 
-    @cached_property
+    @property
     def presets(self) -> tuple[Preset, ...]:
         """Presets of the planners that it was saved with; none for a map that was only loaded."""
         return tuple(map(parts.preset_of, self._of_kind(PRESET.kind)))
 
-    @cached_property
+    @property
     def rooms(self) -> RoomLabels | None:
         """The rooms that its places were grown with, None without."""
-        found = self._of_kind(ROOMS.kind)
-        return parts.rooms_of(found[0], self._sizes) if found else None
+        rooms: RoomLabels | None = self._once("rooms", self._read_rooms)
+        return rooms
 
-    @cached_property
+    @property
     def topology(self) -> TopologicalMap:
         """The topological map: as it was saved, or else grown as the first preset states, or as
         `shortest` does."""
+        topology: TopologicalMap = self._once("topology", self._read_topology)
+        return topology
+
+    def _once(self, name: str, read: Callable[[], Any]) -> Any:
+        """What is read once for all threads: planners must be on one grid."""
+        if name not in self._read:
+            with self._reading:
+                if name not in self._read:
+                    self._read[name] = read()
+        return self._read[name]
+
+    def _read_grid(self) -> OccupancyGrid:
+        if self._grid is not None:
+            return self._grid
+        return parts.grid_of(self._of_kind(GRID.kind)[0], self._sizes)
+
+    def _read_rooms(self) -> RoomLabels | None:
+        found = self._of_kind(ROOMS.kind)
+        return parts.rooms_of(found[0], self._sizes) if found else None
+
+    def _read_topology(self) -> TopologicalMap:
         found = self._of_kind(PYRAMID.kind)
         if found:
             pyramid = parts.pyramid_of(found[0], self._sizes, self.grid, self.rooms)
@@ -265,44 +287,6 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
     return Model(None, filed, max_cells)
 
 
-def save(
-    thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
-    path: PathLike,
-    *,
-    compress: bool = False,
-) -> None:
-    """Write a model: a map with all that was prepared on it.
-
-    Parameters
-    ----------
-    thing
-        A planner, with its grid, its topological map, and what it has prepared so far: call
-        `HybridPlanner.prepare` before, to have all of it. Or several planners on one topological
-        map, such as those of several presets. Or such a map, a grid or a `Model` alone.
-    path
-        The file, which must end in `.hnm`. It is written whole or not at all; who has loaded the
-        one that it replaces keeps that.
-    compress
-        Whether arrays are deflated: the file is some eight times as small, and loads more slowly,
-        into memory of its own.
-
-    Raises
-    ------
-    InvalidValueError
-        When the path ends otherwise, or the planners are not on one topological map.
-    ModelError
-        When the file cannot be written.
-    """
-    if not is_model(path):
-        raise InvalidValueError(
-            f"the name of a model must end in {MODEL_SUFFIX}, got {printable(path)}"
-        )
-    try:
-        write_parts(Path(path), parts_of(thing), compress=compress)
-    except OSError as error:
-        raise ModelError(f"model {printable(path)}: cannot be written: {error.strerror}") from None
-
-
 def load(
     path: PathLike,
     *,
@@ -351,45 +335,3 @@ def load(
         max_cells=max_cells,
     )
     return Model(grid)
-
-
-def parts_of(
-    thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
-) -> list[Part]:
-    """Describe what `save` writes."""
-    if isinstance(thing, Model):
-        return thing.parts()
-    if isinstance(thing, OccupancyGrid):
-        return [parts.grid_part(thing)]
-    if isinstance(thing, TopologicalMap):
-        return _parts_of_map(thing)
-    from hybridnav.planner import HybridPlanner  # noqa: PLC0415 - loads numba
-
-    planners = [thing] if isinstance(thing, HybridPlanner) else list(thing)
-    if not planners or not all(isinstance(planner, HybridPlanner) for planner in planners):
-        raise InvalidValueError(
-            "a model is saved of a planner, several planners, a topological map or a grid, "
-            f"got {thing!r:.80}"
-        )
-    topology = planners[0].topology
-    if any(planner.topology is not topology for planner in planners):
-        raise InvalidValueError(
-            "planners are saved together when they are on one topological map, these are on several"
-        )
-    from hybridnav.io.models.searches import made_for, search_parts  # noqa: PLC0415
-
-    found, keys = _parts_of_map(topology), []
-    found += [parts.preset_part(planner.preset) for planner in planners]
-    for planner in planners:
-        settings, prepared = planner.preset.planner, planner.prepared
-        key = made_for(settings, topology)
-        if prepared is not None and (settings.coarse, key) not in keys:
-            keys.append((settings.coarse, key))
-            found += search_parts(prepared, key)
-    return found
-
-
-def _parts_of_map(topology: TopologicalMap) -> list[Part]:
-    pyramid = topology.pyramid
-    rooms = [] if pyramid.rooms is None else [parts.rooms_part(pyramid.rooms)]
-    return [parts.grid_part(topology.grid), *rooms, parts.pyramid_part(pyramid)]

@@ -1,0 +1,102 @@
+"""Planners, maps and grids, written to files as models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hybridnav._files import MODEL_SUFFIX
+from hybridnav.config.yaml_file import printable
+from hybridnav.errors import InvalidValueError, ModelError
+from hybridnav.grid import OccupancyGrid
+from hybridnav.io.models import parts
+from hybridnav.io.models.container import write_parts
+from hybridnav.io.models.model import Model, is_model
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from hybridnav._typing import PathLike
+    from hybridnav.io.models.container import Part
+    from hybridnav.planner import HybridPlanner
+
+
+def save(
+    thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
+    path: PathLike,
+    *,
+    compress: bool = False,
+) -> None:
+    """Write a model: a map with all that was prepared on it.
+
+    Parameters
+    ----------
+    thing
+        A planner, with its grid, its topological map, and what it has prepared so far: call
+        `HybridPlanner.prepare` before, to have all of it. Or several planners on one topological
+        map, such as those of several presets. Or such a map, a grid or a `Model` alone.
+    path
+        The file, which must end in `.hnm`. It is written whole or not at all; who has loaded the
+        one that it replaces keeps that.
+    compress
+        Whether arrays are deflated: the file is some eight times as small, and loads more slowly,
+        into memory of its own.
+
+    Raises
+    ------
+    InvalidValueError
+        When the path ends otherwise, or the planners are not on one topological map.
+    ModelError
+        When the file cannot be written.
+    """
+    if not is_model(path):
+        raise InvalidValueError(
+            f"the name of a model must end in {MODEL_SUFFIX}, got {printable(path)}"
+        )
+    try:
+        write_parts(Path(path), parts_of(thing), compress=compress)
+    except OSError as error:
+        raise ModelError(f"model {printable(path)}: cannot be written: {error.strerror}") from None
+
+
+def parts_of(
+    thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
+) -> list[Part]:
+    """Describe what `save` writes."""
+    if isinstance(thing, Model):
+        return thing.parts()
+    if isinstance(thing, OccupancyGrid):
+        return [parts.grid_part(thing)]
+    if isinstance(thing, TopologicalMap):
+        return _parts_of_map(thing)
+    from hybridnav.planner import HybridPlanner  # noqa: PLC0415 - loads numba
+
+    planners = [thing] if isinstance(thing, HybridPlanner) else list(thing)
+    if not planners or not all(isinstance(planner, HybridPlanner) for planner in planners):
+        raise InvalidValueError(
+            "a model is saved of a planner, several planners, a topological map or a grid, "
+            f"got {thing!r:.80}"
+        )
+    topology = planners[0].topology
+    if any(planner.topology is not topology for planner in planners):
+        raise InvalidValueError(
+            "planners are saved together when they are on one topological map, these are on several"
+        )
+    from hybridnav.io.models.searches import made_for, search_parts  # noqa: PLC0415
+
+    found, keys = _parts_of_map(topology), []
+    found += [parts.preset_part(planner.preset) for planner in planners]
+    for planner in planners:
+        settings, prepared = planner.preset.planner, planner.prepared
+        key = made_for(settings, topology)
+        if prepared is not None and (settings.coarse, key) not in keys:
+            keys.append((settings.coarse, key))
+            found += search_parts(prepared, key)
+    return found
+
+
+def _parts_of_map(topology: TopologicalMap) -> list[Part]:
+    pyramid = topology.pyramid
+    rooms = [] if pyramid.rooms is None else [parts.rooms_part(pyramid.rooms)]
+    return [parts.grid_part(topology.grid), *rooms, parts.pyramid_part(pyramid)]
