@@ -80,7 +80,7 @@ def test_help_is_quick_and_complete():
         "--plot FILE ",
         "--json ",
         "in metres",
-        "[default: shortest]",
+        "[default: (shortest)]",
         "Exits with 0 when it is solved",
     ):
         assert words in " ".join(done.stdout.split()) + " "

@@ -40,7 +40,7 @@ def save(
         The file, which must end in `.hnm`. It is written whole or not at all; who has loaded the
         one that it replaces keeps that.
     compress
-        Whether arrays are deflated: the file is some eight times as small, and loads more slowly,
+        Whether arrays are deflated: the file is some six times as small, and loads more slowly,
         into memory of its own.
 
     Raises
