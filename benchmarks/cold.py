@@ -21,7 +21,7 @@ PLAN = ("plan", str(_OFFICE), "--start", "1.0,13.2", "--goal", "40.6,19.4")
 def seconds_of(cache: Path, *arguments: str) -> tuple[float, float]:
     """Return the seconds of a command with a cache folder: on the clock, of all processors."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    subprocess.run(  # noqa: S603 - this interpreter and our own package
+    subprocess.run(
         [sys.executable, "-m", "hybridnav", *arguments],
         check=True,
         capture_output=True,

@@ -16,7 +16,7 @@ import hybridnav as hn
 from hybridnav.grid.worlds import figure1_world
 from hybridnav.io.models import structures
 from hybridnav.jumps.build import JumpGraph, JumpHierarchy
-from hybridnav.mesh import ConvexMesh, CornerGraph
+from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
 from hybridnav.pyramid.record import Record
 from hybridnav.route._portal_kernels import Tables
 from hybridnav.topology.portals import Portals
@@ -83,6 +83,19 @@ def test_a_planner_comes_back_bit_by_bit(preset: str, tmp_path: Path, *, compres
     assert_alike(saved.prepared, came_back.prepared, set())
     same_answers(saved, came_back)
     same_answers(saved, pickle.loads(pickle.dumps(came_back)))  # noqa: S301 - our own
+
+
+def test_a_graph_that_took_too_long_to_contract_comes_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hybridnav.mesh.hierarchy._MOST_LOOKED", 0)
+    saved = hn.HybridPlanner(topology())
+    saved.prepare()
+    came_back = loaded(saved, tmp_path / "m.hnm").planner()
+    assert isinstance(came_back.prepared, MeshSearch)
+    assert isinstance(came_back.prepared.graph, CornerGraph)
+    assert_alike(saved.prepared, came_back.prepared, set())
+    same_answers(saved, came_back)
 
 
 @pytest.mark.full
@@ -284,6 +297,7 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.PYRAMID, Record, ()),
         (structures.MESH, ConvexMesh, ()),
         (structures.CORNER_GRAPH, CornerGraph, ()),
+        (structures.CORNER_HIERARCHY, CornerHierarchy, ()),
         (structures.JUMP_GRAPH, JumpGraph, ("origin", "width")),
         (structures.JUMP_HIERARCHY, JumpHierarchy, ()),
         (structures.TABLES, Tables, ("shift",)),

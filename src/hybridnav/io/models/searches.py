@@ -9,7 +9,9 @@ from pydantic import BaseModel, ConfigDict
 from hybridnav.io.models.fields import refusal
 from hybridnav.io.models.parts import plain, values_of
 from hybridnav.io.models.structures import (
+    CORNER_EDGES,
     CORNER_GRAPH,
+    CORNER_HIERARCHY,
     JUMP_GRAPH,
     JUMP_HIERARCHY,
     MESH,
@@ -18,7 +20,7 @@ from hybridnav.io.models.structures import (
 )
 from hybridnav.jumps import JumpSearch
 from hybridnav.jumps.build import JumpGraph, JumpHierarchy
-from hybridnav.mesh import ConvexMesh, CornerGraph, MeshSearch
+from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
 from hybridnav.route import BuiltPortals
 from hybridnav.route._portal_kernels import Tables
 from hybridnav.topology.portals import Portals
@@ -26,6 +28,7 @@ from hybridnav.topology.portals import Portals
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from hybridnav._typing import IntArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.io.models.container import FiledPart, Part
     from hybridnav.planner.cell_plans import Prepared
@@ -60,7 +63,6 @@ def made_for(settings: PlannerSettings, topology: TopologicalMap) -> dict[str, A
     key: dict[str, Any] = {"allow_unexplored": settings.allow_unexplored}
     if settings.coarse == "portals":
         key |= {
-            "all_gates": settings.refine == "gates",
             "merge_distance_m": plain(topology.pyramid.merge_distance_m),
             "seed": topology.pyramid.seed,
         }
@@ -125,14 +127,19 @@ def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
     }
     values = key | {"is_prepared": search.is_prepared, "expanded": search.expanded}
     parts = [MESH.part(mesh, sizes, values)]
-    if graph is not None:
-        sizes = {
-            "corners": len(mesh.corners),
-            "edges": len(graph.heads),
-            "landmarks": graph.landmark_distances.shape[1],
-        }
-        parts.append(CORNER_GRAPH.part(graph, sizes, key))
-    return parts
+    if search.edges is None or graph is None:
+        return parts
+    sizes = {"corners": len(mesh.corners), "edges": len(search.edges[1])}
+    if isinstance(graph, CornerGraph):
+        sizes["landmarks"] = graph.landmark_distances.shape[1]
+        return [*parts, CORNER_GRAPH.part(graph, sizes, key)]
+    edges = dict(zip(("first", "heads"), search.edges, strict=True))
+    of_arcs = {"corners": len(mesh.corners), "arcs": len(graph.arcs)}
+    return [
+        *parts,
+        CORNER_EDGES.part(edges, sizes, key),
+        CORNER_HIERARCHY.part(graph, of_arcs, key),
+    ]
 
 
 def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch:
@@ -140,13 +147,27 @@ def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch
     search = MeshSearch(ConvexMesh(**MESH.read(fitting[MESH.kind], known)))
     search.expanded = values.expanded
     if values.is_prepared:
-        filed = fitting.get(CORNER_GRAPH.kind)
-        graph = None
-        if filed is not None:
-            _check_same(filed, "corners", len(search.mesh.corners))
-            graph = CornerGraph(**CORNER_GRAPH.read(filed, known))
-        search.adopt(graph)
+        search.adopt(*_corners_of(fitting, known, len(search.mesh.corners)))
     return search
+
+
+def _corners_of(
+    fitting: dict[str, FiledPart], known: dict[str, int], n_corners: int
+) -> tuple[tuple[LongArray, IntArray] | None, CornerGraph | CornerHierarchy | None]:
+    """Read the edges between the corners of a mesh, and the graph that is searched."""
+    for structure in (CORNER_GRAPH, CORNER_EDGES, CORNER_HIERARCHY):
+        if structure.kind in fitting:
+            _check_same(fitting[structure.kind], "corners", n_corners)
+    if CORNER_GRAPH.kind in fitting:
+        graph = CornerGraph(**CORNER_GRAPH.read(fitting[CORNER_GRAPH.kind], known))
+        return (graph.first, graph.heads), graph
+    if CORNER_HIERARCHY.kind not in fitting:
+        return None, None
+    filed = fitting[CORNER_HIERARCHY.kind]
+    if CORNER_EDGES.kind not in fitting:
+        raise refusal(filed, f"the {CORNER_EDGES.kind} are missing")
+    edges = CORNER_EDGES.read(fitting[CORNER_EDGES.kind], known)
+    return (edges["first"], edges["heads"]), CornerHierarchy(**CORNER_HIERARCHY.read(filed, known))
 
 
 def _jump_parts(search: JumpSearch, key: dict[str, Any]) -> list[Part]:

@@ -57,6 +57,8 @@ MESH = Structure(
     {"corners": "4*cells", "polygons": "2*corners", "slots": "6*corners", "blocks": "polygons"},
 )
 
+_EDGES: dict[str, int | str] = {"corners": "4*cells", "edges": "200*corners"}
+
 CORNER_GRAPH = Structure(
     "corner graph",
     1,
@@ -65,7 +67,22 @@ CORNER_GRAPH = Structure(
         Field("heads", "int32", ("edges",), least=0, below="corners"),
         Field("landmark_distances", "float64", ("corners", "landmarks"), least=0),
     ),
-    {"corners": "4*cells", "edges": "200*corners", "landmarks": 256},
+    {**_EDGES, "landmarks": 256},
+)
+
+CORNER_EDGES = Structure("corner edges", 1, CORNER_GRAPH.fields[:2], dict(_EDGES))
+"""The edges alone: what a hierarchy leaves of the graph that was contracted."""
+
+CORNER_HIERARCHY = Structure(
+    "corner hierarchy",
+    1,
+    (
+        Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
+        Field("arcs", "int64", ("arcs", 2), least=0),
+        Field("middles", "int32", ("arcs",), least=-1, below="corners"),
+        Field("follow", "int64", (4, 64)),
+    ),
+    {"corners": "4*cells", "arcs": "2000*corners"},
 )
 
 JUMP_GRAPH = Structure(
@@ -164,6 +181,8 @@ KINDS = frozenset(
         KEY,
         MESH,
         CORNER_GRAPH,
+        CORNER_EDGES,
+        CORNER_HIERARCHY,
         JUMP_GRAPH,
         JUMP_HIERARCHY,
         PORTALS,
