@@ -263,3 +263,16 @@ def test_counts_name_what_was_expanded() -> None:
         .stats.expanded_intervals
         == 0
     )
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile", "portals", "paper", "grid-astar"])
+def test_preparing_reports_every_step_and_nothing_that_is_done_already(preset: str) -> None:
+    planner = hn.HybridPlanner(mapped(drawn(".....", ".###.", ".....")), preset=preset)
+    steps: list[tuple[int, int]] = []
+    planner.prepare(progress=lambda done, total: steps.append((done, total)))
+    total = steps[-1][1]
+    assert steps == [(done, total) for done in range(1, total + 1)]
+    if preset != "grid-astar":  # which has nothing to build, and reports that at once
+        again: list[int] = []
+        planner.prepare(progress=lambda done, _: again.append(done))
+        assert not again

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from hybridnav.cli.common import (
     is_model_file,
     load_model,
     overridden,
+    progress_bar,
     read_settings,
     stage,
     timings,
@@ -97,11 +99,13 @@ def build(
     topology = grow_topology(
         model, settings[0], seconds, rooms_file=rooms_file, find_rooms=find_rooms
     )
-    with stage("preparing the planners", seconds, "prepare"):
-        planners = [model.planner(each, topology=topology) for each in settings]
-        for planner in planners:
-            planner.prepare()
-            planner.close()
+    began = time.perf_counter()
+    planners = [model.planner(each, topology=topology) for each in settings]
+    for each, planner in zip(settings, planners, strict=True):
+        with progress_bar(f"preparing {each.name}") as advance:
+            planner.prepare(progress=advance)
+        planner.close()
+    seconds["prepare"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
         hn.save(planners, out, compress=compress)
     answer(_summary(out, topology, settings, seconds))

@@ -20,7 +20,7 @@ from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from contextlib import AbstractContextManager
     from pathlib import Path
 
@@ -59,6 +59,34 @@ def stage(text: str, seconds: dict[str, float], key: str) -> Iterator[None]:
     with _spinner(text) if sys.stderr.isatty() else nullcontext():
         yield
     seconds[key] = round(time.perf_counter() - began, 6)
+
+
+@contextmanager
+def progress_bar(text: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Draw a bar on stderr where that is a terminal.
+
+    Returns
+    -------
+    Iterator
+        What to call with the number of steps done and of all; None where there is no terminal.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console  # noqa: PLC0415 - on demand
+    from rich.progress import (  # noqa: PLC0415
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    parts = BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn()
+    with Progress(TextColumn("{task.description}"), *parts, console=Console(stderr=True)) as bar:
+        task = bar.add_task(text, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _spinner(text: str) -> AbstractContextManager[object]:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from hybridnav.cli.common import answer, complain, read_settings
+from hybridnav.cli.common import answer, complain, progress_bar, read_settings
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import MaxCellsOption
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav.harness.run import RunSettings
     from hybridnav.harness.yardstick import Yardstick
 
@@ -172,30 +169,7 @@ def _yardstick(metric: str) -> Yardstick:
 def _run(settings: RunSettings, out: Path) -> None:
     from hybridnav.harness.run import evaluate as run  # noqa: PLC0415
 
-    if not sys.stderr.isatty():
-        run(settings, out)
-        return
-    from rich.console import Console  # noqa: PLC0415 - on demand
-    from rich.progress import (  # noqa: PLC0415
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    bar = Progress(
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
-    with bar:
-        task = bar.add_task("records", total=None)
-        advance: Callable[[int, int], None] = lambda done, total: bar.update(  # noqa: E731
-            task, completed=done, total=total
-        )
+    with progress_bar("records") as advance:
         run(settings, out, progress=advance)
 
 

@@ -21,6 +21,8 @@ from hybridnav.mesh.hierarchy import CornerHierarchy, contract_corners
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.mesh.build import ConvexMesh
     from hybridnav.mesh.corner_graph import CornerGraph
@@ -180,20 +182,29 @@ class MeshSearch:
         """The graph of corners, contracted or not; None until it is built."""
         return self._graph
 
-    def prepare(self) -> None:
-        """Build the graph of corners now, if it is not there yet: up to a microsecond a cell."""
+    def prepare(self, progress: Callable[[int, int], None] | None = None) -> None:
+        """Build the graph of corners now, if it is not there yet: up to a microsecond a cell.
+
+        Parameters
+        ----------
+        progress
+            Called after each step with the number of steps done and of all.
+        """
+        heard = progress or (lambda _done, _total: None)
         if self.is_prepared:
             return
         with self._lock:
             if self.is_prepared:
                 return
             edges = find_edges(self.mesh, self.arrays)
+            heard(1, 2)
             graph: CornerGraph | CornerHierarchy | None = None
             if edges is not None:
                 graph = contract_corners(self.mesh, self.arrays, edges)
                 if graph is None:
                     graph = add_landmarks(self.mesh, self.arrays, edges)
             self.adopt(edges, graph)
+            heard(2, 2)
 
     def adopt(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
@@ -18,8 +19,6 @@ from hybridnav.route import BuiltPortals, MaxDistanceSearch, PortalSearch, corri
 from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.refine import GridRefiner
@@ -67,6 +66,14 @@ class CellPlans:
     """float64 (m, 2), (x, y) in metres, map frame."""
 
 
+Progress = Callable[[int, int], None]
+"""Called after each step with the number of steps done and of all."""
+
+
+def no_progress(done: int, total: int) -> None:
+    """Report to nobody."""
+
+
 class CellPlanner(Protocol):
     """Plans between two cells that may be entered."""
 
@@ -75,8 +82,9 @@ class CellPlanner(Protocol):
         """What is built for queries and worth to be kept, None while there is nothing."""
         ...
 
-    def prepare(self) -> object:
-        """Build what queries need, once; the first query does it otherwise."""
+    def prepare(self, progress: Progress = no_progress) -> object:
+        """Build what queries need, once, and report each step; the first query does it
+        otherwise."""
         ...
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
@@ -95,9 +103,11 @@ class WholeMap:
         """Nothing: the legal moves of cells are found in no time; see `CellPlanner`."""
         return
 
-    def prepare(self) -> object:
+    def prepare(self, progress: Progress = no_progress) -> object:
         """Build the search of cells; see `CellPlanner`."""
-        return self._refiner.search
+        search = self._refiner.search
+        progress(1, 1)
+        return search
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
         """Find a shortest path; see `CellPlanner`."""
@@ -130,13 +140,14 @@ class MaxDistance:
         """Nothing: what it searches belongs to the topological map; see `CellPlanner`."""
         return
 
-    def prepare(self) -> MaxDistanceSearch:
+    def prepare(self, progress: Progress = no_progress) -> MaxDistanceSearch:
         """Compute the attributes of the arcs; see `CellPlanner`."""
         if self._search is None:
             allowed = self._settings.allow_unexplored
             with self._building:
                 if self._search is None:
                     self._search = MaxDistanceSearch(self._topology, allow_unexplored=allowed)
+                    progress(1, 1)
         return self._search
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
@@ -194,8 +205,8 @@ class OverPortals:
         """Portals and tables, None until they are built."""
         return self._built if self._search is None else self._search.built
 
-    def prepare(self) -> PortalSearch:
-        """Build portals and table, once."""
+    def prepare(self, progress: Progress = no_progress) -> PortalSearch:
+        """Build portals and table, once; see `CellPlanner`."""
         if self._search is None:
             with self._building:
                 if self._search is None:
@@ -204,6 +215,7 @@ class OverPortals:
                         self._refiner.search,
                         allow_unexplored=self._settings.allow_unexplored,
                         built=self._built,
+                        progress=progress,
                     )
         return self._search
 

@@ -11,13 +11,14 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph
-from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap
+from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap, no_progress
 from hybridnav.route._portal_kernels import centres
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.cell_plans import Progress
     from hybridnav.refine import GridRefiner
 
 Cell = tuple[int, int]
@@ -67,16 +68,18 @@ class OverJumps:
         """The search of the graph, None until it is built."""
         return self._search
 
-    def prepare(self) -> JumpSearch:
-        """Build the graph, once."""
+    def prepare(self, progress: Progress = no_progress) -> JumpSearch:
+        """Build the graph, once; see `CellPlanner`."""
         if self._search is None:
             with self._building:
                 if self._search is None:
                     free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
                     graph = build_jump_graph(free)
+                    progress(1, 2)
                     is_contracted = graph.n_corners >= CONTRACTED_FROM
                     hierarchy = contract_graph(graph) if is_contracted else None
                     self._search = JumpSearch(graph, hierarchy)
+                    progress(2, 2)
         return self._search
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:

@@ -15,13 +15,14 @@ from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
 from hybridnav.mesh import DetourSearch, MeshPath, MeshSearch, build_mesh, shortest_paths
-from hybridnav.planner.cell_plans import CellPlan, CellPlans
+from hybridnav.planner.cell_plans import CellPlan, CellPlans, no_progress
 from hybridnav.refine import LineOfSight
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.cell_plans import Progress
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.refine import GridRefiner
 
@@ -101,10 +102,12 @@ class OverMesh:
         """The search of the mesh, None until it is built."""
         return self._search
 
-    def prepare(self) -> MeshSearch:
+    def prepare(self, progress: Progress = no_progress) -> MeshSearch:
         """Build the mesh and the graph of its corners, once; see `CellPlanner`."""
         search = self._on_mesh()
-        search.prepare()
+        if not search.is_prepared:
+            progress(1, 3)
+            search.prepare(lambda done, total: progress(done + 1, total + 1))
         return search
 
     def _on_mesh(self) -> MeshSearch:

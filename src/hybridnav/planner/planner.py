@@ -13,7 +13,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import cell_planner
-from hybridnav.planner.cell_plans import CellPlan, OverPortals
+from hybridnav.planner.cell_plans import CellPlan, OverPortals, no_progress
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
 from hybridnav.planner.mesh_plans import OverMesh
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray, LongArray, PathLike
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_plans import Prepared
+    from hybridnav.planner.cell_plans import Prepared, Progress
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import PlanBatch
@@ -202,14 +202,19 @@ class HybridPlanner:
         cells = self._cells if self._ompl is None else None
         return plan_many(self, cells, (first, last), finish, self.closed(blocked))
 
-    def prepare(self) -> None:
+    def prepare(self, *, progress: Progress | None = None) -> None:
         """Build now what queries would build when they need it: the mesh and the graph of its
         corners, the jump-point graph, or the table of portals.
 
         Nothing happens where that is built already. Threads may call it, and plan meanwhile: what
         is built is built once.
+
+        Parameters
+        ----------
+        progress
+            Called after each step with the number of steps done and of all, as for a progress bar.
         """
-        self._cells.prepare()
+        self._cells.prepare(progress or no_progress)
 
     def close(self) -> None:
         """End the process that a preset with OMPL plans in; the next query waits for another."""

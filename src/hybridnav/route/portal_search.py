@@ -28,7 +28,7 @@ from hybridnav.topology.portals import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -118,6 +118,8 @@ class PortalSearch:
         Whether unexplored cells may be entered; as in `cell_search`.
     built
         What another search has built of the same map with the same settings, None to build it.
+    progress
+        Called after each step of building with the number of steps done and of all.
     """
 
     def __init__(
@@ -127,6 +129,7 @@ class PortalSearch:
         *,
         allow_unexplored: bool = False,
         built: BuiltPortals | None = None,
+        progress: Callable[[int, int], None] | None = None,
     ) -> None:
         grid = topology.grid
         self._cols = grid.shape[1]
@@ -134,7 +137,11 @@ class PortalSearch:
         if built is None:
             enterable = grid.enterable(allow_unexplored=allow_unexplored)
             field_of, portals, has_all_gates = _portals_of(topology, enterable, allow_unexplored)
+            if progress is not None:
+                progress(1, 2)
             built = BuiltPortals(field_of, portals, build_tables(portals), has_all_gates)
+            if progress is not None:
+                progress(2, 2)
         self.built = built
         self._field_of, self.is_exact = built.field_of, built.has_all_gates
         self.portals, self.tables = built.portals, built.tables
