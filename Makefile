@@ -42,10 +42,10 @@ unit: setup
 nojit: setup
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
 
-# Four times as many random examples. Bounds checks need a cache of their own: cached code ignores
+# Four times as many random examples as `unit` tries. Bounds checks need a cache of their own: cached code ignores
 # the setting.
 full: setup
-	HYBRIDNAV_EXAMPLES=4 $(BIN)/python -m pytest
+	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-bounds $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
 
 setup: $(READY)

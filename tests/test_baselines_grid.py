@@ -14,7 +14,7 @@ from hybridnav.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, OccupancyGrid
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,7 +56,7 @@ def cells_of(classes: Any, seed: int, count: int) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("name", METHODS)
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(classes=class_grids(), seed=st.integers(0, 1000))
 def test_paths_are_legal_and_as_long_as_the_bound_allows(
     name: str, classes: Any, seed: int

@@ -16,7 +16,7 @@ from hybridnav.grid import CellClass
 from hybridnav.io.movingai import load_movingai_map, read_scenarios
 from hybridnav.search.octile import length_in_cells
 from tests.oracle.grid import assert_legal, components, distances, move_graph, recounted
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +49,7 @@ def passed(method: HpaStar, answer: Answer) -> list[int]:
     return [int(r) for i, r in enumerate(regions) if i == 0 or r != regions[i - 1]]
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(classes=class_grids(), side=SIDES, seed=st.integers(0, 1000))
 def test_paths_are_legal_never_too_short_and_found_where_there_is_one(
     classes: Any, side: int, seed: int
@@ -82,7 +82,7 @@ def test_paths_are_legal_never_too_short_and_found_where_there_is_one(
             assert answers[0].nodes == answers[1].nodes == tuple(passed(raw, answers[0]))
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(classes=class_grids(), side=SIDES)
 def test_regions_are_the_connected_pieces_of_the_clusters(classes: Any, side: int) -> None:
     region_of = HpaStar(occupancy_grid(classes), cluster_cells=side).region_of
@@ -103,7 +103,7 @@ def test_regions_are_the_connected_pieces_of_the_clusters(classes: Any, side: in
     assert seen == set(range(len(seen)))
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(classes=class_grids(24), side=SIDES)
 def test_edges_are_shortest_paths_inside_clusters_and_steps_between_them(
     classes: Any, side: int

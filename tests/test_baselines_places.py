@@ -22,7 +22,7 @@ from hybridnav.route import MaxDistanceSearch
 from hybridnav.search.arc_search import ArcSearch
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, components, distances, move_graph, recounted
-from tests.strategies import MAX_SIDE, Scene, drawn, occupancy_grid, scenes
+from tests.strategies import MAX_SIDE, Scene, drawn, examples, occupancy_grid, scenes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -92,7 +92,7 @@ def assert_plan_holds(method: Method, answer: Answer, start: Cell, goal: Cell) -
     assert np.isin(region_of[answer.cells[:, 0], answer.cells[:, 1]], answer.nodes).all()
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(scene=scenes(), seed=st.integers(0, 10**6))
 def test_the_overlay_is_as_short_as_the_grid_optimum(scene: Scene, seed: int) -> None:
     topology = map_of_scene(scene)
@@ -178,7 +178,7 @@ def test_a_cell_that_is_not_free_is_named(make: Callable[..., Method], cell: Cel
 
 
 @both
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(scene=scenes(), seed=st.integers(0, 10**6))
 def test_solvability_is_that_of_the_grid(
     make: Callable[..., Method], scene: Scene, seed: int
@@ -208,7 +208,7 @@ def test_a_map_without_a_free_cell_can_be_prepared(make: Callable[..., Method], 
     assert method.n_nodes == method.n_edges == 0
 
 
-@settings(max_examples=80)
+@settings(max_examples=examples(80))
 @given(scene=scenes(), seed=st.integers(0, 10**6))
 def test_the_simple_graph_plans_as_the_multigraph_where_no_arcs_are_parallel(
     scene: Scene, seed: int

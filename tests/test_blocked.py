@@ -21,7 +21,7 @@ from hybridnav.grid.worlds import office_world
 from hybridnav.planner.blocked import Blocked, as_blocked
 from hybridnav.pyramid import LevelArc
 from tests.oracle.grid import components, move_graph
-from tests.strategies import drawn, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 TOLERANCE = 1e-5
 ROOMS = drawn(
@@ -36,7 +36,7 @@ ROOMS = drawn(
     ".......#.......",
 )
 DOOR = hn.Door(3, ("kitchen", None), (1.0, 2.0), 0.9, (LevelArc(2, 0),))
-PLAIN = settings(max_examples=100, deadline=None, derandomize=True)
+PLAIN = settings(max_examples=examples(100), deadline=None, derandomize=True)
 
 
 def map_of(classes: Any, **build: Any) -> hn.TopologicalMap:
@@ -319,7 +319,7 @@ def arcs_crossed(topology: hn.TopologicalMap, mask: Any) -> dict[int, set[tuple[
 
 
 @given(scene=scenes(max_side=12), data=st.data())
-@settings(PLAIN, max_examples=150)
+@settings(PLAIN, max_examples=examples(150))
 def test_no_move_crosses_a_closed_arc(scene: Any, data: Any) -> None:
     topology = hn.TopologicalMap(scene.pyramid("radius"))
     pairs = pairs_of(topology)
@@ -333,7 +333,7 @@ def test_no_move_crosses_a_closed_arc(scene: Any, data: Any) -> None:
 
 
 @given(scene=scenes(max_side=14), data=st.data())
-@settings(PLAIN, max_examples=150)
+@settings(PLAIN, max_examples=examples(150))
 def test_closing_all_arcs_round_some_places_cuts_them_off(scene: Any, data: Any) -> None:
     topology = hn.TopologicalMap(scene.pyramid("radius"))
     pairs = pairs_of(topology)

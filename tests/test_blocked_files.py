@@ -14,7 +14,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.grid import Frame
-from tests.strategies import drawn, occupancy_grid
+from tests.strategies import drawn, examples, occupancy_grid
 from tests.test_cli import cli  # noqa: F401 - the fixture
 
 # Two rooms over a hall; kitchen and lab have a door each to the hall and one between them.
@@ -135,7 +135,9 @@ WHOLE = json.dumps(collection(geometry("Polygon", BOX), geometry("LineString", L
 
 @given(st.data())
 @settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(150),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 def test_damaged_geojson_is_read_or_refused(
     grid: hn.OccupancyGrid, tmp_path: Any, data: Any

@@ -18,7 +18,7 @@ import hybridnav as hn
 from hybridnav.planner import Blocked
 from hybridnav.pyramid import LevelArc
 from tests.oracle.grid import assert_legal, distances, move_graph
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 OFFICE = Path(__file__).parents[1] / "maps" / "office" / "office.yaml"
 # Kitchen and lab with two doors between them, and a hall below with a door to each.
@@ -265,7 +265,7 @@ def test_alternatives_go_by_no_door_that_is_shut(planners: dict[str, hn.HybridPl
 
 
 @given(classes=class_grids(14), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(60), deadline=None, derandomize=True)
 def test_alternatives_keep_off_closed_cells_and_begin_with_the_optimum(
     classes: Any, seed: int
 ) -> None:
@@ -313,7 +313,7 @@ def divided_maps(draw: st.DrawFn) -> hn.TopologicalMap:
 
 
 @given(topology=divided_maps(), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=120, deadline=None, derandomize=True)
+@settings(max_examples=examples(120), deadline=None, derandomize=True)
 def test_no_plan_crosses_a_shut_door_wherever_rooms_are(
     topology: hn.TopologicalMap, seed: int
 ) -> None:
@@ -344,7 +344,7 @@ def test_no_plan_crosses_a_shut_door_wherever_rooms_are(
 
 
 @given(topology=divided_maps())
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(60), deadline=None, derandomize=True)
 def test_a_closed_room_loses_all_its_cells_and_no_others(topology: hn.TopologicalMap) -> None:
     labels = topology.rooms.labels
     for label, name in enumerate(labels.names):

@@ -27,7 +27,7 @@ from hybridnav.baselines.simple_graph import SimpleGraphPyramid
 from hybridnav.baselines.thrun import ThrunMap
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.pool import Pool
-from tests.strategies import Scene, scenes
+from tests.strategies import Scene, examples, scenes
 
 FIGURE1 = Path(__file__).parents[1] / "maps" / "figure1" / "figure1.yaml"
 
@@ -224,7 +224,7 @@ def test_a_result_is_read_where_there_is_no_map(tmp_path: Path) -> None:
 
 
 @given(scene=scenes())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 def test_a_copied_search_finds_the_same_paths(scene: Scene) -> None:
     enterable = scene.grid.enterable()
     free = np.argwhere(enterable)

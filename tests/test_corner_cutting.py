@@ -17,7 +17,7 @@ from hybridnav.baselines.overlay import ExactOverlay
 from hybridnav.baselines.simple_graph import SimpleGraphPyramid
 from hybridnav.baselines.thrun import ThrunMap
 from hybridnav.grid import CellClass
-from tests.strategies import MAX_SIDE, drawn
+from tests.strategies import MAX_SIDE, drawn, examples
 
 if TYPE_CHECKING:
     from hybridnav.baselines import Method
@@ -65,7 +65,7 @@ def test_a_path_between_two_blocked_cells_is_found(preset: str) -> None:
 
 
 @given(topology=mazes(), seed=st.integers(0, 99))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 def test_every_status_is_true(topology: hn.TopologicalMap, seed: int) -> None:
     grid = topology.grid
     for preset in PRESETS:
@@ -90,7 +90,7 @@ def test_every_status_is_true(topology: hn.TopologicalMap, seed: int) -> None:
 
 
 @given(topology=mazes(), seed=st.integers(0, 99))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 def test_no_baseline_denies_a_path_that_exists(topology: hn.TopologicalMap, seed: int) -> None:
     grid = topology.grid
     part = joined(grid.enterable())

@@ -16,6 +16,7 @@ from hybridnav.refine import MotionCheck
 from hybridnav.refine.differential import driven
 from hybridnav.refine.footprint import Footprint
 from tests.oracle.motions import ShapelyRobot, drive_phases, turning_poses
+from tests.strategies import examples
 
 CELL_M = 0.05
 EXACT_M = 2e-6 * CELL_M
@@ -74,7 +75,7 @@ yards = st.builds(Yard, st.integers(0, 2**32 - 1))
 
 
 @given(yards)
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=examples(25), derandomize=True)
 def test_turns_on_the_spot_agree_with_shapely(yard: Yard) -> None:
     for start in yard.starts(12):
         goal = start + np.array([0, 0, yard.rng.uniform(-3, 3)])
@@ -84,7 +85,7 @@ def test_turns_on_the_spot_agree_with_shapely(yard: Yard) -> None:
 
 
 @given(yards, st.booleans())
-@settings(max_examples=25, derandomize=True)
+@settings(max_examples=examples(25), derandomize=True)
 def test_drives_agree_with_shapely(yard: Yard, backwards: bool) -> None:  # noqa: FBT001
     for start in yard.starts(10):
         goal = yard.beside(start)
@@ -96,7 +97,7 @@ def test_drives_agree_with_shapely(yard: Yard, backwards: bool) -> None:  # noqa
 
 
 @given(yards, st.booleans())
-@settings(max_examples=30, derandomize=True)
+@settings(max_examples=examples(30), derandomize=True)
 def test_paths_are_spelled_out_as_turns_and_drives(yard: Yard, reverses: bool) -> None:  # noqa: FBT001
     def may_go(first: Any, second: Any) -> bool:
         ways = (False, True) if reverses else (False,)

@@ -15,12 +15,12 @@ from hybridnav.pyramid import DualGraphPyramid, FaceKind
 from tests.oracle.checks import crossing_darts, phi_walks
 from tests.oracle.inclusion import nested_scenes, signed_area
 from tests.oracle.pyramid import Base, boundaries, canonical, face_sequences, holes, orbits
-from tests.strategies import MAX_SIDE, drawn, occupancy_grid
+from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid
 
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(20, MAX_SIDE)
-ORDINARY = settings(max_examples=40, deadline=None, derandomize=True)
-MANY = settings(max_examples=300, deadline=None)
+ORDINARY = settings(max_examples=examples(40), deadline=None, derandomize=True)
+MANY = settings(max_examples=examples(300), deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 

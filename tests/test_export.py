@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.dual import FaceKind
-from tests.strategies import drawn, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 FIGURE1 = Path(__file__).parents[1] / "maps" / "figure1" / "figure1.yaml"
-SOME = settings(max_examples=40, deadline=None)
+SOME = settings(max_examples=examples(40), deadline=None)
 
 
 def level_of(scene, index):

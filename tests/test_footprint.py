@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine.footprint import MAX_CORNERS, Footprint
+from tests.strategies import examples
 
 TRUCK = [[1.5, 0.5], [1.5, -0.5], [-0.25, -0.5], [-0.25, 0.5]]
 L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
@@ -52,7 +53,7 @@ def test_same_footprint_however_it_is_given(closed: bool, step: int) -> None:  #
 
 
 @given(stars)
-@settings(max_examples=200, derandomize=True)
+@settings(max_examples=examples(200), derandomize=True)
 def test_convex_parts_tile_the_outline(corners: Any) -> None:
     footprint = Footprint(corners)
     parts = [shapely.Polygon(part) for part in footprint.convex_parts()]
@@ -64,7 +65,7 @@ def test_convex_parts_tile_the_outline(corners: Any) -> None:
 
 
 @given(stars)
-@settings(max_examples=100, derandomize=True)
+@settings(max_examples=examples(100), derandomize=True)
 def test_discs_of_the_radii_lie_inside_and_around(corners: Any) -> None:
     footprint, outline = Footprint(corners), shapely.Polygon(corners)
     inner = shapely.Point(0, 0).buffer(footprint.inscribed_radius_m * 0.999)

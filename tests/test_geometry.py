@@ -19,7 +19,7 @@ from hybridnav.pyramid.geometry import boundary_lines, field_polygons
 from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 ORDINARY = settings(max_examples=examples(30), deadline=None, derandomize=True)
-MANY = settings(max_examples=1000, deadline=None)
+MANY = settings(max_examples=examples(1000), deadline=None)
 UNIT = Frame()
 LINKAGES = st.sampled_from(["radius", "survivor", "diameter"])
 FRAMES = st.builds(

@@ -20,7 +20,7 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 from tests import faulty_methods as faulty
-from tests.strategies import drawn, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 LINKAGES = ("survivor", "radius", "diameter")
 
@@ -70,7 +70,7 @@ def consistency_of(topology):
 # --- nothing is wrong where nothing is ----------------------------------------------------------
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(scenes(max_side=16), st.sampled_from(LINKAGES))
 def test_the_pyramid_is_consistent_on_any_map(scene, linkage):
     topology = topology_of(scene.grid, scene.merge_distance_m, linkage)
@@ -92,7 +92,7 @@ def test_the_pyramid_is_consistent_on_any_map(scene, linkage):
                 assert checks.check_walk(path) is None
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(scenes(max_side=12))
 def test_regions_of_any_kind_are_judged_without_arcs(scene):
     free = scene.classes == CellClass.FREE

@@ -21,7 +21,7 @@ from hybridnav.harness.pairs import (
 )
 from hybridnav.harness.paths import decode_path, encode_path
 from hybridnav.io.movingai import Scenario
-from tests.strategies import drawn, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 TWO_PARTS = occupancy_grid(drawn("....#..", "....#..", "....#.."))
 OFFICE = office_world().grid(robot_radius_m=0)
@@ -221,7 +221,7 @@ def test_text_of_paths():
     assert encode_path(np.array([(0, 0), (0, 1), (0, 2), (1, 3), (1, 3), (0, 3)])) == "a2b1(0,0)g1"
 
 
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 @given(st.text(alphabet="abhi0123456789(),- x²", max_size=6))
 def test_damaged_text_is_refused_in_words(text):
     try:

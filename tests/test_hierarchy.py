@@ -15,12 +15,12 @@ from hybridnav.pyramid import DualGraphPyramid
 from tests.oracle.checks import base_darts, protected_of, sigma_of
 from tests.oracle.inclusion import nested_scenes
 from tests.oracle.reference import PlaneMap
-from tests.strategies import MAX_SIDE, drawn, occupancy_grid
+from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid
 
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(20, MAX_SIDE)
-ORDINARY = settings(max_examples=60, deadline=None, derandomize=True)
-MANY = settings(max_examples=300, deadline=None)
+ORDINARY = settings(max_examples=examples(60), deadline=None, derandomize=True)
+MANY = settings(max_examples=examples(300), deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
@@ -126,7 +126,7 @@ def test_kernels_are_stars_and_with_what_survives_all_arcs(scene, linkage):
 
 @each_linkage
 @given(scene=nested_scenes(min(14, SIDE)))
-@settings(ORDINARY, max_examples=40)
+@settings(ORDINARY, max_examples=examples(40))
 def test_kernels_applied_edge_by_edge_give_every_level(scene, linkage):
     check_replay(built(scene, linkage), scene.classes)
 
@@ -144,7 +144,7 @@ def test_many_maps_hang_together_between_levels(scene, linkage):
 
 
 @given(scene=nested_scenes(min(14, SIDE)), seed=st.integers(0, 2**32 - 1))
-@settings(ORDINARY, max_examples=30)
+@settings(ORDINARY, max_examples=examples(30))
 def test_levels_do_not_depend_on_the_order_they_are_asked_for(scene, seed):
     pyramid, other = built(scene, "radius"), built(scene, "radius")
     rng = np.random.default_rng(seed)

@@ -25,12 +25,12 @@ from tests.oracle.inclusion import (
     rotations,
     sets_of,
 )
-from tests.strategies import MAX_SIDE, class_grids, drawn, occupancy_grid
+from tests.strategies import MAX_SIDE, class_grids, drawn, examples, occupancy_grid
 
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(20, MAX_SIDE)
-ORDINARY = settings(max_examples=50, deadline=None, derandomize=True)
-MANY = settings(max_examples=300, deadline=None)
+ORDINARY = settings(max_examples=examples(50), deadline=None, derandomize=True)
+MANY = settings(max_examples=examples(300), deadline=None)
 
 each_linkage = pytest.mark.parametrize("linkage", LINKAGES)
 
@@ -160,7 +160,7 @@ def test_several_connected_places_are_one_thing(scene, seed):
 
 @each_linkage
 @given(scene=nested_scenes(min(12, SIDE)))
-@settings(ORDINARY, max_examples=25)
+@settings(ORDINARY, max_examples=examples(25))
 def test_the_places_round_a_thing_part_it_from_the_outside(scene, linkage):
     topology = topology_of(scene, linkage)
     inside = insides(topology)

@@ -16,7 +16,7 @@ import hybridnav as hn
 from hybridnav.baselines.grid import WeightedAstar
 from hybridnav.baselines.hpa import HpaStar
 from tests.interrupts import Struck, lines_of, timer
-from tests.strategies import occupancy_grid
+from tests.strategies import examples, occupancy_grid
 from tests.test_threads import OVER_CELLS, grid_with_rooms, told
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def test_a_query_that_is_interrupted_before_any_line_changes_no_other(preset: st
     expected = plain(), closed()
     assert expected[0] != expected[1]
     for call in (plain, closed):
-        for at in range(1, lines_of(call) + 1):
+        for at in spread(lines_of(call), examples(60)):
             assert struck(call, at)
             assert (plain(), closed()) == expected
 

@@ -13,6 +13,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from hybridnav.errors import MapError
 from hybridnav.io.image import read_raster
+from tests.strategies import examples
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 ADAM7 = (
@@ -104,7 +105,7 @@ def test_no_cut_is_read(read, mode):
     assert _same(read(content + b"what follows the end"), read(content))
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=examples(60))
 @given(data=st.data())
 def test_an_interlaced_image_is_whole_at_any_size(read, data):
     shape = data.draw(st.tuples(st.integers(1, 20), st.integers(1, 20)))

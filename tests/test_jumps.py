@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hybridnav.grid import CellClass
 from hybridnav.jumps import JumpPaths, JumpSearch, build_jump_graph, contract_graph
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
-from tests.strategies import MAX_SIDE, class_grids, drawn
+from tests.strategies import MAX_SIDE, class_grids, drawn, examples
 from tests.test_movingai_optima import problem_set, scenario_files
 
 if TYPE_CHECKING:
@@ -67,13 +67,13 @@ def map_of(*lines: str) -> NDArray[np.bool_]:
     return free
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 @given(class_grids(max_side=6))
 def test_paths_between_all_pairs_of_small_maps_are_shortest(classes: Any) -> None:
     assert_all_pairs(classes == CellClass.FREE)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(class_grids(), seeds)
 def test_paths_are_shortest(classes: Any, seed: int) -> None:
     free = classes == CellClass.FREE

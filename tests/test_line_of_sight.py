@@ -18,7 +18,7 @@ from hybridnav.metrics import VisibilityGraph, segment_faults
 from hybridnav.refine.line_of_sight import LineOfSight
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import length_of_points
-from tests.strategies import MAX_SIDE, class_grids, drawn, occupancy_grid
+from tests.strategies import MAX_SIDE, class_grids, drawn, examples, occupancy_grid
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -82,7 +82,7 @@ def at_blocked_corner(grid: OccupancyGrid, points: Any) -> bool:
 
 
 @given(class_grids(), seeds, yaws)
-@settings(max_examples=400, derandomize=True)
+@settings(max_examples=examples(400), derandomize=True)
 def test_shortened_path_is_legal_and_never_longer(classes: Any, seed: int, yaw_rad: float) -> None:
     rng = np.random.default_rng(seed)
     grid = framed(classes, yaw_rad)
@@ -113,7 +113,7 @@ def test_thousands_of_noisy_paths_are_legal(blocked: float) -> None:
 
 
 @given(class_grids(max_side=16), seeds)
-@settings(max_examples=100, derandomize=True)
+@settings(max_examples=examples(100), derandomize=True)
 def test_inner_points_are_blocked_corners_that_cannot_be_left_out(classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid = framed(classes)
@@ -126,7 +126,7 @@ def test_inner_points_are_blocked_corners_that_cannot_be_left_out(classes: Any, 
 
 
 @given(class_grids(max_side=16), seeds, yaws)
-@settings(max_examples=150, derandomize=True)
+@settings(max_examples=examples(150), derandomize=True)
 @example(drawn("......", ".####.", ".#....", ".#.##.", "...#.."), 3, 0.0)
 def test_path_is_the_optimum_where_no_obstacle_can_be_passed_on_two_sides(
     classes: Any, seed: int, yaw_rad: float
@@ -238,7 +238,7 @@ def test_unexplored_cells_are_walls_unless_allowed() -> None:
 
 
 @given(class_grids(max_side=20), seeds, yaws)
-@settings(max_examples=150, derandomize=True)
+@settings(max_examples=examples(150), derandomize=True)
 def test_cut_corners_never_fail(classes: Any, seed: int, yaw_rad: float) -> None:
     rng = np.random.default_rng(seed)
     grid = framed(classes, yaw_rad, corner_cutting=True)

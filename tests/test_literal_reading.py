@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from scipy import ndimage
 
 from hybridnav.pyramid import DualGraphPyramid
-from tests.strategies import class_grids, occupancy_grid
+from tests.strategies import class_grids, examples, occupancy_grid
 
 U_D_CELLS = 1.5
 
@@ -52,7 +52,7 @@ def n_single_class_components(classes):
 
 
 @given(classes=class_grids(max_side=10))
-@settings(max_examples=60, derandomize=True)
+@settings(max_examples=examples(60), derandomize=True)
 def test_read_literally_every_component_collapses_into_one_place(classes):
     graph, attributes = literal_apex(classes)
     assert attributes == {1.0}

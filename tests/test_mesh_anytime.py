@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hybridnav.grid import CellClass
 from hybridnav.mesh import MeshPath, MeshSearch, build_mesh
 from tests.oracle.mesh import KINDS, search_of
-from tests.strategies import class_grids
+from tests.strategies import class_grids, examples
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -82,7 +82,7 @@ _ROUNDED = """
 """Where a search is stopped one step before it ends, with a bound that rounding put above."""
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(classes=class_grids(max_side=14), seed=seeds, kind=st.sampled_from(KINDS))
 @example(
     classes=np.array([list(row) for row in _ROUNDED.split()], dtype=np.uint8),
@@ -110,7 +110,7 @@ def test_bounds_rise_to_the_optimum_at_every_step(classes: Any, seed: int, kind:
     assert between(search, start, goal).length_cells == optimum
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(classes=class_grids(max_side=14), seed=seeds, kind=st.sampled_from(KINDS))
 def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(
     classes: Any, seed: int, kind: str
@@ -134,7 +134,7 @@ def test_a_known_path_is_the_answer_until_a_shorter_one_is_found(
     assert found[-1].lower_bound_cells == found[-1].length_cells
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(
     classes=class_grids(max_side=14),
     seed=seeds,

@@ -14,7 +14,7 @@ from hybridnav.grid import CellClass
 from hybridnav.mesh import MeshSearch, build_mesh, cut_mesh
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import assert_sides_agree, twice_the_area
-from tests.strategies import class_grids
+from tests.strategies import class_grids, examples
 
 
 @st.composite
@@ -28,7 +28,7 @@ def cuts(draw: st.DrawFn) -> tuple[Any, Any]:
     return free, np.flatnonzero(shut)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(cuts(), st.integers(0, 2**32 - 1))
 def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
     free, closed = cut

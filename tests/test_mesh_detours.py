@@ -19,7 +19,7 @@ from hybridnav.mesh import DetourSearch, MeshSearch, build_mesh, shortest_paths
 from hybridnav.mesh import detour as detours
 from tests.interrupts import Struck, lines_of
 from tests.oracle.any_angle import some_positions
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,7 +53,7 @@ def queries(free: Any, seed: int) -> Iterator[tuple[Any, Any]]:
         yield (first, last), (start, goal)
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=examples(120), deadline=None)
 @given(closures(), seeds, st.booleans())
 def test_a_detour_is_the_shortest_path_of_a_mesh_without(
     case: tuple[Any, Any],
@@ -81,7 +81,7 @@ def test_a_detour_is_the_shortest_path_of_a_mesh_without(
             assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(closures(), seeds)
 def test_many_paths_are_judged_as_one_by_one(case: tuple[Any, Any], seed: int) -> None:
     free, closed = case
@@ -146,7 +146,7 @@ def steps(
             return
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(closures(), seeds)
 def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
     case: tuple[Any, Any], seed: int
@@ -175,7 +175,7 @@ def test_bounds_of_a_detour_rise_to_the_optimum_at_every_step(
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(closures(), seeds, st.sampled_from([0.01, 0.3]))
 def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(
     case: tuple[Any, Any], seed: int, epsilon: float

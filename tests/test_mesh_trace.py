@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hybridnav.grid import CellClass
 from hybridnav.mesh import MeshSearch, SearchTrace, build_mesh, trace_search
 from hybridnav.metrics import segment_faults
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -34,7 +34,7 @@ def cross(first: Any, second: Any) -> float:
     return float(first[0] * second[1] - first[1] * second[0])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(class_grids(max_side=14), seeds)
 def test_every_interval_is_seen_from_its_root(classes: Any, seed: int) -> None:
     trace = traced(classes, seed)
@@ -48,7 +48,7 @@ def test_every_interval_is_seen_from_its_root(classes: Any, seed: int) -> None:
                 assert not segment_faults(grid, grid.frame.points_of_grid([root, point]))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(class_grids(max_side=14), seeds)
 def test_costs_rise_from_interval_to_interval_by_the_way_between_roots(
     classes: Any, seed: int

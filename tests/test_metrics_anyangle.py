@@ -20,7 +20,7 @@ from hybridnav.metrics import (
     segment_faults,
 )
 from tests.oracle.grid import length_of_points
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 Cell = tuple[int, int]
 
@@ -73,7 +73,7 @@ def _pinched(free: Any, row: int, col: int) -> bool:
 
 
 @given(class_grids(max_side=12), seeds, yaws)
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 def test_optimum_lies_between_the_straight_line_and_the_grid_optimum(
     classes: Any, seed: int, yaw_rad: float
 ) -> None:
@@ -96,7 +96,7 @@ def test_optimum_lies_between_the_straight_line_and_the_grid_optimum(
 
 
 @given(class_grids(max_side=5), seeds)
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 def test_no_path_over_any_lattice_corners_is_shorter(classes: Any, seed: int) -> None:
     start, goal = two_cells(classes, seed)
     grid = occupancy_grid(classes)

@@ -19,7 +19,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.metrics import ScipyOptimum, judge_path, scipy_optimum, segment_faults
 from tests.oracle.grid import distances, move_graph
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 Position = tuple[Fraction, Fraction]
 
@@ -120,7 +120,7 @@ def _joined(free: Any, corner: Position, before: set[Any], after: set[Any]) -> b
 
 
 @given(small_maps, seeds)
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 def test_segments_on_halves_are_judged_as_shapely_does(classes: Any, seed: int) -> None:
     rng, free = np.random.default_rng(seed), classes == CellClass.FREE
     grid = framed(classes)
@@ -133,7 +133,7 @@ def test_segments_on_halves_are_judged_as_shapely_does(classes: Any, seed: int) 
 
 
 @given(small_maps, seeds, st.sampled_from([1, 2, 3, 64, 2**24]))
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 def test_segments_are_judged_exactly(classes: Any, seed: int, parts: int) -> None:
     rng, free = np.random.default_rng(seed), classes == CellClass.FREE
     parts = 1 << (parts.bit_length() - 1)

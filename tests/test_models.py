@@ -20,7 +20,7 @@ from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
 from hybridnav.pyramid.record import Record
 from hybridnav.route._portal_kernels import Tables
 from hybridnav.topology.portals import Portals
-from tests.strategies import Scene, scenes
+from tests.strategies import Scene, examples, scenes
 from tests.test_copies import assert_alike, kernels
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def test_a_map_and_a_grid_alone_are_models_too(tmp_path: Path) -> None:
 
 
 @given(scene=scenes(), compress=...)
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 def test_any_grid_comes_back_bit_by_bit(
     scene: Scene, tmp_path_factory: pytest.TempPathFactory, *, compress: bool
 ) -> None:

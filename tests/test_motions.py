@@ -252,7 +252,7 @@ def test_heading_turns_the_short_way_over_the_seam() -> None:
 
 
 @given(class_grids(max_side=12), seeds)
-@settings(max_examples=100, derandomize=True)
+@settings(max_examples=examples(100), derandomize=True)
 def test_paths_are_judged_with_their_bends(classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid = framed(classes)

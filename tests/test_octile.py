@@ -16,7 +16,7 @@ import hybridnav as hn
 from hybridnav.grid.worlds import figure1_world, office_world
 from hybridnav.harness.pairs import sample_pairs
 from tests.oracle.grid import assert_legal, recounted
-from tests.strategies import class_grids, occupancy_grid
+from tests.strategies import class_grids, examples, occupancy_grid
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,7 +57,7 @@ def assert_same(found: hn.PlanResult, expected: hn.PlanResult, enterable: Any) -
         assert (found.path.points[[0, -1]] == expected.path.points[[0, -1]]).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(class_grids(), st.booleans(), st.integers(0, 2**32 - 1))
 def test_it_answers_what_the_whole_grid_answers(classes: Any, unexplored: bool, seed: int) -> None:  # noqa: FBT001
     grid = occupancy_grid(classes)

@@ -21,14 +21,14 @@ from hybridnav.topology.portals import (
     compact_labels,
 )
 from tests.divided import GATES, Divided, costs_from, fields_of, halves, partitions
-from tests.strategies import drawn, occupancy_grid
+from tests.strategies import drawn, examples, occupancy_grid
 
 MOVES = 8
 """Moves that one stored direction stands for, where it has this bit set."""
 ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1])
 COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1])
-ENOUGH = settings(max_examples=120, derandomize=True, deadline=None)
-FEWER = settings(max_examples=40, derandomize=True, deadline=None)
+ENOUGH = settings(max_examples=examples(120), derandomize=True, deadline=None)
+FEWER = settings(max_examples=examples(40), derandomize=True, deadline=None)
 
 
 def position_of(portals: Portals, cells: Any, cols: int) -> Any:

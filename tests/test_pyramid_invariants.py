@@ -29,7 +29,7 @@ from tests.strategies import MAX_SIDE, Scene, drawn, examples, occupancy_grid, s
 
 LINKAGES = ("radius", "survivor", "diameter")
 ORDINARY = settings(max_examples=examples(40), deadline=None, derandomize=True)
-MANY = settings(max_examples=1000, deadline=None)
+MANY = settings(max_examples=examples(1000), deadline=None)
 ARRAYS = (
     "field_of",
     "cells",
@@ -160,7 +160,7 @@ def test_levels_follow_from_the_rules_edge_by_edge(scene, linkage):
 
 @each_linkage
 @given(scene=scenes())
-@settings(ORDINARY, max_examples=30)
+@settings(ORDINARY, max_examples=examples(30))
 def test_equal_seeds_give_equal_pyramids(scene, linkage):
     first, second = levels_of(build(scene, linkage)), levels_of(build(scene, linkage))
     assert len(first) == len(second)

@@ -188,7 +188,7 @@ def test_rules_and_oracle_agree(classes, rng):
 
 @pytest.mark.full
 @given(class_grids(max_side=24), st.randoms(use_true_random=False))
-@settings(max_examples=3000, deadline=None)
+@settings(max_examples=examples(3000), deadline=None)
 def test_rules_and_oracle_agree_on_many_maps(classes, rng):
     agree(classes, rng)
 

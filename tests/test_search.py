@@ -22,7 +22,7 @@ from hybridnav.search.octile import (
     path_length_in_cells,
 )
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
-from tests.strategies import class_grids, drawn
+from tests.strategies import class_grids, drawn, examples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -119,7 +119,7 @@ def test_in_a_corridor_it_finds_the_length_that_dijkstra_finds_there(
 
 
 @given(seeds, st.sampled_from([0.0, 0.1, 0.25, 0.4]))
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 def test_one_object_serves_many_searches(seed: int, density: float) -> None:
     rng = np.random.default_rng(seed)
     enterable = rng.random((11, 12)) >= density
@@ -213,7 +213,7 @@ def inside_of(enterable: Bools, corridor: tuple[Labels, Bools] | None) -> Bools:
 
 
 @given(cases())
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
     case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any],
 ) -> None:
@@ -252,7 +252,7 @@ def test_only_paths_below_the_limit_are_found(
 
 
 @given(cases(), st.sampled_from([1, 3, 20]))
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 def test_blocked_cells_are_as_on_a_grid_without_them_and_only_for_one_search(
     case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any], n_blocked: int
 ) -> None:
@@ -412,7 +412,7 @@ def test_without_obstacles_the_shortest_path_has_the_octile_distance(
 
 
 @given(class_grids(), seeds)
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_distances_inside_fields_are_those_that_dijkstra_finds(classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     vertices = classes != CellClass.OCCUPIED
@@ -459,7 +459,7 @@ def multigraphs(draw: st.DrawFn) -> tuple[int, list[tuple[int, int]], list[int],
 
 
 @given(multigraphs(), st.data())
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 def test_cheapest_arcs_are_those_of_networkx_and_ties_go_by_the_second_cost(
     graph: tuple[int, list[tuple[int, int]], list[int], list[int]], data: st.DataObject
 ) -> None:

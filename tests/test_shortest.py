@@ -18,7 +18,7 @@ import hybridnav as hn
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from hybridnav.planner.mesh_plans import OverMesh
 from tests.oracle.any_angle import by_visibility, some_positions
-from tests.strategies import class_grids, drawn, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 seeds = st.integers(0, 2**32 - 1)
 FRAMES = (hn.Frame(1.0), hn.Frame(0.05, (12.3, -400.0), 0.7), hn.Frame(0.1, (5e5, 4e6), -2.0))
@@ -53,7 +53,7 @@ def assert_optimal(grid: hn.OccupancyGrid, result: hn.PlanResult, optimum_m: flo
     assert len(result.route.arcs) == len(result.route.places) - 1
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(class_grids(max_side=14), seeds, st.sampled_from(FRAMES))
 def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn.Frame) -> None:
     free = classes == hn.CellClass.FREE
@@ -72,7 +72,7 @@ def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn
             assert result.path.cells[[0, -1]].tolist() == [list(first), list(last)]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(class_grids(max_side=14), seeds, st.booleans())
 def test_paths_round_closed_cells_are_optimal(
     classes: Any,
@@ -168,7 +168,7 @@ def test_smoothing_changes_nothing() -> None:
     assert {result.metric for result in results} == {"any-angle"}
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 @given(class_grids(max_side=14), seeds, st.sampled_from([0.0, 0.01, 0.3]))
 def test_a_path_is_as_near_the_optimum_as_it_was_asked_to_be(
     classes: Any, seed: int, epsilon: float

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.simple import ArcGroup, report_of
-from tests.strategies import drawn, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 ROOT = Path(__file__).parents[1]
 MAPS = ROOT / "maps"
-SOME = settings(max_examples=60, deadline=None)
+SOME = settings(max_examples=examples(60), deadline=None)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from hybridnav.viz import plot_level, plot_map, plot_places, plot_plan, save_fig
 from hybridnav.viz.colouring import colour_vertices
 from hybridnav.viz.layout import round_length, text_width, wrapped
 from hybridnav.viz.places import Places
-from tests.strategies import class_grids, occupancy_grid
+from tests.strategies import class_grids, examples, occupancy_grid
 
 MAPS = Path(__file__).parents[1] / "maps"
 FREE, OCCUPIED, UNKNOWN = 0.0, 1.0, math.nan
@@ -101,7 +101,7 @@ def _title(ax):
     return ax.get_title().replace("\n", "  ·  ")
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(class_grids(), st.integers(0, 9))
 def test_neighbouring_places_have_different_colours_on_every_level(classes, index):
     pyramid = DualGraphPyramid.build(occupancy_grid(classes), merge_distance_m=3.0)

@@ -14,7 +14,7 @@ from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.mesh import build_mesh, trace_search
 from hybridnav.viz import plot_mesh, plot_search
 from hybridnav.viz.mesh import _views
-from tests.strategies import class_grids, occupancy_grid
+from tests.strategies import class_grids, examples, occupancy_grid
 from tests.test_mesh_trace import seeds, traced
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def test_a_search_is_drawn_with_its_roots_and_its_path() -> None:
     assert "shortest path" in [text.get_text() for text in legend.get_texts()]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(class_grids(max_side=14), seeds)
 def test_what_is_drawn_as_seen_lies_in_free_space(classes: Any, seed: int) -> None:
     trace = traced(classes, seed)

@@ -20,10 +20,10 @@ from hybridnav.viz.boundaries import Boundaries, boundary_line
 from hybridnav.viz.curves import Arc
 from hybridnav.viz.fields import Field
 from hybridnav.viz.loops import Loops
-from tests.strategies import drawn, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 MAPS = Path(__file__).parents[1] / "maps"
-SOME = settings(max_examples=25, deadline=None)
+SOME = settings(max_examples=examples(25), deadline=None)
 WIDE = 1.5
 
 

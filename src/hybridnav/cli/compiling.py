@@ -111,11 +111,11 @@ def _is_cold(job: str) -> bool:
 
     if _is_kept(select_stars):
         return False
-    from hybridnav.jumps._search_kernels import shortest  # noqa: PLC0415
+    from hybridnav.jumps._query_kernels import paths  # noqa: PLC0415
     from hybridnav.mesh._query_kernels import query  # noqa: PLC0415
     from hybridnav.search._kernels import astar  # noqa: PLC0415
 
-    return not _is_kept({"mesh": query, "jumps": shortest}.get(job, astar))
+    return not _is_kept({"mesh": query, "jumps": paths}.get(job, astar))
 
 
 def _is_kept(kernel: Any) -> bool:
