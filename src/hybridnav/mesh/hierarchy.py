@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 _SETTLED = 1
 """Corners that a search for another way settles at most: it sees other arcs alone. With 10 there
 are up to 2 % fewer shortcuts, and it takes five times as long."""
-_MOST_LOOKED = 150
-"""Arcs for each free cell that the contraction looks at before it is given up: some 0.6
+_MOST_LOOKED = 100
+"""Arcs for each free cell that the contraction looks at before it is given up: some 0.7
 microseconds. Buildings take 20 to 100; raw scans full of speckle would take 1,000."""
+_LOOKED_AN_EDGE = 110
+"""Arcs that it looks at for each edge of the graph, at least on the real maps where it is given up
+but for one: where that is too much already it does not begin."""
 
 
 @copies_alike
@@ -72,9 +75,11 @@ def contract_corners(
     hierarchical routing in road networks, 2008. A shortcut is put in only where a path may bend at
     both its corners; without that there are five times as many, and it takes 60 times as long.
     """
+    most = _MOST_LOOKED * np.count_nonzero(mesh.polygon_at >= 0)
+    if _LOOKED_AN_EDGE * len(edges[1]) > most:
+        return None
     first, arcs = arcs_of(arrays, *edges)
     follow = ways_that_follow()
-    most = _MOST_LOOKED * np.count_nonzero(mesh.polygon_at >= 0)
     found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most))
     if len(arcs) and not len(found[1]):
         return None
