@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
 from hybridnav._files import MODEL_SUFFIX, check_replaceable
+from hybridnav._progress import no_progress
 from hybridnav.cli.errors import UsageError
 from hybridnav.config import load_preset
 from hybridnav.config.preset import is_preset_name
@@ -20,10 +21,11 @@ from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
     from contextlib import AbstractContextManager
     from pathlib import Path
 
+    from hybridnav._progress import Progress
     from hybridnav.cli.blocked import Closing
     from hybridnav.config import Preset
 
@@ -62,16 +64,16 @@ def stage(text: str, seconds: dict[str, float], key: str) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(text: str) -> Iterator[Callable[[int, int], None] | None]:
+def progress_bar(text: str) -> Iterator[Progress]:
     """Draw a bar on stderr where that is a terminal.
 
     Returns
     -------
     Iterator
-        What to call with the number of steps done and of all; None where there is no terminal.
+        What to call with the number of steps done and of all.
     """
     if not sys.stderr.isatty():
-        yield None
+        yield no_progress
         return
     from rich.console import Console  # noqa: PLC0415 - on demand
     from rich.progress import (  # noqa: PLC0415

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav._files import MODEL_SUFFIX
+from hybridnav._progress import no_progress
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import DEFAULT_MAX_CELLS
@@ -26,8 +27,9 @@ from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.io.movingai import read_scenarios
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
+    from hybridnav._progress import Progress
     from hybridnav._typing import PathLike
     from hybridnav.config import Preset
     from hybridnav.grid import OccupancyGrid
@@ -73,9 +75,7 @@ class RunSettings:
     """Longest silence of a worker: one query, or a preparation."""
 
 
-def evaluate(
-    settings: RunSettings, folder: PathLike, *, progress: Callable[[int, int], None] | None = None
-) -> int:
+def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no_progress) -> int:
     """Answer all pairs on all maps by all methods, and append the records to a folder.
 
     A record that is there already is not made again, so a run that was killed goes on where it was.
@@ -119,8 +119,7 @@ def evaluate(
                 known = len(records.ids)
                 records.append(batch)
                 done += len(records.ids) - known
-                if progress is not None:
-                    progress(done, total)
+                progress(done, total)
             return len(records.ids) - before
     except OSError as error:
         raise InvalidValueError(f"folder {folder}: {error.strerror}") from None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav._progress import no_progress
 from hybridnav.mesh import _polyanya_kernels as polyanya
 from hybridnav.mesh._corner_search_kernels import query_corners
 from hybridnav.mesh._hierarchy_search_kernels import FAR, query_hierarchy
@@ -21,8 +22,7 @@ from hybridnav.mesh.hierarchy import CornerHierarchy, contract_corners
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
+    from hybridnav._progress import Progress
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.mesh.build import ConvexMesh
     from hybridnav.mesh.corner_graph import CornerGraph
@@ -182,7 +182,7 @@ class MeshSearch:
         """The graph of corners, contracted or not; None until it is built."""
         return self._graph
 
-    def prepare(self, progress: Callable[[int, int], None] | None = None) -> None:
+    def prepare(self, progress: Progress = no_progress) -> None:
         """Build the graph of corners now, if it is not there yet: up to a microsecond a cell.
 
         Parameters
@@ -190,21 +190,20 @@ class MeshSearch:
         progress
             Called after each step with the number of steps done and of all.
         """
-        heard = progress or (lambda _done, _total: None)
         if self.is_prepared:
             return
         with self._lock:
             if self.is_prepared:
                 return
             edges = find_edges(self.mesh, self.arrays)
-            heard(1, 2)
+            progress(1, 2)
             graph: CornerGraph | CornerHierarchy | None = None
             if edges is not None:
                 graph = contract_corners(self.mesh, self.arrays, edges)
                 if graph is None:
                     graph = add_landmarks(self.mesh, self.arrays, edges)
             self.adopt(edges, graph)
-            heard(2, 2)
+            progress(2, 2)
 
     def adopt(
         self,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav._progress import no_progress
 from hybridnav.jumps import JumpSearch
 from hybridnav.mesh import MeshSearch
 from hybridnav.result import Route
@@ -19,6 +19,9 @@ from hybridnav.route import BuiltPortals, MaxDistanceSearch, PortalSearch, corri
 from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.refine import GridRefiner
@@ -64,14 +67,6 @@ class CellPlans:
     """int64 (n + 1,), where the points of each path begin."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame."""
-
-
-Progress = Callable[[int, int], None]
-"""Called after each step with the number of steps done and of all."""
-
-
-def no_progress(done: int, total: int) -> None:
-    """Report to nobody."""
 
 
 class CellPlanner(Protocol):

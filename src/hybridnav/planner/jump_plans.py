@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav._progress import no_progress
 from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph
-from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap, no_progress
+from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap
 from hybridnav.route._portal_kernels import centres
 
 if TYPE_CHECKING:
+    from hybridnav._progress import Progress
     from hybridnav._typing import LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.planner.cell_plans import Progress
     from hybridnav.refine import GridRefiner
 
 Cell = tuple[int, int]

@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav._progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
 from hybridnav.mesh import DetourSearch, MeshPath, MeshSearch, build_mesh, shortest_paths
-from hybridnav.planner.cell_plans import CellPlan, CellPlans, no_progress
+from hybridnav.planner.cell_plans import CellPlan, CellPlans
 from hybridnav.refine import LineOfSight
 
 if TYPE_CHECKING:
+    from hybridnav._progress import Progress
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.planner.cell_plans import Progress
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.refine import GridRefiner
 

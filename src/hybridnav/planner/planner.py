@@ -8,12 +8,13 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from hybridnav._progress import no_progress
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import cell_planner
-from hybridnav.planner.cell_plans import CellPlan, OverPortals, no_progress
+from hybridnav.planner.cell_plans import CellPlan, OverPortals
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
 from hybridnav.planner.mesh_plans import OverMesh
@@ -26,9 +27,10 @@ from hybridnav.search.octile import path_length_in_cells
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from hybridnav._progress import Progress
     from hybridnav._typing import FloatArray, LongArray, PathLike
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_plans import Prepared, Progress
+    from hybridnav.planner.cell_plans import Prepared
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import PlanBatch
@@ -202,7 +204,7 @@ class HybridPlanner:
         cells = self._cells if self._ompl is None else None
         return plan_many(self, cells, (first, last), finish, self.closed(blocked))
 
-    def prepare(self, *, progress: Progress | None = None) -> None:
+    def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build now what queries would build when they need it: the mesh and the graph of its
         corners, the jump-point graph, or the table of portals.
 
@@ -214,7 +216,7 @@ class HybridPlanner:
         progress
             Called after each step with the number of steps done and of all, as for a progress bar.
         """
-        self._cells.prepare(progress or no_progress)
+        self._cells.prepare(progress)
 
     def close(self) -> None:
         """End the process that a preset with OMPL plans in; the next query waits for another."""

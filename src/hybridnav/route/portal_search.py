@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.pyramid import DualGraphPyramid
@@ -28,10 +29,11 @@ from hybridnav.topology.portals import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
+    from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.pyramid import Level
     from hybridnav.route.any_angle_bound import Position
@@ -129,7 +131,7 @@ class PortalSearch:
         *,
         allow_unexplored: bool = False,
         built: BuiltPortals | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Progress = no_progress,
     ) -> None:
         grid = topology.grid
         self._cols = grid.shape[1]
@@ -137,11 +139,9 @@ class PortalSearch:
         if built is None:
             enterable = grid.enterable(allow_unexplored=allow_unexplored)
             field_of, portals, has_all_gates = _portals_of(topology, enterable, allow_unexplored)
-            if progress is not None:
-                progress(1, 2)
+            progress(1, 2)
             built = BuiltPortals(field_of, portals, build_tables(portals), has_all_gates)
-            if progress is not None:
-                progress(2, 2)
+            progress(2, 2)
         self.built = built
         self._field_of, self.is_exact = built.field_of, built.has_all_gates
         self.portals, self.tables = built.portals, built.tables
