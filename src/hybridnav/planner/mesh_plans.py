@@ -279,12 +279,12 @@ class OverMesh:
             passed = self._passed_beside(query.closed, found.positions)
         # An end on a side may be named after the cell behind it.
         cells = query.cells
-        start, goal = tuple(passed[0].tolist()), tuple(passed[-1].tolist())
-        if (start, goal) == cells:
-            return passed
-        before = [] if start == cells[0] else [cells[0]]
-        behind = [] if goal == cells[1] else [cells[1]]
-        return np.array([*before, *passed.tolist(), *behind], dtype=np.int64)
+        parts = [passed]
+        if tuple(passed[0].tolist()) != cells[0]:
+            parts.insert(0, np.array([cells[0]]))
+        if tuple(passed[-1].tolist()) != cells[1]:
+            parts.append(np.array([cells[1]]))
+        return passed if len(parts) == 1 else np.concatenate(parts)
 
     def _passed_beside(self, closed: ClosedCells, positions: FloatArray) -> LongArray:
         """Cells that a path passes along sides of closed ones, without these."""
