@@ -4,7 +4,7 @@
 
 Maps of FOLDER/maps.tsv (robot radius 0.25 m) and MovingAI maps (a point robot) whose path in FOLDER
 matches; without `--map` buildings, open floors and raw maps. Every pair is put to A*, to the graph
-and to its hierarchy before the next one; lengths must be equal, or the exit code is 1.
+and to the contracted one before the next one; lengths must be equal, or the exit code is 1.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ COLUMNS = (
     "corner cells",
     "graph, us a cell",
     "bytes a cell",
-    "hierarchy, us a cell",
+    "contraction, us a cell",
     "bytes a cell",
     "A*, us median / p95",
     "graph",
-    "hierarchy",
+    "contracted",
     "many",
     "not equal",
 )
@@ -73,8 +73,8 @@ def row(path: Path, n_pairs: int) -> tuple[list[str], int]:
     build_us = min(timed(lambda: build_jump_graph(free)) for _ in range(3))
     graph = build_jump_graph(free)
     contract_us = timed(lambda: contract_graph(graph))
-    hierarchy = contract_graph(graph)
-    searches = GridSearch(free), JumpSearch(graph), JumpSearch(graph, hierarchy)
+    contracted = contract_graph(graph)
+    searches = GridSearch(free), JumpSearch(graph), JumpSearch(contracted)
     methods: list[Callable[..., CellPath | JumpPath]] = [
         searches[0].search,
         searches[1].path,
@@ -100,7 +100,7 @@ def row(path: Path, n_pairs: int) -> tuple[list[str], int]:
         f"{build_us / n_free:.2f}",
         f"{graph.memory_bytes / n_free:.0f}",
         f"{contract_us / n_free:.2f}",
-        f"{hierarchy.memory_bytes / n_free:.0f}",
+        f"{contracted.memory_bytes / n_free:.0f}",
         *(f"{np.median(taken[3:]):.0f} / {np.quantile(taken[3:], 0.95):.0f}" for taken in us),
         f"{many_us:.0f}",
         str(unequal),

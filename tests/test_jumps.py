@@ -32,9 +32,9 @@ QUICK_FILES = 4
 
 
 def searches(free: NDArray[np.bool_]) -> tuple[JumpSearch, JumpSearch]:
-    """One of the graph of free cells, and one of its hierarchy."""
+    """One of the graph of free cells, and one of the contracted graph."""
     graph = build_jump_graph(free)
-    return JumpSearch(graph), JumpSearch(graph, contract_graph(graph))
+    return JumpSearch(graph), JumpSearch(contract_graph(graph))
 
 
 def assert_shortest(
@@ -121,7 +121,7 @@ def test_the_map_given_is_not_changed_and_the_graph_cannot_be() -> None:
     before = free.copy()
     graph = build_jump_graph(free)
     assert (free == before).all()
-    for array in (graph.number, graph.ahead, graph.places, graph.first, graph.arcs):
+    for array in (graph.index, graph.ahead, graph.places, graph.first, graph.arcs):
         assert not array.flags.writeable
 
 
@@ -161,7 +161,7 @@ def test_no_pairs_get_no_answers() -> None:
     assert found.path_start.tolist() == [0]
 
 
-def test_a_hierarchy_expands_less() -> None:
+def test_a_contracted_graph_expands_less() -> None:
     starts, goals = pairs_of(speckled(3), 200)
     flat, contracted = (search.many(starts, goals) for search in searches(speckled(3)))
     assert contracted.length_cells.tolist() == flat.length_cells.tolist()

@@ -187,7 +187,8 @@ CRAFTED: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "overlapping": (put("mesh", "arrays", "kinds", "offset", to=0), "overlaps"),
     "outside": (put("mesh", "arrays", "kinds", "offset", to=1 << 40), "behind the file"),
     "other frame": (put("jump graph", "values", "origin", to=[-9, 0]), "frame"),
-    "other width": (put("jump graph", "values", "width", to=0), "frame"),
+    "other width": (put("jump graph", "values", "shape", to=[9, 0]), "frame"),
+    "other height": (put("jump graph", "values", "shape", to=[2, 9]), "frame"),
 }
 
 
@@ -214,7 +215,7 @@ INDICES = [
     ("corner edges", "first"),
     ("corner hierarchy", "middles"),
     ("corner hierarchy", "first"),
-    ("jump graph", "number"),
+    ("jump graph", "index"),
     ("jump graph", "first"),
     ("portals", "exit_gate"),
     ("portals", "side_start"),

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 import hybridnav as hn
 from hybridnav.grid.worlds import figure1_world
 from hybridnav.io.models import structures
-from hybridnav.jumps.build import JumpGraph, JumpHierarchy
+from hybridnav.jumps.build import JumpGraph
 from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
 from hybridnav.pyramid.record import Record
 from hybridnav.route._portal_kernels import Tables
@@ -298,8 +298,7 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.MESH, ConvexMesh, ()),
         (structures.CORNER_GRAPH, CornerGraph, ()),
         (structures.CORNER_HIERARCHY, CornerHierarchy, ()),
-        (structures.JUMP_GRAPH, JumpGraph, ("origin", "width")),
-        (structures.JUMP_HIERARCHY, JumpHierarchy, ()),
+        (structures.JUMP_GRAPH, JumpGraph, ("origin", "shape")),
         (structures.TABLES, Tables, ("shift",)),
         (structures.PORTALS, Portals, ()),
         (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors")),

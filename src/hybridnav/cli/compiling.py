@@ -183,7 +183,7 @@ def compile_search(coarse: str) -> None:
         OverMesh(grid, refiner, settings).plan(*_ENDS)
     elif coarse == "jumps":
         graph = build_jump_graph(grid.enterable())
-        JumpSearch(graph, contract_graph(graph)).path(*_ENDS)  # as on maps of buildings
+        JumpSearch(contract_graph(graph)).path(*_ENDS)  # as on maps of buildings
     else:
         WholeMap(refiner).plan(*_ENDS)
 

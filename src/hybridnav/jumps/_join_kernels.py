@@ -6,6 +6,7 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.jumps._leg_kernels import class_of, reverse, row_col_kind
+from hybridnav.jumps._table_kernels import corner_at, is_corner, number_of
 from hybridnav.search._contract_kernels import pack
 from hybridnav.search._kernels import grow, octile_cost
 
@@ -20,8 +21,8 @@ def join(tables, cell, found):
     Parameters
     ----------
     tables
-        Numbers of cells and what they see (see `look_ahead`), width of the framed grid, number of
-        corner cells.
+        The index of cells (see `number_cells`), what they see (see `look_ahead`), which corner cell
+        of the graph each is, int32 (n,), and the width of the framed grid.
     cell
         Flat free cell.
     found
@@ -32,40 +33,42 @@ def join(tables, cell, found):
     int
         How many were found.
     """
-    number, ahead, width, n_corners = tables
-    here = np.int64(number[cell])
+    index, ahead, order, width = tables
+    here = number_of(index, cell)
     n_found = 0
     for side in range(0, 8, 2):
         seen = np.int64(ahead[here, side])
         if seen > 0:
-            found[n_found] = number[cell + seen * step_of(side, width)]
+            found[n_found] = order[corner_at(index, cell + seen * step_of(side, width))]
             n_found += 1
+    # By turns, for the processor fetches what the four need at the same time: where they stand, or
+    # -1 at their end, and how far something along the sides on their right and left counts.
+    at, limits = np.full(8, cell), np.empty((8, 2), np.int64)
     for k in range(1, 8, 2):
-        first, second = k - 1, k + 1 & 7
-        step = step_of(k, width)
-        first_step, second_step = step_of(first, width), step_of(second, width)
-        first_limit, second_limit = _limit(ahead[here, first]), _limit(ahead[here, second])
-        at, there = cell, here
-        while True:
-            seen = np.int64(ahead[there, k])
-            if seen <= 0:
-                break
-            at += seen * step
-            there = np.int64(number[at])
-            if there < n_corners:
-                found[n_found] = there
-                n_found += 1
-                break
-            seen = np.int64(ahead[there, first])
-            if 0 < seen < first_limit:
-                found[n_found] = number[at + seen * first_step]
-                n_found += 1
-            first_limit = min(first_limit, _limit(seen))
-            seen = np.int64(ahead[there, second])
-            if 0 < seen < second_limit:
-                found[n_found] = number[at + seen * second_step]
-                n_found += 1
-            second_limit = min(second_limit, _limit(seen))
+        limits[k, 0], limits[k, 1] = _limit(ahead[here, k - 1]), _limit(ahead[here, k + 1 & 7])
+    n_left = 4
+    while n_left > 0:
+        for k in range(1, 8, 2):
+            if at[k] < 0:
+                continue
+            seen = np.int64(ahead[number_of(index, at[k]), k])
+            at[k] += seen * step_of(k, width)
+            if seen <= 0 or is_corner(index, at[k]):
+                if seen > 0:
+                    found[n_found] = order[corner_at(index, at[k])]
+                    n_found += 1
+                at[k] = -1
+                n_left -= 1
+                continue
+            there = number_of(index, at[k])
+            for i in range(2):
+                along = k - 1 + 2 * i & 7
+                seen = np.int64(ahead[there, along])
+                if 0 < seen < limits[k, i]:
+                    side = at[k] + seen * step_of(along, width)
+                    found[n_found] = order[corner_at(index, side)]
+                    n_found += 1
+                limits[k, i] = min(limits[k, i], _limit(seen))
     return n_found
 
 
@@ -91,7 +94,7 @@ def _limit(seen):
 @njit(cache=True, nogil=True)
 def is_direct(tables, cell, goal):
     """Whether the way from a cell along a diagonal and then a side to another one is free."""
-    width = tables[2]
+    width = tables[3]
     rows, cols = goal // width - cell // width, goal % width - cell % width
     diagonal = min(abs(rows), abs(cols))
     side = max(abs(rows), abs(cols)) - diagonal
@@ -111,10 +114,10 @@ def is_direct(tables, cell, goal):
 @njit(cache=True, nogil=True)
 def _is_free(tables, at, k, distance):
     """Whether so many moves in a direction are legal."""
-    number, ahead, width, _ = tables
+    index, ahead, _, width = tables
     step = step_of(k, width)
     while True:
-        seen = np.int64(ahead[number[at], k])
+        seen = np.int64(ahead[number_of(index, at), k])
         if seen <= 0:
             return -seen >= distance
         if seen >= distance:

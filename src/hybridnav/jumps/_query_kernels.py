@@ -43,9 +43,9 @@ def _walk(cells, n_cells, rows, cols, is_side_first):
 def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
     """Append the cells of a path to `cells`; return these, another array where there was no room,
     their number, and the path's moves along sides and along diagonals."""
-    (_, _, width, _), places = graph[:2]
+    (_, _, _, width), places = graph[:2]
     row, col = ends[0] // width, ends[0] % width
-    cells = _with_room(cells, n_cells, 1)
+    cells = _with_room(cells, n_cells, 1 + _moves(places, width, ends, nodes))
     cells[n_cells, 0], cells[n_cells, 1] = row + origin[0], col + origin[1]
     n_cells += 1
     n_straight = n_diagonal = np.int64(0)
@@ -54,7 +54,6 @@ def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
         if i < nodes.size:
             to_row, to_col, _ = row_col_kind(places[nodes[i]])
         rows, cols = to_row - row, to_col - col
-        cells = _with_room(cells, n_cells, max(abs(rows), abs(cols)))
         # The last leg is free in the order of the goal.
         is_side_first = i == nodes.size and meeting != FROM_START
         n_cells, straight, diagonal = _walk(cells, n_cells, rows, cols, is_side_first)
@@ -65,11 +64,26 @@ def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
 
 
 @njit(cache=True, nogil=True)
+def _moves(places, width, ends, nodes):
+    """Count the moves of a path."""
+    row, col = ends[0] // width, ends[0] % width
+    count = np.int64(0)
+    for i in range(nodes.size + 1):
+        to_row, to_col = ends[1] // width, ends[1] % width
+        if i < nodes.size:
+            to_row, to_col, _ = row_col_kind(places[nodes[i]])
+        count += max(abs(to_row - row), abs(to_col - col))
+        row, col = to_row, to_col
+    return count
+
+
+@njit(cache=True, nogil=True)
 def _with_room(cells, n_cells, more):
     """Return cells with room for some more, a copy where they have none."""
     if n_cells + more <= cells.shape[0]:
         return cells
-    larger = np.empty((2 * (n_cells + more), 2), np.int64)
+    # One path gets what it needs; of many the room doubles.
+    larger = np.empty((2 * n_cells + more, 2), np.int64)
     larger[:n_cells] = cells[:n_cells]
     return larger
 
@@ -84,8 +98,7 @@ def paths(graph, middles, origin, ends, work):
     graph
         See `shortest`.
     middles
-        int32 (m,), what the arcs of a hierarchy lead past; empty for a graph that is not
-        contracted.
+        int64 (m,), what the arcs of a contracted graph lead past; empty for another one.
     origin
         Row and column of the framed grid's first cell.
     ends
@@ -100,12 +113,12 @@ def paths(graph, middles, origin, ends, work):
         int64 (k, 3), moves along sides, moves along diagonals, -1 for both where there is no path,
         and corner cells expanded.
     """
-    width, (first, table) = graph[0][2], graph[4]
+    width, first = graph[0][3], graph[4][0]
     records, _, touched, _ = work
     n = ends.shape[0]
     begin = np.zeros(n + 1, np.int64)
     counts = np.full((n, 3), np.int64(-1))
-    cells = np.empty((256, 2), np.int64)
+    cells = np.empty((0, 2), np.int64)
     n_cells = np.int64(0)
     for i in range(n):
         pair = (
@@ -116,7 +129,7 @@ def paths(graph, middles, origin, ends, work):
         if cost < FAR:
             nodes = touched[:0]
             if meeting >= 0:
-                nodes = corners_between((first, table, middles), meeting, records)
+                nodes = corners_between((first, middles), meeting, records)
             cells, n_cells, counts[i, 0], counts[i, 1] = _cells_of(
                 graph, pair, meeting, nodes, origin, cells, n_cells
             )

@@ -7,6 +7,7 @@ import numpy as np
 from hybridnav._jit import njit
 from hybridnav.jumps._join_kernels import is_direct, join
 from hybridnav.jumps._leg_kernels import FAR, class_of, row_col_kind
+from hybridnav.jumps._table_kernels import corner_at, is_corner
 from hybridnav.search._heap_kernels import pop, push
 from hybridnav.search._kernels import octile_cost
 from hybridnav.search._unpack_kernels import NO_ARC
@@ -24,12 +25,12 @@ def _begin(graph, ends, side, work, is_queued):
     the end is joined to none.
     """
     tables, places, component, _, _ = graph
-    number, _, width, n_corners = tables
+    index, _, order, width = tables
     records, heaps, touched, found = work
     cell, aim = ends[side], ends[1 - side]
     n_found = 1
-    if number[cell] < n_corners:
-        found[0] = number[cell]
+    if is_corner(index, cell):
+        found[0] = order[corner_at(index, cell)]
     else:
         n_found = join(tables, cell, found)
     row, col = cell // width, cell % width
@@ -80,7 +81,7 @@ def shortest(graph, ends, is_contracted, work):
     """
     tables, places, _, follow, (first, arcs) = graph
     records, heaps, touched, found = work
-    number, _, width, _ = tables
+    width = tables[3]
     rows, cols = ends[1] // width - ends[0] // width, ends[1] % width - ends[0] % width
     if is_direct(tables, ends[0], ends[1]):
         return octile_cost(rows, cols), FROM_START, 0, 0
@@ -115,7 +116,7 @@ def shortest(graph, ends, is_contracted, work):
             by = records[node, 2 + side]
             if by != NO_ARC:
                 may_follow = follow[kind, arcs[by & 0xFFFFFFFF, 1] & 63]
-            elif number[ends[side]] == node:
+            elif row * width + col == ends[side]:
                 may_follow = np.int64(-1)
             else:
                 leg = class_of(ends[side] // width - row, ends[side] % width - col)

@@ -15,10 +15,38 @@ BLOCKED = -1
 """Number of cells that are not free."""
 
 
+@njit(cache=True, nogil=True)
+def _n_bits(word):
+    """Count the bits that are set in an int64."""
+    pairs = word - (word >> 1 & 0x5555555555555555)
+    fours = (pairs & 0x3333333333333333) + (pairs >> 2 & 0x3333333333333333)
+    return ((fours + (fours >> 4)) & 0x0F0F0F0F0F0F0F0F) * 0x0101010101010101 >> 56
+
+
+@njit(cache=True, nogil=True)
+def number_of(index, cell):
+    """Return the number of a free cell; see `number_cells` for the index."""
+    word, before = cell >> 6, (np.int64(1) << (cell & 63)) - 1
+    return (index[word, 2] >> 32) + _n_bits(index[word, 0] & before)
+
+
+@njit(cache=True, nogil=True)
+def is_corner(index, cell):
+    """Return whether a cell is a corner cell."""
+    return index[cell >> 6, 1] >> (cell & 63) & 1 == 1
+
+
+@njit(cache=True, nogil=True)
+def corner_at(index, cell):
+    """Return the number of a corner cell among these, in the order of rows."""
+    word, before = cell >> 6, (np.int64(1) << (cell & 63)) - 1
+    return (index[word, 2] & 0xFFFFFFFF) + _n_bits(index[word, 1] & before)
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def number_cells(free):
-    """Number the free cells: corner cells first, then the others, each in the order of rows.
+    """Number the free cells, and the corner cells among them, in the order of rows.
 
     A corner cell has a blocked cell at one of its corners, and both cells beside that one are free:
     there shortest paths turn.
@@ -32,42 +60,39 @@ def number_cells(free):
     -------
     tuple
         int32 ((rows + 2) * (cols + 2),), the number of each cell of the framed grid, `BLOCKED` for
-        none; int32 (n,), flat corner cells by number; uint8 (n,), which of their corners are
-        blocked, bit k for direction 2 * k + 1.
+        none; int32 (n,), flat corner cells; uint8 (n,), which of their corners are blocked, bit k
+        for direction 2 * k + 1; the index, int64 (words, 3), which keeps the numbers in 3 bits a
+        cell: for every 64 flat cells which are free, which are corner cells, and how many of each
+        come before, free ones in the high half.
     """
     rows, cols = free.shape
     width = cols + 2
     number = np.full((rows + 2) * width, BLOCKED, np.int32)
+    n_cells = np.int32(0)
     for row in range(rows):
         at = (row + 1) * width + 1
         for col in range(cols):
             if free[row, col]:
-                number[at + col] = 0
-    n_corners = 0
-    for is_counted in (True, False):
-        if not is_counted:
-            corners, kinds = np.empty(n_corners, np.int32), np.empty(n_corners, np.uint8)
-            n_corners = 0
-        for row in range(1, rows + 1):
-            for cell in range(row * width + 1, row * width + cols + 1):
-                if number[cell] == BLOCKED:
-                    continue
-                kind = _kind(number, width, cell)
-                if kind == 0:
-                    continue
-                if not is_counted:
-                    corners[n_corners], kinds[n_corners] = cell, kind
-                n_corners += 1
-    for i in range(n_corners):
-        number[corners[i]] = i + 1
-    n_cells = n_corners
+                number[at + col] = n_cells
+                n_cells += 1
+    index = np.zeros((number.size + 63 >> 6, 3), np.int64)
+    n_corners, n_free = 0, np.int64(0)
     for cell in range(number.size):
-        if number[cell] == 0:
-            number[cell] = n_cells
-            n_cells += 1
-        elif number[cell] > 0:
-            number[cell] -= 1
-    return number, corners, kinds
+        if cell & 63 == 0:
+            index[cell >> 6, 2] = n_free << 32 | n_corners
+        if number[cell] != BLOCKED:
+            n_free += 1
+            index[cell >> 6, 0] |= np.int64(1) << (cell & 63)
+            if _kind(number, width, cell) != 0:
+                n_corners += 1
+                index[cell >> 6, 1] |= np.int64(1) << (cell & 63)
+    corners, kinds = np.empty(n_corners, np.int32), np.empty(n_corners, np.uint8)
+    n_corners = 0
+    for cell in range(number.size):
+        if is_corner(index, cell):
+            corners[n_corners], kinds[n_corners] = cell, _kind(number, width, cell)
+            n_corners += 1
+    return number, corners, kinds, index
 
 
 @njit(cache=True, nogil=True)
@@ -88,17 +113,15 @@ def _kind(number, width, cell):
 
 
 @njit(cache=True, nogil=True)
-def look_ahead(number, width, n_corners, ahead):
+def look_ahead(number, width, index, ahead):
     """Fill in what each free cell sees in the eight directions.
 
     Parameters
     ----------
-    number
+    number, index
         Of `number_cells`.
     width
         Columns of the framed grid.
-    n_corners
-        Number of corner cells.
     ahead
         int16 or int32 (n_free, 8), filled in. Along a side: the distance to the next corner cell,
         or 0 or less, minus the free cells before a blocked one. Along a diagonal: the distance to
@@ -117,7 +140,7 @@ def look_ahead(number, width, n_corners, ahead):
                 there = number[cell + step]
                 if there == BLOCKED:
                     ahead[here, k] = 0
-                elif there < n_corners:
+                elif is_corner(index, cell + step):
                     ahead[here, k] = 1
                 else:
                     seen = ahead[there, k]
@@ -139,7 +162,11 @@ def look_ahead(number, width, n_corners, ahead):
                     or number[cell + along_col] == BLOCKED
                 ):
                     ahead[here, k] = 0
-                elif there < n_corners or ahead[there, k - 1] > 0 or ahead[there, k + 1 & 7] > 0:
+                elif (
+                    is_corner(index, cell + along_row + along_col)
+                    or ahead[there, k - 1] > 0
+                    or ahead[there, k + 1 & 7] > 0
+                ):
                     ahead[here, k] = 1
                 else:
                     seen = ahead[there, k]

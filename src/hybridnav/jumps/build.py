@@ -1,8 +1,8 @@
-"""The jump-point graph of free cells, and the hierarchy that contraction makes of it."""
+"""The jump-point graph of free cells, and its contraction."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.jumps._join_kernels import arcs_of, components
 from hybridnav.jumps._leg_kernels import COLUMN_BITS, KIND_BITS, legs_that_follow
 from hybridnav.jumps._table_kernels import look_ahead, number_cells
-from hybridnav.search._contract_kernels import contract
+from hybridnav.search._contract_kernels import contract, renumbered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 _SHORT = 32_000
 """Longest side of a map whose distances fit 16 bits."""
-_SETTLED = 10
-"""Corner cells that a search for another way settles at most when the graph is contracted. With 80
-there are 1 to 3 % fewer shortcuts, and it takes four times as long."""
+_SETTLED = 1
+"""Corner cells that a search for another way settles at most when the graph is contracted: it sees
+other arcs alone. With 10 there are 4 to 13 % fewer shortcuts, and it takes twice as long."""
 _NO_LIMIT = 1 << 62
 """More arcs than any contraction looks at."""
 
@@ -36,26 +36,34 @@ class JumpGraph:
     shortest paths turn. An arc is a leg: moves along one diagonal and one side next to it, which
     may come in any order. Cells are those of the smallest rectangle that holds all free ones, in a
     frame of blocked ones; a flat cell is its place in there.
+
+    Contracted, arcs lead from each corner cell to those that were contracted after it, and corner
+    cells are numbered from the last one contracted to the first.
     """
 
     origin: tuple[int, int]
     """Row and column of the frame's first cell."""
-    width: int
-    """Columns of the framed rectangle."""
-    number: IntArray
-    """int32 (c,), the number of each flat cell, those of corner cells first; -1 for a blocked
-    one."""
+    shape: tuple[int, int]
+    """Rows and columns of the framed rectangle."""
+    index: LongArray
+    """int64 (words, 3), for every 64 flat cells which are free, which are corner cells, and how
+    many of each come before, free ones in the high half."""
     ahead: NDArray[np.int16 | np.int32]
-    """int16 or int32 (n_free, 8), by number and direction: along a side the distance to the next
-    corner cell, along a diagonal to the next cell that is one or sees one along a side; where there
-    is none, minus the moves that are legal."""
+    """int16 or int32 (n_free, 8), by free cell in the order of rows and by direction: along a side
+    the distance to the next corner cell, along a diagonal to the next cell that is one or sees one
+    along a side; where there is none, minus the moves that are legal."""
+    order: IntArray
+    """int32 (n,), the number of each corner cell in the order of rows."""
     places: LongArray
     """int64 (n,), row and column in the frame of each corner cell and its blocked corners."""
     first: IntArray
     """int32 (n + 1,), where the arcs of each corner cell begin."""
     arcs: LongArray
-    """int64 (m, 2), the cost of each arc in the units of `hybridnav.search`, its head and the class
-    of its leg."""
+    """int64 (m, 2), the cost of each arc in the units of `hybridnav.search`, its head, the class of
+    its first leg, and of its last one backwards."""
+    middles: LongArray
+    """int64 (m,), the corner cell that a shortcut leads past and two of its arcs, see `contract` in
+    the kernels; -1 for an arc of the graph; empty where the graph is not contracted."""
     component: IntArray
     """int32 (n,), the connected part of the graph that each corner cell belongs to."""
 
@@ -65,28 +73,15 @@ class JumpGraph:
         return len(self.places)
 
     @property
-    def memory_bytes(self) -> int:
-        """Bytes of its arrays."""
-        arrays = self.number, self.ahead, self.places, self.first, self.arcs, self.component
-        return sum(array.nbytes for array in arrays)
-
-
-@copies_alike
-@dataclass(frozen=True, eq=False)
-class JumpHierarchy:
-    """The graph contracted: arcs from each corner cell to those that were contracted after it."""
-
-    first: IntArray
-    """int32 (n + 1,), where the arcs of each corner cell begin."""
-    arcs: LongArray
-    """int64 (u, 2), as `JumpGraph.arcs`; classes of the first leg, and of the last backwards."""
-    middles: IntArray
-    """int32 (u,), the corner cell that a shortcut leads past, -1 for an arc of the graph."""
+    def is_contracted(self) -> bool:
+        """Whether arcs lead only to corner cells contracted later."""
+        return len(self.middles) > 0
 
     @property
     def memory_bytes(self) -> int:
         """Bytes of its arrays."""
-        return self.first.nbytes + self.arcs.nbytes + self.middles.nbytes
+        arrays = (getattr(self, field.name) for field in fields(self))
+        return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
 def build_jump_graph(free: BoolArray) -> JumpGraph:
@@ -113,27 +108,30 @@ def build_jump_graph(free: BoolArray) -> JumpGraph:
     low = (int(rows[0]), int(cols[0])) if len(rows) else (0, 0)
     high = (int(rows[-1]) + 1, int(cols[-1]) + 1) if len(rows) else (0, 0)
     inside = np.ascontiguousarray(free[low[0] : high[0], low[1] : high[1]])
-    width = inside.shape[1] + 2
-    number, corners, kinds = number_cells(inside)
+    height, width = inside.shape[0] + 2, inside.shape[1] + 2
+    number, corners, kinds, index = number_cells(inside)
     distances = np.int16 if max(inside.shape) <= _SHORT else np.int32
-    ahead = np.empty((int(number.max()) + 1, 8), dtype=distances)
-    look_ahead(number, width, len(corners), ahead)
+    ahead = np.empty((int(np.count_nonzero(inside)), 8), dtype=distances)
+    look_ahead(number, width, index, ahead)
     row, col = np.divmod(corners.astype(np.int64), width)
     places = (row << COLUMN_BITS | col) << KIND_BITS | kinds
-    first, arcs = arcs_of((number, ahead, width, len(corners)), corners, places)
-    arrays = (number, ahead, places, first, arcs, components(first, arcs))
+    order, none = np.arange(len(corners), dtype=np.int32), np.empty(0, np.int64)
+    first, arcs = arcs_of((index, ahead, order, width), corners, places)
+    arrays = index, ahead, order, places, first, arcs, none, components(first, arcs)
     for array in arrays:
         array.flags.writeable = False
-    return JumpGraph((low[0] - 1, low[1] - 1), width, *arrays)
+    return JumpGraph((low[0] - 1, low[1] - 1), (height, width), *arrays)
 
 
-def contract_graph(graph: JumpGraph) -> JumpHierarchy:
-    """Contract a jump-point graph into a hierarchy, which makes queries several times faster.
+def contract_graph(graph: JumpGraph) -> JumpGraph:
+    """Contract a jump-point graph, which makes queries several times faster.
+
+    Where there are several shortest paths a contracted graph may find another one.
 
     Parameters
     ----------
     graph
-        The graph, which stays as it is.
+        Not contracted; it stays as it is.
 
     Notes
     -----
@@ -141,7 +139,21 @@ def contract_graph(graph: JumpGraph) -> JumpHierarchy:
     hierarchical routing in road networks, 2008.
     """
     kinds = (graph.places & (1 << KIND_BITS) - 1).astype(np.uint8)
-    arrays = contract(kinds, graph.first, graph.arcs, legs_that_follow(), (_SETTLED, _NO_LIMIT))
-    for array in arrays:
+    effort = _SETTLED, _NO_LIMIT
+    *found, taken = contract(kinds, graph.first, graph.arcs, legs_that_follow(), effort)
+    top_first = taken[::-1]
+    order = np.empty(len(taken), np.int32)
+    order[top_first] = np.arange(len(taken), dtype=np.int32)
+    first, arcs, middles = renumbered(*found, order)
+    places, component = graph.places[top_first], graph.component[top_first]
+    for array in (order, places, component, first, arcs, middles):
         array.flags.writeable = False
-    return JumpHierarchy(*arrays)
+    return replace(
+        graph,
+        order=order,
+        places=places,
+        first=first,
+        arcs=arcs,
+        middles=middles,
+        component=component,
+    )

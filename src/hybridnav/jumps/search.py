@@ -18,7 +18,7 @@ from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.jumps.build import JumpGraph, JumpHierarchy
+    from hybridnav.jumps.build import JumpGraph
 
 Cell = tuple[int, int]
 
@@ -72,11 +72,7 @@ class JumpSearch:
     Parameters
     ----------
     graph
-        Of the map's free cells.
-    hierarchy
-        The graph contracted, which makes queries several times faster where many corner cells lie
-        between start and goal; None to search the graph itself. Where there are several shortest
-        paths each of the two may find another one.
+        Of the map's free cells, contracted or not.
 
     Notes
     -----
@@ -84,14 +80,12 @@ class JumpSearch:
     2019.
     """
 
-    def __init__(self, graph: JumpGraph, hierarchy: JumpHierarchy | None = None) -> None:
-        self.graph, self.hierarchy = graph, hierarchy
-        searched = graph if hierarchy is None else hierarchy
-        tables = graph.number, graph.ahead, graph.width, graph.n_corners
-        arcs = searched.first, searched.arcs
+    def __init__(self, graph: JumpGraph) -> None:
+        self.graph = graph
+        tables = graph.index, graph.ahead, graph.order, graph.shape[1]
+        arcs = graph.first, graph.arcs
         self._arrays = tables, graph.places, graph.component, legs_that_follow(), arcs
-        self._middles = np.empty(0, np.int32) if hierarchy is None else hierarchy.middles
-        self._works = Pool(partial(_Work, graph.n_corners, len(searched.arcs)))
+        self._works = Pool(partial(_Work, graph.n_corners, len(graph.arcs)))
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:
         """Find a shortest path between two free cells."""
@@ -123,6 +117,6 @@ class JumpSearch:
         """Return where the cells of each path begin, these, and moves and expansions of each."""
         with self._works.lent() as work:
             found: tuple[Any, Any, Any] = kernels.paths(
-                self._arrays, self._middles, self.graph.origin, ends, work.arrays
+                self._arrays, self.graph.middles, self.graph.origin, ends, work.arrays
             )
         return found

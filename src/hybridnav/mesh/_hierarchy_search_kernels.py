@@ -81,7 +81,8 @@ def query_hierarchy(mesh, hierarchy, where, ends, work, effort):
         if status != DONE:
             return status, way
     if counts[LAST] >= 0:
-        nodes = corners_between(hierarchy[:3], counts[LAST], records)
+        first, _, middles, _ = hierarchy
+        nodes = corners_between((first, middles), counts[LAST], records)
         way = _way(mesh, ends, nodes)
         is_proved = bounds[LOWER] >= bounds[UPPER]
         bounds[UPPER] = 0.0

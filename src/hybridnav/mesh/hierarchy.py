@@ -39,13 +39,14 @@ class CornerHierarchy:
     """int32 (n + 1,), where the arcs of each corner begin."""
     arcs: LongArray
     """int64 (u, 2), cost in 2^-34 of a cell; head and classes, see `pack` in the kernels."""
-    middles: IntArray
-    """int32 (u,), the corner that a shortcut leads past, -1 for an edge of the graph of corners."""
+    middles: LongArray
+    """int64 (u,), the corner that a shortcut leads past and two of its arcs, see `contract` in the
+    kernels; -1 for an edge of the graph of corners."""
     follow: LongArray
     """int64 (4, 64), which classes may follow which on a shortest path."""
 
     @property
-    def arrays(self) -> tuple[IntArray, LongArray, IntArray, LongArray]:
+    def arrays(self) -> tuple[IntArray, LongArray, LongArray, LongArray]:
         """The arrays in the order of the kernels."""
         return self.first, self.arcs, self.middles, self.follow
 

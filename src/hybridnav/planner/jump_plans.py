@@ -77,9 +77,9 @@ class OverJumps:
                     free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
                     graph = build_jump_graph(free)
                     progress(1, 2)
-                    is_contracted = graph.n_corners >= CONTRACTED_FROM
-                    hierarchy = contract_graph(graph) if is_contracted else None
-                    self._search = JumpSearch(graph, hierarchy)
+                    if graph.n_corners >= CONTRACTED_FROM:
+                        graph = contract_graph(graph)
+                    self._search = JumpSearch(graph)
                     progress(2, 2)
         return self._search
 

@@ -11,31 +11,21 @@ NO_ARC = -1
 
 
 @njit(cache=True, nogil=True)
-def _arc_between(arcs, tail, head):
-    """Return the arc of a hierarchy from a corner to one contracted later."""
-    first, table, _ = arcs
-    for arc in range(first[tail], first[tail + 1]):
-        if table[arc, 1] >> 12 == head:
-            return arc
-    return NO_ARC
-
-
-@njit(cache=True, nogil=True)
 def _unpack(arcs, way, nodes, count):
     """Append the corners on the way of an arc to those of a path, but for its tail.
 
-    `way` is its tail, its head, and itself or its reverse. Returns the corners, another array where
-    there was no room, and their number.
+    `way` is where it is entered, where it is left, and its number, or -1 minus that where it is
+    passed backwards. Returns the corners, another array where there was no room, and their number.
     """
-    middles = arcs[2]
+    first, middles = arcs
     stack = np.empty((64, 3), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2] = way
     depth = 1
     while depth > 0:
         depth -= 1
         tail, head, arc = stack[depth, 0], stack[depth, 1], stack[depth, 2]
-        middle = np.int64(middles[arc]) if middles.size > 0 else np.int64(-1)
-        if middle < 0:
+        past = middles[max(arc, -1 - arc)] if middles.size > 0 else NO_ARC
+        if past < 0:
             if count == nodes.size:
                 nodes = np.concatenate((nodes, nodes))
             nodes[count] = head
@@ -43,10 +33,13 @@ def _unpack(arcs, way, nodes, count):
             continue
         if depth + 2 > stack.shape[0]:
             stack = np.concatenate((stack, stack))
-        after, before = _arc_between(arcs, middle, head), _arc_between(arcs, middle, tail)
-        stack[depth, 0], stack[depth, 1], stack[depth, 2] = middle, head, after
+        middle = past >> 32
+        back, on = first[middle] + (past >> 16 & 0xFFFF), first[middle] + (past & 0xFFFF)
+        if arc < 0:
+            back, on = on, back
+        stack[depth, 0], stack[depth, 1], stack[depth, 2] = middle, head, on
         depth += 1
-        stack[depth, 0], stack[depth, 1], stack[depth, 2] = tail, middle, before
+        stack[depth, 0], stack[depth, 1], stack[depth, 2] = tail, middle, -1 - back
         depth += 1
     return nodes, count
 
@@ -58,8 +51,8 @@ def corners_between(arcs, meeting, records):
     Parameters
     ----------
     arcs
-        Where the arcs of each corner begin, the arcs, their middles: of `contract`; without middles
-        in a graph that is not contracted.
+        Where the arcs of each corner begin, and their middles, of `contract`; no middles in a graph
+        that is not contracted.
     meeting
         The corner where the searches from both ends meet.
     records
@@ -89,6 +82,6 @@ def corners_between(arcs, meeting, records):
     node = np.int64(meeting)
     while records[node, 3] != NO_ARC:
         by = records[node, 3]
-        nodes, count = _unpack(arcs, (node, by >> 32, by & 0xFFFFFFFF), nodes, count)
+        nodes, count = _unpack(arcs, (node, by >> 32, -1 - (by & 0xFFFFFFFF)), nodes, count)
         node = by >> 32
     return nodes[:count]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from hybridnav.io.models.fields import refusal
@@ -13,16 +14,16 @@ from hybridnav.io.models.structures import (
     CORNER_GRAPH,
     CORNER_HIERARCHY,
     JUMP_GRAPH,
-    JUMP_HIERARCHY,
     MESH,
     PORTALS,
     TABLES,
 )
 from hybridnav.jumps import JumpSearch
-from hybridnav.jumps.build import JumpGraph, JumpHierarchy
+from hybridnav.jumps.build import JumpGraph
 from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
 from hybridnav.route import BuiltPortals
 from hybridnav.route._portal_kernels import Tables
+from hybridnav.search._contract_kernels import HEAD_SHIFT
 from hybridnav.topology.portals import Portals
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class _MeshValues(_Values):
 
 class _JumpValues(_Values):
     origin: tuple[int, int]
-    width: int
+    shape: tuple[int, int]
 
 
 class _PortalValues(_Values):
@@ -167,42 +168,61 @@ def _corners_of(
     if CORNER_EDGES.kind not in fitting:
         raise refusal(filed, f"the {CORNER_EDGES.kind} are missing")
     edges = CORNER_EDGES.read(fitting[CORNER_EDGES.kind], known)
-    return (edges["first"], edges["heads"]), CornerHierarchy(**CORNER_HIERARCHY.read(filed, known))
+    arrays = CORNER_HIERARCHY.read(filed, known)
+    _check_arcs(filed, arrays)
+    return (edges["first"], edges["heads"]), CornerHierarchy(**arrays)
 
 
 def _jump_parts(search: JumpSearch, key: dict[str, Any]) -> list[Part]:
-    graph, hierarchy = search.graph, search.hierarchy
+    graph = search.graph
     sizes = {
-        "framed": len(graph.number),
+        "words": len(graph.index),
         "free": len(graph.ahead),
         "corners": graph.n_corners,
         "arcs": len(graph.arcs),
+        "middles": len(graph.middles),
     }
-    parts = [
-        JUMP_GRAPH.part(graph, sizes, key | {"origin": list(graph.origin), "width": graph.width})
-    ]
-    if hierarchy is not None:
-        sizes = {"corners": graph.n_corners, "arcs": len(hierarchy.arcs)}
-        parts.append(JUMP_HIERARCHY.part(hierarchy, sizes, key))
-    return parts
+    values = key | {"origin": list(graph.origin), "shape": list(graph.shape)}
+    return [JUMP_GRAPH.part(graph, sizes, values)]
 
 
 def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearch:
     filed = fitting[JUMP_GRAPH.kind]
     values = values_of(_JumpValues, filed)
-    sizes, width = filed.part.sizes, values.width
+    sizes, (height, width) = filed.part.sizes, values.shape
     arrays = JUMP_GRAPH.read(filed, known)
     row, col = values.origin
-    height = sizes["framed"] // max(width, 1)
     inside = -1 <= row <= known["rows"] + 1 - height and -1 <= col <= known["cols"] + 1 - width
-    if not inside or min(height, width) < _FRAME or height * width != sizes["framed"]:
-        raise refusal(filed, f"a frame at {values.origin}, {width} wide, of {sizes['framed']}")
-    hierarchy = None
-    if JUMP_HIERARCHY.kind in fitting:
-        other = fitting[JUMP_HIERARCHY.kind]
-        _check_same(other, "corners", sizes["corners"])
-        hierarchy = JumpHierarchy(**JUMP_HIERARCHY.read(other, known))
-    return JumpSearch(JumpGraph(values.origin, width, **arrays), hierarchy)
+    words = -(height * width // -64)
+    if not inside or min(height, width) < _FRAME or words != sizes["words"]:
+        raise refusal(filed, f"a frame at {values.origin} of {values.shape}")
+    if sizes["middles"] not in {0, sizes["arcs"]}:
+        raise refusal(filed, f"{sizes['middles']} middles for {sizes['arcs']} arcs")
+    _check_index(filed, arrays["index"])
+    _check_arcs(filed, arrays)
+    return JumpSearch(JumpGraph(values.origin, values.shape, **arrays))
+
+
+def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:
+    """Refuse arcs to corners, and past arcs, that do not exist."""
+    heads, middles = arrays["arcs"][:, 1] >> HEAD_SHIFT, arrays["middles"]
+    past = middles[middles >= 0]
+    room = np.diff(arrays["first"])[past >> 32]
+    if (heads >= filed.part.sizes["corners"]).any():
+        raise refusal(filed, "arcs lead to corners that do not exist")
+    if ((past >> 16 & 0xFFFF) >= room).any() or ((past & 0xFFFF) >= room).any():
+        raise refusal(filed, "middles name arcs that do not exist")
+
+
+def _check_index(filed: FiledPart, index: LongArray) -> None:
+    """Refuse an index of cells whose counts are not those of its bits."""
+    counts = np.bitwise_count(index[:, :2].view(np.uint64)).astype(np.int64)
+    before = np.zeros((len(index) + 1, 2), dtype=np.int64)
+    np.cumsum(counts, axis=0, out=before[1:])
+    sizes = filed.part.sizes
+    stated = (index[:, 2] == (before[:-1, 0] << 32 | before[:-1, 1])).all()
+    if not stated or before[-1].tolist() != [sizes["free"], sizes["corners"]]:
+        raise refusal(filed, "index holds other counts than its bits")
 
 
 def _portal_parts(built: BuiltPortals, key: dict[str, Any]) -> list[Part]:

@@ -75,11 +75,11 @@ CORNER_EDGES = Structure("corner edges", 1, CORNER_GRAPH.fields[:2], dict(_EDGES
 
 CORNER_HIERARCHY = Structure(
     "corner hierarchy",
-    1,
+    2,
     (
         Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
         Field("arcs", "int64", ("arcs", 2), least=0),
-        Field("middles", "int32", ("arcs",), least=-1, below="corners"),
+        Field("middles", "int64", ("arcs",), least=-1, below="4294967296*corners"),
         Field("follow", "int64", (4, 64)),
     ),
     {"corners": "4*cells", "arcs": "2000*corners"},
@@ -87,27 +87,24 @@ CORNER_HIERARCHY = Structure(
 
 JUMP_GRAPH = Structure(
     "jump graph",
-    1,
+    2,
     (
-        Field("number", "int32", ("framed",), least=-1, below="free"),
+        Field("index", "int64", ("words", 3)),
         Field("ahead", "int16 int32", ("free", 8)),
+        Field("order", "int32", ("corners",), least=0, below="corners"),
         Field("places", "int64", ("corners",), least=0),
         Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
         Field("arcs", "int64", ("arcs", 2), least=0),
+        Field("middles", "int64", ("middles",), least=-1, below="4294967296*corners"),
         Field("component", "int32", ("corners",), least=0, below="corners"),
     ),
-    {"framed": "9*cells", "free": "cells", "corners": "cells", "arcs": "2000*corners"},
-)
-
-JUMP_HIERARCHY = Structure(
-    "jump hierarchy",
-    1,
-    (
-        Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
-        Field("arcs", "int64", ("arcs", 2), least=0),
-        Field("middles", "int32", ("arcs",), least=-1, below="corners"),
-    ),
-    {"corners": "cells", "arcs": "2000*corners"},
+    {
+        "words": "cells",
+        "free": "cells",
+        "corners": "cells",
+        "arcs": "2000*corners",
+        "middles": "arcs",
+    },
 )
 
 _Open = partial(Field, frozen=False)
@@ -184,7 +181,6 @@ KINDS = frozenset(
         CORNER_EDGES,
         CORNER_HIERARCHY,
         JUMP_GRAPH,
-        JUMP_HIERARCHY,
         PORTALS,
         TABLES,
     )
