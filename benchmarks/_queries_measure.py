@@ -18,8 +18,9 @@ from hybridnav.config import load_preset
 from hybridnav.grid.worlds import figure1_world, office_world
 from hybridnav.harness.analysis import loss_of
 from hybridnav.harness.methods import _nbytes
-from hybridnav.harness.pairs import sample_pairs
+from hybridnav.harness.pairs import sample_pairs, scenario_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
+from hybridnav.io.movingai import read_scenarios
 from hybridnav.metrics import judge_line, judge_path
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ OPEN_SHARE = 0.1
 than the merge distance."""
 N_WARM = 3
 """Pairs that every planner answers before the clock runs."""
+_ROUNDED = 0.004
+"""Cells, and share, by which the optimum that a scenario file states may differ: some are rounded,
+some count 1.41 for a diagonal."""
 SLACK = 1e-9
 """Relative difference of two lengths that is rounding."""
 
@@ -75,7 +79,7 @@ def warm_up(presets: Presets) -> None:
 
 
 def measure(
-    path: Path, grid: hn.OccupancyGrid, presets: Presets, *, pairs: int, seed: int
+    path: Path, grid: hn.OccupancyGrid, presets: Presets, asked: Mapping[str, int]
 ) -> tuple[list[Row], list[str]]:
     """Prepare all presets on a map and ask them the same queries.
 
@@ -87,8 +91,9 @@ def measure(
         The map.
     presets
         Those of `presets_of`.
-    pairs, seed
-        As `sample_pairs` takes them.
+    asked
+        How many pairs, and the seed of those that are sampled; whether they are problems of the
+        map's scenario file instead.
 
     Returns
     -------
@@ -102,7 +107,7 @@ def measure(
     InvalidValueError
         When the map has no pair of cells to ask for.
     """
-    queries = sample_pairs(grid, pairs, seed=seed)
+    queries = _pairs(path, grid, asked)
     if not queries:
         raise hn.InvalidValueError(f"map {grid.name} has no two free cells that are joined")
     is_movingai = path.suffix == ".map"
@@ -117,7 +122,7 @@ def measure(
         "places s": time.perf_counter() - began,
     }
     planners, rows = _prepare(topology, presets, _ends(grid, queries[-1]))
-    solved, answers, faults, core = _ask(planners, grid, queries, seed)
+    solved, answers, faults, core = _ask(planners, grid, queries, asked["seed"])
     peak_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     about |= {"core %": 100 * core, "peak GB": peak_gb}
     planners.clear()
@@ -138,6 +143,15 @@ def measure(
             "broken": len(faults[name]),
         }
     return list(rows.values()), [f"{name}: {line}" for name in faults for line in faults[name]]
+
+
+def _pairs(path: Path, grid: hn.OccupancyGrid, asked: Mapping[str, int]) -> list[Pair]:
+    """The pairs of a map: sampled, or spread evenly over its scenario file."""
+    if not asked["scenarios"]:
+        return sample_pairs(grid, asked["asked"], seed=asked["seed"])
+    stated = scenario_pairs(grid, read_scenarios(path.with_name(path.name + ".scen")))
+    count = min(asked["asked"], len(stated))
+    return [stated[at * len(stated) // count] for at in range(count)]
 
 
 def _ends(grid: hn.OccupancyGrid, pair: Pair) -> FloatArray:
@@ -201,6 +215,11 @@ def _ask(
             result = planners[name].plan(*ends)
             results[name] = result, 1e6 * (time.perf_counter() - began)
         expected = results[YARDSTICK][0].status
+        stated, found_m = pair.stated_optimum_cells, results[YARDSTICK][0].cost
+        if stated is not None and not math.isclose(
+            found_m / grid.resolution_m, stated, rel_tol=_ROUNDED, abs_tol=_ROUNDED
+        ):
+            faults[YARDSTICK].append(f"{pair.start} to {pair.goal}: {stated} cells are stated")
         for name, (result, _) in results.items():
             wrong = _faults(grid, pair, result)
             wrong += [] if result.status == expected else [f"{result.status}, not {expected}"]
@@ -247,6 +266,7 @@ def _figures(answers: Mapping[str, FloatArray], yard_us: FloatArray, best_m: Flo
     return {
         "pairs": len(ms),
         "ms median": _quantile(ms, 0.5),
+        "ms mean": _mean(ms),
         "ms p95": _quantile(ms, 0.95),
         "ms max": _quantile(ms, 1.0),
         "times A*": _quantile(yard_us / answers["us"], 0.5),

@@ -1,7 +1,7 @@
 """The table of queries: presets against the tuned grid A*, at `planner.plan`.
 
     python -m benchmarks.queries [--data FOLDER] [-o FILE.csv] [--presets A,B] [--maps GLOB]
-                                 [--pairs 200] [--seed 0]
+                                 [--pairs 200] [--seed 0] [--scenarios]
     python -m benchmarks.queries --scale 16,64 [--maps GLOB] [--pairs 100]
 
 All ROS maps of kind `map` in FOLDER/maps.tsv (robot radius 0.25 m, merge distance 4 m) and all
@@ -16,6 +16,9 @@ already are not measured again.
 The answers are checked as well: paths are legal, statuses agree with A*'s, lower bound <= optimum
 <= cost in the metric of the path, gap <= epsilon. Where one is not, it is listed on stderr and the
 exit code is 1.
+
+`--scenarios` takes MovingAI maps alone, and instead of sampled pairs the problems of each map's
+scenario file, spread evenly over it; A*'s lengths must then be those that the file states.
 
 With `--scale` one building, tiled to so many millions of cells: see `benchmarks._queries_scale`.
 """
@@ -44,7 +47,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[1]
 Asked = dict[str, int]
-"""Pairs that were asked for, and their seed."""
+"""Pairs that were asked for, their seed, and whether they are those of scenario files."""
 _WORDS = frozenset({"map", "preset", "kind", "metric", "error"})
 
 
@@ -66,8 +69,7 @@ def run(files: dict[str, Path], presets: Presets, out: Path | None, asked: Asked
         if name in known:
             continue
         began = time.perf_counter()
-        pairs, seed = asked["asked"], asked["seed"]
-        rows, broken = measure(file, read(file), presets, pairs=pairs, seed=seed)
+        rows, broken = measure(file, read(file), presets, asked)
         known[name] = [{"map": name, **asked, **row} for row in rows]
         for line in broken:
             sys.stderr.write(f"broken promise: {name}: {line}\n")
@@ -112,9 +114,12 @@ def main() -> int:
     parser.add_argument("--maps", action="append", default=[], metavar="GLOB")
     parser.add_argument("--pairs", type=int)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--scenarios", action="store_true")
     parser.add_argument("--scale", metavar="MILLIONS")
     given = parser.parse_args()
     names = [] if given.data is None else maps_of(Path(given.data), given.maps)
+    if given.scenarios:
+        names = [name for name in names if name.endswith(".map")]
     if given.scale is not None:
         if given.maps and len(names) != 1:
             parser.error(f"--scale tiles one map, --maps matches {len(names)}")
@@ -128,7 +133,8 @@ def main() -> int:
     presets = presets_of((given.presets or all_presets).split(","))
     files = {name: Path(given.data) / name for name in names}
     try:
-        rows = run(files, presets, given.out, {"asked": given.pairs or 200, "seed": given.seed})
+        pairs = {"asked": given.pairs or 200, "seed": given.seed, "scenarios": given.scenarios}
+        rows = run(files, presets, given.out, pairs)
     except hn.InvalidValueError as error:
         parser.error(str(error))
     print(page(rows))

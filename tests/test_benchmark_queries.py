@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from benchmarks import _queries_scale, queries
-from benchmarks._queries_measure import presets_of
+from benchmarks._queries_measure import measure, presets_of, read
 from benchmarks._queries_tables import page
 from scipy import ndimage
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 MAP = "figure1/figure1.yaml"
 FILES = {MAP: Path(__file__).parents[1] / "maps" / MAP}
-ASKED = {"asked": 12, "seed": 0}
+ASKED = {"asked": 12, "seed": 0, "scenarios": 0}
 NAMES = ("paper", "grid-astar:planner.smooth=line-of-sight")
 
 
@@ -52,6 +52,19 @@ def test_every_preset_is_set_beside_both_optima(tmp_path: Path) -> None:
     text = page(list(rows.values()))
     assert "Promises broken: 0." in text
     assert "| paper | 1 |" in text
+
+
+def test_problems_of_a_scenario_file_are_asked_and_held_against_it(tmp_path: Path) -> None:
+    path = tmp_path / "room.map"
+    path.write_text("type octile\nheight 3\nwidth 4\nmap\n....\n.@@.\n....\n")
+    problems = ((0, 0, 3, 0, 3.0), (0, 0, 3, 2, 5.0), (0, 0, 0, 2, 9.0))
+    lines = (f"0\troom.map\t4\t3\t{a}\t{b}\t{c}\t{d}\t{cost}\n" for a, b, c, d, cost in problems)
+    path.with_name("room.map.scen").write_text("version 1\n" + "".join(lines))
+    rows, wrong = measure(path, read(path), presets_of(["paper"]), {**ASKED, "scenarios": 1})
+    assert [row["pairs"] for row in rows] == [3, 3]
+    assert [row["kind"] for row in rows] == [f"MovingAI {tmp_path.name}"] * 2
+    assert len(wrong) == 1
+    assert "9.0 cells are stated" in wrong[0]
 
 
 def test_a_map_is_not_measured_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
