@@ -168,6 +168,11 @@ def test_a_contracted_graph_expands_less() -> None:
     assert contracted.expanded.sum() < flat.expanded.sum()
 
 
+def test_noise_is_not_contracted_for_minutes() -> None:
+    graph = build_jump_graph(np.random.default_rng(0).random((300, 300)) > 0.1)
+    assert contract_graph(graph) is graph
+
+
 def test_threads_that_share_a_search_get_the_answers_of_one() -> None:
     free = speckled(4)
     starts, goals = pairs_of(free, 400)
