@@ -15,7 +15,10 @@ route: setup
 	$(BIN)/hybridnav plan maps/office/office.yaml --start 1.0,13.2 --goal 40.6,19.4 --compare --plot out/route.png
 	@echo "picture: out/route.png"
 
-test: lint docs unit nojit
+# What uses one core runs side by side.
+test: setup
+	$(MAKE) --no-print-directory -j2 lint docs nojit
+	$(MAKE) --no-print-directory unit
 
 test-full: lint docs full nojit
 
