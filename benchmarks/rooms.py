@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 import hybridnav as hn
 from benchmarks._rooms_truth import FLOORS, RADIUS_M, Floor
-from hybridnav.grid.rooms import Segmentation
+from hybridnav.grid.names import Segmentation
 from hybridnav.metrics import compare_rooms
 from hybridnav.route import MaxDistanceSearch, RoomSearch
 from hybridnav.topology.merging import Pieces

@@ -13,7 +13,7 @@ import hybridnav as hn
 from hybridnav.cli.app import run
 from hybridnav.config.ompl import OmplSettings
 from hybridnav.config.yaml_file import parse_value
-from hybridnav.grid.rooms import read_point
+from hybridnav.grid.names import read_point
 
 FIGURE = Path(__file__).parents[1] / "maps" / "figure1" / "figure1.yaml"
 QUERY = ("plan", str(FIGURE), "--start", "0.5,1.5", "--goal", "3.5,1.5")

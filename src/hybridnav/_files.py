@@ -1,4 +1,4 @@
-"""Files that are old or new and never half."""
+"""Files that are old or new and never half, and their names in messages."""
 
 from __future__ import annotations
 
@@ -100,3 +100,20 @@ def remove_unfinished() -> None:
     for path in list(_unfinished):
         with suppress(OSError):
             path.unlink()
+
+
+def printable(path: str | os.PathLike[str]) -> str:
+    """Text of a path for a message: as it is, or escaped when it would break the line.
+
+    Parameters
+    ----------
+    path
+        Any path.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    text = str(path)
+    return text if text.isprintable() else repr(text)

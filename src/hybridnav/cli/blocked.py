@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hybridnav._files import printable
 from hybridnav.cli.errors import UsageError
-from hybridnav.config.yaml_file import printable
 
 if TYPE_CHECKING:
     import hybridnav as hn

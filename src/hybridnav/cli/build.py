@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import hybridnav as hn
-from hybridnav._files import MODEL_SUFFIX
+from hybridnav._files import MODEL_SUFFIX, printable
 from hybridnav.cli.common import (
     Reading,
     answer,
@@ -35,7 +35,6 @@ from hybridnav.cli.options import (
     SeedOption,
     SetOption,
 )
-from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
 OutOption = Annotated[

@@ -12,12 +12,9 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav._files import MODEL_SUFFIX, check_replaceable
+from hybridnav._files import MODEL_SUFFIX, check_replaceable, printable
 from hybridnav._progress import no_progress
 from hybridnav.cli.errors import UsageError
-from hybridnav.config import load_preset
-from hybridnav.config.preset import is_preset_name
-from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
@@ -101,8 +98,10 @@ def _spinner(text: str) -> AbstractContextManager[object]:
 def read_preset(source: str) -> Preset:
     """A preset by name or file: an unknown name is wrong usage, a bad file unreadable input."""
     try:
-        return load_preset(source)
+        return hn.load_preset(source)
     except hn.PresetNotFoundError as error:
+        from hybridnav.config.preset import is_preset_name  # noqa: PLC0415 - loads pydantic
+
         if is_preset_name(source):
             raise UsageError(str(error)) from None
         raise
@@ -152,7 +151,7 @@ def overridden(
             raise UsageError(f"--smooth must be one of {', '.join(_SMOOTH)}, got {smooth!r:.80}")
         settings.append(f"planner.smooth={smooth}")
     try:
-        return load_preset(plain, overrides=settings)
+        return hn.load_preset(plain, overrides=settings)
     except hn.PresetError as error:
         raise UsageError(str(error)) from None
 
@@ -222,6 +221,13 @@ def load_model(path: Path, preset: Preset, seconds: dict[str, float], reading: R
 def is_model_file(path: Path) -> bool:
     """Return whether a path names a model, without loading what reads it."""
     return path.suffix.lower() == MODEL_SUFFIX
+
+
+def extent_line(grid: hn.OccupancyGrid) -> str:
+    """Return the summary's line on where a map lies."""
+    from hybridnav.grid.occupancy import extent  # noqa: PLC0415 - loads numpy
+
+    return f"extent     {extent(grid)}"
 
 
 def islands_line(grid: hn.OccupancyGrid) -> list[str]:

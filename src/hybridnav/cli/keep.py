@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hybridnav._files import printable
 from hybridnav.cli.common import complain, is_model_file, load_model
-from hybridnav.config.yaml_file import printable
 from hybridnav.errors import ModelError
 
 if TYPE_CHECKING:

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybridnav as hn
+from hybridnav._files import printable
 from hybridnav.cli.blocked import BlockedOption, parsed_closing, told_closing
 from hybridnav.cli.common import (
     Reading,
     answer,
     check_picture,
     check_room_to_be,
+    extent_line,
     grow_topology,
     islands_figures,
     islands_line,
@@ -44,10 +46,8 @@ from hybridnav.cli.options import (
     SmoothOption,
 )
 from hybridnav.cli.tour import Errand, parsed_stop, run_errand
-from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.grid.occupancy import extent
-from hybridnav.grid.rooms import read_point
+from hybridnav.grid.names import read_point
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -319,7 +319,7 @@ def summary(grid: hn.OccupancyGrid, ends: tuple[Point, Point], figures: dict[str
     ]
     lines += islands_line(grid)
     if "outside" in figures["status"]:
-        lines.append(f"extent     {extent(grid)}")
+        lines.append(extent_line(grid))
     if figures["length_m"] is not None and figures["lower_bound"] is None:
         short_m = math.dist(figures["points"][-1], ends[1][:2])
         told = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"

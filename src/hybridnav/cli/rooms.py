@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 import typer
 
 import hybridnav as hn
+from hybridnav._files import printable
 from hybridnav.cli.common import (
     Reading,
     answer,
@@ -34,9 +35,8 @@ from hybridnav.cli.options import (
     RadiusOption,
     RoomsOption,
 )
-from hybridnav.config.yaml_file import printable
 from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.grid.rooms import Segmentation
+from hybridnav.grid.names import Segmentation
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import numpy as np
 import typer
 
+import hybridnav as hn
+from hybridnav._files import printable
 from hybridnav.cli.common import (
     Reading,
     answer,
     check_picture,
+    extent_line,
     grow_topology,
     islands_line,
     load_model,
@@ -30,12 +32,7 @@ from hybridnav.cli.options import (
     SeedOption,
     SetOption,
 )
-from hybridnav.config.yaml_file import printable
-from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
-from hybridnav.grid.occupancy import extent
-
-if TYPE_CHECKING:
-    import hybridnav as hn
+from hybridnav.grid import DEFAULT_MAX_CELLS
 
 LevelOption = Annotated[
     int,
@@ -90,7 +87,7 @@ def _describe_map(pyramid: hn.DualGraphPyramid) -> str:
     return "\n".join(
         [
             f"map        {printable(grid.name)}, {size}, {size_m}",
-            f"extent     {extent(grid)}",
+            extent_line(grid),
             f"cells      {counts} by a robot radius of {grid.robot_radius_m:g} m{closed}",
             *islands_line(grid),
             f"pyramid    U_d {pyramid.merge_distance_m:g} m, {built}",
@@ -113,7 +110,9 @@ def _describe_levels(pyramid: hn.DualGraphPyramid, shown: hn.Level) -> str:
 
 def _describe_level(level: hn.Level) -> str:
     """One line on a level; a simple graph would lose its parallel arcs: second doors."""
-    free = int(np.count_nonzero(level.classes == CellClass.FREE))
+    import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
+
+    free = int(np.count_nonzero(level.classes == hn.CellClass.FREE))
     largest_m2 = int(level.areas.max(initial=0)) * level.grid.resolution_m**2
     plain = np.sort(level.arcs[~level.is_self_loop], axis=1)
     parallel = len(plain) - len(np.unique(plain, axis=0))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import hybridnav as hn
+from hybridnav._files import printable
 from hybridnav.cli.blocked import Closing, told_closing
 from hybridnav.cli.common import (
     answer,
     check_room_to_be,
     complain,
+    extent_line,
     grow_topology,
     islands_figures,
     islands_line,
@@ -26,9 +27,7 @@ from hybridnav.cli.common import (
 )
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.keep import Source
-from hybridnav.config.yaml_file import printable
-from hybridnav.grid.occupancy import extent
-from hybridnav.grid.rooms import read_point
+from hybridnav.grid.names import read_point
 
 if TYPE_CHECKING:
     from hybridnav.planner.named import At
@@ -128,7 +127,7 @@ def parsed_stop(text: str) -> Stop:
     point = read_point(text)
     if point is None:
         return text
-    if not np.isfinite(point).all():
+    if not all(map(math.isfinite, point)):
         raise UsageError(f"expected a name, or finite numbers X,Y or X,Y,YAW, got {text!r:.90}")
     return point
 
@@ -178,7 +177,7 @@ def _alternatives(topology: hn.TopologicalMap, found: hn.Alternatives) -> dict[s
                 "length_m": alternative.path.length_m,
                 "word": list(alternative.word),
                 "rooms": passed,
-                "points": np.round(alternative.path.points, 6).tolist(),
+                "points": alternative.path.points.round(6).tolist(),
             }
         )
     return {"alternatives": routes, "alternatives_complete": found.complete}
@@ -193,7 +192,7 @@ def _summary(grid: hn.OccupancyGrid, figures: dict[str, Any]) -> str:
     ]
     lines += islands_line(grid)
     if "outside" in figures["status"]:
-        lines.append(f"extent     {extent(grid)}")
+        lines.append(extent_line(grid))
     if figures["length_m"] is not None:
         lines += _measured(figures)
     for number, line in enumerate(figures["words"]):

@@ -19,8 +19,9 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from hybridnav._files import printable
 from hybridnav.config.ompl import OmplSettings  # noqa: TC001 - pydantic reads it
-from hybridnav.config.yaml_file import parse_value, printable, read_yaml
+from hybridnav.config.yaml_file import parse_value, read_yaml
 from hybridnav.errors import PresetError, PresetNotFoundError
 
 if TYPE_CHECKING:

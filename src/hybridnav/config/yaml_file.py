@@ -12,6 +12,8 @@ import yaml
 from yaml.composer import ComposerError
 from yaml.constructor import ConstructorError
 
+from hybridnav._files import printable
+
 if TYPE_CHECKING:
     from yaml.nodes import MappingNode, Node
 
@@ -135,23 +137,6 @@ def open_file(
         return Path(path).open("rb")
     except OSError as failure:
         raise error(f"{where}: {failure.strerror}") from None
-
-
-def printable(path: PathLike) -> str:
-    """Text of a path for a message: as it is, or escaped when it would break the line.
-
-    Parameters
-    ----------
-    path
-        Any path.
-
-    Returns
-    -------
-    str
-        One line.
-    """
-    text = str(path)
-    return text if text.isprintable() else repr(text)
 
 
 def parse_value(text: str) -> Any:

@@ -14,19 +14,13 @@ from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.clearance import within_radius
 from hybridnav.grid.frame import Frame
+from hybridnav.grid.limits import MAX_CELLS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._typing import BoolArray, ByteArray
     from hybridnav.grid.islands import DroppedIslands
-
-MAX_CELLS = 178_956_970
-"""Cells a grid may have at most: Pillow's own limit for an image, and well inside int32."""
-
-DEFAULT_MAX_CELLS = 20_000_000
-"""Cells of a map that are read unless more are asked for: 4,472 x 4,472, or 224 m a side at 5 cm.
-Reading so many takes about 5 s and a gigabyte."""
 
 
 class CellClass(IntEnum):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.names import check_names, check_number, did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,16 +20,9 @@ if TYPE_CHECKING:
 
 MAX_ROOMS = 10_000
 """Rooms a map may have at most."""
-MAX_NAME = 80
-"""Characters of a name at most."""
-MAX_NUMBER = 1_000_000_000
-"""Number of a door at most."""
 
 NO_ROOM = -1
 """Label of cells without a room."""
-
-Segmentation = Literal["walls", "watershed", "contraction"]
-"""How rooms may be found; see `hybridnav.topology.find_rooms`."""
 
 Point = tuple[float, float]
 
@@ -101,55 +94,6 @@ class RoomLabels:
         if name in self.names:
             return self.names.index(name)
         raise InvalidValueError(f"no room is called {name!r:.90}{did_you_mean(name, self.names)}")
-
-
-def read_point(text: str) -> tuple[float, ...] | None:
-    """The numbers of a text like `1,2` or `1,2,0.5`, None where it is none: then it is a name."""
-    try:
-        numbers = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        return None
-    return numbers if len(numbers) in {2, 3} else None
-
-
-def check_names(names: tuple[str, ...]) -> None:
-    """Refuse names that are empty, too long, not one printable line, a point's, or given twice."""
-    seen: set[str] = set()
-    for name in names:
-        if not isinstance(name, str) or not name.strip() or not name.isprintable():
-            raise InvalidValueError(f"a room needs a name of one printable line, got {name!r:.90}")
-        if len(name) > MAX_NAME:
-            raise InvalidValueError(f"a name has at most {MAX_NAME} characters, got {name!r:.90}")
-        if read_point(name) is not None:
-            raise InvalidValueError(
-                f"a name must not read as a point, got {name!r}: a plan could not go there"
-            )
-        if name in seen:
-            raise InvalidValueError(f"room {name!r}: the name is given twice")
-        seen.add(name)
-
-
-def did_you_mean(name: str, known: tuple[str, ...]) -> str:
-    """A clause that names what may have been meant: the nearest names, else some of all."""
-    if not known:
-        return ": the map has no names"
-    folded: dict[str, str] = {}
-    for each in known:
-        folded.setdefault(each.casefold(), each)
-    near = difflib.get_close_matches(name[:MAX_NAME].casefold(), folded, n=3, cutoff=0.5)
-    if near:
-        return f": did you mean {' or '.join(folded[each] for each in near)}?"
-    shown = ", ".join(known[:8]) + (", ..." if len(known) > 8 else "")  # noqa: PLR2004
-    return f": there are {shown}"
-
-
-def check_number(number: int) -> int:
-    """Return the number of a door, refuse what is none."""
-    if isinstance(number, bool) or not isinstance(number, int) or not 0 < number <= MAX_NUMBER:
-        raise InvalidValueError(
-            f"a door needs a whole number from 1 to {MAX_NUMBER}, got {number!r:.80}"
-        )
-    return number
 
 
 def _point(what: str, at: Point) -> Point:

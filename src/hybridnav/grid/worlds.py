@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from hybridnav._files import replace_file
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.frame import Frame
-from hybridnav.grid.occupancy import MAX_CELLS
+from hybridnav.grid.limits import MAX_CELLS
 from hybridnav.grid.worlds_base import FREE, OCCUPIED, UNEXPLORED, World
 from hybridnav.grid.worlds_office import office_world
 

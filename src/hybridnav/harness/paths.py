@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.occupancy import MAX_CELLS
+from hybridnav.grid.limits import MAX_CELLS
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from hybridnav.config.yaml_file import Limits, open_file, printable
+from hybridnav._files import printable
+from hybridnav.config.yaml_file import Limits, open_file
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.io.image import read_raster
 from hybridnav.planner.areas import parts_on

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from hybridnav.config.yaml_file import open_file, printable
+from hybridnav._files import printable
+from hybridnav.config.yaml_file import open_file
 from hybridnav.errors import MapError, MapNotFoundError
 from hybridnav.grid import MAX_CELLS
 from hybridnav.io.png import DamagedPngError, check_png

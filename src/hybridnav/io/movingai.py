@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from hybridnav.config.yaml_file import open_file, printable
+from hybridnav._files import printable
+from hybridnav.config.yaml_file import open_file
 from hybridnav.errors import MapError, MapNotFoundError
 from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.io.size import check_max_cells, check_size

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.config.yaml_file import Limits, printable, read_yaml
+from hybridnav._files import printable
+from hybridnav.config.yaml_file import Limits, read_yaml
 from hybridnav.errors import InvalidValueError, MapNotFoundError, RoomsError, RoomsNotFoundError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
+from hybridnav.grid.names import check_names, check_number
 from hybridnav.grid.occupancy import extent
-from hybridnav.grid.rooms import check_names, check_number
 from hybridnav.io.image import read_raster
 from hybridnav.io.rooms_paint import painted, without_slivers
 

@@ -11,8 +11,7 @@ import shapely
 import yaml
 from scipy import ndimage
 
-from hybridnav._files import replace_file
-from hybridnav.config.yaml_file import printable
+from hybridnav._files import printable, replace_file
 from hybridnav.errors import RoomsError
 from hybridnav.io.rooms import LIMITS, check_points, check_rooms, in_cells
 from hybridnav.io.rooms_paint import painted, without_slivers

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.config.yaml_file import printable, read_yaml
+from hybridnav._files import printable
+from hybridnav.config.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning
 from hybridnav.grid import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.io.image import Raster, read_raster

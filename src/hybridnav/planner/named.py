@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
-from hybridnav.grid.rooms import did_you_mean
+from hybridnav.grid.names import did_you_mean
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.stops import cheapest_stops
 

@@ -10,7 +10,8 @@ from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
-from hybridnav.grid.rooms import MAX_ROOMS, Segmentation
+from hybridnav.grid.names import Segmentation
+from hybridnav.grid.rooms import MAX_ROOMS
 from hybridnav.topology import _segmentation_kernels
 from hybridnav.topology.merging import Pieces, grown, least_cells
 from hybridnav.topology.pieces import (

@@ -27,8 +27,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hybridnav import __version__
-from hybridnav._files import replace_file
-from hybridnav.config.yaml_file import printable
+from hybridnav._files import printable, replace_file
 from hybridnav.errors import MapNotFoundError, ModelError
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.config.yaml_file import printable
+from hybridnav._files import printable
 from hybridnav.errors import ModelError
 from hybridnav.io.models.container import Part
 

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridnav import io
-from hybridnav._files import MODEL_SUFFIX
+from hybridnav._files import MODEL_SUFFIX, printable
 from hybridnav.config import Preset, PyramidSettings, load_preset
-from hybridnav.config.yaml_file import printable
 from hybridnav.errors import ModelError
 from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.io.models import parts

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridnav._files import MODEL_SUFFIX
-from hybridnav.config.yaml_file import printable
+from hybridnav._files import MODEL_SUFFIX, printable
 from hybridnav.errors import InvalidValueError, ModelError
 from hybridnav.grid import OccupancyGrid
 from hybridnav.io.models import parts

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from hybridnav.grid.occupancy import MAX_CELLS
+from hybridnav.grid.limits import MAX_CELLS
 from hybridnav.io.models.fields import MOST, Field, Structure
 
 GRID = Structure(
