@@ -60,7 +60,7 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@echo "compiling kernels: about a minute"
-	$(BIN)/python -m hybridnav.cli.compiling
+	$(BIN)/python -m hybridnav.cli.warm
 	touch $(READY)
 
 maps: setup

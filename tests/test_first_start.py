@@ -52,7 +52,7 @@ def compilers(cache: Path) -> list[int]:
             environment = (process / "environ").read_bytes()
         except OSError:
             continue
-        if b"hybridnav.cli.compiling" in command and os.fsencode(cache) in environment:
+        if b"hybridnav.cli.warm" in command and os.fsencode(cache) in environment:
             found.append(int(process.name))
     return found
 
@@ -92,16 +92,16 @@ def test_a_second_process_compiles_what_a_first_plan_searches_with(
     monkeypatch: pytest.MonkeyPatch, preset: str, processors: int, start: str, jobs: list[str]
 ) -> None:
     begun: list[str] = []
-    monkeypatch.setattr(compiling, "_processors", lambda: processors)
+    monkeypatch.setattr(compiling, "processors", lambda: processors)
     monkeypatch.setattr(compiling, "_is_kept", lambda _: start == "warm")
-    monkeypatch.setattr(compiling, "_start", begun.append)
+    monkeypatch.setattr(compiling, "start", begun.append)
     with compiling.compiling_beside(load_preset(preset)) as compiled:
         compiled()
     assert begun == jobs
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
-@pytest.mark.skipif(compiling._processors() == 1, reason="one processor compiles alone")
+@pytest.mark.skipif(compiling.processors() == 1, reason="one processor compiles alone")
 def test_ctrl_c_ends_the_process_that_compiles(tmp_path: Path) -> None:
     with started(tmp_path) as process:
         wait_until(lambda: compilers(tmp_path))
@@ -133,7 +133,7 @@ def test_a_plan_on_the_small_map_compiles_what_one_in_a_building_needs(
 ) -> None:
     code = (
         "import logging\n"
-        "from hybridnav.cli.compiling import compile_plan\n"
+        "from hybridnav.cli.warm import compile_plan\n"
         "from hybridnav.cli.app import run\n"
         f"compile_plan({preset!r})\n"
         "logging.basicConfig(level=logging.INFO)\n"

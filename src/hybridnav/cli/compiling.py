@@ -1,7 +1,4 @@
-"""The first start: a second process compiles what a plan will need, and the user is told.
-
-`python -m hybridnav.cli.compiling` compiles what the first plans need, in all processors.
-"""
+"""The first start: a second process compiles what a plan will need, and the user is told."""
 
 from __future__ import annotations
 
@@ -10,17 +7,11 @@ import logging
 import os
 import subprocess
 import sys
-import threading
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-import hybridnav as hn
 from hybridnav.cli.common import complain, stage
-from hybridnav.config import load_preset
 from hybridnav.errors import CacheWarning
 
 if TYPE_CHECKING:
@@ -31,6 +22,8 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("hybridnav.kernels")
 _PATIENCE_S = 2.0
 """Seconds of compiling after which the user is told what takes so long."""
+SEARCHES = {"mesh": "shortest", "jumps": "octile", "none": "grid-astar", "max-distance": "paper"}
+"""A preset for each kind of search that can be compiled without a pyramid."""
 _PACKAGES = Path(__file__).parents[2]
 _FIRST = "compiling kernels, which a new installation does once; the next start is quick"
 
@@ -81,10 +74,10 @@ def compiling_beside(preset: Preset) -> Iterator[Callable[[], None]]:
         Waits until it is compiled.
     """
     job = preset.planner.coarse
-    if job not in _SEARCHES or _processors() == 1 or not _is_cold(job):
+    if job not in SEARCHES or processors() == 1 or not _is_cold(job):
         yield lambda: None
         return
-    process = _start(job)
+    process = start(job)
     try:
         yield lambda: _wait_for(process)
     finally:
@@ -99,7 +92,8 @@ def _wait_for(process: subprocess.Popen[bytes] | None) -> None:
             process.wait()
 
 
-def _processors() -> int:
+def processors() -> int:
+    """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -132,13 +126,13 @@ def _is_kept(kernel: Any) -> bool:
         return True
 
 
-def _start(*jobs: str) -> subprocess.Popen[bytes] | None:
+def start(*jobs: str) -> subprocess.Popen[bytes] | None:
     """Start a process that compiles; it ends with this one, whose end of the pipe is closed."""
     quiet = ("-W", f"ignore:{CacheWarning.opening}")
     paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
     with contextlib.suppress(OSError):
         return subprocess.Popen(  # noqa: S603 - this interpreter and a module of our own
-            [sys.executable, "-P", *quiet, "-m", "hybridnav.cli.compiling", *jobs],
+            [sys.executable, "-P", *quiet, "-m", "hybridnav.cli.warm", *jobs],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -146,93 +140,3 @@ def _start(*jobs: str) -> subprocess.Popen[bytes] | None:
             env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
         )
     return None
-
-
-# --- what is compiled ---------------------------------------------------------------------------
-
-_SEARCHES = {"mesh": "shortest", "jumps": "octile", "none": "grid-astar", "max-distance": "paper"}
-"""A preset for each kind of search that can be compiled without a pyramid."""
-_PLANS = ("shortest", "grid-astar", "octile", "paper")
-"""Presets whose whole plans set-up compiles, what their searches have in common first."""
-_ENDS = ((2, 2), (60, 60))
-
-
-def small_grid() -> hn.OccupancyGrid:
-    """Return a map that needs what buildings need: rooms, doors, posts, unexplored cells."""
-    side, room = 64, 16
-    probability = np.zeros((side, side), np.float32)
-    probability[::room] = probability[:, ::room] = 1.0
-    for door in range(room // 2, side, room):
-        probability[room::room, door - 1 : door + 2] = 0.0
-        probability[door - 1 : door + 2, room::room] = 0.0
-    probability[20:23, 20:23] = 1.0
-    probability[11::room, 11::room] = 0.5  # a place round each of these has a self-loop
-    return hn.OccupancyGrid(probability, frame=hn.Frame(resolution_m=0.5), robot_radius_m=0.25)
-
-
-def compile_search(coarse: str) -> None:
-    """Compile a kind of search, by a search of a small map."""
-    from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
-    from hybridnav.planner.cell_plans import WholeMap  # noqa: PLC0415 - loads numba
-    from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
-    from hybridnav.refine import GridRefiner  # noqa: PLC0415
-
-    grid, settings = small_grid(), load_preset(_SEARCHES[coarse]).planner
-    refiner = GridRefiner(grid)
-    if coarse == "mesh":
-        OverMesh(grid, refiner, settings).plan(*_ENDS)
-    elif coarse == "jumps":
-        graph = build_jump_graph(grid.enterable())
-        JumpSearch(contract_graph(graph)).path(*_ENDS)  # as on maps of buildings
-    else:
-        WholeMap(refiner).plan(*_ENDS)
-
-
-def compile_plan(preset: str) -> None:
-    """Compile all that a plan needs, by one on a small map; of no preset the pyramid alone."""
-    grid = small_grid()
-    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-    if preset in _PLANS:
-        ends = grid.frame.points_of(np.array(_ENDS))
-        hn.HybridPlanner(topology, preset=preset).plan(*ends).to_dict()
-
-
-def _end_with_parent() -> None:
-    sys.stdin.buffer.read()
-    os._exit(1)
-
-
-def compile_all() -> None:
-    """Compile what the first plans need, a process for each processor, with a bar on stderr."""
-    from rich.console import Console  # noqa: PLC0415 - on demand
-    from rich.progress import Progress  # noqa: PLC0415
-
-    # What all plans share first: processes that compile the same do it twice.
-    waves = (("mesh", "pyramid", "jumps", "none"), _PLANS)
-    with Progress(console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task("compiling kernels", total=sum(map(len, waves)))
-        for wave in waves:
-            waiting = list(wave)
-            running: list[subprocess.Popen[bytes] | None] = []
-            while waiting or running:
-                while waiting and len(running) < _processors():
-                    running.append(_start(waiting.pop(0)))
-                for process in running.copy():
-                    if process is None or process.poll() is not None:
-                        running.remove(process)
-                        progress.advance(bar)
-                time.sleep(0.1)
-
-
-def main(jobs: list[str]) -> None:
-    """Compile jobs, kinds of search or presets, or everything."""
-    if not jobs:
-        compile_all()
-        return
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    for job in jobs:
-        compile_search(job) if job in _SEARCHES else compile_plan(job)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

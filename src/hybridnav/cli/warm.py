@@ -1,0 +1,102 @@
+"""Compile what first plans need: `python -m hybridnav.cli.warm`, in all processors."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import hybridnav as hn
+from hybridnav.cli.compiling import SEARCHES, processors, start
+
+if TYPE_CHECKING:
+    import subprocess
+
+_PLANS = ("shortest", "grid-astar", "octile", "paper")
+"""Presets whose whole plans set-up compiles, what their searches have in common first."""
+_ENDS = ((2, 2), (60, 60))
+
+
+def small_grid() -> hn.OccupancyGrid:
+    """Return a map that needs what buildings need: rooms, doors, posts, unexplored cells."""
+    side, room = 64, 16
+    probability = np.zeros((side, side), np.float32)
+    probability[::room] = probability[:, ::room] = 1.0
+    for door in range(room // 2, side, room):
+        probability[room::room, door - 1 : door + 2] = 0.0
+        probability[door - 1 : door + 2, room::room] = 0.0
+    probability[20:23, 20:23] = 1.0
+    probability[11::room, 11::room] = 0.5  # a place round each of these has a self-loop
+    return hn.OccupancyGrid(probability, frame=hn.Frame(resolution_m=0.5), robot_radius_m=0.25)
+
+
+def compile_search(coarse: str) -> None:
+    """Compile a kind of search, by a search of a small map."""
+    from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
+    from hybridnav.planner.cell_plans import WholeMap  # noqa: PLC0415 - loads numba
+    from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
+    from hybridnav.refine import GridRefiner  # noqa: PLC0415
+
+    grid, settings = small_grid(), hn.load_preset(SEARCHES[coarse]).planner
+    refiner = GridRefiner(grid)
+    if coarse == "mesh":
+        OverMesh(grid, refiner, settings).plan(*_ENDS)
+    elif coarse == "jumps":
+        graph = build_jump_graph(grid.enterable())
+        JumpSearch(contract_graph(graph)).path(*_ENDS)  # as on maps of buildings
+    else:
+        WholeMap(refiner).plan(*_ENDS)
+
+
+def compile_plan(preset: str) -> None:
+    """Compile all that a plan needs, by one on a small map; of no preset the pyramid alone."""
+    grid = small_grid()
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
+    if preset in _PLANS:
+        ends = grid.frame.points_of(np.array(_ENDS))
+        hn.HybridPlanner(topology, preset=preset).plan(*ends).to_dict()
+
+
+def _end_with_parent() -> None:
+    sys.stdin.buffer.read()
+    os._exit(1)
+
+
+def compile_all() -> None:
+    """Compile what the first plans need, a process for each processor, with a bar on stderr."""
+    from rich.console import Console  # noqa: PLC0415 - on demand
+    from rich.progress import Progress  # noqa: PLC0415
+
+    # What all plans share first: processes that compile the same do it twice.
+    waves = (("mesh", "pyramid", "jumps", "none"), _PLANS)
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("compiling kernels", total=sum(map(len, waves)))
+        for wave in waves:
+            waiting = list(wave)
+            running: list[subprocess.Popen[bytes] | None] = []
+            while waiting or running:
+                while waiting and len(running) < processors():
+                    running.append(start(waiting.pop(0)))
+                for process in running.copy():
+                    if process is None or process.poll() is not None:
+                        running.remove(process)
+                        progress.advance(bar)
+                time.sleep(0.1)
+
+
+def main(jobs: list[str]) -> None:
+    """Compile jobs, kinds of search or presets, or everything."""
+    if not jobs:
+        compile_all()
+        return
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    for job in jobs:
+        compile_search(job) if job in SEARCHES else compile_plan(job)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
