@@ -59,15 +59,54 @@ def test_exit_codes_of_the_program(ends, code):
     assert length_m is None if code else 3 <= length_m < 3.5
 
 
-def test_help_is_quick_and_complete():
-    # What takes a second to import is not imported, and nothing is taken for markup.
+SLOW = {"PIL", "matplotlib", "networkx", "numba", "numpy", "ompl", "scipy", "shapely", "yaml"}
+"""What help and wrong usage can do without, and would wait for."""
+CHECKED = {"pydantic"}
+"""What Typer itself loads to check the options of a command."""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "unused"),
+    [
+        ((), 2, SLOW | CHECKED),
+        (("--help",), 0, SLOW | CHECKED),
+        (("--version",), 0, SLOW | CHECKED),
+        (("plon",), 2, SLOW | CHECKED),
+        (("plan", "--help"), 0, SLOW),
+        (("build", "--help"), 0, SLOW),
+        (("show", "--help"), 0, SLOW),
+        (("rooms", "--help"), 0, SLOW),
+        (("evaluate", "--help"), 0, SLOW),
+        (("compare", "--help"), 0, SLOW),
+        (("preset", "--help"), 0, SLOW),
+        (("preset", "check", "--help"), 0, SLOW),
+        (("plan", "map.yaml", "--start", "here"), 2, SLOW),
+        (("preset", "list"), 0, SLOW - {"yaml"}),
+    ],
+)
+def test_a_command_loads_nothing_that_it_does_not_use(arguments, code, unused):
     script = (
         "import sys\nfrom hybridnav.cli import main\n"
         "try:\n    main()\nfinally:\n"
-        "    slow = {'numba', 'matplotlib', 'networkx', 'PIL', 'scipy'} & sys.modules.keys()\n"
-        "    assert not slow, slow\n"
+        f"    loaded = {unused} & sys.modules.keys()\n"
+        "    assert not loaded, loaded\n"
     )
-    done = _python("-c", script, "plan", "--help", env=os.environ | {"COLUMNS": "100"})
+    done = _python("-c", script, *arguments)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_unknown_command_is_refused_with_what_may_have_been_meant():
+    done = _python("-m", "hybridnav", "plon", "map.yaml")
+    assert (done.returncode, done.stdout) == (2, "")
+    meant = "no such command 'plon'. Did you mean 'plan'?; see hybridnav --help"
+    assert done.stderr == f"hybridnav: {meant}\n"
+
+
+def test_help_is_complete():
+    # Nothing is taken for markup.
+    options = {"env": os.environ | {"COLUMNS": "100"}}
+    done = _python("-m", "hybridnav", "plan", "--help", **options)
     assert (done.returncode, done.stderr) == (0, "")
     for words in (
         "--start X,Y ",

@@ -4,26 +4,68 @@ from __future__ import annotations
 
 import sys
 import warnings
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 import hybridnav as hn
-from hybridnav.cli.build import build
 from hybridnav.cli.common import answer, complain
 from hybridnav.cli.compiling import told_of_compiling
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
-from hybridnav.cli.evaluate import compare, evaluate
-from hybridnav.cli.plan import plan
-from hybridnav.cli.presets import preset_app
-from hybridnav.cli.rooms import rooms
-from hybridnav.cli.show import show
 from hybridnav.errors import HybridNavError
+
+_HOME_OF = {
+    "plan": "plan",
+    "build": "build",
+    "show": "show",
+    "rooms": "rooms",
+    "evaluate": "evaluate",
+    "compare": "evaluate",
+    "preset": "presets",
+}
+"""The module of each command, in the order of the help."""
 
 _WrongUsage: Any = typer.BadParameter.__base__
 """click's UsageError: Typer brings a click of its own or not, and names only this subclass."""
 
+
+class _Commands(TyperGroup):
+    """The commands, of which only the one that is called is loaded."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
+        del ctx
+        return list(_HOME_OF)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command, None where there is none of the name."""
+        if cmd_name in _HOME_OF and cmd_name not in self.commands:
+            home = import_module(f"hybridnav.cli.{_HOME_OF[cmd_name]}")
+            self.add_command(_command(cmd_name, getattr(home, cmd_name)), cmd_name)
+        return super().get_command(ctx, cmd_name)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse an unknown command before Typer loads what checks the options of a known one."""
+        if args and args[0] not in _HOME_OF and not args[0].startswith("-"):
+            for name in _HOME_OF:  # one of them may have been meant
+                self.get_command(ctx, name)
+            self.resolve_command(ctx, args)
+        return super().parse_args(ctx, args)
+
+
+def _command(name: str, home: Any) -> Any:
+    """Build a command, or a group of commands, as Typer does."""
+    if isinstance(home, typer.Typer):
+        return typer.main.get_command(home)
+    alone = typer.Typer(add_completion=False, rich_markup_mode=None)
+    alone.command(name)(home)
+    return typer.main.get_command(alone)
+
+
 app = typer.Typer(
+    cls=_Commands,
     name="hybridnav",
     help="Robot routes planned on an occupancy grid and the topological map grown out of it.",
     no_args_is_help=True,
@@ -49,15 +91,6 @@ VersionOption = Annotated[
 @app.callback()
 def _options(version: VersionOption = False) -> None:
     """Take what comes before a command."""
-
-
-app.command()(plan)
-app.command()(build)
-app.command()(show)
-app.command()(rooms)
-app.command()(evaluate)
-app.command()(compare)
-app.add_typer(preset_app, name="preset")
 
 
 def run(arguments: list[str]) -> int:

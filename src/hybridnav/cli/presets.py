@@ -6,11 +6,15 @@ from typing import Annotated
 
 import typer
 
+import hybridnav as hn
 from hybridnav.cli.common import answer, read_preset
-from hybridnav.config import load_preset, preset_names
 
-preset_app = typer.Typer(
-    help="List, print and check presets.", no_args_is_help=True, rich_markup_mode=None
+preset = typer.Typer(
+    name="preset",
+    help="List, print and check presets.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
 )
 
 PresetArgument = Annotated[
@@ -18,21 +22,21 @@ PresetArgument = Annotated[
 ]
 
 
-@preset_app.command("list")
+@preset.command("list")
 def list_presets() -> None:
     """List the presets that come with the package."""
-    names = preset_names()
+    names = hn.preset_names()
     width = max(map(len, names), default=0)
-    answer("".join(f"{name:<{width}}  {load_preset(name).description}\n" for name in names))
+    answer("".join(f"{name:<{width}}  {hn.load_preset(name).description}\n" for name in names))
 
 
-@preset_app.command("show")
-def show_preset(preset: PresetArgument) -> None:
+@preset.command("show")
+def show_preset(source: PresetArgument) -> None:
     """Print a preset in full, every key present."""
-    answer(read_preset(preset).to_yaml())
+    answer(read_preset(source).to_yaml())
 
 
-@preset_app.command("check")
-def check_preset(preset: PresetArgument) -> None:
+@preset.command("check")
+def check_preset(source: PresetArgument) -> None:
     """Check a preset; an error names the key."""
-    answer(f"{read_preset(preset).name}: valid\n")
+    answer(f"{read_preset(source).name}: valid\n")
