@@ -110,6 +110,15 @@ def test_inflation_equals_brute_force(occupied, radius_cells):
     np.testing.assert_array_equal(occupied, before)
 
 
+@pytest.mark.parametrize("radius_cells", [63.5, 64.0, 64.1, 80.0, 119.0])
+def test_inflation_by_large_radii_equals_brute_force(radius_cells):
+    occupied = np.zeros((150, 90), dtype=np.bool_)
+    occupied[60, 2] = occupied[3, 5] = True
+    within = within_radius(occupied, radius_cells=radius_cells)
+    assert not within.all()
+    np.testing.assert_array_equal(within, _brute_force(occupied, radius_cells))
+
+
 def test_a_distance_equal_to_the_radius_is_blocked_despite_rounding():
     # 0.25 / 0.05 and 0.3 / 0.1 fall short of 5 and 3 as floats.
     for resolution_m, radius_m, reach in [(0.05, 0.25, 5), (0.1, 0.3, 3), (0.1, 0.7, 7)]:

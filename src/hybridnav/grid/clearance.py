@@ -10,6 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray
 
+_FEW_ROWS = 64
+"""Radius in cells up to which rows are shifted one by one: for more of them scipy is quicker."""
 _ROUNDING = 1e-9
 """Relative slack on a squared radius, so that 0.25 m is 5 cells of 0.05 m and not 4.999..."""
 
@@ -27,7 +29,7 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
     Returns
     -------
     BoolArray
-        Same shape; by the exact Euclidean distance transform (compared as integers).
+        Same shape; by exact Euclidean distances (compared as integers).
     """
     if not occupied.any():
         return np.zeros_like(occupied)
@@ -35,7 +37,30 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
         return occupied.copy()
     if radius_cells >= math.hypot(*occupied.shape):
         return np.ones_like(occupied)
-    from scipy import ndimage  # noqa: PLC0415 - half a second that a radius of 0 does not need
+    squared = math.floor(radius_cells**2 * (1 + _ROUNDING))
+    if squared <= _FEW_ROWS**2:
+        return _within_rows(occupied, squared)
+    return _within_distance(occupied, squared)
+
+
+def _within_rows(occupied: BoolArray, most: int) -> BoolArray:
+    """The cells of which some row has an occupied one within a squared distance."""
+    cols = np.arange(occupied.shape[1], dtype=np.int32)
+    far = np.int32(occupied.shape[1] + _FEW_ROWS)
+    before = np.maximum.accumulate(np.where(occupied, cols, -far), axis=1)
+    after = np.minimum.accumulate(np.where(occupied, cols, 2 * far)[:, ::-1], axis=1)[:, ::-1]
+    in_row = np.minimum(cols - before, after - cols)
+    within = np.zeros_like(occupied)
+    for down in range(min(math.isqrt(most) + 1, len(occupied))):
+        near = in_row <= math.isqrt(most - down**2)
+        within[down:] |= near[: len(near) - down]
+        within[: len(near) - down] |= near[down:]
+    return within
+
+
+def _within_distance(occupied: BoolArray, most: int) -> BoolArray:
+    """The same by the distance transform."""
+    from scipy import ndimage  # noqa: PLC0415 - half a second that smaller radii do not need
 
     nearest = ndimage.distance_transform_edt(~occupied, return_distances=False, return_indices=True)
     squared = np.zeros(occupied.shape, dtype=np.int64)
@@ -43,7 +68,7 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
         offset = np.arange(size, dtype=np.int64)
         offset = offset[:, None] if axis == 0 else offset[None, :]
         squared += (nearest[axis] - offset) ** 2
-    within: BoolArray = squared <= math.floor(radius_cells**2 * (1 + _ROUNDING))
+    within: BoolArray = squared <= most
     return within
 
 
