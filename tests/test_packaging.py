@@ -96,6 +96,29 @@ def test_a_command_loads_nothing_that_it_does_not_use(arguments, code, unused):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("preset", "others"),
+    [
+        ("shortest", {"hybridnav.jumps.search", "hybridnav.route.portal_search"}),
+        ("octile", {"hybridnav.route.portal_search", "hybridnav.refine.motions"}),
+    ],
+)
+def test_a_plan_loads_nothing_of_other_presets(preset, others):
+    office = ROOT / "maps" / "office" / "office.yaml"
+    unused = others | {"matplotlib", "networkx", "ompl", "shapely"}
+    unused |= {f"scipy.{part}" for part in ("linalg", "ndimage", "sparse")}
+    script = (
+        "import sys\nfrom hybridnav.cli import main\n"
+        "try:\n    main()\nfinally:\n"
+        f"    loaded = {unused} & sys.modules.keys()\n"
+        "    assert not loaded, loaded\n"
+    )
+    ends = ("--start", "1.0,13.2", "--goal", "40.6,19.4")
+    done = _python("-c", script, "plan", office, *ends, "--preset", preset)
+    assert "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == 0
+
+
 def test_an_unknown_command_is_refused_with_what_may_have_been_meant():
     done = _python("-m", "hybridnav", "plon", "map.yaml")
     assert (done.returncode, done.stdout) == (2, "")

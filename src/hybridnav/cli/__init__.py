@@ -10,7 +10,7 @@ from hybridnav._files import remove_unfinished
 
 _EXIT_INTERRUPTED = 130
 """As a shell reports a program that Ctrl-C (SIGINT, 2) ended: 128 + 2."""
-_SOME_OBJECTS = 200_000
+_SOME_OBJECTS = 500_000
 """New objects after which Python looks for garbage: by its own setting it does 300 times while a
 plan is imported, a tenth of the plan's time, and finds none."""
 _SHOW_CURSOR = b"\r\x1b[K\x1b[?25h"
@@ -31,7 +31,8 @@ def main() -> None:
         code = _EXIT_INTERRUPTED
     # The answer is out: an interrupt while Python comes to its end does not change it.
     _handle_interrupts(signal.SIG_IGN)
-    gc.freeze()  # Python would take every object apart, for a fifth of a plan's time
+    if "ompl" not in sys.modules:  # its bindings report what nobody took apart
+        gc.freeze()  # Python would take every object apart, for a fifth of a plan's time
     sys.exit(code)
 
 

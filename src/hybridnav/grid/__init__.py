@@ -5,9 +5,9 @@ Names load on first use: how many cells a grid may have is known without numpy.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from hybridnav._lazy import on_first_use
 from hybridnav.grid.limits import DEFAULT_MAX_CELLS, MAX_CELLS
 
 if TYPE_CHECKING:
@@ -29,19 +29,16 @@ __all__ = [
     "drop_islands",
 ]
 
-_HOME_OF = {
-    "CellClass": "occupancy",
-    "DroppedIslands": "islands",
-    "Frame": "frame",
-    "MAX_ROOMS": "rooms",
-    "NO_ROOM": "rooms",
-    "OccupancyGrid": "occupancy",
-    "RoomLabels": "rooms",
-    "drop_islands": "islands",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'hybridnav.grid' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"hybridnav.grid.{_HOME_OF[name]}"), name)
+__getattr__ = on_first_use(
+    __name__,
+    {
+        "CellClass": "occupancy",
+        "DroppedIslands": "islands",
+        "Frame": "frame",
+        "MAX_ROOMS": "rooms",
+        "NO_ROOM": "rooms",
+        "OccupancyGrid": "occupancy",
+        "RoomLabels": "rooms",
+        "drop_islands": "islands",
+    },
+)

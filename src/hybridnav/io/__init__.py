@@ -5,14 +5,14 @@ Names load on first use: rooms need scipy, models and what is closed numba, a ma
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hybridnav.io.maps import load_map
+from hybridnav._lazy import on_first_use
 
 if TYPE_CHECKING:
     from hybridnav.io.blocked import load_blocked
     from hybridnav.io.examples import example_map
+    from hybridnav.io.maps import load_map
     from hybridnav.io.models import Model, load, save
     from hybridnav.io.movingai import Scenario, load_movingai_map, read_scenarios
     from hybridnav.io.rooms import load_rooms
@@ -34,22 +34,20 @@ __all__ = [
     "save_rooms",
 ]
 
-_HOME_OF = {
-    "Model": "models",
-    "Scenario": "movingai",
-    "example_map": "examples",
-    "load": "models",
-    "load_blocked": "blocked",
-    "load_movingai_map": "movingai",
-    "load_rooms": "rooms",
-    "load_ros_map": "ros",
-    "read_scenarios": "movingai",
-    "save": "models",
-    "save_rooms": "rooms_out",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module 'hybridnav.io' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"hybridnav.io.{_HOME_OF[name]}"), name)
+__getattr__ = on_first_use(
+    __name__,
+    {
+        "Model": "models",
+        "Scenario": "movingai",
+        "example_map": "examples",
+        "load": "models",
+        "load_blocked": "blocked",
+        "load_map": "maps",
+        "load_movingai_map": "movingai",
+        "load_rooms": "rooms",
+        "load_ros_map": "ros",
+        "read_scenarios": "movingai",
+        "save": "models",
+        "save_rooms": "rooms_out",
+    },
+)

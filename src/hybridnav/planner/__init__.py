@@ -1,16 +1,19 @@
-"""The planner that the presets configure, and what may be closed for one of its queries."""
+"""The planner that the presets configure, and what may be closed for one of its queries.
+
+Names load on first use: alternatives and what is closed load shapely.
+"""
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hybridnav.planner.planner import HybridPlanner
-from hybridnav.planner.tour import Tour, plan_tour
+from hybridnav._lazy import on_first_use
 
 if TYPE_CHECKING:
     from hybridnav.planner.alternatives import Alternative, Alternatives, plan_alternatives
     from hybridnav.planner.blocked import Blocked
+    from hybridnav.planner.planner import HybridPlanner
+    from hybridnav.planner.tour import Tour, plan_tour
 
 __all__ = [
     "Alternative",
@@ -22,15 +25,15 @@ __all__ = [
     "plan_tour",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    homes = {
+__getattr__ = on_first_use(
+    __name__,
+    {
         "Alternative": "alternatives",
         "Alternatives": "alternatives",
         "Blocked": "blocked",
+        "HybridPlanner": "planner",
+        "Tour": "tour",
         "plan_alternatives": "alternatives",
-    }
-    if name not in homes:
-        raise AttributeError(f"module 'hybridnav.planner' has no attribute {name!r}")
-    # They load shapely.
-    return getattr(importlib.import_module(f"hybridnav.planner.{homes[name]}"), name)
+        "plan_tour": "tour",
+    },
+)

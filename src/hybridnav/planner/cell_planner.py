@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
+from hybridnav import jumps, mesh, route
 from hybridnav.errors import InvalidValueError
-from hybridnav.jumps import JumpSearch
-from hybridnav.mesh import MeshSearch
 from hybridnav.planner.cell_plans import MaxDistance, OverPortals, WholeMap
-from hybridnav.planner.jump_plans import OverJumps
 from hybridnav.planner.mesh_plans import OverMesh
-from hybridnav.route import BuiltPortals
 
 if TYPE_CHECKING:
     from hybridnav.config import PlannerSettings
@@ -47,12 +44,14 @@ def cell_planner(
     """
     grid, coarse = topology.grid, settings.coarse
     if coarse == "portals":
-        built = _taken(BuiltPortals, prepared, coarse)
+        built = _taken(route.BuiltPortals, prepared, coarse)
         return OverPortals(topology, refiner, settings, built)
     if coarse == "mesh":
-        return OverMesh(grid, refiner, settings, _taken(MeshSearch, prepared, coarse))
+        return OverMesh(grid, refiner, settings, _taken(mesh.MeshSearch, prepared, coarse))
     if coarse == "jumps":
-        return OverJumps(grid, refiner, settings, _taken(JumpSearch, prepared, coarse))
+        from hybridnav.planner.jump_plans import OverJumps  # noqa: PLC0415 - one preset needs it
+
+        return OverJumps(grid, refiner, settings, _taken(jumps.JumpSearch, prepared, coarse))
     _taken(type(None), prepared, coarse)
     return MaxDistance(topology, refiner, settings) if coarse != "none" else WholeMap(refiner)
 

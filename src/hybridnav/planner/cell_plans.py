@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from hybridnav import route as routes
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
-from hybridnav.jumps import JumpSearch
-from hybridnav.mesh import MeshSearch
 from hybridnav.result import Route
-from hybridnav.route import BuiltPortals, MaxDistanceSearch, PortalSearch, corridor_of
 from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:
@@ -24,13 +22,17 @@ if TYPE_CHECKING:
     from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings
+    from hybridnav.jumps import JumpSearch
+    from hybridnav.mesh import MeshSearch
     from hybridnav.refine import GridRefiner
     from hybridnav.result import Metric
+    from hybridnav.route import BuiltPortals, MaxDistanceSearch, PortalSearch
     from hybridnav.topology import TopologicalMap
 
+    Prepared = MeshSearch | JumpSearch | BuiltPortals
+    """What planners of cell paths build of a map."""
+
 Cell = tuple[int, int]
-Prepared = MeshSearch | JumpSearch | BuiltPortals
-"""What planners of cell paths build of a map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +143,9 @@ class MaxDistance:
             allowed = self._settings.allow_unexplored
             with self._building:
                 if self._search is None:
-                    self._search = MaxDistanceSearch(self._topology, allow_unexplored=allowed)
+                    self._search = routes.MaxDistanceSearch(
+                        self._topology, allow_unexplored=allowed
+                    )
                     progress(1, 1)
         return self._search
 
@@ -157,7 +161,7 @@ class MaxDistance:
         if route is None:
             return CellPlan(None, seconds=seconds)
         beside = search.enterable if self._settings.corridor == "neighbours" else None
-        corridor = corridor_of(topology, route.places, neighbours=beside)
+        corridor = routes.corridor_of(topology, route.places, neighbours=beside)
         seconds["coarse"] = time.perf_counter() - began
         cells, expanded = self._refiner.refine(start, goal, corridor)
         seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
@@ -205,7 +209,7 @@ class OverPortals:
         if self._search is None:
             with self._building:
                 if self._search is None:
-                    self._search = PortalSearch(
+                    self._search = routes.PortalSearch(
                         self._topology,
                         self._refiner.search,
                         allow_unexplored=self._settings.allow_unexplored,

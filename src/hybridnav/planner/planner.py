@@ -12,7 +12,6 @@ from hybridnav._progress import no_progress
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
-from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import cell_planner
 from hybridnav.planner.cell_plans import CellPlan, OverPortals
 from hybridnav.planner.closed import ClosedCells, Closures
@@ -202,6 +201,8 @@ class HybridPlanner:
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
         finish = self._finish_asked_for(smooth)
         cells = self._cells if self._ompl is None else None
+        from hybridnav.planner.batch import plan_many  # noqa: PLC0415 - loads every method
+
         return plan_many(self, cells, (first, last), finish, self.closed(blocked))
 
     def prepare(self, *, progress: Progress = no_progress) -> None:

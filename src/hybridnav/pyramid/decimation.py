@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _kernels
 from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents
 from hybridnav.pyramid.hulls import merge_hulls
-from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Record
+from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Linkage, Record
 from hybridnav.pyramid.resistance import Steering
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from hybridnav.pyramid.resistance import Resistance
 
     KindArray = NDArray[np.uint8] | NDArray[np.uint16]
-
-Linkage = Literal["survivor", "radius", "diameter"]
 
 _LINKAGES: dict[Linkage, int] = {
     "survivor": _kernels.SURVIVOR,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, get_args, overload
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid.decimation import Linkage, decimate, squared_limit
 from hybridnav.pyramid.level import Level
+from hybridnav.pyramid.record import Linkage
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -104,6 +104,9 @@ class DualGraphPyramid:
             seed = operator.index(seed)
         except TypeError:
             raise InvalidValueError(f"seed must be a whole number, got {seed!r:.80}") from None
+        # A model holds what they build.
+        from hybridnav.pyramid.decimation import decimate, squared_limit  # noqa: PLC0415
+
         limit = squared_limit(merge_distance_m, grid.resolution_m)
         labels = None
         if rooms is not None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, IntArray
+
+Linkage = Literal["survivor", "radius", "diameter"]
 
 SURVIVES = 255
 """End of what is still there at the apex."""

@@ -7,8 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from hybridnav.route._any_angle_kernels import least_over_boxes
 
@@ -78,6 +76,10 @@ class AnyAngleBound:
         kept = np.ones(len(tail), dtype=np.bool_)
         kept[1:] = (np.diff(tail) != 0) | (np.diff(head) != 0)
         entries = np.maximum(length[kept], 1e-9), (tail[kept].astype(int), head[kept].astype(int))
+        # Most planners have no portals, and it takes as long to load as they all.
+        from scipy import sparse  # noqa: PLC0415
+        from scipy.sparse import csgraph  # noqa: PLC0415
+
         graph = sparse.coo_array(entries, shape=(n, n)).tocsr()
         costs = csgraph.dijkstra(graph) if n else np.empty((0, 0))
         below: NDArray[np.float32] = np.nextafter(

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from hybridnav.search.arc_search import ArcSearch
 
@@ -97,6 +95,9 @@ class RoomSearch:
 
 def _parts(arcs: IntArray, n_vertices: int) -> LongArray:
     """The connected component of each vertex."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - most planners search no rooms
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
     ones = np.ones(len(arcs), dtype=np.int8)
     graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))
     label: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)

@@ -1,13 +1,17 @@
-"""The topological map: places and boundaries, rooms and doors."""
+"""The topological map: places and boundaries, rooms and doors.
+
+Names load on first use: few maps have rooms, and to find them takes scipy.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hybridnav.topology.map import Component, Obstacle, TopologicalMap
-from hybridnav.topology.rooms import Door, Rooms
+from hybridnav._lazy import on_first_use
 
 if TYPE_CHECKING:
+    from hybridnav.topology.map import Component, Obstacle, TopologicalMap
+    from hybridnav.topology.rooms import Door, Rooms
     from hybridnav.topology.segmentation import find_rooms
 
 __all__ = [
@@ -19,10 +23,14 @@ __all__ = [
     "find_rooms",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name != "find_rooms":
-        raise AttributeError(f"module 'hybridnav.topology' has no attribute {name!r}")
-    from hybridnav.topology.segmentation import find_rooms  # noqa: PLC0415 - loads scipy
-
-    return find_rooms
+__getattr__ = on_first_use(
+    __name__,
+    {
+        "Component": "map",
+        "Door": "rooms",
+        "Obstacle": "map",
+        "Rooms": "rooms",
+        "TopologicalMap": "map",
+        "find_rooms": "segmentation",
+    },
+)

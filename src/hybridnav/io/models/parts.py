@@ -17,8 +17,7 @@ from hybridnav.io.models.fields import refusal
 from hybridnav.io.models.structures import GRID, PRESET, PYRAMID, ROOMS
 from hybridnav.io.size import check_size
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.decimation import Linkage  # noqa: TC001 - pydantic reads it
-from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Record
+from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Linkage, Record
 
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray

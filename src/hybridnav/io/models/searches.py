@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from hybridnav import jumps
+from hybridnav import mesh as meshes
 from hybridnav.io.models.fields import refusal
 from hybridnav.io.models.parts import plain, values_of
 from hybridnav.io.models.structures import (
@@ -18,13 +20,6 @@ from hybridnav.io.models.structures import (
     PORTALS,
     TABLES,
 )
-from hybridnav.jumps import JumpSearch
-from hybridnav.jumps.build import JumpGraph
-from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-from hybridnav.route import BuiltPortals
-from hybridnav.route._portal_kernels import Tables
-from hybridnav.search._contract_kernels import HEAD_SHIFT
-from hybridnav.topology.portals import Portals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +27,10 @@ if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.io.models.container import FiledPart, Part
+    from hybridnav.jumps import JumpSearch
+    from hybridnav.mesh import CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.planner.cell_plans import Prepared
+    from hybridnav.route import BuiltPortals
     from hybridnav.topology import TopologicalMap
 
 
@@ -80,9 +78,9 @@ def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
     key
         Of `made_for`.
     """
-    if isinstance(prepared, MeshSearch):
+    if isinstance(prepared, meshes.MeshSearch):
         return _mesh_parts(prepared, key)
-    if isinstance(prepared, JumpSearch):
+    if isinstance(prepared, jumps.JumpSearch):
         return _jump_parts(prepared, key)
     return _portal_parts(prepared, key)
 
@@ -131,7 +129,7 @@ def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
     if search.edges is None or graph is None:
         return parts
     sizes = {"corners": len(mesh.corners), "edges": len(search.edges[1])}
-    if isinstance(graph, CornerGraph):
+    if isinstance(graph, meshes.CornerGraph):
         sizes["landmarks"] = graph.landmark_distances.shape[1]
         return [*parts, CORNER_GRAPH.part(graph, sizes, key)]
     edges = dict(zip(("first", "heads"), search.edges, strict=True))
@@ -145,7 +143,7 @@ def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
 
 def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch:
     values = values_of(_MeshValues, fitting[MESH.kind])
-    search = MeshSearch(ConvexMesh(**MESH.read(fitting[MESH.kind], known)))
+    search = meshes.MeshSearch(meshes.ConvexMesh(**MESH.read(fitting[MESH.kind], known)))
     search.expanded = values.expanded
     if values.is_prepared:
         search.adopt(*_corners_of(fitting, known, len(search.mesh.corners)))
@@ -160,7 +158,7 @@ def _corners_of(
         if structure.kind in fitting:
             _check_same(fitting[structure.kind], "corners", n_corners)
     if CORNER_GRAPH.kind in fitting:
-        graph = CornerGraph(**CORNER_GRAPH.read(fitting[CORNER_GRAPH.kind], known))
+        graph = meshes.CornerGraph(**CORNER_GRAPH.read(fitting[CORNER_GRAPH.kind], known))
         return (graph.first, graph.heads), graph
     if CORNER_HIERARCHY.kind not in fitting:
         return None, None
@@ -170,7 +168,7 @@ def _corners_of(
     edges = CORNER_EDGES.read(fitting[CORNER_EDGES.kind], known)
     arrays = CORNER_HIERARCHY.read(filed, known)
     _check_arcs(filed, arrays)
-    return (edges["first"], edges["heads"]), CornerHierarchy(**arrays)
+    return (edges["first"], edges["heads"]), meshes.CornerHierarchy(**arrays)
 
 
 def _jump_parts(search: JumpSearch, key: dict[str, Any]) -> list[Part]:
@@ -200,11 +198,13 @@ def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearc
         raise refusal(filed, f"{sizes['middles']} middles for {sizes['arcs']} arcs")
     _check_index(filed, arrays["index"])
     _check_arcs(filed, arrays)
-    return JumpSearch(JumpGraph(values.origin, values.shape, **arrays))
+    return jumps.JumpSearch(jumps.JumpGraph(values.origin, values.shape, **arrays))
 
 
 def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:
     """Refuse arcs to corners, and past arcs, that do not exist."""
+    from hybridnav.search._contract_kernels import HEAD_SHIFT  # noqa: PLC0415 - loads numba
+
     heads, middles = arrays["arcs"][:, 1] >> HEAD_SHIFT, arrays["middles"]
     past = middles[middles >= 0]
     room = np.diff(arrays["first"])[past >> 32]
@@ -248,6 +248,10 @@ def _portal_parts(built: BuiltPortals, key: dict[str, Any]) -> list[Part]:
 
 
 def _portals_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> BuiltPortals:
+    from hybridnav.route import BuiltPortals  # noqa: PLC0415 - most models hold none
+    from hybridnav.route._portal_kernels import Tables  # noqa: PLC0415
+    from hybridnav.topology.portals import Portals  # noqa: PLC0415
+
     filed = fitting[PORTALS.kind]
     values = values_of(_PortalValues, filed)
     arrays = PORTALS.read(filed, known)
