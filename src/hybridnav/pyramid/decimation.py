@@ -102,7 +102,9 @@ def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
     rooms, and so on, two for each room."""
     n_kinds = _N_CLASSES * (int(rooms.max()) + 2) + 1
     kinds = np.where(classes == 0, 0, _N_CLASSES * (rooms + 1) + classes)
-    return kinds.astype(np.uint8) if n_kinds <= _MOST_KINDS else kinds.astype(np.uint16)
+    kinds = kinds.astype(np.uint8 if n_kinds <= _MOST_KINDS else np.uint16)
+    kinds.flags.writeable = False  # as the classes are: another type is compiled once more
+    return kinds
 
 
 @dataclass
