@@ -23,6 +23,7 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks._queries_scale import _tiled
+from benchmarks.cold import PLAINLY
 from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def seconds(command: list[str], runs: int) -> float:
     found = []
     for _ in range(runs + 1):
         began = time.perf_counter()
-        subprocess.run(command, check=True, capture_output=True)
+        subprocess.run(command, check=True, capture_output=True, env=PLAINLY)
         found.append(time.perf_counter() - began)
     return min(found[1:])
 
