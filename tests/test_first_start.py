@@ -71,14 +71,22 @@ def wait_until(is_so, seconds: float = 60.0) -> None:
 
 def test_the_user_is_told_once_and_only_of_seconds(capsys: pytest.CaptureFixture[str]) -> None:
     with told_of_compiling():
-        KERNELS.info("compiled", extra={"seconds": 1.5})
+        KERNELS.info("compiled", extra={"seconds": 1.5, "is_kept": True})
         assert capsys.readouterr().err == ""
         for _ in range(3):
-            KERNELS.info("compiled", extra={"seconds": 1.5})
+            KERNELS.info("compiled", extra={"seconds": 1.5, "is_kept": True})
     told = capsys.readouterr().err
     assert told.startswith("hybridnav: compiling kernels, ")
     assert told.count("\n") == 1
-    KERNELS.warning("compiled", extra={"seconds": 9.0})
+    KERNELS.warning("compiled", extra={"seconds": 9.0, "is_kept": True})
+    assert capsys.readouterr().err == ""
+
+
+def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with told_of_compiling():
+        KERNELS.info("compiled", extra={"seconds": 9.0, "is_kept": False})
     assert capsys.readouterr().err == ""
 
 

@@ -111,7 +111,8 @@ class _Kernel(CPUDispatcher):
         entry = super().compile(sig)
         if self._n_missed() > n_missed:
             seconds, name = time.perf_counter() - began, self.py_func.__name__
-            _LOG.info("compiled %s in %.1f s", name, seconds, extra={"seconds": seconds})
+            about = {"seconds": seconds, "is_kept": self.stats.cache_path is not None}
+            _LOG.info("compiled %s in %.1f s", name, seconds, extra=about)
         return entry
 
     def _n_missed(self) -> int:

@@ -29,7 +29,10 @@ _FIRST = "compiling kernels, which a new installation does once; the next start 
 
 
 class _Teller(logging.Handler):
-    """Tells the user, once, that it is the compiler that takes so long."""
+    """Reports once that it is the compiler that takes so long.
+
+    Not where nothing can be kept: `CacheWarning` states that every start takes as long there.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -38,7 +41,7 @@ class _Teller(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Add the seconds that a kernel took."""
         before, seconds = self._spent_s, record.__dict__.get("seconds", 0.0)
-        self._spent_s += seconds
+        self._spent_s += seconds if record.__dict__.get("is_kept") else 0.0
         if before < _PATIENCE_S <= self._spent_s:
             complain(_FIRST)
 
