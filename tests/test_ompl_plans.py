@@ -197,7 +197,7 @@ def test_clearance_weighs_more_than_length(planner_of: Any) -> None:
         pytest.param("dubins", "RRTConnect", marks=pytest.mark.full),
         ("dubins", "BITstar"),
         ("reeds-shepp", "RRTConnect"),
-        ("reeds-shepp", "RRTstar"),
+        pytest.param("reeds-shepp", "RRTstar", marks=pytest.mark.full),
         pytest.param("reeds-shepp", "BITstar", marks=pytest.mark.full),
         pytest.param("reeds-shepp", "PRMstar", marks=pytest.mark.full),
     ],
