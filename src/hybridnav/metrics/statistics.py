@@ -22,6 +22,7 @@ TOLERANCE = 1e-9
 
 Interval = tuple[float, float]
 _CHUNK = 2_000_000
+"""Numbers drawn at a time."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ def summarise(losses: ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Sum
         p99=float(np.percentile(values, 99)),
         max=float(values.max()),
         share_without_loss=share,
-        mean_interval=_interval(_resampled_means(values, rng, resamples)),
+        mean_interval=_interval_of_mean(values, rng, resamples),
         share_interval=_interval(shares),
     )
 
@@ -166,7 +167,7 @@ def paired_difference(
         n=n,
         dropped=dropped,
         mean=float(difference.mean()),
-        interval=_interval(_resampled_means(difference, rng, resamples)),
+        interval=_interval_of_mean(difference, rng, resamples),
         p_value=float(stats.wilcoxon(changed).pvalue) if len(changed) else 1.0,
     )
 
@@ -240,15 +241,12 @@ def _interval(values: FloatArray) -> Interval:
     return float(low), float(high)
 
 
-def _resampled_means(values: FloatArray, rng: np.random.Generator, resamples: int) -> FloatArray:
-    """Means of resamples with replacement, drawn a few at a time to bound the memory."""
-    n = len(values)
+def _interval_of_mean(values: FloatArray, rng: np.random.Generator, resamples: int) -> Interval:
+    """Return the bootstrap interval of the mean, from a few resamples at a time to bound memory."""
     if np.ptp(values) == 0:
-        return np.full(resamples, values[0])
-    means = np.empty(resamples)
-    chunk = max(_CHUNK // n, 1)
-    for first in range(0, resamples, chunk):
-        size = min(chunk, resamples - first)
-        drawn = rng.integers(n, size=(size, n), dtype=np.int32)
-        means[first : first + size] = values[drawn].mean(axis=1)
-    return means
+        return float(values[0]), float(values[0])
+    batch = max(_CHUNK // len(values), 1)
+    found = stats.bootstrap(
+        (values,), np.mean, n_resamples=resamples, batch=batch, method="percentile", rng=rng
+    )
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
