@@ -17,12 +17,15 @@ import hybridnav as hn
 from hybridnav.mesh import build_mesh, trace_search
 from hybridnav.viz import (
     plot_dual,
+    plot_losses,
     plot_map,
     plot_mesh,
+    plot_paths,
     plot_places,
     plot_plan,
     plot_rooms,
     plot_search,
+    plot_speed,
     plot_topology,
     plot_tour,
 )
@@ -77,6 +80,18 @@ def _search(ax: Axes) -> Axes:
     return plot_search(grid, trace_search(mesh, cells, positions), ax=ax)
 
 
+def _paths(ax: Axes) -> Axes:
+    shortest = [(1.0, 1.0), (5.8, 1.4), (6.6, 1.4), (11.0, 2.4)]
+    path = [(1.0, 1.0), (5.8, 4.8), (6.6, 4.8), (10.1, 4.3), (11.0, 2.4)]
+    return plot_paths(two_rooms().grid, path, shortest, ax=ax)
+
+
+def _losses() -> dict[str, np.ndarray]:
+    """Three methods: exact, good, and one that loses much on a few pairs."""
+    rng = np.random.default_rng(2)
+    return {"a": np.zeros(200), "b": rng.gamma(0.6, 0.01, 200), "c": rng.gamma(0.2, 0.3, 200)}
+
+
 PICTURES: dict[str, Callable[[Axes], Axes]] = {
     "map": lambda ax: plot_map(two_rooms().grid, ax=ax),
     "places": lambda ax: plot_places(two_rooms(), ax=ax, self_loops=True),
@@ -87,6 +102,9 @@ PICTURES: dict[str, Callable[[Axes], Axes]] = {
     "tour": _tour,
     "mesh": lambda ax: plot_mesh(two_rooms().grid, ax=ax),
     "search": _search,
+    "paths": _paths,
+    "losses": lambda ax: plot_losses(_losses(), ax=ax),
+    "speed": lambda ax: plot_speed(_losses(), {"a": 0.3, "b": 2.0, "c": 40.0}, ax=ax),
 }
 
 

@@ -1,11 +1,16 @@
-"""Pictures: maps, places, graphs, plans. Drawn on matplotlib figures without pyplot or display."""
+"""Pictures of maps, places, graphs and plans, and charts of methods.
 
+Drawn on matplotlib figures without pyplot or display.
+"""
+
+from hybridnav.viz.charts import method_styles, plot_losses, plot_speed
 from hybridnav.viz.dual import plot_dual
 from hybridnav.viz.kernels import plot_kernels
 from hybridnav.viz.levels import plot_levels
 from hybridnav.viz.maps import plot_level, plot_map, plot_places
 from hybridnav.viz.mesh import plot_mesh
 from hybridnav.viz.paper import plot_figure1
+from hybridnav.viz.paths import plot_paths
 from hybridnav.viz.plan import plot_plan
 from hybridnav.viz.rooms import plot_rooms
 from hybridnav.viz.save import save_figure
@@ -14,18 +19,22 @@ from hybridnav.viz.topology import plot_topology
 from hybridnav.viz.ways import plot_alternatives, plot_tour
 
 __all__ = [
+    "method_styles",
     "plot_alternatives",
     "plot_dual",
     "plot_figure1",
     "plot_kernels",
     "plot_level",
     "plot_levels",
+    "plot_losses",
     "plot_map",
     "plot_mesh",
+    "plot_paths",
     "plot_places",
     "plot_plan",
     "plot_rooms",
     "plot_search",
+    "plot_speed",
     "plot_topology",
     "plot_tour",
     "save_figure",

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes
 
-_ROUTE_WIDTH, _PATH_WIDTH, _CASING = 1.5, 2.0, 1.5
+_ROUTE_WIDTH, PATH_WIDTH, _CASING = 1.5, 2.0, 1.5
 
 
 def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
@@ -94,7 +94,7 @@ def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
         _draw_route(canvas, topology, result.route, places)
     if result.path is not None:
         path = result.path.points
-        _draw_path(canvas, path)
+        draw_path(canvas, path)
     draw_markers(canvas, markers, path)
     canvas.ax.set_axis_off()
     add_title(canvas, _words(topology, result, optimum_m) if title is None else [title])
@@ -157,16 +157,17 @@ def _draw_route(canvas: Canvas, topology: TopologicalMap, route: Route, places: 
     dots.set_gid("route-places")
 
 
-def _draw_path(canvas: Canvas, points: FloatArray) -> None:
+def draw_path(canvas: Canvas, points: FloatArray) -> None:
+    """Draw a path as a line with a pale rim; points `(x, y)` in metres."""
     factor = canvas.sizes.line
     casing = patheffects.withStroke(
-        linewidth=(_PATH_WIDTH + _CASING) * factor, foreground=style.FREE, capstyle="round"
+        linewidth=(PATH_WIDTH + _CASING) * factor, foreground=style.FREE, capstyle="round"
     )
     line = Line2D(
         points[:, 0],
         points[:, 1],
         color=style.PATH,
-        linewidth=_PATH_WIDTH * factor,
+        linewidth=PATH_WIDTH * factor,
         solid_capstyle="round",
         solid_joinstyle="round",
         path_effects=[casing],
@@ -197,7 +198,7 @@ def _entries(result: PlanResult, places: Places, strong: BoolArray, sizes: Sizes
     entries: list[Entry] = []
     width = sizes.line
     if result.path is not None:
-        entries.append((Line2D([], [], color=style.PATH, lw=_PATH_WIDTH * width), "path"))
+        entries.append((Line2D([], [], color=style.PATH, lw=PATH_WIDTH * width), "path"))
     if result.route is not None:
         line = Line2D([], [], color=style.INK, lw=_ROUTE_WIDTH * width, marker="o")
         line.set(markerfacecolor=style.FREE, markersize=3.6 * width, markeredgewidth=width)

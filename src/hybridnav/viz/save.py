@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _METADATA: dict[str, dict[str, Any]] = {
     ".pdf": {"CreationDate": None},
     ".png": {"Software": None},
-    ".svg": {"Date": None},
+    ".svg": dict.fromkeys(("Creator", "Date", "Format", "Type")),
 }
 _MAX_PIXELS = 30_000
 
@@ -52,6 +52,15 @@ def save_figure(picture: Axes | Figure, path: PathLike, *, dpi: float = 200) -> 
     if suffix not in _METADATA:
         kinds = ", ".join(_METADATA)
         raise InvalidValueError(f"a picture's file name must end in {kinds}, got '{file}'")
+    data = picture_bytes(picture, suffix, dpi=dpi)
+    try:
+        replace_file(file, data)
+    except OSError as error:
+        raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
+
+
+def picture_bytes(picture: Axes | Figure, suffix: str, *, dpi: float) -> bytes:
+    """Return what `save_figure` writes."""
     figure = picture if isinstance(picture, Figure) else picture.figure.figure
     limit = _MAX_PIXELS / max(figure.get_size_inches())
     if not (math.isfinite(dpi) and 0 < dpi <= limit):
@@ -65,7 +74,4 @@ def save_figure(picture: Axes | Figure, path: PathLike, *, dpi: float = 200) -> 
         figure.savefig(
             data, format=suffix[1:], dpi=dpi, bbox_inches=box, metadata=_METADATA[suffix]
         )
-    try:
-        replace_file(file, data.getvalue())
-    except OSError as error:
-        raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
+    return data.getvalue()

@@ -30,6 +30,8 @@ ROUTES = (PATH, "#4837b6", "#e49b34", "#110328", "#8c8d8c")
 """Routes in one picture, the shortest first: as far apart as five can be for every kind of colour
 vision, from each other and from pale places."""
 UNEXPLORED_NODE = "#8a8a8a"
+METHODS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", INK)
+"""Okabe and Ito's palette, safe for the colour-blind, without the yellow that white swallows."""
 
 PLACES = ("#3ba2b2", "#e0d59d", "#99a9ea", "#aea160", "#abcdec", "#daada3")
 """Found by simulated annealing: as far apart as six can be for every kind of colour vision and in
