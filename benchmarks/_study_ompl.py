@@ -11,15 +11,16 @@ import numpy as np
 import hybridnav as hn
 from hybridnav.config import load_preset
 from hybridnav.harness.analysis import nanmean, nanquantile, pairs_in_common
-from hybridnav.harness.charts import chart_file, loss_chart
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.svg import looks
 from hybridnav.harness.tables import figures, to_markdown
+from hybridnav.viz import plot_losses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from matplotlib.axes import Axes
 
     from hybridnav.config import Preset
     from hybridnav.harness.analysis import Outcome, Study
@@ -126,11 +127,9 @@ is of all; OMPL's include what it takes to send a query to its process.
 {to_markdown(of_maps, _OF_MAPS)}"""
 
 
-def chart(study: Study) -> str:
-    """The losses of all methods, as the text of an SVG file."""
-    losses = {label: study.pooled(label, "losses") for label in _labels(study)}
-    title = "Any-angle loss of each method's own paths, all maps"
-    return chart_file(loss_chart(losses, looks(list(losses)), title))
+def chart(study: Study) -> Axes:
+    """Draw the any-angle losses of all methods' own paths."""
+    return plot_losses({label: study.pooled(label, "losses") for label in _labels(study)})
 
 
 def _labels(study: Study) -> list[str]:

@@ -28,12 +28,10 @@ from typing import TYPE_CHECKING
 import hybridnav as hn
 from benchmarks import _study_ompl
 from hybridnav.harness.analysis import nanquantile
-from hybridnav.harness.charts import chart_file, loss_chart, speed_chart
 from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.methods import BASELINES
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.svg import looks
 from hybridnav.harness.tables import (
     EFFICIENCY_COLUMNS,
     loss_columns,
@@ -41,6 +39,7 @@ from hybridnav.harness.tables import (
     rows_of_study,
     to_markdown,
 )
+from hybridnav.viz import plot_losses, plot_speed, save_figure
 
 if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
@@ -214,7 +213,7 @@ def main() -> None:
         _study_ompl.run(maps, folder, workers=arguments.workers, **asked)
         found = write_outputs(folder, title="hybridnav: the study, OMPL", root=data)
         _write(docs / "study-ompl.md", _study_ompl.page(found, **asked))
-        _write(docs / "images" / "study-ompl-loss.svg", _study_ompl.chart(found))
+        save_figure(_study_ompl.chart(found), docs / "images" / "study-ompl-loss.svg")
 
 
 def write_methods(arguments: argparse.Namespace, docs: Path) -> None:
@@ -227,13 +226,8 @@ def write_methods(arguments: argparse.Namespace, docs: Path) -> None:
     times = {
         label: 1e3 * nanquantile(study.pooled(label, "seconds"), 0.5) for label in study.labels
     }
-    seen = looks(study.labels)
-    charts = {
-        "study-loss.svg": loss_chart(losses, seen, "Loss of each method, all maps"),
-        "study-speed.svg": speed_chart(losses, times, seen, "Speed against loss, all maps"),
-    }
-    for name, chart in charts.items():
-        _write(docs / "images" / name, chart_file(chart))
+    save_figure(plot_losses(losses), docs / "images" / "study-loss.svg")
+    save_figure(plot_speed(losses, times), docs / "images" / "study-speed.svg")
 
 
 def _write(path: Path, text: str) -> None:

@@ -13,7 +13,7 @@ from hybridnav.harness.analysis import Outcome, Study, load_study, nanquantile, 
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.paths import decode_path
 from hybridnav.harness.records import map_digest
-from hybridnav.harness.report_html import MapSection, ReportData, Table, WorstCase, render_report
+from hybridnav.harness.report import MapSection, ReportData, Table, WorstCase, render_report
 from hybridnav.harness.tables import (
     EFFICIENCY_COLUMNS,
     Row,
@@ -214,6 +214,8 @@ def _worst(outcome: Outcome) -> list[WorstCase]:
 
 
 def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
+    from hybridnav.harness.figures import paths_uri  # noqa: PLC0415 - loads matplotlib
+
     about = outcome.preparation
     if "file" not in about:
         return None
@@ -232,22 +234,17 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
         if reference is not None and reference.get("path"):
             optimum = _path(reference, grid)
     else:  # a fault of the regions: the two cells that show it
-        path = np.array(record["fault_cells"][record["faults"].index(text)], dtype=np.float64)
-    return WorstCase(
-        title=f"{outcome.label}, {_pair_text(record)}: {text}",
-        classes=grid.classes,
-        resolution_m=grid.resolution_m,
-        path=path,
-        optimum=optimum,
-    )
+        path = grid.frame.points_of(record["fault_cells"][record["faults"].index(text)])
+    title = f"{outcome.label}, {_pair_text(record)}: {text}"
+    return WorstCase(title, paths_uri(grid, path, optimum))
 
 
 def _path(record: Record, grid: OccupancyGrid) -> FloatArray:
-    """What there is to draw of an answer: its path, or where there is none its ends."""
+    """Return the points to draw of an answer: its path, or its ends where there is none."""
     start, goal = record["start"], record["goal"]
     if record.get("points"):
-        positions = [grid.frame.position_of(x, y) for x, y in record["points"]]
-        return np.array(positions) - 0.5
+        points = np.array(record["points"], dtype=np.float64)
+        return points[np.isfinite(points).all(axis=1)]
     if record.get("path"):
-        return decode_path((start[0], start[1]), record["path"]).astype(np.float64)
-    return np.array([start, goal], dtype=np.float64)
+        return grid.frame.points_of(decode_path((start[0], start[1]), record["path"]))
+    return grid.frame.points_of([start, goal])

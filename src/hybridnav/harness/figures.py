@@ -1,0 +1,150 @@
+"""The figures of the report, drawn by `hybridnav.viz`, as data URIs."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+import matplotlib as mpl
+import numpy as np
+from PIL import Image
+
+from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed
+from hybridnav.viz.save import picture_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+
+    from hybridnav._typing import FloatArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.report import MapSection, ReportData
+
+_CASE_WIDTH_IN = 4.0
+_CASE_DPI = 144.0
+_CASE_COLOURS = 32
+"""Cells have four; the others are of lines and of what smooths their rims."""
+
+_OF_LOSSES = (
+    "Each line is the share of pairs whose loss is above the value below it; at 0, the share with "
+    "any loss. The share is logarithmic, so that the few worst pairs show; a line ends at the "
+    "largest loss of its method, and one on the axis stands for no pair. A line further down and "
+    "left is better."
+)
+_OF_SPEED = "Down and to the left is better; the loss axis is logarithmic above 0.01\u00a0%."
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A chart with its caption."""
+
+    title: str
+    uri: str
+    """A data URI; empty where there is nothing to draw."""
+    caption: str
+    missing: list[str]
+    """Methods without values."""
+
+
+class Charts:
+    """The charts of a report, in which each method looks the same.
+
+    Parameters
+    ----------
+    report
+        The report.
+    """
+
+    def __init__(self, report: ReportData) -> None:
+        names = [*report.overall_losses, *report.overall_times_ms]
+        for section in report.maps:
+            names += [*section.losses, *section.times_ms]
+        self._styles = method_styles(names)
+        self._report = report
+
+    def overall(self) -> list[Chart]:
+        """Return those of all maps together, one for each metric."""
+        losses, times_ms = self._report.overall_losses, self._report.overall_times_ms
+        title = "Speed against loss, all maps"
+        groups = self._groups([*losses, *times_ms])
+        return [self._speed(losses, times_ms, names, f"{title}{of}") for of, names in groups]
+
+    def of_map(self, section: MapSection) -> list[Chart]:
+        """Return those of one map, two for each metric."""
+        losses, times_ms, name = section.losses, section.times_ms, section.name
+        charts = []
+        for of, names in self._groups([*losses, *times_ms]):
+            charts.append(self._losses(losses, names, f"Loss, {name}{of}"))
+            title = f"Speed against loss, {name}{of}"
+            charts.append(self._speed(losses, times_ms, names, title))
+        return charts
+
+    def _groups(self, names: list[str]) -> list[tuple[str, list[str]]]:
+        """Return the methods of each metric, and what titles add for it: nothing for octile alone.
+
+        Without methods there is one group, which is empty.
+        """
+        groups: dict[str, list[str]] = {}
+        for name in dict.fromkeys(names):
+            groups.setdefault(self._report.metric_of.get(name, "octile"), []).append(name)
+        if groups.keys() <= {"octile"}:
+            return [("", groups.get("octile", []))]
+        return [(f", {metric} paths", of_metric) for metric, of_metric in groups.items()]
+
+    def _losses(self, losses: Mapping[str, FloatArray], names: list[str], title: str) -> Chart:
+        asked = [name for name in names if name in losses]
+        drawn = {name: losses[name] for name in asked if np.isfinite(losses[name]).any()}
+        missing = [name for name in asked if name not in drawn]
+        if not drawn:
+            return Chart(title, "", "No pair has a known loss.", missing)
+        return Chart(title, _svg_uri(plot_losses(drawn, styles=self._styles)), _OF_LOSSES, missing)
+
+    def _speed(
+        self,
+        losses: Mapping[str, FloatArray],
+        times_ms: Mapping[str, float],
+        names: list[str],
+        title: str,
+    ) -> Chart:
+        drawn = {
+            name: losses[name]
+            for name in names
+            if np.isfinite(losses.get(name, np.empty(0))).any()
+            and 0 < times_ms.get(name, math.nan) < math.inf
+        }
+        missing = [name for name in names if name not in drawn]
+        if not drawn:
+            return Chart(title, "", "No method has both a time and a loss.", missing)
+        chart = plot_speed(drawn, times_ms, styles=self._styles)
+        return Chart(title, _svg_uri(chart), _OF_SPEED, missing)
+
+
+def paths_uri(grid: OccupancyGrid, path: FloatArray, shortest: FloatArray | None) -> str:
+    """Return the picture of a path and a shortest one as a PNG, half as large as an SVG.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    path, shortest
+        float64 (n, 2), points `(x, y)` in metres.
+    """
+    ax = plot_paths(grid, path, shortest, title="", width_in=_CASE_WIDTH_IN)
+    drawn, small = io.BytesIO(picture_bytes(ax, ".png", dpi=_CASE_DPI)), io.BytesIO()
+    with Image.open(drawn) as image:
+        image.convert("RGB").quantize(_CASE_COLOURS).save(small, format="PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(small.getvalue()).decode('ascii')}"
+
+
+def _svg_uri(chart: Axes) -> str:
+    """Return a chart whose texts are texts: the reader's fonts have more letters than ours."""
+    with mpl.rc_context({"svg.fonttype": "none"}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        drawn = picture_bytes(chart, ".svg", dpi=_CASE_DPI)
+    return f"data:image/svg+xml,{quote(drawn, safe=' /:=,;()!*+-._~')}"

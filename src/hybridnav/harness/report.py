@@ -1,0 +1,122 @@
+"""The report of a run as one HTML text that opens without network: tables, charts, worst cases."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, StrictUndefined
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+    from hybridnav._typing import FloatArray
+
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts."""
+
+    columns: list[str]
+    rows: list[list[str]]
+    caption: str
+    numeric: frozenset[int] = frozenset()
+    """Indices of the columns that are aligned to the right."""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise InvalidValueError(
+                    f"table {self.caption!r}: a row has {len(row)} cells, "
+                    f"expected {len(self.columns)}"
+                )
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """A pair with a large loss."""
+
+    title: str
+    picture: str
+    """A data URI: drawn at once, so that a report does not hold the cells of all its maps."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapSection:
+    """What the report holds about one map."""
+
+    name: str
+    facts: list[tuple[str, str]] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    losses: dict[str, FloatArray] = field(default_factory=dict)
+    """Per method, the loss of each solved pair; 0.01 is 1 %."""
+    times_ms: dict[str, float] = field(default_factory=dict)
+    """Per method, the median time of a query in milliseconds."""
+    worst: list[WorstCase] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class ReportData:
+    """All that a report holds."""
+
+    title: str
+    facts: list[tuple[str, str]]
+    faults: list[str]
+    """Counter-examples to consistency and paths that failed a check, one line each."""
+    checks: int
+    """Checks made, passed or not."""
+    criteria: Table
+    """Thrun's three criteria, a row per method, all maps together."""
+    maps: list[MapSection]
+    overall_losses: dict[str, FloatArray] = field(default_factory=dict)
+    overall_times_ms: dict[str, float] = field(default_factory=dict)
+    metric_of: dict[str, str] = field(default_factory=dict)
+    """Per method, the metric of its paths where losses refer to it, octile unless said otherwise:
+    each has charts of its own."""
+
+
+def render_report(report: ReportData) -> str:
+    """Return the report as one HTML text without scripts and without references to other files.
+
+    Equal data give equal text. Losses and times that are not finite are left out of the charts,
+    and so are methods that have none left; each chart names those.
+
+    Parameters
+    ----------
+    report
+        What to show. Texts may hold any characters.
+
+    Returns
+    -------
+    str
+        An HTML document, to be written as UTF-8.
+    """
+    from hybridnav.harness.figures import Charts  # noqa: PLC0415 - loads matplotlib
+
+    return _template().render(report=report, charts=Charts(report))
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        autoescape=True,
+        finalize=_printable,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    source = resources.files("hybridnav.harness").joinpath("report.html.j2")
+    return environment.from_string(source.read_text(encoding="utf-8"))
+
+
+def _printable(value: Any) -> Any:
+    """Replace what no page may hold: file names can carry control codes and lone surrogates."""
+    return _UNPRINTABLE.sub("\ufffd", value) if type(value) is str else value
