@@ -12,7 +12,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.planner.cell_plans import OverPortals
-from hybridnav.route import portal_search
+from hybridnav.portals import search as portal_search
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 

@@ -13,9 +13,9 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from hybridnav.grid import CellClass
-from hybridnav.route import portal_table
+from hybridnav.portals import distances as portal_table
+from hybridnav.portals.build import build_portals
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.topology.portals import build_portals
 from tests.oracle.grid import move_graph
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid, scenes
 from tests.test_search import block_labels
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pytest
 
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.topology.portals import Portals
+    from hybridnav.portals.build import Portals
 
 SIDE = min(MAX_SIDE, 20)
 KINDS = ("pyramid", "pieces", "pieces", "stairs", "grown", "grown", "one", "cells")

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from hybridnav.route import portal_search
-from hybridnav.route.portal_search import PortalSearch
+from hybridnav.portals import search as portal_search
+from hybridnav.portals.search import PortalSearch
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search.grid_search import GridSearch
 from tests.divided import Divided, costs_from, with_rounding
 from tests.oracle.grid import assert_legal, centre, moves, recounted
 
 if TYPE_CHECKING:
-    from hybridnav.route.portal_search import PortalAnswer
+    from hybridnav.portals.search import PortalAnswer
     from hybridnav.topology import TopologicalMap
 
 EPSILONS = (0.0, 0.0, 0.01, 0.1, 1.0)

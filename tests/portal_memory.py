@@ -6,8 +6,8 @@ import hashlib
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.route import portal_search
-from hybridnav.route.portal_table import build_tables
+from hybridnav.portals import search as portal_search
+from hybridnav.portals.distances import build_tables
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:

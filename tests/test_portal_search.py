@@ -12,10 +12,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.grid.worlds import figure1_world, office_world
+from hybridnav.portals._path_kernels import FAR
+from hybridnav.portals._side_kernels import side_costs, ways_by_sides
+from hybridnav.portals.search import PortalSearch
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.route._portal_kernels import FAR
-from hybridnav.route._side_kernels import side_costs, ways_by_sides
-from hybridnav.route.portal_search import PortalSearch
 from hybridnav.search._costs import STRAIGHT
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav.route import portal_table
-from hybridnav.route._descent_kernels import descend
-from hybridnav.route._portal_kernels import FAR, UNREACHED
-from hybridnav.route.portal_table import build_tables
+from hybridnav.portals import distances as portal_table
+from hybridnav.portals._descent_kernels import descend
+from hybridnav.portals._path_kernels import FAR, UNREACHED
+from hybridnav.portals.distances import build_tables
 from hybridnav.search._costs import STRAIGHT
 from tests.divided import (
     GATES,
@@ -27,7 +27,7 @@ from tests.divided import (
 from tests.strategies import examples
 
 if TYPE_CHECKING:
-    from hybridnav.topology.portals import Portals
+    from hybridnav.portals.build import Portals
 
 ENOUGH = settings(max_examples=examples(40), derandomize=True, deadline=None)
 FEWER = settings(max_examples=examples(20), derandomize=True, deadline=None)

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.topology.portals import (
+from hybridnav.portals.build import (
     PathTooLongError,
     Portals,
     PortalsTooLargeError,
     build_portals,
     compact_labels,
 )
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from tests.divided import GATES, Divided, costs_from, fields_of, halves, partitions
 from tests.strategies import drawn, examples, occupancy_grid
 

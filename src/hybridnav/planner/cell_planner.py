@@ -10,7 +10,7 @@ from hybridnav.mesh import MeshSearch
 from hybridnav.planner.cell_plans import MaxDistance, OverPortals, WholeMap
 from hybridnav.planner.jump_plans import OverJumps
 from hybridnav.planner.mesh_plans import OverMesh
-from hybridnav.route import BuiltPortals
+from hybridnav.portals import BuiltPortals
 
 if TYPE_CHECKING:
     from hybridnav.config import PlannerSettings

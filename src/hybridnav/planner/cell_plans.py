@@ -14,8 +14,9 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.jumps import JumpSearch
 from hybridnav.mesh import MeshSearch
+from hybridnav.portals import BuiltPortals, PortalSearch
 from hybridnav.result import Route
-from hybridnav.route import BuiltPortals, MaxDistanceSearch, PortalSearch, corridor_of
+from hybridnav.route import MaxDistanceSearch, corridor_of
 from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph
 from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap
-from hybridnav.route._portal_kernels import centres
+from hybridnav.portals._path_kernels import centres
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress

@@ -1,18 +1,14 @@
-"""Routes over the places of the topological map, and paths over portals of other fields."""
+"""Routes over the places and the rooms of the topological map, and their corridors."""
 
 from hybridnav.route.coarse import CoarseRoute, MaxDistanceSearch
 from hybridnav.route.corridor import Corridor, corridor_of
-from hybridnav.route.portal_search import BuiltPortals, PortalAnswers, PortalSearch
 from hybridnav.route.rooms import RoomRoute, RoomSearch
 from hybridnav.route.walk import Walks
 
 __all__ = [
-    "BuiltPortals",
     "CoarseRoute",
     "Corridor",
     "MaxDistanceSearch",
-    "PortalAnswers",
-    "PortalSearch",
     "RoomRoute",
     "RoomSearch",
     "Walks",

@@ -21,10 +21,10 @@ from hybridnav.io.models.structures import (
 from hybridnav.jumps import JumpSearch
 from hybridnav.jumps.build import JumpGraph
 from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-from hybridnav.route import BuiltPortals
-from hybridnav.route._portal_kernels import Tables
+from hybridnav.portals import BuiltPortals
+from hybridnav.portals._path_kernels import Tables
+from hybridnav.portals.build import Portals
 from hybridnav.search._contract_kernels import HEAD_SHIFT
-from hybridnav.topology.portals import Portals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

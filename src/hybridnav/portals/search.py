@@ -13,20 +13,20 @@ import numpy as np
 from hybridnav._progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.route import _answer_kernels as kernels
-from hybridnav.route._portal_kernels import FAR, Tables, centres
-from hybridnav.route.any_angle_bound import AnyAngleBound
-from hybridnav.route.portal_table import build_tables
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import octile_cost
-from hybridnav.search.octile import cost_of, length_in_cells, length_of_cost
-from hybridnav.topology.portals import (
+from hybridnav.portals import _answer_kernels as kernels
+from hybridnav.portals._path_kernels import FAR, Tables, centres
+from hybridnav.portals.any_angle_bound import AnyAngleBound
+from hybridnav.portals.build import (
     PathTooLongError,
     PortalsTooLargeError,
     build_portals,
     compact_labels,
 )
+from hybridnav.portals.distances import build_tables
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._kernels import octile_cost
+from hybridnav.search.octile import cost_of, length_in_cells, length_of_cost
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
     from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.portals.any_angle_bound import Position
+    from hybridnav.portals.build import Portals
     from hybridnav.pyramid import Level
-    from hybridnav.route.any_angle_bound import Position
     from hybridnav.search.grid_search import GridSearch
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.portals import Portals
 
 Cell = tuple[int, int]
 

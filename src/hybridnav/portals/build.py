@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.portals import _gate_kernels as kernels
+from hybridnav.portals.crossings import find_crossings
+from hybridnav.portals.layout import Layout, offsets_of, starts_of
 from hybridnav.search._kernels import legal_moves
-from hybridnav.topology import _gate_kernels as kernels
-from hybridnav.topology.crossings import find_crossings
-from hybridnav.topology.portal_layout import Layout, offsets_of, starts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

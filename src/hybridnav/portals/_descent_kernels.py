@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.route._portal_kernels import FAR, costs_to_gates
+from hybridnav.portals._path_kernels import FAR, costs_to_gates
 from hybridnav.search._kernels import grow
 
 

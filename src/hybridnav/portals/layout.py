@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, IntArray, LongArray
-    from hybridnav.topology.crossings import Crossings
+    from hybridnav.portals.crossings import Crossings
 
 
 def starts_of(sorted_keys: IntArray | LongArray, count: int) -> LongArray:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.route._descent_kernels import descend, with_ends
-from hybridnav.route._portal_kernels import FAR, cells_of_way, field_at
-from hybridnav.route._side_kernels import best_gates, side_costs, ways_by_sides
+from hybridnav.portals._descent_kernels import descend, with_ends
+from hybridnav.portals._path_kernels import FAR, cells_of_way, field_at
+from hybridnav.portals._side_kernels import best_gates, side_costs, ways_by_sides
 
 
 @guarded

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.route._portal_kernels import FAR, UNREACHED, costs_to_gates, position_of
+from hybridnav.portals._path_kernels import FAR, UNREACHED, costs_to_gates, position_of
 from hybridnav.search._kernels import octile_cost
 
 

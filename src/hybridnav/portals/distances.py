@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.route import _table_kernels as kernels
-from hybridnav.route._portal_kernels import UNREACHED, Tables
-from hybridnav.route._side_kernels import entries_of
+from hybridnav.portals import _table_kernels as kernels
+from hybridnav.portals._path_kernels import UNREACHED, Tables
+from hybridnav.portals._side_kernels import entries_of
 from hybridnav.search._costs import DIAGONAL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._typing import IntArray
-    from hybridnav.topology.portals import Portals
+    from hybridnav.portals.build import Portals
 
 AT_ONCE = 256
 """So many rows are worked on together, to keep what is thrown away small."""

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav.portals._gate_kernels import LEAP
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
-from hybridnav.topology._gate_kernels import LEAP
 
 _INVERSE = DIAGONAL % STRAIGHT
 FAR = 1 << 60
