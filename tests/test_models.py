@@ -17,8 +17,7 @@ from hybridnav.grid.worlds import figure1_world
 from hybridnav.io.models import structures
 from hybridnav.jumps.build import JumpGraph
 from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-from hybridnav.portals._path_kernels import Tables
-from hybridnav.portals.build import Portals
+from hybridnav.portals import Portals, Tables
 from hybridnav.pyramid.record import Record
 from tests.strategies import Scene, examples, scenes
 from tests.test_copies import assert_alike, kernels

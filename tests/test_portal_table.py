@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav.portals import distances as portal_table
+from hybridnav.portals import PortalOptions, build_tables
 from hybridnav.portals._descent_kernels import descend
 from hybridnav.portals._path_kernels import FAR, UNREACHED
-from hybridnav.portals.distances import build_tables
 from hybridnav.search._costs import STRAIGHT
 from tests.divided import (
     GATES,
@@ -22,12 +21,11 @@ from tests.divided import (
     gate_graph,
     halves,
     partitions,
-    with_rounding,
 )
 from tests.strategies import examples
 
 if TYPE_CHECKING:
-    from hybridnav.portals.build import Portals
+    from hybridnav.portals import Portals
 
 ENOUGH = settings(max_examples=examples(40), derandomize=True, deadline=None)
 FEWER = settings(max_examples=examples(20), derandomize=True, deadline=None)
@@ -38,11 +36,10 @@ ROUNDED = st.sampled_from([0, 0, 1, 3, 9])
 def made(divided: Divided, gates: str, bits: int = 0) -> tuple[Portals, Any]:
     """Portals and their tables."""
     portals = divided.portals(gates)
-    with pytest.MonkeyPatch.context() as patch:
-        with_rounding(patch, bits)
-        if portals.n_gates % 2:  # else one part is enough for maps as small as these
-            patch.setattr(portal_table, "AT_ONCE", 1 + portals.n_gates % 19)
-        tables = build_tables(portals)
+    options = PortalOptions(dropped_bits=bits)
+    if portals.n_gates % 2:  # else one part is enough for maps as small as these
+        options = replace(options, rows_at_once=1 + portals.n_gates % 19)
+    tables = build_tables(portals, options)
     assert tables.shift == bits
     return portals, tables
 

@@ -17,8 +17,8 @@ from hybridnav.portals.build import (
     Portals,
     PortalsTooLargeError,
     build_portals,
-    compact_labels,
 )
+from hybridnav.portals.fields import compact_labels
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from tests.divided import GATES, Divided, costs_from, fields_of, halves, partitions
 from tests.strategies import drawn, examples, occupancy_grid

@@ -14,7 +14,7 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.jumps import JumpSearch
 from hybridnav.mesh import MeshSearch
-from hybridnav.portals import BuiltPortals, PortalSearch
+from hybridnav.portals import BuiltPortals, PortalSearch, prepare_portals
 from hybridnav.result import Route
 from hybridnav.route import MaxDistanceSearch, corridor_of
 from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
@@ -199,20 +199,21 @@ class OverPortals:
     @property
     def prepared(self) -> BuiltPortals | None:
         """Portals and tables, None until they are built."""
-        return self._built if self._search is None else self._search.built
+        return self._built
 
     def prepare(self, progress: Progress = no_progress) -> PortalSearch:
         """Build portals and table, once; see `CellPlanner`."""
         if self._search is None:
             with self._building:
                 if self._search is None:
-                    self._search = PortalSearch(
-                        self._topology,
-                        self._refiner.search,
-                        allow_unexplored=self._settings.allow_unexplored,
-                        built=self._built,
-                        progress=progress,
-                    )
+                    if self._built is None:
+                        self._built = prepare_portals(
+                            self._topology,
+                            allow_unexplored=self._settings.allow_unexplored,
+                            progress=progress,
+                        )
+                    frame = self._topology.grid.frame
+                    self._search = PortalSearch(self._built, self._refiner.search, frame)
         return self._search
 
     @property

@@ -6,11 +6,10 @@ where as many moves lead that way.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav.grid.centres import centres
 from hybridnav.portals._gate_kernels import LEAP
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
@@ -19,22 +18,6 @@ _INVERSE = DIAGONAL % STRAIGHT
 FAR = 1 << 60
 """More than any path costs."""
 UNREACHED = np.uint32(0xFFFFFFFF)
-
-
-class Tables(NamedTuple):
-    """What is known between sources and gates; S sources, G gates, R sides."""
-
-    route: np.ndarray
-    """uint32 (S, G), costs of shortest paths over gates without their last `shift` bits,
-    `UNREACHED` for none."""
-    between: np.ndarray
-    """uint32 (R, R), the least cost between gates of two of the R sides, likewise."""
-    shift: int
-    """0, but on maps with paths of more than 53,000 cells."""
-    gate_field: np.ndarray
-    """int32 (G,), the field of each gate."""
-    source_at: np.ndarray
-    """int32 (G,), a source at each gate, -1 for none."""
 
 
 @njit(cache=True, nogil=True)
@@ -163,15 +146,3 @@ def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
             at[i] = here + onward[i]
             i += 1
     return cells, centres(cells, frame)
-
-
-@njit(cache=True, nogil=True)
-def centres(cells, frame):
-    """Centres of (row, col) in the map frame, as `Frame.points_of` has them."""
-    resolution, origin_x, origin_y, cosine, sine = frame
-    points = np.empty((cells.shape[0], 2), np.float64)
-    for i in range(cells.shape[0]):
-        x, y = (cells[i, 1] + 0.5) * resolution, (cells[i, 0] + 0.5) * resolution
-        points[i, 0] = origin_x + cosine * x - sine * y
-        points[i, 1] = origin_y + sine * x + cosine * y
-    return points

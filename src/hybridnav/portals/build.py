@@ -16,13 +16,14 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.portals import _gate_kernels as kernels
 from hybridnav.portals.crossings import find_crossings
+from hybridnav.portals.fields import compact_labels
 from hybridnav.portals.layout import Layout, offsets_of, starts_of
 from hybridnav.search._kernels import legal_moves
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav._typing import ByteArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
 
@@ -163,39 +164,6 @@ def build_portals(  # noqa: PLR0913 - independent choices
     if layout.n_bytes > max_bytes:
         raise PortalsTooLargeError(f"portals would take {layout.n_bytes / 1e6:.0f} MB")
     return _assembled(layout, _filled(layout, moves))
-
-
-def compact_labels(
-    field_of: NDArray[np.int16 | np.int32], enterable: BoolArray
-) -> NDArray[np.int16 | np.int32]:
-    """Number the fields of the cells that may be entered from 0, in their order.
-
-    Parameters
-    ----------
-    field_of
-        int32 (rows, cols), the field of each of these cells.
-    enterable
-        bool (rows, cols).
-
-    Returns
-    -------
-    NDArray
-        (rows, cols), -1 for all other cells; int16 where that is enough.
-
-    Raises
-    ------
-    InvalidValueError
-        When a cell that may be entered is in no field.
-    """
-    if field_of.shape != enterable.shape or (field_of[enterable] < 0).any():
-        raise InvalidValueError("every cell that may be entered must be in a field")
-    is_used = np.zeros(int(field_of.max(initial=-1)) + 1, dtype=np.bool_)
-    is_used[field_of[enterable]] = True
-    number = np.cumsum(is_used) - 1
-    fits = len(is_used) == 0 or number[-1] <= np.iinfo(np.int16).max
-    label = np.full(field_of.shape, -1, dtype=np.int16 if fits else np.int32)
-    label[enterable] = number[field_of[enterable]]
-    return label
 
 
 def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:

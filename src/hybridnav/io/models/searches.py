@@ -21,9 +21,7 @@ from hybridnav.io.models.structures import (
 from hybridnav.jumps import JumpSearch
 from hybridnav.jumps.build import JumpGraph
 from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-from hybridnav.portals import BuiltPortals
-from hybridnav.portals._path_kernels import Tables
-from hybridnav.portals.build import Portals
+from hybridnav.portals import BuiltPortals, Portals, Tables
 from hybridnav.search._contract_kernels import HEAD_SHIFT
 
 if TYPE_CHECKING:
