@@ -235,7 +235,7 @@ def test_ways_too_long_for_the_table_are_rounded_only_there() -> None:
     at = step.ravel()[portals.gate_cell].astype(np.int64)
     costs = np.abs(at[portals.source_gate, None] - at) * STRAIGHT
     assert tables.shift == 2
-    assert np.array_equal(tables.route, costs >> 2)
+    assert np.array_equal(tables.distance, costs >> 2)
     along = np.argwhere(free)[np.argsort(step[free == 1])]
     for first, last in ((0, 55737), (55737, 0), (3, 53900), (1500, 1400), (999, 1000)):
         answer = judge.path(along[first], along[last])

@@ -85,13 +85,13 @@ def between_sides(portals: Portals, costs: Any) -> Any:
 def test_the_table_has_the_costs_of_shortest_paths(divided: Divided, gates: str, bits: int) -> None:
     portals, tables = made(divided, gates, bits)
     costs = costs_from(gate_graph(portals), portals.source_gate)
-    assert np.array_equal(tables.route, stored(costs, bits))
+    assert np.array_equal(tables.distance, stored(costs, bits))
     true = costs_from(divided.moves, portals.gate_cell[portals.source_gate])[:, portals.gate_cell]
     if gates == "all":
         assert np.array_equal(costs, true)
     assert (costs >= true).all()
     assert np.array_equal(np.isfinite(costs), np.isfinite(true)), "too few gates to get there"
-    assert tables.route.dtype == tables.between.dtype == np.uint32
+    assert tables.distance.dtype == tables.between.dtype == np.uint32
     assert np.array_equal(tables.gate_field, divided.label[portals.gate_cell])
     sources = np.full(portals.n_gates, -1)
     sources[portals.source_gate] = np.arange(len(portals.source_gate))
@@ -156,7 +156,7 @@ def test_ways_down_the_table_cost_what_it_says(
         lasts = [(-1, 0), *zip(others.tolist(), steps.tolist(), strict=True)]
         for gate in rng.choice(n, min(12, n), replace=False).tolist():
             last, step = lasts[rng.integers(len(lasts))]
-            way = descend(portals, tables.route, bits, tables.gate_field, gate, source, last)
+            way = descend(portals, tables, gate, source, last)
             cost = costs[source, gate] + step
             if np.isinf(cost):
                 assert way[-1] >= FAR
@@ -197,7 +197,7 @@ def test_a_little_table_is_as_counted_by_hand() -> None:
     tables = build_tables(portals)
     assert portals.gate_cell.tolist() == [0, 2, 4, 1, 3, 5]
     assert portals.source_gate.tolist() == [0, 1, 2]
-    straight = (tables.route // STRAIGHT).tolist()
+    straight = (tables.distance // STRAIGHT).tolist()
     assert straight == [[0, 1, 2, 1, 1, 2], [1, 0, 1, 1, 1, 1], [2, 1, 0, 2, 1, 1]]
     # One side each. From the left one: at the left it stays, to the right it takes a step; and
     # from the right one a step to the left, from where another leads back.
@@ -208,4 +208,4 @@ def test_a_map_without_gates_has_empty_tables() -> None:
     one_field = Divided(halves(3, 3, 3).grid, np.zeros((3, 3), dtype=np.int32))
     for gates in GATES:
         tables = build_tables(one_field.portals(gates))
-        assert tables.route.shape == tables.between.shape == (0, 0)
+        assert tables.distance.shape == tables.between.shape == (0, 0)

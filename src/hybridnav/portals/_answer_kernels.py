@@ -58,9 +58,7 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     lower = min(least, upper)
     if gate < 0:
         return inside, lower, walked, cells, points
-    out, into, legs, crossings = descend(
-        portals, tables.route, tables.shift, gate_field, gate, source, across
-    )
+    out, into, legs, crossings = descend(portals, tables, gate, source, across)
     cost = with_ends(portals, gate_field, cols, start, goal, out, into, legs, crossings)
     if cost >= inside:
         return inside, lower, walked, cells, points

@@ -54,9 +54,9 @@ class Portals(NamedTuple):
     gate_start: LongArray
     gate_cell: IntArray
     """int32 (G,), flat cell of each gate."""
-    row_start: LongArray
-    """int64 (G + 1,), first byte of each gate's row of `rows`."""
-    rows: ByteArray
+    first_move_start: LongArray
+    """int64 (G + 1,), first byte of each gate's row of `first_move`."""
+    first_move: ByteArray
     """uint8, for each cell of the gate's field four bits: direction of the path to the gate, 8 more
     where its next eight moves are that way; anything at the gate itself."""
     clique_start: LongArray
@@ -73,11 +73,11 @@ class Portals(NamedTuple):
     """int64 (R + 1,), where the gates of each side begin."""
     side_gates: IntArray
     """int32, the gates from which moves of the side's portal lead to gates."""
-    steps_start: LongArray
-    """int64 (F + 1,), where the rows of `steps` begin, one a cell, one column a side."""
-    steps_shift: LongArray
-    """int64 (F,), bits that `steps` lack."""
-    steps: NDArray[np.uint16]
+    side_cost_start: LongArray
+    """int64 (F + 1,), where the rows of `side_cost` begin, one a cell, one column a side."""
+    side_cost_shift: LongArray
+    """int64 (F,), bits that `side_cost` lacks."""
+    side_cost: NDArray[np.uint16]
     """uint16, costs from each cell to the nearest gate of its field's sides, rounded down to so
     many bits."""
     source_gate: IntArray
@@ -170,10 +170,10 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
     """The arrays that need searches inside the fields, field by field."""
     sizes, gate_start = np.diff(layout.field_start), layout.gate_start
     clique_start = offsets_of(np.diff(gate_start) ** 2)
-    steps_start = offsets_of(sizes * np.diff(layout.side_start))
-    rows = np.empty(layout.row_start[-1], dtype=np.uint8)
+    side_cost_start = offsets_of(sizes * np.diff(layout.side_start))
+    first_move = np.empty(layout.first_move_start[-1], dtype=np.uint8)
     clique = np.empty(clique_start[-1], dtype=np.int32)
-    steps = np.empty(steps_start[-1], dtype=np.uint16)
+    side_cost = np.empty(side_cost_start[-1], dtype=np.uint16)
     shift = np.zeros(layout.n_fields, dtype=np.int64)
     busy = np.flatnonzero(np.diff(gate_start))
     largest = int(sizes[busy].max(initial=0))
@@ -197,11 +197,13 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
             leaps,
             last - first,
             index[layout.gate_cell[gates]] - first,
-            rows[slice(*layout.row_start[[gates.start, gates.stop]])].reshape(n_gates, -1),
+            first_move[slice(*layout.first_move_start[[gates.start, gates.stop]])].reshape(
+                n_gates, -1
+            ),
             clique[clique_start[f] : clique_start[f + 1]].reshape(n_gates, n_gates),
             starts_of(members[order], n_gates),
             side,
-            steps[steps_start[f] : steps_start[f + 1]].reshape(last - first, -1),
+            side_cost[side_cost_start[f] : side_cost_start[f + 1]].reshape(last - first, -1),
             scratch,
         )
         if shift[f] < 0:
@@ -209,12 +211,12 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
                 "a field is not connected, or a path inside it may be longer than 6,600 cells"
             )
     return {
-        "rows": rows,
+        "first_move": first_move,
         "clique_start": clique_start,
         "clique": clique,
-        "steps_start": steps_start,
-        "steps_shift": shift,
-        "steps": steps,
+        "side_cost_start": side_cost_start,
+        "side_cost_shift": shift,
+        "side_cost": side_cost,
     }
 
 
@@ -247,7 +249,7 @@ def _assembled(layout: Layout, filled: dict[str, NDArray[Any]]) -> Portals:
         field_start=layout.field_start,
         gate_start=layout.gate_start,
         gate_cell=layout.gate_cell.astype(np.int32),
-        row_start=layout.row_start,
+        first_move_start=layout.first_move_start,
         exit_start=starts_of(tail[order], len(layout.gate_cell)),
         exit_gate=head[order],
         exit_cost=np.tile(crossings.cost, 2)[order],

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class Tables(NamedTuple):
     """What is known between sources and gates; S sources, G gates, R sides."""
 
-    route: np.ndarray
+    distance: np.ndarray
     """uint32 (S, G), costs of shortest paths over gates without their last `shift` bits,
     `UNREACHED` for none."""
     between: np.ndarray
@@ -55,9 +55,9 @@ def build_tables(portals: Portals, options: PortalOptions = DEFAULT_OPTIONS) -> 
     source_at[portals.source_gate] = np.arange(len(portals.source_gate))
     shift = options.dropped_bits
     while True:
-        route, between, greatest = _tables(portals, source_at, shift, options.rows_at_once)
+        distance, between, greatest = _tables(portals, source_at, shift, options.rows_at_once)
         if greatest + DIAGONAL >> shift < UNREACHED:
-            return Tables(route, between, shift, portals.gate_field, source_at)
+            return Tables(distance, between, shift, portals.gate_field, source_at)
         shift = greatest.bit_length() - 31
 
 
