@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,13 +11,12 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.planner.cell_plans import OverPortals
-from hybridnav.route import portal_search
+from hybridnav.portals import PortalOptions, PortalSearch
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
+from tests.portal_memory import shared_portals
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from tests.strategies import Scene
 
 Cell = tuple[int, int]
@@ -35,21 +33,28 @@ CHOICES = [
 DIRECTIONS = tuple(move for move in itertools.product((-1, 0, 1), repeat=2) if move != (0, 0))
 
 
-def planners_of(topology: hn.TopologicalMap, *overrides: str) -> list[hn.HybridPlanner]:
-    """A planner for each of the choices.
+def planners_of(
+    topology: hn.TopologicalMap, *overrides: str, options: PortalOptions | None = None
+) -> list[hn.HybridPlanner]:
+    """Return a planner for each of the choices.
 
     Where corners may be cut, paths go where the places have no arcs (`OccupancyGrid` says so): what
     the paper's rule cannot reach there is left out, and tested by itself.
     """
     choices = CHOICES[1:] if topology.grid.corner_cutting else CHOICES
     presets = [hn.load_preset(name, overrides=[*own, *overrides]) for name, own in choices]
-    planners = [hn.HybridPlanner(topology, preset=preset) for preset in presets]
-    for planner in planners:
-        planner.prepare()  # now, while what a test has patched is patched
-    return planners
+    built = shared_portals(
+        topology,
+        allow_unexplored=presets[0].planner.allow_unexplored,
+        options=options or PortalOptions(),
+    )
+    return [
+        hn.HybridPlanner(topology, preset=preset, prepared=built if name == "portals" else None)
+        for (name, _), preset in zip(choices, presets, strict=True)
+    ]
 
 
-def search_of(planner: hn.HybridPlanner) -> portal_search.PortalSearch:
+def search_of(planner: hn.HybridPlanner) -> PortalSearch:
     """The search behind a preset that routes over portals."""
     assert isinstance(planner._cells, OverPortals)
     return planner._cells.search
@@ -147,13 +152,13 @@ def built(scene: Scene, *, corner_cutting: bool = False) -> hn.TopologicalMap:
     return hn.TopologicalMap(pyramid)
 
 
-@contextmanager
-def portals_every(spacing_cells: int | None) -> Iterator[None]:
-    """Portals as sparse as an open floor gets them, on a map of any size; None for all of them."""
-    with pytest.MonkeyPatch.context() as patch:
-        if spacing_cells is not None:
-            patch.setattr(portal_search, "MAX_BYTES_PER_CELL", -1)
-            patch.setattr(portal_search, "LEAST_BYTES", -1)
-            patch.setattr(portal_search, "MAX_SPARSE_BYTES_PER_CELL", 1 << 40)
-            patch.setattr(portal_search, "SPARSE_SPACINGS", (spacing_cells,))
-        yield
+def portals_every(spacing_cells: int | None) -> PortalOptions:
+    """Return options for portals as sparse as an open floor gets them, on a map of any size; None
+    for gates everywhere."""
+    if spacing_cells is None:
+        return PortalOptions()
+    return PortalOptions(
+        all_gates_levels=0,
+        sparse_spacings_cells=(spacing_cells,),
+        most_sparse_bytes_per_cell=math.inf,
+    )

@@ -13,18 +13,15 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from hybridnav.grid import CellClass
-from hybridnav.route import portal_table
+from hybridnav.portals import build_portals
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.topology.portals import build_portals
 from tests.oracle.grid import move_graph
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid, scenes
 from tests.test_search import block_labels
 
 if TYPE_CHECKING:
-    import pytest
-
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.topology.portals import Portals
+    from hybridnav.portals import Portals
 
 SIDE = min(MAX_SIDE, 20)
 KINDS = ("pyramid", "pieces", "pieces", "stairs", "grown", "grown", "one", "cells")
@@ -96,9 +93,9 @@ class Divided:
         """Fields of the cells that may be entered."""
         return int(self.label.max(initial=-1)) + 1
 
-    def portals(self, gates: str = "all", **options: Any) -> Portals:
-        """What is tested."""
-        spacing, sparse = self.spacings
+    def portals(self, gates: str = "all", *, least_spacing: int = 1, **options: Any) -> Portals:
+        """What is tested; sparse gates at least so many cells apart."""
+        spacing, sparse = self.spacings[0], max(self.spacings[1], least_spacing)
         spacings = {"spacing_cells": spacing, "gate_spacing_cells": 1}
         if gates == "sparse":
             spacings = dict.fromkeys(spacings, sparse)
@@ -130,17 +127,6 @@ def gate_graph(portals: Portals) -> Any:
     pairs = [itertools.product(range(a, b), repeat=2) for a, b in itertools.pairwise(starts)]
     ends = np.array([*itertools.chain(*pairs)], dtype=np.int64).reshape(-1, 2).T
     return (graph + sparse.coo_array((portals.clique.astype(float), (*ends,)), (n, n))).tocsr()
-
-
-def with_rounding(patch: pytest.MonkeyPatch, bits: int) -> None:
-    """Have tables made as if the longest path took so many bits more than there are; 0 for none."""
-    exact = portal_table._tables
-
-    def long(*given: Any) -> Any:
-        route, between, greatest = exact(*given)
-        return route, between, max(greatest, (1 << 31 + bits) - 1 if bits else 0)
-
-    patch.setattr(portal_table, "_tables", long)
 
 
 def pieces_of(divided: Divided) -> Any:

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from scipy import sparse
 
-from hybridnav.route import portal_search
-from hybridnav.route.portal_search import PortalSearch
+from hybridnav.portals import BuiltPortals, PortalOptions, PortalSearch, build_tables
+from hybridnav.portals.fields import compact_labels
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search.grid_search import GridSearch
-from tests.divided import Divided, costs_from, with_rounding
+from tests.divided import Divided, costs_from
 from tests.oracle.grid import assert_legal, centre, moves, recounted
+from tests.portal_memory import shared_portals
 
 if TYPE_CHECKING:
-    from hybridnav.route.portal_search import PortalAnswer
+    from hybridnav.portals.search import PortalAnswer
     from hybridnav.topology import TopologicalMap
 
 EPSILONS = (0.0, 0.0, 0.01, 0.1, 1.0)
@@ -46,43 +45,30 @@ class Judge:
 
     def __init__(self, divided: Divided, gates: str = "all", *, bits: int | None = 0) -> None:
         """Route on the very fields of a partition, with its spacings."""
-        level = SimpleNamespace(field_of=divided.field_of)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(portal_search, "_routing_levels", lambda _: iter([level]))
-            patch.setattr(portal_search, "SPACING", divided.spacings[0])
-            limit = -1 if gates == "sparse" else math.inf
-            patch.setattr(portal_search, "LEAST_BYTES", limit)
-            if gates == "sparse":
-                patch.setattr(portal_search, "SPARSE_SPACINGS", (max(divided.spacings[1], 2),))
-                patch.setattr(portal_search, "MAX_BYTES_PER_CELL", limit)
-                patch.setattr(portal_search, "MAX_SPARSE_BYTES_PER_CELL", math.inf)
-            if bits is not None:
-                with_rounding(patch, bits)
-            self._set(divided, SimpleNamespace(grid=divided.grid), gates)
+        portals = divided.portals(gates, least_spacing=2)
+        tables = build_tables(portals, PortalOptions(dropped_bits=bits or 0))
+        field_of = compact_labels(divided.field_of, divided.free)
+        self._set(divided, BuiltPortals(field_of, portals, tables, gates == "all"))
         assert bits in {None, self.search.tables.shift}
 
     @classmethod
     def of(cls, topology: TopologicalMap, gates: str = "all") -> Judge:
         """Route on the fields that the search itself chooses."""
         judge = cls.__new__(cls)
-        with pytest.MonkeyPatch.context() as patch:
-            if gates == "sparse":
-                patch.setattr(portal_search, "LEAST_BYTES", 0)
-                patch.setattr(portal_search, "MAX_BYTES_PER_CELL", 0)
-            judge._set(Divided(topology.grid, topology.level.field_of), topology, gates)
-        judge.divided = replace(judge.divided, field_of=judge.search._field_of)
-        judge.label = judge.search._field_of
+        options = PortalOptions(all_gates_levels=0, least_bytes=0)
+        chosen = {"options": options} if gates == "sparse" else {}
+        built = shared_portals(topology, **chosen)
+        judge._set(Divided(topology.grid, built.field_of), built)
+        assert judge.search.is_exact == (gates == "all")
         return judge
 
-    def _set(self, divided: Divided, topology: Any, gates: str) -> None:
+    def _set(self, divided: Divided, built: BuiltPortals) -> None:
         self.divided = divided
-        corners, entered = divided.grid.corner_cutting, divided.allow_unexplored
-        self.cell_search = GridSearch(divided.free, corner_cutting=corners)
-        self.search = PortalSearch(topology, self.cell_search, allow_unexplored=entered)
-        assert self.search.is_exact == (gates == "all")
+        self.cell_search = GridSearch(divided.free, corner_cutting=divided.grid.corner_cutting)
+        self.search = PortalSearch(built, self.cell_search, divided.grid.frame)
         self.is_rounded = self.search.tables.shift > 0
         self.free = np.argwhere(divided.free)
-        self.label = divided.label.reshape(divided.grid.shape).astype(np.int32)
+        self.label = built.field_of
 
     @property
     def gate_moves(self) -> Any:

@@ -6,27 +6,21 @@ import hashlib
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.route import portal_search
-from hybridnav.route.portal_table import build_tables
-from hybridnav.topology import TopologicalMap
+from hybridnav._progress import no_progress
+from hybridnav.planner import cell_plans
+from hybridnav.portals import BuiltPortals, PortalOptions, prepare_portals
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
+
+    from hybridnav.topology import TopologicalMap
 
 LEAST_CELLS = 20_000
 """Smaller maps are prepared anew each time, as users do."""
 MOST = 4
 """As many maps and settings are kept: the portals of the office weigh 100 MB."""
 
-_SETTINGS = (
-    "SPACING",
-    "SPARSE_SPACINGS",
-    "ALL_GATES_LEVELS",
-    "MAX_BYTES_PER_CELL",
-    "MAX_SPARSE_BYTES_PER_CELL",
-    "LEAST_BYTES",
-    "LEAST_FIELDS",
-)
+_KEPT: OrderedDict[Hashable, BuiltPortals] = OrderedDict()
 
 
 def remember_portals(replace: Callable[[object, str, object], None]) -> None:
@@ -34,29 +28,32 @@ def remember_portals(replace: Callable[[object, str, object], None]) -> None:
 
     `replace` is `setattr`, or that of a patch.
     """
-    find_portals = portal_search._portals_of
-    portals_of: OrderedDict[Hashable, Any] = OrderedDict()
-    tables_of: OrderedDict[Hashable, Any] = OrderedDict()
-
-    def found(topology: TopologicalMap, *choices: Any) -> Any:
-        is_map = isinstance(topology, TopologicalMap)  # and nothing that stands for one
-        if not is_map or topology.grid.classes.size < LEAST_CELLS:
-            return find_portals(topology, *choices)
-        key = _key_of(topology, *choices[1:])
-        return _kept(portals_of, key, lambda: find_portals(topology, *choices))
-
-    def built(portals: Any) -> Any:
-        if not any(portals is kept[1] for kept in portals_of.values()):
-            return build_tables(portals)
-        # The portals stay in the record, so that no others get their id.
-        return _kept(tables_of, id(portals), lambda: (portals, build_tables(portals)))[1]
-
-    replace(portal_search, "_portals_of", found)
-    replace(portal_search, "build_tables", built)
+    replace(cell_plans, "prepare_portals", shared_portals)
 
 
-def _key_of(topology: TopologicalMap, *choices: Any) -> Hashable:
-    """Return all that portals depend on: the cells, and every setting of their search."""
+def shared_portals(topology: TopologicalMap, **choices: Any) -> BuiltPortals:
+    """Return what `prepare_portals` returns, of large maps the same object each time."""
+    if topology.grid.classes.size < LEAST_CELLS:
+        return prepare_portals(topology, **choices)
+    progress = choices.pop("progress", no_progress)
+    key = _key_of(topology, **choices)
+    if key not in _KEPT:
+        _KEPT[key] = prepare_portals(topology, **choices)
+    _KEPT.move_to_end(key)
+    while len(_KEPT) > MOST:
+        _KEPT.popitem(last=False)
+    progress(1, 2)
+    progress(2, 2)
+    return _KEPT[key]
+
+
+def _key_of(
+    topology: TopologicalMap,
+    *,
+    allow_unexplored: bool = False,
+    options: PortalOptions | None = None,
+) -> Hashable:
+    """Return all that portals depend on: the cells, and every setting."""
     grid, pyramid = topology.grid, topology.pyramid
     return (
         hashlib.blake2b(grid.classes.tobytes()).digest(),
@@ -65,15 +62,6 @@ def _key_of(topology: TopologicalMap, *choices: Any) -> Hashable:
         grid.corner_cutting,
         pyramid.merge_distance_m,
         pyramid.seed,
-        *choices,
-        *(getattr(portal_search, name) for name in _SETTINGS),
+        allow_unexplored,
+        options or PortalOptions(),
     )
-
-
-def _kept(record: OrderedDict[Hashable, Any], key: Hashable, make: Callable[[], Any]) -> Any:
-    if key not in record:
-        record[key] = make()
-    record.move_to_end(key)
-    while len(record) > MOST:
-        record.popitem(last=False)
-    return record[key]

@@ -5,6 +5,7 @@ import gc
 import math
 import weakref
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,9 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.grid import CellClass
+from hybridnav.homotopy import AlternativeSearch, alternative_search
 from hybridnav.metrics import judge_path
-from hybridnav.route import Walks, alternatives
-from hybridnav.route.alternatives import AlternativeSearch, alternative_search
+from hybridnav.route import Walks
 from tests.rays import Rays
 from tests.strategies import class_grids, drawn, occupancy_grid
 from tests.test_cli import cli  # noqa: F401 - the fixture
@@ -80,7 +81,7 @@ def test_counts_out_of_range_are_refused(count):
         hn.plan_alternatives(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), count)
 
 
-def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path(monkeypatch):
+def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path():
     ends = (1.5, 1.5), (12.5, 6.5)
     planner = planner_of(TWO_DOORS, "paper", merge_distance_m=6.0)
     optimum = planner_of(TWO_DOORS).plan(*ends).cost
@@ -88,12 +89,21 @@ def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path(monkeypa
     assert whole.complete
     assert len(whole) == 2
     for room in (1, 20, 100):
-        monkeypatch.setattr(alternatives, "MOST_STATES", room)
-        found = hn.plan_alternatives(planner, *ends, 3)
+        found = hn.plan_alternatives(planner, *ends, 3, most_states=room)
         assert not found.complete
         assert found[0].path.length_m == pytest.approx(optimum)
         assert [other.word for other in found] == [other.word for other in whole][: len(found)]
-    assert hn.plan_alternatives(planner, *ends, 1).complete
+    assert hn.plan_alternatives(planner, *ends, 1, most_states=100).complete
+
+
+@pytest.mark.parametrize("most_states", [0, -1, 1 << 27])
+def test_a_search_of_no_or_too_many_states_is_refused(most_states):
+    with pytest.raises(
+        hn.InvalidValueError, match=r"expected a number from 1 to \d+: leave it out"
+    ):
+        hn.plan_alternatives(
+            planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 2, most_states=most_states
+        )
 
 
 def test_the_search_on_a_map_is_kept_while_the_map_is():
@@ -134,16 +144,13 @@ def test_no_route_goes_into_a_room_round_a_table_and_out_again():
     assert len(inside) == 2
 
 
-def test_between_points_of_a_room_with_one_door_the_search_soon_knows_that_there_is_no_more(
-    monkeypatch,
-):
+def test_between_points_of_a_room_with_one_door_the_search_soon_knows_that_there_is_no_more():
     """Beyond the door are a hundred pillars; the paths round them would take hours to list."""
     classes = np.ones((31, 45), np.uint8)
     classes[2:30:3, 15:44:3] = 0
     classes[:, 12] = 0
     classes[15, 12] = 1
-    monkeypatch.setattr(alternatives, "MOST_STATES", 5000)
-    found = AlternativeSearch(topology_of(classes)).paths((3, 2), (28, 9), 3)
+    found = AlternativeSearch(topology_of(classes)).paths((3, 2), (28, 9), 3, most_states=5000)
     assert found.complete
     assert len(found.paths) == 1
 
@@ -333,6 +340,7 @@ def test_the_command_line_tells_no_more_from_gave_up(cli, two_doors_file, monkey
     query = ("plan", two_doors_file, *ends, "--robot-radius", "0", "--alternatives", "3")
     assert "gave up" not in cli(*query).out
     assert cli(*query, "--json").answer["alternatives_complete"] is True
-    monkeypatch.setattr(alternatives, "MOST_STATES", 100)
+    impatient = partial(hn.plan_alternatives, most_states=100)
+    monkeypatch.setattr("hybridnav.planner.alternatives.plan_alternatives", impatient)
     assert "routes     the search gave up: there may be more\n" in cli(*query).out
     assert cli(*query, "--json").answer["alternatives_complete"] is False

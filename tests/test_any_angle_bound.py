@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.grid.worlds import office_world
 from hybridnav.metrics import VisibilityGraph
-from hybridnav.route.any_angle_bound import AnyAngleBound
+from hybridnav.portals.any_angle_bound import AnyAngleBound
 from tests.divided import Divided, halves, partitions
 from tests.strategies import examples
 

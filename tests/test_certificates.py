@@ -67,8 +67,7 @@ def test_bounds_hold_with_sparse_portals(
     spacing: int,
 ) -> None:
     topology = built(scene, corner_cutting=corner_cutting)
-    with portals_every(spacing):
-        planners = planners_of(topology)
+    planners = planners_of(topology, options=portals_every(spacing))
     searches = [search_of(p) for p in planners if p.preset.planner.coarse == "portals"]
     assert len(searches) == 3
     assert not any(search.is_exact for search in searches)
@@ -136,8 +135,7 @@ def test_bounds_hold_for_all_pairs(name: str, corner_cutting: bool, spacing: int
     for distance_m in (1.5, 4.0):
         scene = Scene(DRAWINGS[name], 1.0, distance_m, 0)
         topology = built(scene, corner_cutting=corner_cutting)
-        with portals_every(spacing):
-            planners = planners_of(topology)[-5:]
+        planners = planners_of(topology, options=portals_every(spacing))[-5:]
         cells = [tuple(cell) for cell in np.argwhere(topology.grid.enterable()).tolist()]
         # A step that no row of pairs is a multiple of: each cell comes up as a start and a goal.
         pairs = list(itertools.product(cells, cells))[:: max(1, len(cells) ** 2 // 150) | 1]
@@ -147,7 +145,7 @@ def test_bounds_hold_for_all_pairs(name: str, corner_cutting: bool, spacing: int
 def test_bounds_hold_inside_fields_across_borders_and_where_fields_only_touch() -> None:
     topology = built(Scene(np.ones((24, 24), dtype=np.uint8), 1.0, 1.5, 1))
     planners = planners_of(topology)
-    field_of = search_of(planners[-1])._field_of
+    field_of = search_of(planners[-1]).field_of
     borders = {
         frozenset(pair)
         for first, second in ((field_of[1:], field_of[:-1]), (field_of[:, 1:], field_of[:, :-1]))
@@ -174,8 +172,7 @@ def test_bounds_hold_inside_fields_across_borders_and_where_fields_only_touch() 
 def test_a_cell_and_itself_have_no_gap(spacing: int | None) -> None:
     for classes in DRAWINGS.values():
         topology = built(Scene(classes, 0.05, 0.15, 0))
-        with portals_every(spacing):
-            planners = planners_of(topology)
+        planners = planners_of(topology, options=portals_every(spacing))
         for planner in planners:
             for cell in np.argwhere(topology.grid.enterable()).tolist()[::5]:
                 result = check_plan(planner, cell, cell, 0.0)

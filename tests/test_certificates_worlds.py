@@ -47,8 +47,7 @@ def test_bounds_hold_on_an_open_floor(spacing: int | None) -> None:
     classes = np.ones((260, 300), dtype=np.uint8)
     classes[60:64, 40:260] = classes[130:200, 150:152] = 0
     topology = built(Scene(classes, 0.05, 2.0, 0))
-    with portals_every(spacing):
-        planners = planners_of(topology)
+    planners = planners_of(topology, options=portals_every(spacing))
     pairs = random_pairs(topology.grid.enterable(), np.random.default_rng(1), 40)
     check_pairs(planners, pairs, by_scipy=False)
 
@@ -73,8 +72,7 @@ def test_bounds_hold_in_the_office(office: list[hn.HybridPlanner]) -> None:
 
 def test_bounds_hold_in_the_office_with_sparse_portals(office: list[hn.HybridPlanner]) -> None:
     topology = office[0].topology
-    with portals_every(32):
-        planners = planners_of(topology)
+    planners = planners_of(topology, options=portals_every(32))
     check_pairs(planners, pairs_of(topology.grid, 120, 6), by_scipy=False)
 
 

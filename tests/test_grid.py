@@ -10,6 +10,7 @@ from hypothesis.extra import numpy as hnp
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import MAX_CELLS, CellClass, Frame, OccupancyGrid
+from hybridnav.grid.centres import centres
 from hybridnav.grid.clearance import within_radius
 
 FREE, OCCUPIED, UNEXPLORED = CellClass.FREE, CellClass.OCCUPIED, CellClass.UNEXPLORED
@@ -36,6 +37,12 @@ cells = hnp.arrays(
 @example(Frame(0.05, (-12.5, -12.5), 0.0), np.array([[0, 0], [499, 499]]))
 def test_a_cell_holds_its_own_centre(frame, cells):
     np.testing.assert_array_equal(frame.cells_of(frame.points_of(cells)), cells)
+
+
+@given(frames, cells)
+def test_compiled_centres_are_those_of_the_frame(frame, cells):
+    found = centres(cells, frame.for_kernels)
+    np.testing.assert_allclose(found, frame.points_of(cells), rtol=1e-14, atol=1e-9)
 
 
 @given(frames, cells, st.floats(0.001, 0.999), st.floats(0.001, 0.999))

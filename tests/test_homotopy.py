@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.homotopy.classes import HomotopyClasses, inverse, product
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.topology.homotopy import HomotopyClasses, inverse, product
 from tests.rays import Rays, holes_of
 from tests.strategies import class_grids, drawn, occupancy_grid
 

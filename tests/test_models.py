@@ -17,9 +17,8 @@ from hybridnav.grid.worlds import figure1_world
 from hybridnav.io.models import structures
 from hybridnav.jumps.build import JumpGraph
 from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
+from hybridnav.portals import Portals, Tables
 from hybridnav.pyramid.record import Record
-from hybridnav.route._portal_kernels import Tables
-from hybridnav.topology.portals import Portals
 from tests.strategies import Scene, examples, scenes
 from tests.test_copies import assert_alike, kernels
 

@@ -12,10 +12,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.grid.worlds import figure1_world, office_world
+from hybridnav.portals import PortalSearch, prepare_portals
+from hybridnav.portals._path_kernels import FAR
+from hybridnav.portals._side_kernels import side_costs, ways_by_sides
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.route._portal_kernels import FAR
-from hybridnav.route._side_kernels import side_costs, ways_by_sides
-from hybridnav.route.portal_search import PortalSearch
 from hybridnav.search._costs import STRAIGHT
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
@@ -215,8 +215,9 @@ def test_an_answer_depends_on_its_query_only(divided: Divided, gates: str, seed:
 def test_open_floors_find_a_level_whatever_the_merge_distance(merge_distance: float) -> None:
     grid = occupancy_grid(drawn(*["." * 300] * 300))
     pyramid = DualGraphPyramid.build(grid, merge_distance_m=merge_distance)
-    search = GridSearch(grid.enterable())
-    found = PortalSearch(TopologicalMap(pyramid), search).path((3, 3), (290, 200))
+    built = prepare_portals(TopologicalMap(pyramid))
+    search = PortalSearch(built, GridSearch(grid.enterable()), grid.frame)
+    found = search.path((3, 3), (290, 200))
     assert found.cells is not None
     assert len(found.cells) == 288
 
@@ -234,7 +235,7 @@ def test_ways_too_long_for_the_table_are_rounded_only_there() -> None:
     at = step.ravel()[portals.gate_cell].astype(np.int64)
     costs = np.abs(at[portals.source_gate, None] - at) * STRAIGHT
     assert tables.shift == 2
-    assert np.array_equal(tables.route, costs >> 2)
+    assert np.array_equal(tables.distance, costs >> 2)
     along = np.argwhere(free)[np.argsort(step[free == 1])]
     for first, last in ((0, 55737), (55737, 0), (3, 53900), (1500, 1400), (999, 1000)):
         answer = judge.path(along[first], along[last])

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav.route import portal_table
-from hybridnav.route._descent_kernels import descend
-from hybridnav.route._portal_kernels import FAR, UNREACHED
-from hybridnav.route.portal_table import build_tables
+from hybridnav.portals import PortalOptions, build_tables
+from hybridnav.portals._descent_kernels import descend
+from hybridnav.portals._path_kernels import FAR, UNREACHED
 from hybridnav.search._costs import STRAIGHT
 from tests.divided import (
     GATES,
@@ -22,12 +21,11 @@ from tests.divided import (
     gate_graph,
     halves,
     partitions,
-    with_rounding,
 )
 from tests.strategies import examples
 
 if TYPE_CHECKING:
-    from hybridnav.topology.portals import Portals
+    from hybridnav.portals import Portals
 
 ENOUGH = settings(max_examples=examples(40), derandomize=True, deadline=None)
 FEWER = settings(max_examples=examples(20), derandomize=True, deadline=None)
@@ -38,11 +36,10 @@ ROUNDED = st.sampled_from([0, 0, 1, 3, 9])
 def made(divided: Divided, gates: str, bits: int = 0) -> tuple[Portals, Any]:
     """Portals and their tables."""
     portals = divided.portals(gates)
-    with pytest.MonkeyPatch.context() as patch:
-        with_rounding(patch, bits)
-        if portals.n_gates % 2:  # else one part is enough for maps as small as these
-            patch.setattr(portal_table, "AT_ONCE", 1 + portals.n_gates % 19)
-        tables = build_tables(portals)
+    options = PortalOptions(dropped_bits=bits)
+    if portals.n_gates % 2:  # else one part is enough for maps as small as these
+        options = replace(options, rows_at_once=1 + portals.n_gates % 19)
+    tables = build_tables(portals, options)
     assert tables.shift == bits
     return portals, tables
 
@@ -88,13 +85,13 @@ def between_sides(portals: Portals, costs: Any) -> Any:
 def test_the_table_has_the_costs_of_shortest_paths(divided: Divided, gates: str, bits: int) -> None:
     portals, tables = made(divided, gates, bits)
     costs = costs_from(gate_graph(portals), portals.source_gate)
-    assert np.array_equal(tables.route, stored(costs, bits))
+    assert np.array_equal(tables.distance, stored(costs, bits))
     true = costs_from(divided.moves, portals.gate_cell[portals.source_gate])[:, portals.gate_cell]
     if gates == "all":
         assert np.array_equal(costs, true)
     assert (costs >= true).all()
     assert np.array_equal(np.isfinite(costs), np.isfinite(true)), "too few gates to get there"
-    assert tables.route.dtype == tables.between.dtype == np.uint32
+    assert tables.distance.dtype == tables.between.dtype == np.uint32
     assert np.array_equal(tables.gate_field, divided.label[portals.gate_cell])
     sources = np.full(portals.n_gates, -1)
     sources[portals.source_gate] = np.arange(len(portals.source_gate))
@@ -159,7 +156,7 @@ def test_ways_down_the_table_cost_what_it_says(
         lasts = [(-1, 0), *zip(others.tolist(), steps.tolist(), strict=True)]
         for gate in rng.choice(n, min(12, n), replace=False).tolist():
             last, step = lasts[rng.integers(len(lasts))]
-            way = descend(portals, tables.route, bits, tables.gate_field, gate, source, last)
+            way = descend(portals, tables, gate, source, last)
             cost = costs[source, gate] + step
             if np.isinf(cost):
                 assert way[-1] >= FAR
@@ -200,7 +197,7 @@ def test_a_little_table_is_as_counted_by_hand() -> None:
     tables = build_tables(portals)
     assert portals.gate_cell.tolist() == [0, 2, 4, 1, 3, 5]
     assert portals.source_gate.tolist() == [0, 1, 2]
-    straight = (tables.route // STRAIGHT).tolist()
+    straight = (tables.distance // STRAIGHT).tolist()
     assert straight == [[0, 1, 2, 1, 1, 2], [1, 0, 1, 1, 1, 1], [2, 1, 0, 2, 1, 1]]
     # One side each. From the left one: at the left it stays, to the right it takes a step; and
     # from the right one a step to the left, from where another leads back.
@@ -211,4 +208,4 @@ def test_a_map_without_gates_has_empty_tables() -> None:
     one_field = Divided(halves(3, 3, 3).grid, np.zeros((3, 3), dtype=np.int32))
     for gates in GATES:
         tables = build_tables(one_field.portals(gates))
-        assert tables.route.shape == tables.between.shape == (0, 0)
+        assert tables.distance.shape == tables.between.shape == (0, 0)

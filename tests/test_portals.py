@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.topology.portals import (
+from hybridnav.portals.build import (
     PathTooLongError,
     Portals,
     PortalsTooLargeError,
     build_portals,
-    compact_labels,
 )
+from hybridnav.portals.fields import compact_labels
+from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from tests.divided import GATES, Divided, costs_from, fields_of, halves, partitions
 from tests.strategies import drawn, examples, occupancy_grid
 
@@ -152,7 +152,9 @@ def test_paths_inside_fields_are_those_that_dijkstra_finds(divided: Divided, gat
         cells = np.flatnonzero(label == field)
         place = positions[cells] - portals.field_start[field]
         assert np.array_equal(np.sort(place), np.arange(len(cells)))
-        row = portals.rows[portals.row_start[gate] : portals.row_start[gate + 1]]
+        row = portals.first_move[
+            portals.first_move_start[gate] : portals.first_move_start[gate + 1]
+        ]
         assert len(row) == -(-len(cells) // 2)
         code = row[place // 2] >> place % 2 * 4 & 15
         away = cells != portals.gate_cell[gate]
@@ -195,12 +197,12 @@ def test_steps_lead_to_the_nearest_gate_of_each_side(divided: Divided, gates: st
     for f in range(portals.n_fields):
         cells = np.flatnonzero(label == f)
         sides = range(portals.side_start[f], portals.side_start[f + 1])
-        stored = portals.steps[portals.steps_start[f] : portals.steps_start[f + 1]]
+        stored = portals.side_cost[portals.side_cost_start[f] : portals.side_cost_start[f + 1]]
         stored = stored.reshape(len(cells), len(sides))
         place = position_of(portals, cells, cols) - portals.field_start[f]
         for column, side in zip(stored[place].T, sides, strict=True):
             nearest = exact[portals.side_gates[starts[side] : starts[side + 1]]].min(axis=0)
-            rounded = nearest[cells].astype(np.int64) >> portals.steps_shift[f]
+            rounded = nearest[cells].astype(np.int64) >> portals.side_cost_shift[f]
             assert np.array_equal(column, rounded)
 
 
@@ -308,7 +310,7 @@ def test_a_field_with_too_long_a_path_is_refused(folded: bool) -> None:  # noqa:
             far = costs_from(divided.inside, np.array([1]))[0]
             portals = divided.portals()
             farthest = np.where(np.isfinite(far), far, 0).max()
-            assert portals.steps.max() == int(farthest) >> portals.steps_shift[0]
+            assert portals.side_cost.max() == int(farthest) >> portals.side_cost_shift[0]
             continue
         with pytest.raises(PathTooLongError, match="longer than 6,600 cells") as refused:
             divided.portals()
@@ -320,11 +322,11 @@ def test_a_field_with_too_long_a_path_is_refused(folded: bool) -> None:  # noqa:
 def test_portals_that_take_too_much_memory_are_refused(divided: Divided, gates: str) -> None:
     portals = divided.portals(gates)
     cells, n_gates = np.diff(portals.field_start), np.diff(portals.gate_start)
-    size = 0.5 * (cells * n_gates).sum() + portals.clique.nbytes + portals.steps.nbytes
+    size = 0.5 * (cells * n_gates).sum() + portals.clique.nbytes + portals.side_cost.nbytes
     table = 4 * portals.n_gates * len(portals.source_gate)
     divided.portals(gates, max_bytes=size + table)
     # Where gates are sparse, other moves between them than those that were chosen may add sources.
     most = size if gates == "sparse" else size + table
     with pytest.raises(PortalsTooLargeError, match="portals would take 0 MB"):
         divided.portals(gates, max_bytes=most - 1)
-    assert portals.rows.nbytes <= 0.5 * (cells * n_gates).sum() + 0.5 * portals.n_gates
+    assert portals.first_move.nbytes <= 0.5 * (cells * n_gates).sum() + 0.5 * portals.n_gates

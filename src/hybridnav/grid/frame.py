@@ -77,6 +77,12 @@ class Frame:
         turned = math.cos(self.yaw_rad), math.sin(self.yaw_rad), x, y
         object.__setattr__(self, "_turned", turned)
 
+    @property
+    def for_kernels(self) -> tuple[float, float, float, float, float]:
+        """Side of a cell, `(x, y)` of the origin in metres, cosine and sine of the yaw."""
+        turned = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return (self.resolution_m, *self.origin_m, *turned)
+
     def points_of(self, cells: ArrayLike) -> FloatArray:
         """Centres of cells in the map frame.
 

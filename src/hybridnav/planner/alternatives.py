@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, overload
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.homotopy.search import MOST_STATES, alternative_search
 from hybridnav.planner.named import At, check_names, stop_points
 from hybridnav.result import Path
-from hybridnav.route.alternatives import alternative_search
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import path_length_in_cells
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import LongArray
+    from hybridnav.homotopy.classes import Word
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.homotopy import Word
 
 MOST = 20
 """Alternatives that may be asked for."""
@@ -61,7 +61,7 @@ class Alternatives(Sequence[Alternative]):
         return len(self.found)
 
 
-def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
+def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
     planner: HybridPlanner,
     start: ArrayLike | str,
     goal: ArrayLike | str,
@@ -70,6 +70,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
     least_hole_m2: float = 1.0,
     at: At = "point",
     blocked: Closable | None = None,
+    most_states: int = MOST_STATES,
 ) -> Alternatives:
     """Plan paths of different homotopy classes: by another door, on the other side of an obstacle.
 
@@ -97,13 +98,15 @@ def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
     blocked
         What is closed for this query, as in `HybridPlanner.plan`. It makes no hole: ways on both
         sides of a closed area are of one class where nothing else lies between them.
+    most_states
+        Pairs of a cell and a class that are looked at before the search gives up, from 1 to 2^26;
+        more take more time and memory.
 
     Returns
     -------
     Alternatives
         Of different classes, the shortest first; none where no path exists. Fewer than `count`
-        where there are no more, or, `complete` being False, where the search gave up after a
-        million pairs of a cell and a class.
+        where there are no more, or, `complete` being False, where the search gave up.
 
     Raises
     ------
@@ -130,7 +133,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last three have defaults
         return Alternatives((), complete=True)
     first, last = (tuple(own.cells[i].tolist()) for i in (0, -1))
     flat = None if closed is None else closed.flat
-    found = search.paths(first, last, wanted, closed=flat)
+    found = search.paths(first, last, wanted, closed=flat, most_states=most_states)
     alternatives = {}
     length_cells = path_length_in_cells(own.cells)
     if result.metric == "octile" and length_cells <= found.shortest_cells * (1 + 1e-12):

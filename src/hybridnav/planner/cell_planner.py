@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
-from hybridnav import jumps, mesh, route
+from hybridnav import jumps, mesh, portals
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.cell_plans import MaxDistance, OverPortals, WholeMap
 from hybridnav.planner.mesh_plans import OverMesh
@@ -44,7 +44,7 @@ def cell_planner(
     """
     grid, coarse = topology.grid, settings.coarse
     if coarse == "portals":
-        built = _taken(route.BuiltPortals, prepared, coarse)
+        built = _taken(portals.BuiltPortals, prepared, coarse)
         return OverPortals(topology, refiner, settings, built)
     if coarse == "mesh":
         return OverMesh(grid, refiner, settings, _taken(mesh.MeshSearch, prepared, coarse))

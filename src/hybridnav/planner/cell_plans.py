@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from hybridnav import portals
 from hybridnav import route as routes
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
     from hybridnav.config import PlannerSettings
     from hybridnav.jumps import JumpSearch
     from hybridnav.mesh import MeshSearch
+    from hybridnav.portals import BuiltPortals, PortalSearch
     from hybridnav.refine import GridRefiner
     from hybridnav.result import Metric
-    from hybridnav.route import BuiltPortals, MaxDistanceSearch, PortalSearch
+    from hybridnav.route import MaxDistanceSearch
     from hybridnav.topology import TopologicalMap
 
     Prepared = MeshSearch | JumpSearch | BuiltPortals
@@ -202,20 +204,21 @@ class OverPortals:
     @property
     def prepared(self) -> BuiltPortals | None:
         """Portals and tables, None until they are built."""
-        return self._built if self._search is None else self._search.built
+        return self._built
 
     def prepare(self, progress: Progress = no_progress) -> PortalSearch:
         """Build portals and table, once; see `CellPlanner`."""
         if self._search is None:
             with self._building:
                 if self._search is None:
-                    self._search = routes.PortalSearch(
-                        self._topology,
-                        self._refiner.search,
-                        allow_unexplored=self._settings.allow_unexplored,
-                        built=self._built,
-                        progress=progress,
-                    )
+                    if self._built is None:
+                        self._built = portals.prepare_portals(
+                            self._topology,
+                            allow_unexplored=self._settings.allow_unexplored,
+                            progress=progress,
+                        )
+                    frame = self._topology.grid.frame
+                    self._search = portals.PortalSearch(self._built, self._refiner.search, frame)
         return self._search
 
     @property

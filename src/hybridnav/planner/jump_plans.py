@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -11,9 +10,9 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
+from hybridnav.grid.centres import centres
 from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph
 from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap
-from hybridnav.route._portal_kernels import centres
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress
@@ -60,9 +59,7 @@ class OverJumps:
         self._whole_map = WholeMap(refiner)
         self._search = search
         self._building = threading.Lock()
-        frame = grid.frame
-        turned = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
-        self._frame = frame.resolution_m, *frame.origin_m, *turned
+        self._frame = grid.frame.for_kernels
 
     @property
     def prepared(self) -> JumpSearch | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from hybridnav import jumps
+from hybridnav import jumps, portals
 from hybridnav import mesh as meshes
 from hybridnav.io.models.fields import refusal
 from hybridnav.io.models.parts import plain, values_of
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from hybridnav.jumps import JumpSearch
     from hybridnav.mesh import CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.planner.cell_plans import Prepared
-    from hybridnav.route import BuiltPortals
+    from hybridnav.portals import BuiltPortals
     from hybridnav.topology import TopologicalMap
 
 
@@ -232,12 +232,12 @@ def _portal_parts(built: BuiltPortals, key: dict[str, Any]) -> list[Part]:
         "positions": len(portals.position),
         "entered": int(portals.field_start[-1]),
         "gates": portals.n_gates,
-        "bytes": len(portals.rows),
+        "moves": len(portals.first_move),
         "costs": len(portals.clique),
         "exits": len(portals.exit_gate),
         "sides": portals.n_sides,
         "members": len(portals.side_gates),
-        "steps": len(portals.steps),
+        "side_costs": len(portals.side_cost),
         "sources": len(portals.source_gate),
         "portals": len(portals.portal_sides),
     }
@@ -248,10 +248,6 @@ def _portal_parts(built: BuiltPortals, key: dict[str, Any]) -> list[Part]:
 
 
 def _portals_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> BuiltPortals:
-    from hybridnav.route import BuiltPortals  # noqa: PLC0415 - most models hold none
-    from hybridnav.route._portal_kernels import Tables  # noqa: PLC0415
-    from hybridnav.topology.portals import Portals  # noqa: PLC0415
-
     filed = fitting[PORTALS.kind]
     values = values_of(_PortalValues, filed)
     arrays = PORTALS.read(filed, known)
@@ -261,8 +257,8 @@ def _portals_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> BuiltPo
     for name in TABLES.most:
         _check_same(tables, name, filed.part.sizes[name])
     field_of = arrays.pop("field_of")
-    made = Tables(shift=values.shift, **TABLES.read(tables, known))
-    return BuiltPortals(field_of, Portals(**arrays), made, values.has_all_gates)
+    made = portals.Tables(shift=values.shift, **TABLES.read(tables, known))
+    return portals.BuiltPortals(field_of, portals.Portals(**arrays), made, values.has_all_gates)
 
 
 def _check_same(filed: FiledPart, name: str, wanted: int) -> None:

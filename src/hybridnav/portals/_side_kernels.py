@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.route._portal_kernels import FAR, UNREACHED, costs_to_gates, position_of
+from hybridnav.portals._distance_kernels import distances
+from hybridnav.portals._path_kernels import FAR, UNREACHED, position_of, stored_costs
 from hybridnav.search._kernels import octile_cost
 
 
@@ -17,18 +18,18 @@ from hybridnav.search._kernels import octile_cost
 def side_costs(portals, cols, field, cell):
     """Costs from a cell to the nearest gate of each of its field's sides, rounded down."""
     side_start = portals.side_start
-    steps_start = portals.steps_start
+    side_cost_start = portals.side_cost_start
     index = portals.position
     field_start = portals.field_start
-    steps_shift = portals.steps_shift
-    steps = portals.steps
+    side_cost_shift = portals.side_cost_shift
+    side_cost = portals.side_cost
     begin, end = side_start[field], side_start[field + 1]
-    row = steps_start[field]
+    row = side_cost_start[field]
     row += (position_of(index, cols, cell) - field_start[field]) * (end - begin)
     low = np.empty(end - begin, np.int64)
-    shift = steps_shift[field]
+    shift = side_cost_shift[field]
     for i in range(end - begin):
-        low[i] = np.int64(steps[row + i]) << shift
+        low[i] = np.int64(side_cost[row + i]) << shift
     return low
 
 
@@ -66,12 +67,7 @@ def _weigh_gates(portals, cols, cell, begin, end, low, known, costs):
 @njit(cache=True, nogil=True)
 def _walk(portals, cols, cell, field, begin, end, is_wanted, known):
     """Make the costs known from a cell to those gates of a side that are wanted."""
-    index = portals.position
-    rows = portals.rows
-    row_start = portals.row_start
-    gate_cell = portals.gate_cell
     side_gates = portals.side_gates
-    first = portals.field_start[field]
     gates = np.empty(end - begin, np.int64)
     costs = np.empty(end - begin, np.int64)
     count = 0
@@ -79,7 +75,7 @@ def _walk(portals, cols, cell, field, begin, end, is_wanted, known):
         if is_wanted[q - begin] and known[q - begin] < 0:
             gates[count] = side_gates[q]
             count += 1
-    costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count, cell, costs)
+    stored_costs(portals, field, cols, gates, count, cell, costs)
     walked = count
     count = 0
     for q in range(begin, end):
@@ -124,12 +120,11 @@ def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, kn
 
     `ends`, `fields`, `sides` and `lows` are those of the start and of the goal: cells, their
     fields, sides of these, lower bounds on the costs to their gates. `known_start` and
-    `known_goal` are costs to the gates of these sides, -1 where they are not known yet. Gives the
-    cost, `limit` or more where there is none, the gate left by, the source, the gate entered across
-    from the source (-1 where the source is in the goal's field), and how many stored paths were
-    walked.
+    `known_goal` are costs to the gates of these sides, -1 where they are not known yet. Returns
+    the cost, `limit` or more where there is none, the gate left by, the source, the gate entered
+    across from the source (-1 where the source is in the goal's field), and how many stored paths
+    were walked.
     """
-    table, shift = tables.route, tables.shift
     side_gates = portals.side_gates
     side_gates_start = portals.side_gates_start
     a0, a1 = side_gates_start[sides[0]], side_gates_start[sides[0] + 1]
@@ -139,16 +134,17 @@ def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, kn
     _weigh_gates(portals, cols, ends[0], a0, a1, lows[0], known_start, near)
     _weigh_gates(portals, cols, ends[1], b0, b1, lows[1], known_goal, far)
     place, source, step = entries_of(portals, tables.source_at, b0, b1)
+    own_gates = side_gates[a0:a1]
+    between = np.empty(near.size, np.int64)
     wants_start = np.zeros(near.size, np.bool_)
     wants_goal = np.zeros(far.size, np.bool_)
     for e in range(place.size):
         rest = far[place[e]] + step[e]
+        distances(tables, source[e], own_gates, between)
         for i in range(near.size):
-            between = table[source[e], side_gates[a0 + i]]
-            if near[i] + (np.int64(between) << shift) + rest < limit:
-                if between != UNREACHED:
-                    wants_start[i] = True
-                    wants_goal[place[e]] = True
+            if near[i] + between[i] + rest < limit and between[i] < FAR:
+                wants_start[i] = True
+                wants_goal[place[e]] = True
     walked = _walk(portals, cols, ends[0], fields[0], a0, a1, wants_start, known_start)
     walked += _walk(portals, cols, ends[1], fields[1], b0, b1, wants_goal, known_goal)
     best, gate, entry = limit, np.int64(-1), np.int64(-1)
@@ -156,11 +152,11 @@ def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, kn
         if not wants_goal[place[e]]:
             continue
         rest = known_goal[place[e]] + step[e]
+        distances(tables, source[e], own_gates, between)
         for i in range(near.size):
-            between = table[source[e], side_gates[a0 + i]]
-            if not wants_start[i] or between == UNREACHED:
+            if not wants_start[i] or between[i] >= FAR:
                 continue
-            over = known_start[i] + (np.int64(between) << shift) + rest
+            over = known_start[i] + between[i] + rest
             if over < best:
                 best, gate, entry = over, np.int64(side_gates[a0 + i]), np.int64(e)
     across = np.int64(-1)

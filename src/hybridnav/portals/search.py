@@ -1,61 +1,32 @@
-"""The portal planner: paths over portals of fields that are grown for planning alone."""
+"""Paths over portals, found by look-ups, and lower bounds on all paths."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, islice
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._progress import no_progress
-from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
-from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.route import _answer_kernels as kernels
-from hybridnav.route._portal_kernels import FAR, Tables, centres
-from hybridnav.route.any_angle_bound import AnyAngleBound
-from hybridnav.route.portal_table import build_tables
+from hybridnav.grid.centres import centres
+from hybridnav.portals import _answer_kernels as kernels
+from hybridnav.portals._path_kernels import FAR
+from hybridnav.portals.any_angle_bound import AnyAngleBound
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import octile_cost
 from hybridnav.search.octile import cost_of, length_in_cells, length_of_cost
-from hybridnav.topology.portals import (
-    PathTooLongError,
-    PortalsTooLargeError,
-    build_portals,
-    compact_labels,
-)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
-    from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, LongArray
-    from hybridnav.pyramid import Level
-    from hybridnav.route.any_angle_bound import Position
+    from hybridnav.grid import Frame
+    from hybridnav.portals.any_angle_bound import Position
+    from hybridnav.portals.prepare import BuiltPortals
     from hybridnav.search.grid_search import GridSearch
-    from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.portals import Portals
 
 Cell = tuple[int, int]
-
-SPACING = 16
-"""Of portals, in cells, where every border cell can be a gate."""
-SPARSE_SPACINGS = (16, 32, 64, 128, 256)
-"""Of portals and gates where that would take too much memory: open floors have long borders."""
-ALL_GATES_LEVELS = 2
-"""So many levels are tried with gates everywhere, before fewer gates are."""
-MAX_BYTES_PER_CELL = 640
-MAX_SPARSE_BYTES_PER_CELL = 160
-LEAST_BYTES = 16e6
-"""What any map may take."""
-LEAST_FIELDS = 16
-"""With fewer fields of the size asked for, half the size is tried: a field is searched cell by cell
-where start and goal share it."""
 
 _SHORTEST = math.sqrt(2) * STRAIGHT / DIAGONAL
 """A path is as much shorter than its integer cost says at most: DIAGONAL / STRAIGHT > sqrt 2."""
@@ -92,66 +63,26 @@ class PortalAnswers:
     """float64 (m, 2), centres of cells in the map frame."""
 
 
-@dataclass(frozen=True, eq=False)
-class BuiltPortals:
-    """What is built of a map before paths are found over its portals."""
-
-    field_of: NDArray[np.int16 | np.int32]
-    """int16 or int32 (rows, cols), the field of each cell, -1 for none."""
-    portals: Portals
-    tables: Tables
-    has_all_gates: bool
-    """Whether every border cell was a gate."""
-
-
 class PortalSearch:
     """Paths over portals, and lower bounds on all paths.
 
-    The fields are not the places: a level of its own, grown with the linkage "survivor" and twice
-    the merge distance of the places, routes better and costs less.
-
     Parameters
     ----------
-    topology
-        The map; of it only the grid, the merge distance and the seed are used.
+    built
+        Fields, portals and tables; see `prepare_portals`.
     cell_search
         Searches inside fields, over cells that paths may use.
-    allow_unexplored
-        Whether unexplored cells may be entered; as in `cell_search`.
-    built
-        What another search has built of the same map with the same settings, None to build it.
-    progress
-        Called after each step of building with the number of steps done and of all.
+    frame
+        Turns cells into points.
     """
 
-    def __init__(
-        self,
-        topology: TopologicalMap,
-        cell_search: GridSearch,
-        *,
-        allow_unexplored: bool = False,
-        built: BuiltPortals | None = None,
-        progress: Progress = no_progress,
-    ) -> None:
-        grid = topology.grid
-        self._cols = grid.shape[1]
-        self._search = cell_search
-        if built is None:
-            enterable = grid.enterable(allow_unexplored=allow_unexplored)
-            field_of, portals, has_all_gates = _portals_of(topology, enterable, allow_unexplored)
-            progress(1, 2)
-            built = BuiltPortals(field_of, portals, build_tables(portals), has_all_gates)
-            progress(2, 2)
+    def __init__(self, built: BuiltPortals, cell_search: GridSearch, frame: Frame) -> None:
         self.built = built
         self._field_of, self.is_exact = built.field_of, built.has_all_gates
         self.portals, self.tables = built.portals, built.tables
-        frame = grid.frame
-        self._frame = (
-            frame.resolution_m,
-            *frame.origin_m,
-            math.cos(frame.yaw_rad),
-            math.sin(frame.yaw_rad),
-        )
+        self._cols = built.field_of.shape[1]
+        self._search = cell_search
+        self._frame = frame.for_kernels
 
     @property
     def field_of(self) -> NDArray[np.int16 | np.int32]:
@@ -245,73 +176,3 @@ class PortalSearch:
     @cached_property
     def _any_angle_bound(self) -> AnyAngleBound:
         return AnyAngleBound(self.portals)
-
-
-def _portals_of(
-    topology: TopologicalMap,
-    enterable: BoolArray,
-    allow_unexplored: bool,  # noqa: FBT001
-) -> tuple[NDArray[np.int16 | np.int32], Portals, bool]:
-    """Fields to route on and their portals, the first that fit into memory, and whether every
-    border cell is a gate."""
-    n_cells = max(int(enterable.sum()), 1)
-    for level, spacing, gate_spacing in _choices(topology):
-        field_of = compact_labels(level.field_of, enterable)
-        has_all_gates = gate_spacing == 1
-        limit = MAX_BYTES_PER_CELL if has_all_gates else MAX_SPARSE_BYTES_PER_CELL
-        try:
-            portals = build_portals(
-                topology.grid,
-                field_of,
-                spacing_cells=spacing,
-                gate_spacing_cells=gate_spacing,
-                allow_unexplored=allow_unexplored,
-                max_bytes=max(limit * n_cells, LEAST_BYTES),
-            )
-        except (PortalsTooLargeError, PathTooLongError):
-            continue
-        return field_of, portals, has_all_gates
-    raise InvalidValueError("no level of the map makes portals of an acceptable size")
-
-
-def _choices(topology: TopologicalMap) -> Iterator[tuple[Level, int, int]]:
-    """Levels and spacings of portals and of gates: those with gates everywhere first."""
-    levels = _routing_levels(topology)
-    first = list(islice(levels, ALL_GATES_LEVELS))
-    for level in first:
-        yield level, SPACING, 1
-    for level in chain(first, levels):
-        for spacing in SPARSE_SPACINGS:
-            yield level, spacing, spacing
-
-
-def _routing_levels(topology: TopologicalMap) -> Iterator[Level]:
-    """Levels to route on: the one with the largest fields that make enough of them first, then
-    larger ones, which have fewer portals, then smaller ones, which have shorter paths."""
-    pyramid, resolution_m = topology.pyramid, topology.grid.resolution_m
-    widest_m = 2 * max(topology.grid.shape) * resolution_m
-
-    def level_of(distance_m: float) -> Level:
-        return DualGraphPyramid.build(
-            topology.grid, merge_distance_m=distance_m, linkage="survivor", seed=pyramid.seed
-        )[-1]
-
-    first_m = min(2 * pyramid.merge_distance_m, widest_m)
-    level = level_of(first_m)
-    while not _has_enough_fields(level) and first_m >= 8 * resolution_m:
-        first_m /= 2
-        level = level_of(first_m)
-    yield level
-    distance_m = 2 * first_m
-    while distance_m < 2 * widest_m:
-        yield level_of(distance_m)
-        distance_m *= 2
-    distance_m = first_m / 2
-    while distance_m > resolution_m:
-        yield level_of(distance_m)
-        distance_m /= 2
-
-
-def _has_enough_fields(level: Level) -> bool:
-    large = level.areas[level.classes == CellClass.FREE] > level.areas.max(initial=0) / 100
-    return int(large.sum()) >= LEAST_FIELDS

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.route._descent_kernels import descend, with_ends
-from hybridnav.route._portal_kernels import FAR, cells_of_way, field_at
-from hybridnav.route._side_kernels import best_gates, side_costs, ways_by_sides
+from hybridnav.portals._descent_kernels import descend, with_ends
+from hybridnav.portals._path_kernels import FAR, cells_of_way, field_at
+from hybridnav.portals._side_kernels import best_gates, side_costs, ways_by_sides
 
 
 @guarded
@@ -58,9 +58,7 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     lower = min(least, upper)
     if gate < 0:
         return inside, lower, walked, cells, points
-    out, into, legs, crossings = descend(
-        portals, tables.route, tables.shift, gate_field, gate, source, across
-    )
+    out, into, legs, crossings = descend(portals, tables, gate, source, across)
     cost = with_ends(portals, gate_field, cols, start, goal, out, into, legs, crossings)
     if cost >= inside:
         return inside, lower, walked, cells, points

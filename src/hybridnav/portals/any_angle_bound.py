@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.route._any_angle_kernels import least_over_boxes
+from hybridnav.portals._any_angle_kernels import least_over_boxes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._typing import FloatArray
-    from hybridnav.topology.portals import Portals
+    from hybridnav.portals.build import Portals
 
 Position = tuple[float, float]
 

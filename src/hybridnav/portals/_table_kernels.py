@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.route._portal_kernels import FAR, UNREACHED
+from hybridnav.portals._path_kernels import FAR, UNREACHED
 
 LANES = 16
 """Portals that are searched from together."""

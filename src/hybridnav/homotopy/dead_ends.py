@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage, sparse
 
-from hybridnav.route import _dead_end_kernels
+from hybridnav.homotopy import _dead_end_kernels
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, IntArray, LongArray

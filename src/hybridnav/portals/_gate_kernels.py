@@ -14,7 +14,7 @@ from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 
 LANES = 16
 """Gates that are searched from together: one cache line of costs a cell."""
-FAR = 1 << 30
+TOO_FAR = 1 << 30
 """No path inside a field may cost as much; a diagonal more still fits int32."""
 _STRAIGHT = np.int32(STRAIGHT)
 _DIAGONAL = np.int32(DIAGONAL)
@@ -60,7 +60,7 @@ def wave(near, n, source, cost, ring, order):
     final when its turn comes, and three buckets in turn are enough. `ring` is scratch, (3, size).
     Gives the number of cells reached.
     """
-    cost[:n] = FAR
+    cost[:n] = TOO_FAR
     count = np.zeros(3, np.int64)
     cost[source] = 0
     ring[0, 0] = source
@@ -217,31 +217,31 @@ def shift_of(cost):
 
 
 @njit(cache=True, nogil=True)
-def _lower_steps(cost, n, lanes, sides, count, shift, steps):
-    """Set steps[i, side] to the least of itself and the shifted costs of some lanes."""
+def _lower_side_cost(cost, n, lanes, sides, count, shift, side_cost):
+    """Set side_cost[i, side] to the least of itself and the shifted costs of some lanes."""
     for i in range(n):
         for q in range(count):
             there = cost[i * LANES + lanes[q]] >> shift
-            if there < steps[i, sides[q]]:
-                steps[i, sides[q]] = there
+            if there < side_cost[i, sides[q]]:
+                side_cost[i, sides[q]] = there
 
 
 @njit(cache=True, nogil=True)
-def fill_field(near, far, n, gates, rows, clique, begin, side, steps, scratch):
+def fill_field(near, far, n, gates, first_move, clique, begin, side, side_cost, scratch):
     """Paths from all gates of a field.
 
-    `rows` gets their directions, a row a gate, two cells a byte; `clique` the costs from gate to
-    gate; `steps` (n, R) those from each cell to the nearest gate of each side: gate c is one of the
-    sides `side[begin[c]:begin[c + 1]]`. Gates are local cells. Gives the bits that `steps` lack, -1
-    where a path is too long.
+    `first_move` gets their directions, a row a gate, two cells a byte; `clique` the costs from gate
+    to gate; `side_cost` (n, R) those from each cell to the nearest gate of each side: gate c is one
+    of the sides `side[begin[c]:begin[c + 1]]`. Gates are local cells. Returns the bits that
+    `side_cost` lacks, -1 where a path is too long.
     """
     cost, first_cost, ring, order, row, stale, heading, member, gate_at = scratch
     if wave(near, n, gates[0], first_cost, ring, order) < n:
         return -1
     shift = shift_of(first_cost[:n])
-    if 2 * np.int64(first_cost[:n].max()) >= FAR:
+    if 2 * np.int64(first_cost[:n].max()) >= TOO_FAR:
         return -1
-    steps[:] = np.iinfo(np.uint16).max
+    side_cost[:] = np.iinfo(np.uint16).max
     lane_of = np.empty(side.size, np.int64)
     side_of = np.empty(side.size, np.int64)
     gate_at[:n] = -1
@@ -264,7 +264,7 @@ def fill_field(near, far, n, gates, rows, clique, begin, side, steps, scratch):
                 if lanes == LANES:
                     break
         left -= lanes
-        cost[: (n + 1) * LANES] = FAR
+        cost[: (n + 1) * LANES] = TOO_FAR
         for lane in range(lanes):
             cost[np.int64(gates[member[lane]]) * LANES + lane] = 0
         relax(near, n, order, prefix, cost, row, stale, LANES)
@@ -276,8 +276,8 @@ def fill_field(near, far, n, gates, rows, clique, begin, side, steps, scratch):
             for q in range(begin[c], begin[c + 1]):
                 lane_of[count], side_of[count] = lane, side[q]
                 count += 1
-        _lower_steps(cost, n, lane_of, side_of, count, shift, steps)
+        _lower_side_cost(cost, n, lane_of, side_of, count, shift, side_cost)
         directions(near, far, n, cost, row, LANES, heading)
         for lane in range(lanes):
-            _pack(heading[lane], n, rows[member[lane]])
+            _pack(heading[lane], n, first_move[member[lane]])
     return shift

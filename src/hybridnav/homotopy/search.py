@@ -10,21 +10,21 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.route import _class_kernels
-from hybridnav.route.dead_ends import DeadEnds
+from hybridnav.homotopy import _class_kernels
+from hybridnav.homotopy.classes import HomotopyClasses
+from hybridnav.homotopy.dead_ends import DeadEnds
 from hybridnav.search._kernels import field_distances, legal_moves
 from hybridnav.search.octile import length_in_cells
-from hybridnav.topology.homotopy import HomotopyClasses
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, LongArray
+    from hybridnav.homotopy.classes import Word
     from hybridnav.topology import TopologicalMap
-    from hybridnav.topology.homotopy import Word
 
 Cell = tuple[int, int]
 
 MOST_STATES = 1_000_000
-"""Pairs of a cell and a word that a search looks at before it gives up."""
+"""Pairs of a cell and a word that a search looks at before it gives up, if not told otherwise."""
 _LARGEST_GAP_M = 1.0
 """A path that comes back nearer to itself than this winds, however large holes are that count."""
 
@@ -128,7 +128,13 @@ class AlternativeSearch:
         self._dead_ends: DeadEnds | None = None
 
     def paths(
-        self, start: Cell, goal: Cell, count: int, *, closed: LongArray | None = None
+        self,
+        start: Cell,
+        goal: Cell,
+        count: int,
+        *,
+        closed: LongArray | None = None,
+        most_states: int = MOST_STATES,
     ) -> ClassPaths:
         """Find paths of different classes.
 
@@ -141,7 +147,20 @@ class AlternativeSearch:
         closed
             int64 (m,), flat cells that may not be entered; None for none. Start and goal are not
             among them. They make no holes: words are those of the open map.
+        most_states
+            Pairs of a cell and a word that are looked at before the search gives up, from 1 to
+            2^26; each takes 85 bytes while the search runs.
+
+        Raises
+        ------
+        InvalidValueError
+            When `most_states` is out of range.
         """
+        if not 1 <= most_states <= _class_kernels.MOST_STATES:
+            raise InvalidValueError(
+                f"most_states is {most_states!r:.80}, expected a number from 1 to "
+                f"{_class_kernels.MOST_STATES}: leave it out for {MOST_STATES}"
+            )
         cols = self._enterable.shape[1]
         enterable = self._enterable
         if closed is not None:
@@ -152,8 +171,8 @@ class AlternativeSearch:
         left = field_distances(enterable.astype(np.uint8), label, np.array([last]))
         shortest = float(length_in_cells(left[[first]])[0]) if left[first] >= 0 else math.inf
         apart = self._apart if shortest == math.inf else min(self._apart, int(shortest / 2))
-        states = _class_kernels.States.of_room(MOST_STATES)
-        tree = _class_kernels.Tree.of_room(MOST_STATES)
+        states = _class_kernels.States.of_room(most_states)
+        tree = _class_kernels.Tree.of_room(most_states)
         dead_ends = self._dead_ends_of(enterable, max(1, apart))
         goals, reason = _class_kernels.find_classes(
             legal_moves(dead_ends.left(start, goal), False).ravel(),

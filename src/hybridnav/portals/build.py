@@ -14,15 +14,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.portals import _gate_kernels as kernels
+from hybridnav.portals.crossings import find_crossings
+from hybridnav.portals.fields import compact_labels
+from hybridnav.portals.layout import Layout, offsets_of, starts_of
 from hybridnav.search._kernels import legal_moves
-from hybridnav.topology import _gate_kernels as kernels
-from hybridnav.topology.crossings import find_crossings
-from hybridnav.topology.portal_layout import Layout, offsets_of, starts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav._typing import ByteArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
 
@@ -53,9 +54,9 @@ class Portals(NamedTuple):
     gate_start: LongArray
     gate_cell: IntArray
     """int32 (G,), flat cell of each gate."""
-    row_start: LongArray
-    """int64 (G + 1,), first byte of each gate's row of `rows`."""
-    rows: ByteArray
+    first_move_start: LongArray
+    """int64 (G + 1,), first byte of each gate's row of `first_move`."""
+    first_move: ByteArray
     """uint8, for each cell of the gate's field four bits: direction of the path to the gate, 8 more
     where its next eight moves are that way; anything at the gate itself."""
     clique_start: LongArray
@@ -72,11 +73,11 @@ class Portals(NamedTuple):
     """int64 (R + 1,), where the gates of each side begin."""
     side_gates: IntArray
     """int32, the gates from which moves of the side's portal lead to gates."""
-    steps_start: LongArray
-    """int64 (F + 1,), where the rows of `steps` begin, one a cell, one column a side."""
-    steps_shift: LongArray
-    """int64 (F,), bits that `steps` lack."""
-    steps: NDArray[np.uint16]
+    side_cost_start: LongArray
+    """int64 (F + 1,), where the rows of `side_cost` begin, one a cell, one column a side."""
+    side_cost_shift: LongArray
+    """int64 (F,), bits that `side_cost` lacks."""
+    side_cost: NDArray[np.uint16]
     """uint16, costs from each cell to the nearest gate of its field's sides, rounded down to so
     many bits."""
     source_gate: IntArray
@@ -165,47 +166,14 @@ def build_portals(  # noqa: PLR0913 - independent choices
     return _assembled(layout, _filled(layout, moves))
 
 
-def compact_labels(
-    field_of: NDArray[np.int16 | np.int32], enterable: BoolArray
-) -> NDArray[np.int16 | np.int32]:
-    """Number the fields of the cells that may be entered from 0, in their order.
-
-    Parameters
-    ----------
-    field_of
-        int32 (rows, cols), the field of each of these cells.
-    enterable
-        bool (rows, cols).
-
-    Returns
-    -------
-    NDArray
-        (rows, cols), -1 for all other cells; int16 where that is enough.
-
-    Raises
-    ------
-    InvalidValueError
-        When a cell that may be entered is in no field.
-    """
-    if field_of.shape != enterable.shape or (field_of[enterable] < 0).any():
-        raise InvalidValueError("every cell that may be entered must be in a field")
-    is_used = np.zeros(int(field_of.max(initial=-1)) + 1, dtype=np.bool_)
-    is_used[field_of[enterable]] = True
-    number = np.cumsum(is_used) - 1
-    fits = len(is_used) == 0 or number[-1] <= np.iinfo(np.int16).max
-    label = np.full(field_of.shape, -1, dtype=np.int16 if fits else np.int32)
-    label[enterable] = number[field_of[enterable]]
-    return label
-
-
 def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
     """The arrays that need searches inside the fields, field by field."""
     sizes, gate_start = np.diff(layout.field_start), layout.gate_start
     clique_start = offsets_of(np.diff(gate_start) ** 2)
-    steps_start = offsets_of(sizes * np.diff(layout.side_start))
-    rows = np.empty(layout.row_start[-1], dtype=np.uint8)
+    side_cost_start = offsets_of(sizes * np.diff(layout.side_start))
+    first_move = np.empty(layout.first_move_start[-1], dtype=np.uint8)
     clique = np.empty(clique_start[-1], dtype=np.int32)
-    steps = np.empty(steps_start[-1], dtype=np.uint16)
+    side_cost = np.empty(side_cost_start[-1], dtype=np.uint16)
     shift = np.zeros(layout.n_fields, dtype=np.int64)
     busy = np.flatnonzero(np.diff(gate_start))
     largest = int(sizes[busy].max(initial=0))
@@ -229,11 +197,13 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
             leaps,
             last - first,
             index[layout.gate_cell[gates]] - first,
-            rows[slice(*layout.row_start[[gates.start, gates.stop]])].reshape(n_gates, -1),
+            first_move[slice(*layout.first_move_start[[gates.start, gates.stop]])].reshape(
+                n_gates, -1
+            ),
             clique[clique_start[f] : clique_start[f + 1]].reshape(n_gates, n_gates),
             starts_of(members[order], n_gates),
             side,
-            steps[steps_start[f] : steps_start[f + 1]].reshape(last - first, -1),
+            side_cost[side_cost_start[f] : side_cost_start[f + 1]].reshape(last - first, -1),
             scratch,
         )
         if shift[f] < 0:
@@ -241,12 +211,12 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
                 "a field is not connected, or a path inside it may be longer than 6,600 cells"
             )
     return {
-        "rows": rows,
+        "first_move": first_move,
         "clique_start": clique_start,
         "clique": clique,
-        "steps_start": steps_start,
-        "steps_shift": shift,
-        "steps": steps,
+        "side_cost_start": side_cost_start,
+        "side_cost_shift": shift,
+        "side_cost": side_cost,
     }
 
 
@@ -279,7 +249,7 @@ def _assembled(layout: Layout, filled: dict[str, NDArray[Any]]) -> Portals:
         field_start=layout.field_start,
         gate_start=layout.gate_start,
         gate_cell=layout.gate_cell.astype(np.int32),
-        row_start=layout.row_start,
+        first_move_start=layout.first_move_start,
         exit_start=starts_of(tail[order], len(layout.gate_cell)),
         exit_gate=head[order],
         exit_cost=np.tile(crossings.cost, 2)[order],

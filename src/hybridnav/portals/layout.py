@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, IntArray, LongArray
-    from hybridnav.topology.crossings import Crossings
+    from hybridnav.portals.crossings import Crossings
 
 
 def starts_of(sorted_keys: IntArray | LongArray, count: int) -> LongArray:
@@ -86,7 +86,7 @@ class Layout:
         return is_exit
 
     @cached_property
-    def row_start(self) -> LongArray:
+    def first_move_start(self) -> LongArray:
         """int64 (G + 1,), first byte of each gate's row of directions."""
         sizes = np.diff(self.field_start)[self.label[self.gate_cell]]
         return offsets_of((sizes + 1) // 2)
@@ -154,9 +154,9 @@ class Layout:
         """What paths to all gates, costs between them, and a table of those of a lower field to all
         will take."""
         sizes, gates = np.diff(self.field_start), np.diff(self.gate_start)
-        rows = 0.5 * (sizes * gates).sum()
-        steps = 2.0 * (sizes * np.diff(self.side_start)).sum()
+        first_move = 0.5 * (sizes * gates).sum()
+        side_cost = 2.0 * (sizes * np.diff(self.side_start)).sum()
         cliques = 4.0 * (gates.astype(np.float64) ** 2).sum()
         lower = len(np.unique(self.crossings.low[self.crossings.is_gate]))
         table = 4.0 * lower * len(self.gate_cell)
-        return float(rows + cliques + steps + table)
+        return float(first_move + cliques + side_cost + table)

@@ -6,35 +6,18 @@ where as many moves lead that way.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav.grid.centres import centres
+from hybridnav.portals._gate_kernels import LEAP
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
-from hybridnav.topology._gate_kernels import LEAP
 
 _INVERSE = DIAGONAL % STRAIGHT
 FAR = 1 << 60
 """More than any path costs."""
 UNREACHED = np.uint32(0xFFFFFFFF)
-
-
-class Tables(NamedTuple):
-    """What is known between sources and gates; S sources, G gates, R sides."""
-
-    route: np.ndarray
-    """uint32 (S, G), costs of shortest paths over gates without their last `shift` bits,
-    `UNREACHED` for none."""
-    between: np.ndarray
-    """uint32 (R, R), the least cost between gates of two of the R sides, likewise."""
-    shift: int
-    """0, but on maps with paths of more than 53,000 cells."""
-    gate_field: np.ndarray
-    """int32 (G,), the field of each gate."""
-    source_at: np.ndarray
-    """int32 (G,), a source at each gate, -1 for none."""
 
 
 @njit(cache=True, nogil=True)
@@ -56,12 +39,18 @@ def field_at(portals, cols, cell):
 
 
 @njit(cache=True, nogil=True)
-def costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count, cell, costs):
-    """Costs of the stored paths from a cell to the first `count` of some gates of its field.
+def stored_costs(portals, field, cols, gates, count, cell, costs):
+    """Fill `costs` with those of the stored paths from a cell to the first `count` of some gates of
+    its field.
 
     The paths are walked side by side, a step of each in turn: a step waits for memory, and steps of
-    different paths wait together. `first` is where the field begins in the order of cells.
+    different paths wait together.
     """
+    index = portals.position
+    first_move = portals.first_move
+    first_move_start = portals.first_move_start
+    gate_cell = portals.gate_cell
+    first = portals.field_start[field]
     width = np.uint64(cols + 7 >> 3)
     row = np.full(count, cell // cols, np.int64)
     col = np.full(count, cell % cols, np.int64)
@@ -69,7 +58,7 @@ def costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count,
     end = np.empty(count, np.int64)
     place = np.arange(count)
     for i in range(count):
-        begin[i], end[i] = row_start[gates[i]], gate_cell[gates[i]]
+        begin[i], end[i] = first_move_start[gates[i]], gate_cell[gates[i]]
         costs[i] = 0
     left = count
     while left > 0:
@@ -84,7 +73,7 @@ def costs_to_gates(index, rows, row_start, gate_cell, first, cols, gates, count,
             tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
             inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
             at = index[tile << np.uint64(6) | inside] - first
-            code = rows[np.uint64(begin[i] + (at >> 1))] >> ((at & 1) << 2)
+            code = first_move[np.uint64(begin[i] + (at >> 1))] >> ((at & 1) << 2)
             k, n = code & 7, 1 + (LEAP - 1) * (code >> 3 & 1)
             costs[place[i]] += n * (STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT))
             row[i] += n * _ROW_STEP[k]
@@ -104,13 +93,13 @@ def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
     """Cells of a way, int64 (n, 2), and their centres, float64 (n, 2).
 
     The way leaves its fields by the gates `out` and enters the next ones by `into`; `legs` are the
-    costs of its parts, one more. The parts are walked side by side, as in `costs_to_gates`: from
+    costs of its parts, one more. The parts are walked side by side, as in `stored_costs`: from
     where each begins to the gate it ends at, the last one back from the goal.
     """
     index = portals.position
-    rows = portals.rows
+    first_move = portals.first_move
     field_start = portals.field_start
-    row_start = portals.row_start
+    first_move_start = portals.first_move_start
     gate_cell = portals.gate_cell
     n = out.size
     row = np.empty(n + 1, np.int64)
@@ -129,7 +118,7 @@ def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
             cell = np.int64(gate_cell[into[k - 1]])
         gate = out[k] if k < n else into[n - 1]
         row[k], col[k] = cell // cols, cell % cols
-        begin[k], end[k] = row_start[gate], gate_cell[gate]
+        begin[k], end[k] = first_move_start[gate], gate_cell[gate]
         first[k] = field_start[gate_field[gate]]
         at[k] = count
         count += moves_of(legs[k]) + 1
@@ -151,7 +140,7 @@ def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
             tile = (r >> np.uint64(3)) * width + (c >> np.uint64(3))
             inside = (r & np.uint64(7)) << np.uint64(3) | (c & np.uint64(7))
             position = index[tile << np.uint64(6) | inside] - first[i]
-            code = rows[np.uint64(begin[i] + (position >> 1))] >> ((position & 1) << 2)
+            code = first_move[np.uint64(begin[i] + (position >> 1))] >> ((position & 1) << 2)
             k = code & 7
             for _ in range(LEAP - 1 if code & LEAP else 0):
                 row[i] += _ROW_STEP[k]
@@ -163,15 +152,3 @@ def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
             at[i] = here + onward[i]
             i += 1
     return cells, centres(cells, frame)
-
-
-@njit(cache=True, nogil=True)
-def centres(cells, frame):
-    """Centres of (row, col) in the map frame, as `Frame.points_of` has them."""
-    resolution, origin_x, origin_y, cosine, sine = frame
-    points = np.empty((cells.shape[0], 2), np.float64)
-    for i in range(cells.shape[0]):
-        x, y = (cells[i, 1] + 0.5) * resolution, (cells[i, 0] + 0.5) * resolution
-        points[i, 0] = origin_x + cosine * x - sine * y
-        points[i, 1] = origin_y + sine * x + cosine * y
-    return points

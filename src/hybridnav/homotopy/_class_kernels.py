@@ -17,6 +17,8 @@ from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 
 _STATE_BITS = 26
 _STATE_MASK = (1 << _STATE_BITS) - 1
+MOST_STATES = 1 << _STATE_BITS
+"""More states have no numbers that fit into a key of the heap."""
 _OPEN, _EXPANDED, _WINDING = 0, 1, 2
 
 FOUND, EXHAUSTED, LIMITED = 0, 1, 2

@@ -1,0 +1,86 @@
+"""The options that portals are built with: refused where they make no sense, and obeyed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from hybridnav.portals import PortalOptions, PortalSearch, prepare_portals
+from hybridnav.portals.fields import routing_levels
+from hybridnav.search.grid_search import GridSearch
+from tests.strategies import occupancy_grid
+
+if TYPE_CHECKING:
+    from hybridnav.portals import BuiltPortals
+
+WRONG = [
+    ("merge_distance_factor", 0),
+    ("merge_distance_factor", math.inf),
+    ("merge_distance_factor", "2"),
+    ("least_fields", 0),
+    ("spacing_cells", 0),
+    ("spacing_cells", 2.0),
+    ("spacing_cells", True),
+    ("all_gates_levels", -1),
+    ("sparse_spacings_cells", (16, 1)),
+    ("sparse_spacings_cells", [16]),
+    ("sparse_spacings_cells", 16),
+    ("most_bytes_per_cell", -1),
+    ("most_sparse_bytes_per_cell", math.nan),
+    ("least_bytes", None),
+    ("rows_at_once", 0),
+    ("dropped_bits", -1),
+    ("dropped_bits", 31),
+]
+
+
+@pytest.mark.parametrize(("name", "value"), WRONG)
+def test_options_out_of_range_are_refused_by_name(name: str, value: Any) -> None:
+    with pytest.raises(hn.InvalidValueError, match=f"{name} of portals is .*, expected .*: leave"):
+        PortalOptions(**{name: value})
+
+
+def floor() -> hn.TopologicalMap:
+    """An open floor of 40 x 40 cells with a pillar."""
+    free = np.ones((40, 40), dtype=np.uint8)
+    free[18:22, 10:30] = 0
+    pyramid = hn.DualGraphPyramid.build(occupancy_grid(free), merge_distance_m=6.0)
+    return hn.TopologicalMap(pyramid)
+
+
+def shortest(topology: hn.TopologicalMap, built: BuiltPortals) -> float:
+    """Length of a path across the floor, in cells."""
+    grid = topology.grid
+    search = PortalSearch(built, GridSearch(grid.enterable()), grid.frame)
+    return search.path((2, 3), (37, 35)).length_cells
+
+
+def test_the_first_fields_are_as_large_as_the_factor_asks_for() -> None:
+    topology = floor()
+    sizes = []
+    for factor in (0.5, 1.0, 2.0):
+        options = PortalOptions(merge_distance_factor=factor, least_fields=1)
+        sizes.append(next(routing_levels(topology, options)).n_vertices)
+    assert sizes[0] > sizes[1] > sizes[2]
+
+
+def test_every_choice_of_options_finds_paths_as_short() -> None:
+    topology = floor()
+    usual = prepare_portals(topology)
+    choices = [
+        PortalOptions(spacing_cells=3, rows_at_once=7),
+        PortalOptions(all_gates_levels=0, sparse_spacings_cells=(8,)),
+        PortalOptions(least_bytes=0, most_bytes_per_cell=0, most_sparse_bytes_per_cell=math.inf),
+        PortalOptions(dropped_bits=4),
+        PortalOptions(least_fields=1, merge_distance_factor=1.0),
+    ]
+    built = [prepare_portals(topology, options=options) for options in choices]
+    assert [found.has_all_gates for found in built] == [True, False, False, True, True]
+    assert built[0].portals.n_sides > usual.portals.n_sides
+    assert [found.tables.shift for found in built] == [0, 0, 0, 4, 0]
+    lengths = [shortest(topology, found) for found in built]
+    assert lengths == [shortest(topology, usual)] * len(built)
