@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from hybridnav._typing import IntArray
 
 MAX_ROOMS = 10_000
-"""Rooms a map may have at most."""
+"""Most rooms of a map."""
 MAX_NAME = 80
-"""Characters of a name at most."""
+"""Most characters of a name."""
 MAX_NUMBER = 1_000_000_000
-"""Number of a door at most."""
+"""Greatest number of a door."""
 
 NO_ROOM = -1
 """Label of cells without a room."""
 
 Segmentation = Literal["walls", "watershed", "contraction"]
-"""How rooms may be found; see `hybridnav.topology.find_rooms`."""
+"""Methods of finding rooms; see `hybridnav.topology.find_rooms`."""
 
 Point = tuple[float, float]
 
@@ -37,7 +37,7 @@ Point = tuple[float, float]
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class RoomLabels:
-    """Which room each cell belongs to, and points that have names of their own.
+    """The room of each cell, and points with names of their own.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ class RoomLabels:
     label_of
         int32 (rows, cols), the room of each cell as an index into `names`, -1 for none; copied.
     points
-        Named points, `(x, y)` in metres, map frame. One with the name of a room is the point that
-        stands for the room.
+        Named points, `(x, y)` in metres, map frame. A point with the name of a room represents the
+        room.
     doors
-        Numbers of doors that are known, each with a point of its boundary, `(x, y)` in metres: a
-        door keeps its number when rooms are written, read, or planned on for another robot.
+        Known numbers of doors, each with a point of its boundary, `(x, y)` in metres: a door keeps
+        its number when rooms are written, read, or planned on for another robot.
 
     Raises
     ------
@@ -91,12 +91,12 @@ class RoomLabels:
             object.__setattr__(self, name, value)
 
     def index(self, name: str) -> int:
-        """Label of a room.
+        """Return the label of a room.
 
         Raises
         ------
         InvalidValueError
-            When no room has this name; suggests the nearest ones.
+            When no room has this name; the message suggests the nearest ones.
         """
         if name in self.names:
             return self.names.index(name)
@@ -104,7 +104,7 @@ class RoomLabels:
 
 
 def read_point(text: str) -> tuple[float, ...] | None:
-    """The numbers of a text like `1,2` or `1,2,0.5`, None where it is none: then it is a name."""
+    """Return the numbers of a text like `1,2` or `1,2,0.5`, None for any other text, a name."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -113,7 +113,7 @@ def read_point(text: str) -> tuple[float, ...] | None:
 
 
 def check_names(names: tuple[str, ...]) -> None:
-    """Refuse names that are empty, too long, not one printable line, a point's, or given twice."""
+    """Refuse names that are empty, too long, not one printable line, like a point, or repeated."""
     seen: set[str] = set()
     for name in names:
         if not isinstance(name, str) or not name.strip() or not name.isprintable():
@@ -130,7 +130,7 @@ def check_names(names: tuple[str, ...]) -> None:
 
 
 def did_you_mean(name: str, known: tuple[str, ...]) -> str:
-    """A clause that names what may have been meant: the nearest names, else some of all."""
+    """Return a clause with the known names nearest to a name, or with some of all names."""
     if not known:
         return ": the map has no names"
     folded: dict[str, str] = {}
@@ -144,7 +144,7 @@ def did_you_mean(name: str, known: tuple[str, ...]) -> str:
 
 
 def check_number(number: int) -> int:
-    """Return the number of a door, refuse what is none."""
+    """Return the number of a door; refuse other values."""
     if isinstance(number, bool) or not isinstance(number, int) or not 0 < number <= MAX_NUMBER:
         raise InvalidValueError(
             f"a door needs a whole number from 1 to {MAX_NUMBER}, got {number!r:.80}"
