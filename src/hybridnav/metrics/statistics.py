@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
 
 TOLERANCE = 1e-9
-"""A loss, or a difference of two, up to this is rounding and counts as none."""
+"""Greatest loss, or difference of two losses, that counts as rounding."""
 
 Interval = tuple[float, float]
 _CHUNK = 2_000_000
@@ -44,7 +44,7 @@ class Summary:
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """How two methods differ on the same pairs."""
+    """Difference of two methods on the same pairs."""
 
     n: int
     """Pairs compared."""
@@ -78,7 +78,7 @@ def summarise(losses: ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Sum
     seed
         Seed of the resampling: equal input gives equal output.
     resamples
-        Resamples of the bootstrap, >= 1. Time grows with their number times the losses'.
+        Resamples of the bootstrap, >= 1. Time is proportional to resamples times losses.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def summarise(losses: ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Sum
         nan = math.nan
         return Summary(0, nan, nan, nan, nan, nan, nan, (nan, nan), (nan, nan))
     share = float((values <= TOLERANCE).mean())
-    # The share of a resample is binomial: drawing it needs no resample.
+    # The share of a resample is binomial, so it is drawn directly.
     shares = rng.binomial(n, share, size=resamples) / n
     return Summary(
         n=n,
@@ -137,8 +137,8 @@ def paired_difference(
     Returns
     -------
     PairedDifference
-        First minus second. Differences up to 1e-9 are rounding: the test leaves them out, as it
-        does zeros.
+        First minus second. Differences up to 1e-9 are rounding: the test leaves them out like
+        zeros.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def distance_buckets(optima_m: ArrayLike, *, edges: ArrayLike | None = None) -> 
 
 
 def thrun_count(n_nodes: float, mean_plan_length: float) -> float:
-    """Cost of planning counted in value-iteration backups: nodes times mean plan length.
+    """Return the cost of planning in value-iteration backups: nodes times mean plan length.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def _interval(values: FloatArray) -> Interval:
 
 
 def _resampled_means(values: FloatArray, rng: np.random.Generator, resamples: int) -> FloatArray:
-    """Means of resamples with replacement, drawn a few at a time to bound the memory."""
+    """Return the means of resamples with replacement, drawn a few at a time to bound the memory."""
     n = len(values)
     if np.ptp(values) == 0:
         return np.full(resamples, values[0])
