@@ -1,4 +1,4 @@
-"""Pictures: maps, places, graphs, plans. Drawn on matplotlib figures without pyplot or display."""
+"""Pictures of maps, places, graphs and plans, on matplotlib figures without pyplot or display."""
 
 from hybridnav.viz.dual import plot_dual
 from hybridnav.viz.kernels import plot_kernels
