@@ -1,4 +1,4 @@
-"""The planner that the presets configure, and what may be closed for one of its queries."""
+"""The planner that the presets configure, and the closures for single queries."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ def __getattr__(name: str) -> Any:
     }
     if name not in homes:
         raise AttributeError(f"module 'hybridnav.planner' has no attribute {name!r}")
-    # They load shapely.
+    # These load shapely.
     return getattr(importlib.import_module(f"hybridnav.planner.{homes[name]}"), name)
