@@ -65,8 +65,10 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
     `kernel_dart[v]` starts at the parent of v and ends at v; origins become the vertices of the
     next level, `new_vertex[parent[v]]`. `touched` lists one dart of every ordinary face that lost a
-    dart: apart from faces with a self-loop, no other face can have become redundant. `shift` is
-    scratch.
+    dart: apart from faces with a self-loop, no other face can have become redundant. `parent` and
+    `new_vertex` are int32 by vertex; `state`, uint8 by edge, receives `ALIVE` or `CONTRACTED`,
+    `inverse`, int32 by dart, the inverse of sigma; `shift`, int32 by vertex, is scratch; `cols` are
+    the columns of the grid.
     """
     sigma, origin, sweep, protected, base_edge = darts
     one = np.uint32(1)
@@ -176,8 +178,9 @@ def start_together(dart, partner, darts, whole_at, level, cols):
 def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, all_whole):
     """Remove redundant edges through ordinary faces until none is left, in place.
 
-    An edge that ends at a block in pieces (`whole_at` above `level`, unless `all_whole`) waits for
-    the pieces to merge, so all of those are looked at again.
+    `touched`, `any_loop`, `state`, `inverse` and `cols` are those of `contract`; removed edges
+    become `REMOVED`. An edge that ends at a block in pieces (`whole_at`, uint8 by vertex, above
+    `level`, unless `all_whole`) waits for the pieces to merge, so all of those are looked at again.
 
     Rules one and two: a face of degree one, a face of degree two. Rules three and four need a
     self-loop, and the lower levels have none. A removal can make only the merged face redundant, so
