@@ -59,7 +59,10 @@ def raise_powers(power, squares, halves, p):
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record for the blocks alone; return the counts of their vertices and edges.
 
-    The new numbers of the edges that stay are written to `new_edge`.
+    `classes`, (rows, cols), are the kinds of cells, `power` the powers of blocks (see
+    `block_powers`), `templates` the arrays of `Templates`. Filled in: the record's `vertex_end`,
+    `vertex_parent`, by flat cell, and `edge_end`, by base edge; `new_edge`, int32 by base edge, the
+    new numbers of the edges that stay.
     """
     ends, offset, inside_east, inside_north, across_east, across_north = templates
     rows, cols = classes.shape

@@ -137,9 +137,10 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
     merged fields first keeps fields compact (measured 2 to 5 % fewer places on real maps than the
     distance between the surviving cells or the merged radius).
 
-    `origin`, int32 (2 n_edges,), and `base_edge`, int32 (n_edges,), are those of the darts; `limit`
-    is in squared cells. Out: `keys`, uint64 (n_edges,); `ways`, uint8 by edge, which end may
-    survive; `best`, uint64 by vertex, its least key.
+    `origin`, int32 (2 n_edges,), and `base_edge`, int32 (n_edges,), are those of the darts;
+    `vertices` and `hulls` belong to the `level`; `linkage` is one of the constants; `limit` is in
+    squared cells; `seed` orders equal attributes. Out: `keys`, uint64 (n_edges,); `ways`, uint8 by
+    edge, which end may survive; `best`, uint64 by vertex, its least key.
     """
     cells, boxes, classes, whole_at = vertices
     hull_start, hull_points = hulls
@@ -227,7 +228,11 @@ def match(origin, keys, best, matched, rest):
 
 @njit(cache=True, nogil=True)
 def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
-    """Let every vertex without a partner join the best matched neighbour that may survive it."""
+    """Let every vertex without a partner join the best matched neighbour that may survive it.
+
+    `origin`, `keys`, `ways` and `matched` are those of `contractible` and `match`; `best` is
+    scratch by vertex; `parent` and `kernel_dart`, int32 by vertex, are changed.
+    """
     for v in range(matched.size):
         best[v] = _NO_KEY
     for i in range(keys.size):
@@ -283,8 +288,9 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
     a pair without leaves, the vertex with the smaller merged radius survives; the hash breaks ties.
     `kernel_dart[v]` starts at the parent of v and ends at v.
 
-    `keys`, `ways` and `matched` are those of `contractible` and `match`; `best` is scratch by
-    vertex; `stars` holds the arrays `parent` and `kernel_dart`, int32 by vertex.
+    `keys`, `ways` and `matched` are those of `contractible` and `match`; `darts_origin` and
+    `base_edge` belong to the darts; `seed` is that of the keys; `best` is scratch by vertex;
+    `stars` holds `parent`, `kernel_dart` and `has_leaf`, by vertex.
     """
     cells, boxes, _, _ = vertices
     parent, kernel_dart, has_leaf = stars
