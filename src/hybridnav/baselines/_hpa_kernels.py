@@ -218,8 +218,8 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
 
     Start and goal are joined to the nodes of their clusters, and to each other if a path inside one
     cluster does so. `moves`, uint8 (rows, cols), are the legal moves; `start` and `goal` flat
-    cells; `cost_of`, int64, and `previous`, `mark`, one entry for each node and both ends, are work
-    arrays; `mark` and `generation` are as in `_weighted_kernels`.
+    cells; `cost_of`, `previous` and `mark`, one entry for each node, are work arrays; `mark` and
+    `generation` are as in `_weighted_kernels`.
     """
     cols = moves.shape[1]
     is_open, is_closed = 2 * generation, 2 * generation + 1

@@ -185,8 +185,7 @@ def local_of(cells, cols, box):
 
 @njit(cache=True, nogil=True)
 def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first, clique):
-    """Fill `clique` with the distances inside fields between boundary cells; return whether all
-    fit.
+    """Fill `clique` with the distances between boundary cells inside fields; return if all fit.
 
     `labels`, int32 (n_cells,), is the field of each cell; `moves`, uint8 (n_cells,); `boxes`,
     (n_fields, 4); `node_cell`, the flat boundary cells by field, those of field f from

@@ -41,7 +41,7 @@ def draw_lines(free, cells, basis):
 
 @njit(cache=True, nogil=True)
 def give_away(labels, on_line):
-    """Give each cell of a line to a region beside it, in rounds outwards from the regions.
+    """Assign each cell of a line to a region beside it, in rounds outwards from the regions.
 
     `labels` is changed; cells of lines that no region can reach keep -1.
     """
