@@ -209,7 +209,7 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
 
 def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
     """Return the positions (row, col) of points, rounded to 2^-24 of a cell, held near the map."""
-    # The frame at the origin gives the two axes without the rounding of a far origin.
+    # A frame at the origin yields the two axes without the rounding of a far origin.
     axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
     positions = (xy - frame.origin_m) @ axes.T / frame.resolution_m**2
     rounded: FloatArray = np.rint(np.clip(positions, -_FAR, _FAR) / _QUANTUM) * _QUANTUM

@@ -76,7 +76,7 @@ def summarise(losses: ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Sum
     losses
         Finite numbers, any shape; path length / optimum - 1 for instance.
     seed
-        Seed of the resampling: equal input gives equal output.
+        Seed of the resampling: equal input has equal output.
     resamples
         Resamples of the bootstrap, >= 1. Time is proportional to resamples times losses.
 
@@ -130,7 +130,7 @@ def paired_difference(
         One number for each pair, shape (n,) each, in the same order. Pairs with a NaN or an
         infinite number are dropped and counted.
     seed
-        Seed of the resampling: equal input gives equal output.
+        Seed of the resampling: equal input has equal output.
     resamples
         Resamples of the bootstrap, >= 1.
 

@@ -60,7 +60,7 @@ class LineOfSight:
         if closed is not None:
             free.flat[closed] = False
         self._marks = marks_of(free)
-        # The frame at the origin gives the two axes without the rounding of a far origin.
+        # A frame at the origin yields the two axes without the rounding of a far origin.
         resolution_m = grid.resolution_m
         axes = Frame(resolution_m, yaw_rad=grid.frame.yaw_rad).points_of_grid(np.eye(2))
         self._per_metre = axes / resolution_m**2
