@@ -32,7 +32,7 @@ myst_heading_anchors = 3
 
 nb_execution_mode = "off"  # `make site` sets it to "cache"
 nb_execution_cache_path = str(execution_cache())
-nb_execution_show_tb = True  # the warning of a cell that fails, and with it the build, says why
+nb_execution_show_tb = True  # a cell that fails, and with it the build, shows its traceback
 nb_execution_timeout = 300  # of a cell, in seconds
 nb_merge_streams = True
 nb_output_stderr = "remove-warn"

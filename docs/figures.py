@@ -21,7 +21,7 @@ START, GOAL = (1.0, 13.2), (40.6, 19.4)
 
 
 def draw_route(file: Path) -> None:
-    """Draw what `make route` draws, with its command."""
+    """Draw the picture of `make route`, with its command."""
     command = [sys.executable, "-m", "hybridnav", "plan", str(OFFICE)]
     ends = (",".join(map(str, end)) for end in (START, GOAL))
     command += ["--start", next(ends), "--goal", next(ends), "--compare", "--plot", str(file)]
@@ -41,7 +41,7 @@ def draw_levels(file: Path) -> None:
 
 
 def draw_rooms(file: Path) -> None:
-    """Draw the rooms that are found in the office, with their doors."""
+    """Draw the rooms found in the office, with their doors."""
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     pyramid = hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid))
     save_figure(plot_rooms(hn.TopologicalMap(pyramid)), file, dpi=150)

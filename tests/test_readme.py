@@ -141,7 +141,7 @@ def test_readme_plans_the_route_that_make_draws() -> None:
 
 def test_the_reference_lists_every_preset_with_its_settings() -> None:
     page = (ROOT / "docs/reference/presets.md").read_text(encoding="utf-8")
-    section = page.partition("## Those of the package\n")[2].partition("\n## ")[0]
+    section = page.partition("## The presets of the package\n")[2].partition("\n## ")[0]
     rows = dict(re.findall(r"^\| `([\w-]+)` \| (.+)$", section, re.MULTILINE))
     assert sorted(rows) == hn.preset_names()
     for name, row in rows.items():

@@ -1,4 +1,4 @@
-"""A directive that shows what `hybridnav COMMAND --help` prints, asked at the build."""  # noqa: INP001 - no package
+"""A directive that shows the output of `hybridnav COMMAND --help` at the build."""  # noqa: INP001 - no package
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class CommandHelp(SphinxDirective):
-    """Show the help of one command, or of the program where none is named."""
+    """Help of one command, or of the program if none is named."""
 
     optional_arguments = 1
     final_argument_whitespace = True
@@ -37,6 +37,6 @@ class CommandHelp(SphinxDirective):
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Tell Sphinx of the directive."""
+    """Register the directive with Sphinx."""
     app.add_directive("command-help", CommandHelp)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

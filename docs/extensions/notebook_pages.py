@@ -25,10 +25,10 @@ _QUIET_KERNEL = "c.IPKernelApp.log_level = 'ERROR'  # not that it listens on a l
 
 
 def execution_cache() -> Path:
-    """Return the jupyter-cache for the code as it is, and remove those for the code as it was.
+    """Return the jupyter-cache for the present code, and remove those for older code.
 
-    jupyter-cache knows a notebook by its cells, which stay the same when the package that they call
-    changes; so the folder is named by what all notebooks run on.
+    jupyter-cache identifies a notebook by its cells, which stay the same when the package changes;
+    so the name of the folder is a checksum of the code that all notebooks run on.
     """
     state = hashlib.sha256()
     files = {path for pattern in _RUN_ON for path in ROOT.glob(pattern) if path.is_file()}
@@ -43,7 +43,7 @@ def execution_cache() -> Path:
 
 
 def copy_notebooks(_app: Sphinx) -> None:
-    """Sphinx reads nothing outside of its folder, and wants no pages of notebooks that are gone."""
+    """Copy the notebooks into Sphinx's folder, and remove copies of notebooks that are gone."""
     shutil.rmtree(COPIES, ignore_errors=True)
     COPIES.mkdir()
     for notebook in NOTEBOOKS.glob("*.ipynb"):
@@ -61,13 +61,13 @@ def mend_links(_app: Sphinx | None, docname: str, source: list[str]) -> None:
 def fetch_nothing(
     _app: Sphinx, _page: str, _template: str, context: dict[str, Any], _doctree: object
 ) -> None:
-    """Matplotlib's player asks another site for its buttons' icons; wide.css has them here."""
+    """Remove the link of matplotlib's player to icons on another site; wide.css has them here."""
     if "body" in context:
         context["body"] = _FETCHED.sub("", context["body"])
 
 
 def start_kernels_clean() -> None:
-    """Kernels read no start-up files of whoever builds, and both sides report errors only."""
+    """Keep kernels from reading the user's start-up files; let both sides report errors only."""
     profile = ROOT / "out" / "ipython" / "profile_default"
     profile.mkdir(parents=True, exist_ok=True)
     (profile / "ipython_kernel_config.py").write_text(_QUIET_KERNEL, encoding="utf-8")

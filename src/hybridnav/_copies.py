@@ -1,4 +1,4 @@
-"""Copies and pickles that are like what they were made of."""
+"""Copies and pickles that preserve read-only arrays."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _LOCK = type(threading.Lock())
 
 
 def copies_alike(cls: type[_T]) -> type[_T]:
-    """Make copies and pickles of a class keep which of its arrays are read-only.
+    """Make copies and pickles of a class preserve the read-only flags of its arrays.
 
-    numpy forgets that, and to numba a writeable array is another type: every kernel that met a copy
-    would be compiled anew. Views of mappings stay views, and a copy has locks of its own.
+    numpy drops these flags, and for numba a writeable array is another type: every kernel would be
+    compiled again for a copy. Views of mappings stay views, and a copy has its own locks.
 
     Parameters
     ----------
     cls
-        A class whose instances have a `__dict__`. Arrays count that are attributes, or stand in
-        tuples, lists or mappings that are.
+        A class whose instances have a `__dict__`. Arrays count if they are attributes, or in
+        tuples, lists or mappings that are attributes.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def copies_alike(cls: type[_T]) -> type[_T]:
 
 
 def _state_of(thing: object) -> _State:
-    """Attributes; whether each array in them is writeable; names of views, and of locks."""
+    """Return attributes, whether each array in them is writeable, names of views, and of locks."""
     held = vars(thing)
     views = tuple(name for name, value in held.items() if isinstance(value, MappingProxyType))
     locks = tuple(name for name, value in held.items() if isinstance(value, _LOCK))

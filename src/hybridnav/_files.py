@@ -14,25 +14,25 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MODEL_SUFFIX = ".hnm"
-"""What the name of a model ends in."""
+"""Suffix of the name of a model."""
 
 _unfinished: set[Path] = set()
 
 
 def replace_file(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
-    """Write a file whole or not at all: what was there outlives an interrupt and a full disc.
+    """Write a file whole or not at all: the old content survives an interrupt and a full disc.
 
     Parameters
     ----------
     path
         The file; an existing one is replaced and keeps its mode, a link stays a link.
     content
-        All of it, at once or in pieces.
+        The whole content, at once or in pieces.
 
     Raises
     ------
     OSError
-        When it cannot be written.
+        When the file cannot be written.
     """
     if _is_no_file(path):
         _write(path, content)
@@ -58,17 +58,17 @@ def _write(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
 
 
 def check_replaceable(path: Path) -> None:
-    """Try whether `replace_file` could write a file; nothing is left, nothing changed.
+    """Test whether `replace_file` could write a file, without any change.
 
     Parameters
     ----------
     path
-        The file. A pipe is left alone: whoever reads it would take the trial for all.
+        The file. A pipe is not tested: its reader would take the test for the content.
 
     Raises
     ------
     OSError
-        When it could not.
+        When the file could not be written.
     """
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -79,13 +79,13 @@ def check_replaceable(path: Path) -> None:
 
 
 def _is_no_file(path: Path) -> bool:
-    """Return whether a pipe, a terminal or a folder is there, which nothing can replace."""
+    """Return whether a path is a pipe, a terminal or a folder, which cannot be replaced."""
     return path.exists() and not path.is_file()
 
 
 @contextmanager
 def _beside(path: Path) -> Iterator[Path]:
-    """Yield where a thread writes what becomes a file, however long its name is, and remove it."""
+    """Yield a short temporary path beside a file for one thread, and remove it afterwards."""
     beside = path.with_name(f".hybridnav.{os.getpid()}.{threading.get_ident()}")
     _unfinished.add(beside)
     try:
@@ -96,7 +96,7 @@ def _beside(path: Path) -> Iterator[Path]:
 
 
 def remove_unfinished() -> None:
-    """Remove what writing has left in folders so far, as this process is about to end."""
+    """Remove the temporary files of this process, before it ends."""
     for path in list(_unfinished):
         with suppress(OSError):
             path.unlink()

@@ -1,4 +1,4 @@
-"""The one place where kernels are compiled, and where it is decided what becomes of the result."""
+"""Compilation of kernels, and the only place that decides about their cache."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _LOG = logging.getLogger("hybridnav.kernels")
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:
-    """Compile a function as `numba.njit` does, without a cache where none can be written.
+    """Compile a function like `numba.njit`, without a cache if none can be written.
 
-    numba keeps what it compiled beside the module or in the user's home, and refuses the function
-    where it can write to neither: an installation that is read-only, for a user without a home.
+    numba keeps compiled code beside the module or in the user's home, and refuses the function if
+    it can write to neither: in a read-only installation, for a user without a home.
 
     Parameters
     ----------
     options
-        Those of `numba.njit`.
+        Options of `numba.njit`.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     Warns
     -----
     CacheWarning
-        Once in a program, when a cache was asked for and there is no folder for it.
+        Once in a program, when a cache was requested and there is no folder for it.
     """
 
     def decorate(function: Any) -> Any:
@@ -59,8 +59,9 @@ def njit(**options: Any) -> Callable[[Any], Any]:
 
 
 def _kernel(function: Any, options: dict[str, Any]) -> Any:
-    """Compile a function for Python and for other kernels; as it is with the compiler off."""
-    kernel = numba.njit(**{**options, "no_cfunc_wrapper": True})(function)  # nobody calls it from C
+    """Compile a function for Python and for other kernels; leave it as it is with the compiler
+    off."""
+    kernel = numba.njit(**{**options, "no_cfunc_wrapper": True})(function)  # never called from C
     if isinstance(kernel, CPUDispatcher):
         kernel.__class__ = _Kernel
     return kernel
@@ -80,11 +81,11 @@ def _tell() -> None:
 
 
 class _Inner(CPUDispatcher):
-    """What other kernels call in place of a kernel.
+    """The twin of a kernel that other kernels call.
 
-    A first plan spends more time in the compiler than in all else, and there a quarter of it went
-    into what Python needs to call the kernels that it never calls, and into one version of each for
-    every whole number that they are called with.
+    A first plan spends most of its time in the compiler. A quarter of that went into wrappers for
+    Python of kernels that Python never calls, and into one version of each for every integer
+    literal.
     """
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
@@ -92,7 +93,7 @@ class _Inner(CPUDispatcher):
         return super().get_call_template(tuple(map(_type_of, args)), kws)
 
     def add_overload(self, cres: Any) -> None:
-        """Keep what was compiled from Python, which cannot call it."""
+        """Hide compiled code from Python, which cannot call it."""
         self.overloads[tuple(cres.signature.args)] = cres
 
 
@@ -102,11 +103,10 @@ def _type_of(argument: Any) -> Any:
 
 
 class _Kernel(CPUDispatcher):
-    """A kernel that Python calls; other kernels call its twin. It logs what takes the compiler
-    long."""
+    """A kernel that Python calls; other kernels call its twin. Slow compilations are logged."""
 
     def compile(self, sig: Any) -> Any:
-        """Compile for a signature, or load what is kept."""
+        """Compile for a signature, or load it from the cache."""
         began, n_missed = time.perf_counter(), self._n_missed()
         entry = super().compile(sig)
         if self._n_missed() > n_missed:
@@ -116,7 +116,7 @@ class _Kernel(CPUDispatcher):
         return entry
 
     def _n_missed(self) -> int:
-        """How often there was nothing in the cache to load."""
+        """Return the number of cache misses."""
         return sum(self.stats.cache_misses.values())
 
     @cached_property
@@ -138,7 +138,7 @@ class _Kernel(CPUDispatcher):
 
 
 class _Guarded(_Kernel):
-    """A kernel that raises what was raised while its results became objects of Python."""
+    """A kernel that re-raises an exception from the conversion of its results to Python objects."""
 
     def __call__(self, *arguments: Any) -> Any:
         try:
@@ -153,11 +153,11 @@ class _Guarded(_Kernel):
 
 
 def guarded(kernel: Kernel) -> Kernel:
-    """Let a kernel raise what the handler of a signal raises.
+    """Make a kernel raise the exception of a signal handler.
 
-    A handler runs as soon as Python does. That is when numba makes arrays of the results, and for
-    several results numba goes on to the next one: it returns a broken tuple with the exception set,
-    which Python turns into a SystemError whose cause is the exception.
+    A handler runs as soon as Python does, which is when numba makes arrays of the results. With
+    several results numba continues with the next one: it returns a broken tuple with the exception
+    set, which Python turns into a SystemError with the exception as its cause.
     """
     if isinstance(kernel, CPUDispatcher):
         kernel.__class__ = _Guarded  # type: ignore[assignment]

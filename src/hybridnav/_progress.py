@@ -1,12 +1,12 @@
-"""How long work reports how far it is."""
+"""Progress reports of long work."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Progress = Callable[[int, int], None]
-"""Called after each step with the number of steps done and of all, as for a progress bar."""
+"""Called after each step with the number of steps done and of all steps, as for a progress bar."""
 
 
 def no_progress(done: int, total: int) -> None:
-    """Report to nobody."""
+    """Ignore the progress."""

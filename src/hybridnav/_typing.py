@@ -1,4 +1,4 @@
-"""Names for the arrays that the layers hand to each other."""
+"""Names for the types of arrays that the layers exchange."""
 
 import os
 from typing import Any

@@ -1,4 +1,4 @@
-"""Errors and warnings: every one says what was given, what was expected, and where."""
+"""Errors and warnings; each message states the given value, the expected one, and the place."""
 
 
 class HybridNavError(Exception):
@@ -10,16 +10,16 @@ class InvalidValueError(HybridNavError, ValueError):
 
 
 class MapError(HybridNavError, ValueError):
-    """A map file, or the image it names, cannot be read as an occupancy grid; or a file of what is
-    closed on a map cannot be read, or does not fit the map."""
+    """A map file, or the image that it names, cannot be read as an occupancy grid; or a file of
+    closed areas cannot be read, or does not fit the map."""
 
 
 class MapNotFoundError(MapError, FileNotFoundError):
-    """A map file, the image it names, or a file of what is closed, is not there."""
+    """A map file, the image that it names, or a file of closed areas does not exist."""
 
 
 class ModelError(MapError):
-    """A model cannot be read: it is none, not whole, altered, or of another version."""
+    """A file cannot be read as a model: it is none, not whole, altered, or of another version."""
 
 
 class RoomsError(MapError):
@@ -27,7 +27,7 @@ class RoomsError(MapError):
 
 
 class RoomsNotFoundError(RoomsError, FileNotFoundError):
-    """A file of rooms, or the image that it names, is not there."""
+    """A file of rooms, or the image that it names, does not exist."""
 
 
 class PresetError(HybridNavError, ValueError):
@@ -47,11 +47,11 @@ class PlanError(HybridNavError, RuntimeError):
 
 
 class MapWarning(UserWarning):
-    """A map loads, but probably does not mean what its file says."""
+    """A map loads, but its file probably means something else."""
 
 
 class CacheWarning(UserWarning):
-    """Compiled code cannot be kept, so that every start compiles it anew."""
+    """Compiled code cannot be cached, so that every start compiles it again."""
 
     opening = "no folder can be written"
-    """First words of the text, by which processes of a program that has warned are kept quiet."""
+    """First words of the text, by which other processes of a program filter the warning."""

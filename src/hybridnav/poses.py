@@ -14,24 +14,24 @@ if TYPE_CHECKING:
 
 _MAX_POSES = 10_000_000
 _BEND = 1e-6
-"""Radians, and radians per metre, below which a path goes on as before: what is left when cell
-centres on a straight line are rounded far from the origin."""
+"""Radians, and radians per metre, below which a path counts as straight: the rounding of cell
+centres on a straight line far from the origin."""
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What a robot does between the points of a path, one row a step.
+    """Motion of a robot between the points of a path, one row a step.
 
     Parameters
     ----------
     points
         float64 (n, 2), n >= 1, metres.
     headings_rad
-        float64 (n,), None for a robot that faces the way it goes.
+        float64 (n,), None for a robot that faces its direction of travel.
     curved
-        Whether it drives an arc of a circle from each pose to the next, tangent to both headings;
-        else a straight line, on which it turns evenly.
+        Whether the robot drives an arc of a circle from each pose to the next, tangent to both
+        headings; else a straight line, on which it turns evenly.
     """
 
     points: FloatArray
@@ -45,7 +45,7 @@ class Motion:
 
     @property
     def _travel(self) -> FloatArray:
-        """Direction of each step, of one of no length that of the step before, or behind."""
+        """Direction of each step; a step without length has that of the step before, or behind."""
         steps = self._steps
         travel = np.arctan2(steps[:, 1], steps[:, 0])
         return _filled(travel, np.hypot(steps[:, 0], steps[:, 1]) > 0)
@@ -66,8 +66,8 @@ class Motion:
 
     @property
     def directions(self) -> SignArray:
-        """int8 (n - 1,), -1 on steps that lead backwards, else 1; a turn on the spot goes with the
-        step before, or behind."""
+        """int8 (n - 1,), -1 on backward steps, else 1; a turn on the spot has the value of the step
+        before, or behind."""
         ahead = np.ones(len(self.points) - 1)
         if self.headings_rad is not None:
             middle = self.headings_rad[:-1] + self._turns / 2
@@ -77,15 +77,15 @@ class Motion:
 
     @property
     def headings_at_points(self) -> FloatArray:
-        """float64 (n,), the headings, or the direction in which each point is left, the last one
-        reached; 0 where nothing moves."""
+        """float64 (n,), the headings, or the direction of travel after each point, before the last
+        one; 0 without motion."""
         if self.headings_rad is not None:
             return self.headings_rad
         travel = self._travel
         return np.append(travel, travel[-1]) if len(travel) else np.zeros(1)
 
     def bends(self) -> LongArray:
-        """int64, indices of the points that even spacing must keep, both ends among them."""
+        """Return the indices of points that even spacing must keep, with both ends, int64."""
         lengths, turns = self.lengths_m, self._turns
         moves = lengths > 0
         rate = np.divide(turns, lengths, out=np.zeros_like(turns), where=moves)
@@ -100,13 +100,14 @@ class Motion:
         return np.unique(np.concatenate([[0], kept, [len(self.points) - 1]]))
 
     def spread(self, spacing_m: float) -> tuple[FloatArray, SignArray]:
-        """Poses at most so far apart, float64 (m, 3), and the direction in which each is left, int8
-        (m,), the last one reached.
+        """Return poses at most `spacing_m` apart, float64 (m, 3), and their directions, int8 (m,).
+
+        The direction is that after each pose, at the last one that before it.
 
         Raises
         ------
         InvalidValueError
-            When the spacing is not positive, or there were more than ten million poses.
+            When the spacing is not positive, or there would be more than ten million poses.
         """
         lengths = self.lengths_m
         total_m = float(lengths.sum())
@@ -132,7 +133,7 @@ class Motion:
         return self._poses(step, part), self.directions[step]
 
     def _poses(self, step: LongArray, part: FloatArray) -> FloatArray:
-        """Poses at some parts of some steps."""
+        """Return the poses at shares of some steps."""
         place = self.points[step] + part[:, None] * self._steps[step]
         last = part == 1.0
         place[last] = self.points[step[last] + 1]
@@ -149,7 +150,7 @@ class Motion:
     def _off_chord(
         driven_m: FloatArray, heading: FloatArray, turns: FloatArray, part: FloatArray
     ) -> FloatArray:
-        """How far an arc lies off its chord, (x, y), after a part of both."""
+        """Return the offset of an arc from its chord, (x, y), after a share of both."""
 
         def ahead(part: FloatArray) -> FloatArray:
             half = part * turns / 2
@@ -160,7 +161,7 @@ class Motion:
 
 
 def wrapped(angles_rad: FloatArray) -> FloatArray:
-    """The same angles in [-pi, pi)."""
+    """Return angles wrapped to [-pi, pi)."""
     turned: FloatArray = (angles_rad + np.pi) % (2 * np.pi) - np.pi
     return turned
 
@@ -173,8 +174,8 @@ def _part(along_m: FloatArray, lengths_m: FloatArray) -> FloatArray:
 
 
 def _filled(values: FloatArray, known: BoolArray) -> FloatArray:
-    """Return the values, each unknown one replaced by the last known one before it, else the first
-    after it."""
+    """Return values with each unknown one replaced by the last known one before it, else after
+    it."""
     if known.all() or not known.any():
         return values
     last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))

@@ -1,4 +1,4 @@
-"""What a planner answers: statuses, routes, paths, bounds."""
+"""Results of a planner: statuses, routes, paths, bounds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Metric = Literal["octile", "any-angle", "clearance-weighted", "dubins", "reeds-s
 
 
 class PlanStatus(StrEnum):
-    """How a plan ended; outcomes are values, not errors."""
+    """Outcome of a plan, as a value, not an error."""
 
     SOLVED = "solved"
     START_OUTSIDE = "start outside the map"
@@ -36,7 +36,7 @@ class PlanStatus(StrEnum):
     GOAL_BLOCKED = "goal blocked"
     NO_PATH = "no path"
     APPROXIMATE = "approximate"
-    """A sampling-based planner came near the goal and not to it."""
+    """A sampling-based planner came near the goal but did not reach it."""
     TIMEOUT = "timeout"
     """A sampling-based planner found nothing in its time."""
 
@@ -44,19 +44,19 @@ class PlanStatus(StrEnum):
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A path through the grid: from the centre of the start's cell to that of the goal's, or an
-    any-angle one from point to point."""
+    """A path through the grid, between the centres of two cells, or at any angle between two
+    points."""
 
     cells: LongArray
-    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A
-    path shortened by line of sight keeps the cells of the path that was shortened."""
+    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A path
+    shortened by line of sight keeps the cells of the original path."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
     where an any-angle path turns."""
     length_m: float
-    """Length in metres, of a cell path counted as a + b sqrt 2 cells from the moves."""
+    """Length in metres; for a cell path it is counted as a + b sqrt 2 cells from the moves."""
     headings_rad: FloatArray | None = None
-    """float64 (m,), heading at each point, counter-clockwise from the x axis; None where the state
+    """float64 (m,), heading at each point, counter-clockwise from the x axis; None if the state
     space has none."""
     is_curved: bool = False
     """Whether the robot drives an arc of a circle from each point to the next, as in the spaces
@@ -74,42 +74,44 @@ class Path:
 
     @property
     def headings_at_points(self) -> FloatArray:
-        """float64 (m,), `headings_rad`, or the direction of travel from each point on; at the last
-        one that of its arrival, and 0 where nothing moves."""
+        """float64 (m,), `headings_rad`, or the direction of travel after each point, before the
+        last one; 0 without motion."""
         return self._motion.headings_at_points
 
     def poses(self, spacing_m: float = 0.05) -> FloatArray:
-        """Poses along the path for a controller: evenly spaced between the points where it bends.
+        """Return poses along the path for a controller, evenly spaced between the points where it
+        bends.
 
         Parameters
         ----------
         spacing_m
-            Metres driven from one pose to the next at most; every straight line or arc is divided
-            into as few equal parts as that takes.
+            Most metres from one pose to the next; every straight line or arc is divided into as few
+            equal parts as possible.
 
         Returns
         -------
         FloatArray
-            float64 (n, 3), `(x, y, yaw)`, metres and radians in [-pi, pi), map frame, from first
-            to last point. Without `headings_rad` the yaw is the direction of travel: at a bend
-            that of what follows, at the end that of what came before, 0 where nothing moves. With
-            them it is the robot's, as it turns along the way; a turn on the spot is two poses at
-            one point.
+            float64 (n, 3), `(x, y, yaw)`, metres and radians in [-pi, pi), map frame, from first to
+            last point. Without `headings_rad` the yaw is the direction of travel: at a bend the one
+            after it, at the end the one before it, 0 without motion. With `headings_rad` it is the
+            heading of the robot, as it turns along the path; a turn on the spot is two poses at one
+            point.
 
         Raises
         ------
         InvalidValueError
-            When the spacing is not positive, or so small that there were more than ten million.
+            When the spacing is not positive, or so small that there would be more than ten million
+            poses.
         """
         return self._motion.spread(spacing_m)[0]
 
     def directions(self, spacing_m: float = 0.05) -> SignArray:
-        """Whether the robot goes ahead or backwards from each of the `poses`.
+        """Return the direction, ahead or backwards, in which the robot leaves each of the `poses`.
 
         Parameters
         ----------
         spacing_m
-            As for `poses`.
+            As in `poses`.
 
         Returns
         -------
@@ -130,40 +132,40 @@ class Route:
     """The topological answer: the places passed and the arcs between them."""
 
     places: tuple[int, ...]
-    """Ids of the places, from the start's to the goal's."""
+    """Ids of the places, from that of the start to that of the goal."""
     arcs: tuple[int, ...]
-    """Ids of the arcs, one fewer than places; -1 for a step between two occupied cells, where
-    corners may be cut."""
+    """Ids of the arcs, one fewer than places; -1 for a step between two occupied cells, if corners
+    may be cut."""
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """How a sampling-based planner came to its path."""
+    """History of the path of a sampling-based planner."""
 
     steps: tuple[str, ...]
-    """What was tried in turn, and how it ended: `corridor: timeout`, `widened corridor: solved`."""
+    """Attempts in order, with outcomes: `corridor: timeout`, `widened corridor: solved`."""
     by_grid: bool
-    """Whether the path is the grid's, shortened by line of sight, because all of that failed."""
+    """Whether the path is the grid's, shortened by line of sight, because all attempts failed."""
     trace: tuple[tuple[float, float], ...]
     """Seconds and cost of each better path."""
     iterations: int
-    """Of planners and simplification."""
+    """Iterations of planners and simplification."""
 
 
 @dataclass(frozen=True)
 class PlanStats:
-    """What a query took."""
+    """Effort of a query."""
 
     expanded: int = 0
-    """Cells that the refiner expanded."""
+    """Number of cells that the refiner expanded."""
     expanded_places: int = 0
-    """Places that the coarse search expanded."""
+    """Number of places that the coarse search expanded."""
     expanded_gates: int = 0
-    """Border cells that the search over portals expanded."""
+    """Number of border cells that the search over portals expanded."""
     expanded_intervals: int = 0
-    """Intervals that the search on the mesh expanded."""
+    """Number of intervals that the search on the mesh expanded."""
     corridor_cells: int = 0
-    """Cells in the corridor; 0 where it is the whole map, or the route leads over portals."""
+    """Number of cells in the corridor; 0 for the whole map, or a route over portals."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall-clock seconds per stage."""
 
@@ -195,44 +197,46 @@ class PlanBatch:
         return gap - 1
 
     def path(self, query: int) -> FloatArray:
-        """Points of one path, float64 (k, 2); none where there is no path."""
+        """Return the points of one path, float64 (k, 2); none where there is no path."""
         points: FloatArray = self.points[self.path_start[query] : self.path_start[query + 1]]
         return points
 
 
 @dataclass(frozen=True, eq=False)
 class PlanResult:
-    """Outcome of one query; `path` and `route` are None unless it is solved. The path of an
-    approximate one ends short of the goal."""
+    """Outcome of one query; `path` and `route` are None unless it is solved.
+
+    The path of an approximate result ends short of the goal.
+    """
 
     status: PlanStatus
     metric: Metric = "octile"
     path: Path | None = None
     route_source: Callable[[], Route] | Route | None = field(default=None, repr=False)
-    """The route, or what finds it once somebody asks for it."""
+    """The route, or a function that finds it on demand."""
     lower_bound: float = math.inf
     """A proved bound on the optimum in the metric, metres; infinite where there is no path."""
     stats: PlanStats = field(default_factory=PlanStats)
     settings: dict[str, Any] = field(default_factory=dict)
-    """Preset, and how the pyramid was built."""
+    """Preset, and settings of the pyramid."""
     weighted_cost: float | None = None
-    """Cost in a metric that is not the length; None where it is."""
+    """Cost in a metric other than the length; None for the length."""
     refinement: Refinement | None = None
-    """With OMPL: how the path came about."""
+    """History of the path, with OMPL only."""
     start: tuple[float, ...] | None = None
-    """Where it was planned from, `(x, y)` or `(x, y, yaw)`, metres and radians, map frame; in a
-    room the point that was chosen."""
+    """Start of the plan, `(x, y)` or `(x, y, yaw)`, metres and radians, map frame; in a room the
+    chosen point."""
     goal: tuple[float, ...] | None = None
-    """Where to."""
+    """Goal of the plan, like `start`."""
 
     @cached_property
     def route(self) -> Route | None:
-        """The places and arcs of the path: chosen before it (`paper`), or read off it (all other
-        presets); None unless there is a path."""
+        """The places and arcs of the path: chosen before it (`paper`), or derived from it (all
+        other presets); None unless there is a path."""
         return self.route_source() if callable(self.route_source) else self.route_source
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state with the route found, so that copies hold no planner."""
+        """Return the state with a found route, so that copies hold no planner."""
         state = {name: value for name, value in vars(self).items() if name != "route"}
         return state | {"route_source": self.route}
 
@@ -261,17 +265,17 @@ class PlanResult:
         Raises
         ------
         PlanError
-            When it is not; the text names the status.
+            When the result is not solved; the text names the status.
         """
         if not self.solved:
             raise PlanError(f"no path was planned: {self.status}")
         return self
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for strict JSON, by the names that they have here.
+        """Return plain values for strict JSON, under the names of the attributes.
 
-        What is infinite or does not exist is None. Where the path has no headings, `headings_rad`
-        holds the direction of travel at each point.
+        Infinite or missing values are None. If the path has no headings, `headings_rad` holds the
+        direction of travel at each point.
         """
         return {
             "status": str(self.status),

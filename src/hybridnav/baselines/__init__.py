@@ -1,4 +1,4 @@
-"""Other methods' topological and metric layers, behind one protocol."""
+"""Topological and metric layers of other methods, behind one protocol."""
 
 from hybridnav.baselines.protocol import Answer, Line, Method
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray
 
 LONG_RUN = 6
-"""Facing pairs from which on an entrance has a transition at either end instead of one amid."""
+"""Facing pairs from which an entrance has a transition at either end, not one in the middle."""
 
 _NONE = np.iinfo(np.int64).max
 
@@ -41,13 +41,13 @@ class AbstractGraph(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def cluster_at(cols, side, cell):
-    """Index of the cluster that holds a flat cell."""
+    """Return the index of the cluster of a flat cell."""
     return cell // cols // side * ((cols + side - 1) // side) + cell % cols // side
 
 
 @njit(cache=True, nogil=True)
 def label_regions(enterable, moves, side):
-    """Region of each cell, -1 where none may be entered: the connected pieces of the clusters."""
+    """Return the region of each cell, a connected piece of a cluster; -1 for cells not to enter."""
     rows, cols = moves.shape
     region_of = np.full((rows, cols), np.int32(-1), np.int32)
     stack = np.empty(side * side, np.int64)
@@ -81,7 +81,7 @@ def label_regions(enterable, moves, side):
 
 @njit(cache=True, nogil=True)
 def transitions(enterable, side):
-    """Flat cell pairs (n, 2) of the transitions between clusters that share a side.
+    """Return the flat cell pairs (n, 2) of the transitions between clusters that share a side.
 
     An entrance is a maximal run of facing pairs of cells that may be entered, along one side of
     one cluster.
@@ -90,7 +90,7 @@ def transitions(enterable, side):
     pairs = np.empty((2 * rows * (cols // side) + 2 * cols * (rows // side) + 1, 2), np.int64)
     n_pairs = 0
     for upright in range(2):
-        # `across` counts cells along the line between two rows of clusters, `along` along it.
+        # `along` counts cells along the line between two rows of clusters, `across` across it.
         n_across, n_along = (cols, rows) if upright else (rows, cols)
         step_across, step_along = (1, cols) if upright else (cols, 1)
         for across in range(side - 1, n_across - 1, side):
@@ -128,11 +128,13 @@ def transitions(enterable, side):
 
 @njit(cache=True, nogil=True)
 def flood(moves, side, cell, distance, waiting):
-    """Fill `distance` (side, side) with the costs of shortest paths from a cell to those of its
-    cluster that stay in it, -1 where there is none; return how many cells were reached.
+    """Fill `distance` with the costs of paths from a cell inside its cluster; return the cells
+    reached.
+
+    `distance` is (side, side), -1 where no path stays in the cluster; the result counts cells.
 
     Buckets as wide as a straight step make the search label-setting (Dinic 1978). A cell is
-    improved at most once by each neighbour, so 8 entries a cell are room enough in `waiting`.
+    improved at most once by each neighbour, so `waiting` needs 8 entries a cell.
     """
     rows, cols = moves.shape
     row0, col0 = cell // cols // side * side, cell % cols // side * side
@@ -177,14 +179,15 @@ def flood(moves, side, cell, distance, waiting):
 
 @njit(cache=True, nogil=True)
 def distance_in_cluster(distance, cols, side, cell):
-    """What the last flood found for a flat cell of the same cluster."""
+    """Return the result of the last flood for a flat cell of the same cluster."""
     return distance[cell // cols % side, cell % cols % side]
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def intra_edges(moves, side, cells, cluster_first):
-    """Tails, heads and costs of the edges between nodes that a path inside their cluster joins."""
+    """Return tails, heads and costs of the edges between nodes joined by a path in their
+    cluster."""
     cols = moves.shape[1]
     counts = cluster_first[1:] - cluster_first[:-1]
     room = np.sum(counts * (counts - 1))
@@ -208,11 +211,15 @@ def intra_edges(moves, side, cells, cluster_first):
 @guarded
 @njit(cache=True, nogil=True)
 def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, generation):
-    """Flat cells that the cheapest abstract path passes, start and goal included, none where there
-    is none; the nodes expanded; the cells expanded to join start and goal to the graph.
+    """Return the flat cells of the cheapest abstract path, and the nodes and cells expanded.
 
-    Start and goal are joined to the nodes of their clusters, and to each other where a path inside
-    one cluster does so. `mark` is as in `_weighted_kernels`.
+    The path includes start and goal, and is empty if there is none; cells are expanded to join
+    start and goal to the graph.
+
+    Start and goal are joined to the nodes of their clusters, and to each other if a path inside one
+    cluster does so. `moves`, uint8 (rows, cols), are the legal moves; `start` and `goal` flat
+    cells; `cost_of`, `previous` and `mark`, one entry for each node, are work arrays; `mark` and
+    `generation` are as in `_weighted_kernels`.
     """
     cols = moves.shape[1]
     is_open, is_closed = 2 * generation, 2 * generation + 1
@@ -293,7 +300,7 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
 @guarded
 @njit(cache=True, nogil=True)
 def refine(moves, side, passed):
-    """Flat cells of the path that fills in an abstract one, and the cells expanded.
+    """Return the flat cells of the path that refines an abstract one, and the cells expanded.
 
     Two cells in a row lie in one cluster, or face each other across the side of two.
     """
@@ -333,13 +340,13 @@ def refine(moves, side, passed):
 
 @njit(cache=True, nogil=True)
 def smooth(moves, path, reach, position):
-    """A path made shorter by straight lines, as the authors of HPA* do it.
+    """Return a path shortened by straight lines, by the method of the authors of HPA*.
 
     From a cell of the path, lines of at most `reach` legal moves run in the eight directions, each
-    up to the first cell of the path that it meets. The line that saves most replaces what lies
-    between its ends, and its far end is looked at next; where none saves, the next cell of the path
-    is. `position` (one entry a cell) is -1 throughout before and after. A straight line has the
-    fewest moves of all ways between its ends, so the path gets no more cells.
+    up to the first cell of the path that it meets. The line that saves most replaces the path
+    between its ends, and its far end is next; if none saves, the next cell of the path is.
+    `position` (one entry a cell) is -1 throughout before and after. A straight line has the fewest
+    moves of all paths between its ends, so the path gets no more cells.
     """
     cols = moves.shape[1]
     n = path.size
@@ -353,7 +360,7 @@ def smooth(moves, path, reach, position):
     smoothed = np.empty(n, np.int64)
     smoothed[0] = path[0]
     size = 1
-    # A path that comes back to a cell is cut short: the last visit counts.
+    # A path that returns to a cell is cut short: the last visit counts.
     at = np.int64(position[path[0]])
     while at < n - 1:
         cell = path[at]

@@ -18,7 +18,7 @@ _NONE = np.int64(1) << 62
 
 @njit(cache=True, nogil=True)
 def field_boxes(labels, cols, n_fields):
-    """Bounding boxes of fields: least row, least column, greatest row, greatest column."""
+    """Return the bounding boxes of fields: least row and column, greatest row and column."""
     boxes = np.empty((n_fields, 4), np.int64)
     boxes[:, :2] = labels.size
     boxes[:, 2:] = -1
@@ -35,7 +35,7 @@ def field_boxes(labels, cols, n_fields):
 
 @njit(cache=True, nogil=True)
 def boundary_cells(labels, moves, cols):
-    """Flat cells with a legal move into another field, ascending."""
+    """Return the flat cells with a legal move into another field, ascending."""
     found = np.empty(1024, np.int64)
     count = 0
     for cell in range(labels.size):
@@ -53,7 +53,7 @@ def boundary_cells(labels, moves, cols):
 @guarded
 @njit(cache=True, nogil=True)
 def cross_edges(labels, moves, cols, node_cell):
-    """Legal moves between fields, by the node they start from: first, heads, costs."""
+    """Return the legal moves between fields by their first node: offsets, heads, costs."""
     node_of = np.empty(labels.size, np.int32)
     for node in range(node_cell.size):
         node_of[node_cell[node]] = node
@@ -81,7 +81,7 @@ def cross_edges(labels, moves, cols, node_cell):
 
 @njit(cache=True, nogil=True)
 def inner_moves(labels, moves, cols, field, box):
-    """Moves that stay in a field, one byte mask for each cell of its bounding box."""
+    """Return the moves that stay in a field, one byte mask for each cell of its bounding box."""
     width = box[3] - box[1] + 1
     inner = np.zeros((box[2] - box[0] + 1) * width, np.uint8)
     local = 0
@@ -101,9 +101,9 @@ def inner_moves(labels, moves, cols, field, box):
 
 @njit(cache=True, nogil=True)
 def keep_table():
-    """Moves worth trying after a move in each direction out of a cell that has all eight.
+    """Return the useful moves after a move in each direction, out of a cell with all eight.
 
-    All others lead back, or to a cell that the cell before reached at no greater cost.
+    All others lead back, or to a cell that the previous cell reaches at no greater cost.
     """
     keep = np.zeros(8, np.uint8)
     for k in range(8):
@@ -117,10 +117,13 @@ def keep_table():
 
 @njit(cache=True, nogil=True)
 def distances_from(inner, width, source, keep, distance, closed, came, open_cells):
-    """Cost of the shortest path inside a field from one cell to every other, `_NONE` for none.
+    """Fill in the costs of shortest paths inside a field from one cell, `_NONE` for no path.
 
-    Buckets as wide as a straight step make the search label-setting (Dinic 1978); three take
-    turns. A cell is improved at most once by each neighbour, which bounds the buckets.
+    Buckets as wide as a straight step make the search label-setting (Dinic 1978); three take turns.
+    A cell is improved at most once by each neighbour, which bounds the buckets.
+
+    `inner`, uint8, the moves of the cells in the field's bounding box, `width` cells wide; `source`
+    an index in the box; `keep` that of `keep_table`; the others are those of `room_for`.
     """
     distance[:] = _NONE
     closed[:] = False
@@ -161,7 +164,7 @@ def distances_from(inner, width, source, keep, distance, closed, came, open_cell
 
 @njit(cache=True, nogil=True)
 def room_for(size):
-    """Arrays that `distances_from` works in, for a box of so many cells."""
+    """Return the work arrays of `distances_from` for a box of `size` cells."""
     return (
         np.empty(size, np.int64),
         np.empty(size, np.bool_),
@@ -172,7 +175,7 @@ def room_for(size):
 
 @njit(cache=True, nogil=True)
 def local_of(cells, cols, box):
-    """Indices of flat cells in the bounding box of their field."""
+    """Return the indices of flat cells in the bounding box of their field."""
     width = box[3] - box[1] + 1
     local = np.empty(cells.size, np.int64)
     for i in range(cells.size):
@@ -182,9 +185,12 @@ def local_of(cells, cols, box):
 
 @njit(cache=True, nogil=True)
 def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first, clique):
-    """Distances inside every field between its boundary cells, as square matrices one by one.
+    """Fill `clique` with the distances between boundary cells inside fields; return if all fit.
 
-    Returns whether they all fit the type of `clique`.
+    `labels`, int32 (n_cells,), is the field of each cell; `moves`, uint8 (n_cells,); `boxes`,
+    (n_fields, 4); `node_cell`, the flat boundary cells by field, those of field f from
+    `node_first[f]` on; `clique`, flat square matrices, that of field f from `clique_first[f]` on. A
+    distance must fit the type of `clique`.
     """
     keep = keep_table()
     largest = np.iinfo(clique.dtype).max
@@ -211,8 +217,11 @@ def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first
 @guarded
 @njit(cache=True, nogil=True)
 def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, other):
-    """Distances inside its field from a cell to the boundary cells and to another cell, `_NONE`
-    where that lies in another field; and the cells of the field that were reached."""
+    """Return the distances inside its field from a cell to the boundary cells and to another cell.
+
+    The latter is `_NONE` in another field. The third result is the number of cells reached. `cell`
+    and `other` are flat cells; for the other arguments see `fill_cliques`.
+    """
     field = labels[cell]
     box = boxes[field]
     inner = inner_moves(labels, moves, cols, field, box)
@@ -227,7 +236,12 @@ def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, 
 
 @njit(cache=True, nogil=True)
 def relax(heap, best, came, by_cross, node_cell, cols, goal, bound, node, new_cost, via, across):
-    """Note a cheaper way to a node, unless no path through it can cost less than `bound`."""
+    """Note a cheaper path to a node, unless no path through it can cost less than `bound`.
+
+    `best` and `came`, int64 by node, are cost and predecessor, `by_cross` whether it is reached
+    across a boundary; `goal` is a flat cell; `new_cost` the cost through `via`, `across` a boundary
+    or not. Costs are integers.
+    """
     if new_cost >= best[node]:
         return
     cell = np.int64(node_cell[node])
@@ -259,12 +273,16 @@ def overlay_search(
     goal,
     direct,
 ):
-    """A* on the overlay, from the boundary cells of the start's field to those of the goal's.
+    """Search the overlay by A*, from the boundary cells of the start's field to those of the
+    goal's.
 
-    `direct` is the cost of the best path that never leaves the start's field. A node reached
-    inside its field is left across the boundary only: two paths in a row inside one field are
-    never shorter than one. Returns the cost, `_NONE` for no path, the nodes of the path, whether
-    each was reached across a boundary, and the expansions; no nodes where the direct path wins.
+    `node_field` and `node_cell` are the field and flat cell of each node; `cross_first`,
+    `cross_head` and `cross_cost` the moves of `cross_edges`; `start_distance` and `goal_distance`
+    the results of `distances_to_nodes`; for the other arrays see `fill_cliques`. `direct` is the
+    cost of the best path that never leaves the start's field. A node reached inside its field is
+    left only across the boundary: two paths in a row inside one field are never shorter than one.
+    Return the cost, `_NONE` for no path, the nodes of the path, whether each was reached across a
+    boundary, and the expansions; no nodes if the direct path wins.
     """
     best = np.full(node_cell.size, _NONE)
     came = np.full(node_cell.size, -1, np.int32)

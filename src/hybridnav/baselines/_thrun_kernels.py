@@ -9,7 +9,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def draw_lines(free, cells, basis):
-    """Free cells on the lines from critical points to their basis points.
+    """Return the free cells on the lines from critical points to their basis points.
 
     A line steps along one side at a time (the cells that the straight segment passes through), so
     no 4-neighbour move and no diagonal one can slip across it.
@@ -28,8 +28,8 @@ def draw_lines(free, cells, basis):
                 if not free[at_row, at_col]:
                     break
                 on_line[at_row, at_col] = True
-                # Which side of its cell the segment leaves by: compare (r + 1/2) / rows with
-                # (c + 1/2) / cols, both multiplied out.
+                # The side by which the segment leaves its cell: compare (r + 1/2) / rows with (c +
+                # 1/2) / cols, both multiplied out.
                 if r < rows and (c >= cols or (2 * r + 1) * cols <= (2 * c + 1) * rows):
                     r += 1
                 elif c < cols:
@@ -41,7 +41,7 @@ def draw_lines(free, cells, basis):
 
 @njit(cache=True, nogil=True)
 def give_away(labels, on_line):
-    """Give each cell of a line to a region beside it, in rounds outwards from the regions.
+    """Assign each cell of a line to a region beside it, in rounds outwards from the regions.
 
     `labels` is changed; cells of lines that no region can reach keep -1.
     """

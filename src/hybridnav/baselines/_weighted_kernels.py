@@ -1,7 +1,7 @@
 """Kernels of the searches on the whole grid: Dijkstra, weighted A*; and the heap of open cells.
 
 Marks instead of clearing: `mark` holds 2 * generation for a cell that is open in the search of this
-generation, 2 * generation + 1 for one that is closed, anything less for one not yet seen.
+generation, 2 * generation + 1 for one that is closed, less for one not yet seen.
 """
 
 from __future__ import annotations
@@ -51,11 +51,13 @@ def drop_least(keys, items, size):
 @guarded
 @njit(cache=True, nogil=True)
 def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
-    """Whether there is a path between two flat cells, and the expansions up to the goal's.
+    """Return whether there is a path between two flat cells, and the expansions up to the goal's.
 
-    Leaves in `came` the direction by which a shortest path reaches each closed cell. Buckets as
-    wide as a straight step make the search label-setting (Dinic 1978): no cell can be improved
-    from its own bucket, and three buckets that take turns hold all open cells.
+    `moves`, uint8 (n_cells,), are the legal moves on a grid of `cols` columns, `start` and `goal`
+    flat cells; `cost_of`, `came` and `mark`, one entry a cell, are work arrays; `generation` is the
+    number of this search. `came` receives the direction by which a shortest path reaches each
+    closed cell. Buckets as wide as a straight step make the search label-setting (Dinic 1978): no
+    cell can be improved from its own bucket, and three buckets that take turns hold all open cells.
     """
     is_open, is_closed = 2 * generation, 2 * generation + 1
     waiting = np.empty((3, 1024), np.int32)
@@ -101,12 +103,13 @@ def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
 @guarded
 @njit(cache=True, nogil=True)
 def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, generation):
-    """Lower bound on the cost of a shortest path, -1 where there is none, and the expansions.
+    """Return a lower bound on the cost of a shortest path, -1 for none, and the expansions.
 
-    Expands in order of g + weight * h, each cell once. A closed cell that is reached at less cost
-    keeps the better way, which its successors get to know only through `came`, and is put aside.
-    The first cell of a shortest path that was not expanded at its least cost was reached at its
-    least cost, and is open, put aside, or the goal: the least g + h of these bounds the optimum.
+    The other arguments are those of `dijkstra`. Cells are expanded in order of g + weight * h, once
+    each. A closed cell that is reached at less cost keeps the better path, which its successors
+    learn only through `came`, and is put aside. The first cell of a shortest path that was not
+    expanded at its least cost was reached at its least cost, and is open, put aside, or the goal:
+    the least g + h of these bounds the optimum.
     """
     is_open, is_closed = 2 * generation, 2 * generation + 1
     goal_row, goal_col = goal // cols, goal % cols

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class GridAstar:
-    """A* on all free cells, the reference of every comparison: its paths are shortest ones.
+    """A* on all free cells, the reference of every comparison: its paths are shortest.
 
     P. E. Hart, N. J. Nilsson, B. Raphael: A formal basis for the heuristic determination of minimum
     cost paths, 1968.
@@ -60,7 +60,7 @@ class GridDijkstra:
     """Dijkstra's algorithm on all free cells, up to the goal.
 
     E. W. Dijkstra: A note on two problems in connexion with graphs, 1959. Open cells are kept in
-    buckets as wide as a straight step (E. A. Dinic, 1978), so that some of those in the goal's own
+    buckets as wide as a straight step (E. A. Dinic, 1978), so that some cells in the goal's own
     bucket are expanded, some not.
 
     Parameters
@@ -88,13 +88,15 @@ class GridDijkstra:
 
 
 class WeightedAstar:
-    """Weighted A* on all free cells: no cell is expanded twice, and the path is at most `weight`
-    times as long as the shortest, because the octile distance is a consistent estimate.
+    """Weighted A* on all free cells: no cell is expanded twice.
 
-    I. Pohl: Heuristic search viewed as path finding in a graph, 1970. The bound that an answer
-    carries is the weight or, where that is less, the path's length over the least g + h of the
-    cells that were still open or that would have had to be expanded again (E. A. Hansen, R. Zhou:
-    Anytime heuristic search, 2007; M. Likhachev, G. Gordon, S. Thrun: ARA*, 2003).
+    The path is at most `weight` times as long as the shortest, because the octile distance is a
+    consistent estimate.
+
+    I. Pohl: Heuristic search viewed as path finding in a graph, 1970. The bound of an answer is the
+    weight or, if it is less, the path's length over the least g + h of the cells that were still
+    open or would have had to be expanded again (E. A. Hansen, R. Zhou: Anytime heuristic search,
+    2007; M. Likhachev, G. Gordon, S. Thrun: ARA*, 2003).
 
     Parameters
     ----------
@@ -120,7 +122,8 @@ class WeightedAstar:
             self.memory_bytes = array_bytes(work)
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
-        """Find a path between two free cells, and prove how much longer than the shortest it is."""
+        """Find a path between two free cells, with a proved bound on its excess over the
+        shortest."""
         began = time.perf_counter()
         with self._works.lent() as work:
             lower, expanded = work.search(
@@ -132,7 +135,7 @@ class WeightedAstar:
         return Answer(cells, bound=bound, expanded=expanded, seconds=seconds)
 
     def _bound(self, cells: LongArray, lower: int) -> float:
-        """The weight, or what the search proved beyond it."""
+        """Return the weight, or a lower bound that the search proved."""
         if lower == 0:
             return 1.0
         ratio = path_length_in_cells(cells) / float(length_in_cells(lower))
@@ -142,7 +145,7 @@ class WeightedAstar:
 class _Workspace:
     """Legal moves of a grid and the arrays of one search at a time: 18 bytes a cell.
 
-    Searches are told apart by their generation, so nothing is cleared between them.
+    Searches differ by their generation, so nothing is cleared between them.
     """
 
     def __init__(self, moves: ByteArray, cols: int) -> None:
@@ -156,7 +159,7 @@ class _Workspace:
     def search(
         self, kernel: Callable[..., Any], start: Cell, goal: Cell, *parameters: float
     ) -> tuple[int, int]:
-        """What a kernel says of the path between two cells, and the cells expanded."""
+        """Return a kernel's result for the path between two cells, and the cells expanded."""
         self._generation += 1
         said, expanded = kernel(
             self._moves,
@@ -172,7 +175,7 @@ class _Workspace:
         return int(said), int(expanded)
 
     def path(self, start: Cell, goal: Cell) -> LongArray:
-        """Cells of the path that the last search left behind."""
+        """Return the cells of the path of the last search."""
         flat = _kernels.trace(self._came, self._cols, self._flat(start), self._flat(goal))
         return np.stack(divmod(flat, self._cols), axis=1)
 
@@ -181,7 +184,7 @@ class _Workspace:
 
 
 def _workspaces(grid: OccupancyGrid) -> tuple[Pool[_Workspace], tuple[int, int]]:
-    """Work space for searches of the free cells, and the numbers of cells and moves."""
+    """Return work space for searches of the free cells, and the numbers of cells and moves."""
     enterable = grid.classes == CellClass.FREE
     moves: ByteArray = _kernels.legal_moves(enterable, grid.corner_cutting)
     works = Pool(partial(_Workspace, moves.ravel(), grid.shape[1]))
@@ -189,5 +192,5 @@ def _workspaces(grid: OccupancyGrid) -> tuple[Pool[_Workspace], tuple[int, int]]
 
 
 def _graph_size(enterable: BoolArray, moves: ByteArray) -> tuple[int, int]:
-    """Cells that may be entered, and moves between them, both ways counted once."""
+    """Return the number of enterable cells, and of moves between them, both ways counted once."""
     return int(enterable.sum()), int(np.bitwise_count(moves).sum(dtype=np.int64)) // 2

@@ -30,15 +30,15 @@ class HpaStar:
 
     A. Botea, M. Mueller, J. Schaeffer: Near optimal hierarchical path-finding, 2004. Clusters are
     squares; a maximal run of facing free cells along a common side of two clusters is an entrance,
-    with one transition in its middle where it is shorter than 6 cells, else one at either end. The
+    with one transition in its middle if it is shorter than 6 cells, else one at either end. The
     cells of the transitions are the nodes of the abstract graph, joined across the side and, inside
     a cluster, by shortest paths that stay in it. A query joins start and goal to the nodes of their
-    clusters, searches, fills each edge in inside its cluster and replaces parts of the path by
+    clusters, searches, refines each edge inside its cluster and replaces parts of the path by
     straight lines, no longer than the side of a cluster, as the authors' program does.
 
     Regions are the connected pieces of the clusters. The path before smoothing stays inside the
-    regions of `Answer.nodes`, in that order; **the smoothed path may leave them**. Nothing is
-    proved of its length. `n_nodes` and `n_edges` are those of the abstract graph.
+    regions of `Answer.nodes`, in that order; **the smoothed path may leave them**. Its length has
+    no proved bound. `n_nodes` and `n_edges` are those of the abstract graph.
 
     Transitions lie between facing cells only. On a grid that allows cutting corners, paths that
     pass from cluster to cluster only between two occupied cells are therefore not found: there the
@@ -136,7 +136,7 @@ class HpaStar:
         )
 
     def _regions_along(self, path: LongArray) -> tuple[int, ...]:
-        """Regions that a path of flat cells passes, in order."""
+        """Return the regions that a path of flat cells passes, in order."""
         regions = self.region_of.ravel()[path]
         entered = np.concatenate([[True], regions[1:] != regions[:-1]])
         return tuple(regions[entered].tolist())

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 MAX_CLIQUE_BYTES = 1_500_000_000
-"""What the distances between boundary cells may take at most."""
+"""Most bytes of the distances between boundary cells."""
 
 
 @copies_alike
@@ -33,11 +33,11 @@ class ExactOverlay:
 
     D. Delling, A. V. Goldberg, T. Pajor, R. F. Werneck: Customizable route planning in road
     networks, 2015. The nodes are all boundary cells, free cells with a legal move into another
-    field; the edges are these moves (those of fields that meet only in a corner, too) and, inside
-    each field, a clique of exact distances between its boundary cells. A query joins start and
-    goal to the boundary cells of their fields, searches the overlay (A*, octile distances as the
-    heuristic) and unpacks the cliques' edges by searches inside single fields. The path is as
-    short as the shortest on the whole grid.
+    field; the edges are these moves (also between fields that meet only in a corner) and, inside
+    each field, a clique of exact distances between its boundary cells. A query joins start and goal
+    to the boundary cells of their fields, searches the overlay (A*, octile distances as the
+    heuristic) and unpacks the cliques' edges by searches inside single fields. The path is as short
+    as the shortest on the whole grid.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class ExactOverlay:
         self.memory_bytes = array_bytes(self) + self._search.memory_bytes
 
     def _distances_inside(self) -> AnyArray:
-        """Matrices of all cliques in a row; of 32 bits where that is enough."""
+        """Return the matrices of all cliques in a row, of 32 bits if they suffice."""
         for dtype in (np.dtype(np.int32), np.dtype(np.int64)):
             n_entries = int(self._clique_first[-1])
             n_bytes = n_entries * dtype.itemsize
@@ -102,7 +102,7 @@ class ExactOverlay:
         return clique
 
     def _components(self) -> IntArray:
-        """Label of the set of fields that each field is connected with by legal moves."""
+        """Return the label of the set of fields connected with each field by legal moves."""
         tail = np.repeat(self._node_field, np.diff(self._cross_first))
         head = self._node_field[self._cross_head]
         shape = (len(self._boxes), len(self._boxes))
@@ -113,8 +113,8 @@ class ExactOverlay:
     def solve(self, start: Cell, goal: Cell) -> Answer:
         """Find a shortest path between two free cells; the bound is 1.
 
-        The nodes are dense indices of the places that it passes, None where it goes from a place to
-        one that no arc joins it with, by a corner.
+        The nodes are dense indices of the places on the path, None if it passes a corner between
+        two places that no arc joins.
 
         Raises
         ------
@@ -159,7 +159,7 @@ class ExactOverlay:
         )
 
     def _pair_keys(self, fields: LongArray, others: LongArray) -> LongArray:
-        """One number for each unordered pair of fields."""
+        """Return one number for each unordered pair of fields."""
         keys: LongArray = np.minimum(fields, others) * len(self._boxes) + np.maximum(fields, others)
         return keys
 
@@ -179,7 +179,8 @@ class ExactOverlay:
     def _unpacked(
         self, start: Cell, goal: Cell, nodes: LongArray, by_cross: BoolArray
     ) -> tuple[LongArray, int]:
-        """Cells of a path through some nodes, and the cells expanded inside the fields."""
+        """Return the cells of a path through some nodes, and the number of cells expanded inside
+        fields."""
         rows, cols = np.divmod(self._node_cell[nodes], self._cols)
         stops = [start, *zip(rows.tolist(), cols.tolist(), strict=True), goal]
         crossed = [*by_cross.tolist(), False]

@@ -1,6 +1,6 @@
 """Planning on regions: a coarse search on their graph, then the best path inside them.
 
-And what other baselines share: the regions of a topological map, cells checked, bytes counted.
+Also shared by other baselines: the regions of a topological map, checks of cells, counts of bytes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @copies_alike
 class RegionPlanner:
-    """A coarse search on a graph of regions, then grid A* on the cells of the regions it passes.
+    """A coarse search on a graph of regions, then grid A* on the cells of the route's regions.
 
     Parameters
     ----------
@@ -77,14 +77,15 @@ class RegionPlanner:
 
 
 def array_bytes(*holders: object) -> int:
-    """Bytes of the arrays that are attributes of some objects, an array and its views once."""
+    """Return the bytes of arrays in attributes of objects; an array and its views count once."""
     held = (value for holder in holders for value in vars(holder).values())
     arrays = (value for value in held if isinstance(value, np.ndarray))
     return sum({array.ctypes.data: array.nbytes for array in arrays}.values())
 
 
 def free_fields(topology: TopologicalMap) -> IntArray:
-    """int32 (rows, cols), the dense index of each free cell's place, -1 elsewhere; read-only."""
+    """Return the dense index of each free cell's place, int32 (rows, cols), -1 elsewhere;
+    read-only."""
     free = topology.grid.classes == CellClass.FREE
     region_of: IntArray = np.where(free, topology.level.field_of, np.int32(-1))
     region_of.flags.writeable = False
@@ -92,7 +93,7 @@ def free_fields(topology: TopologicalMap) -> IntArray:
 
 
 def region_at(region_of: IntArray, cell: Cell) -> int:
-    """Region of a free cell.
+    """Return the region of a free cell.
 
     Raises
     ------
@@ -112,7 +113,7 @@ def region_at(region_of: IntArray, cell: Cell) -> int:
 def joined_regions(
     region_of: IntArray, *, corner_cutting: bool = False
 ) -> tuple[LongArray, FloatArray]:
-    """Pairs of regions with a legal move from one to the other.
+    """Return the pairs of regions with a legal move from one to the other.
 
     Parameters
     ----------

@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 @copies_alike
 class SimpleGraphPyramid:
-    """What is left of the topological map when two places share at most one edge.
+    """The topological map reduced to a simple graph: two places share at most one edge.
 
-    Regular and irregular pyramids of simple graphs (P. Meer: Stochastic image pyramids, 1989;
-    J.-M. Jolion, A. Montanvert: The adaptive pyramid, 1992) keep one edge for two regions however
-    many boundaries they share. The places are those of the topological map. An edge costs the
+    Regular and irregular pyramids of simple graphs (P. Meer: Stochastic image pyramids, 1989; J.-M.
+    Jolion, A. Montanvert: The adaptive pyramid, 1992) keep one edge for two regions with any number
+    of common boundaries. The places are those of the topological map. An edge costs the
     `max_distance_m` of its arcs, which is the same for all of them; ties are decided by the
-    `through_m` of the arc with the lowest index, since a simple graph keeps whichever it meets
-    first and cannot know that there are others. (`Level.to_simple_graph` is kinder: it keeps the
-    shortest.) The path is the shortest inside the fields of the route. Where corners may be cut, a
-    missing route proves nothing, and the method gives up.
+    `through_m` of the arc with the lowest index, since a simple graph keeps the first arc that it
+    meets and ignores the others. (`Level.to_simple_graph` is kinder: it keeps the shortest.) The
+    path is the shortest inside the fields of the route. If corners may be cut, a missing route
+    proves nothing, and the method gives up.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class SimpleGraphPyramid:
 
 
 def first_arcs(level: Level) -> LongArray:
-    """Arcs that a simple graph keeps: of each two vertices the one with the lowest index."""
+    """Return the arcs that a simple graph keeps, the lowest index between each two vertices."""
     plain = np.flatnonzero(~level.is_self_loop)
     ends = np.sort(level.arcs[plain], axis=1)
     _, first = np.unique(ends, axis=0, return_index=True)

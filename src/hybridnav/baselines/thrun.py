@@ -22,40 +22,41 @@ if TYPE_CHECKING:
 _AROUND = np.ones((3, 3), dtype=np.bool_)
 _STEPS = np.argwhere(_AROUND) - 1
 _OPPOSITE = -0.5
-"""Cosine of the angle between two basis points, seen from the critical point, up to which they lie
-on two sides."""
+"""Greatest cosine of the angle between two basis points on two sides, seen from the critical
+point."""
 
 
 @copies_alike
 class ThrunMap:
-    """Thrun's topological map of a grid, planned on as he does: regions first, then cells.
+    """Thrun's topological map of a grid, and his planning: regions first, then cells.
 
     S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, Artificial
-    Intelligence 99, 1998. His are: free space by a threshold; its Voronoi diagram, the points whose
-    nearest occupied points (basis points) are two or more; critical points, those of the diagram
-    that minimise clearance within a neighbourhood `epsilon`; critical lines from each to its basis
-    points; regions, what is connected once these lines are taken out; a graph of adjacent regions.
+    Intelligence 99, 1998. The paper defines: free space by a threshold; its Voronoi diagram, the
+    points whose nearest occupied points (basis points) are two or more; critical points, those of
+    the diagram that minimise clearance within a neighbourhood `epsilon`; critical lines from each
+    to its basis points; regions, the connected parts without these lines; a graph of adjacent
+    regions.
 
-    Chosen here, where the paper leaves it open or the grid asks for it:
+    Choices where the paper leaves them open or the grid requires them:
 
-    * Free space is that of the robot's centre, after inflation. Unexplored cells and what lies
-      outside the map are obstacles.
+    * Free space is that of the robot's centre, after inflation. Unexplored cells and the outside of
+    the map are obstacles.
     * The neighbourhood `epsilon` is measured along the diagram, in steps from cell to cell.
     * The diagram is the integer medial axis (W. H. Hesselink, J. B. T. M. Roerdink: Euclidean
       skeletons of digital image and volume data in linear time by the integer medial axis
       transform, 2008), thinned to lines one cell wide.
     * Only points with basis points on two sides count (120 degrees apart or more; at a narrowing
-      it is 180), so the branches into corners and most that noise on walls grows are passed over.
-      Of connected points of equal rank, as along a corridor of constant width, the middle one is
-      taken, if the diagram leads away from them in two ways on which clearance does not fall: the
-      middle of a room and dead ends are no passages.
+      it is 180), so the branches into corners and most branches from noise on walls are ignored.
+      Among connected points of equal rank, as along a corridor of constant width, the middle one is
+      taken, if the diagram leads away from them in two directions along which clearance does not
+      fall: the middle of a room and dead ends are no passages.
     * The cells of a critical line go to a region beside it, so that regions partition the free
       cells; they are connected by moves along sides.
     * The coarse plan is the cheapest by the distances from centre to centre of regions (the means
-      of their cells) by way of the middle of the line between them. Straight from centre to centre
-      paths come out 3 to 8 % longer than the shortest on two maps at 5 cm, by this way 2 to 5 %.
-      The path is the shortest inside the regions of the plan, and so no longer than his, composed
-      of plans for three regions at a time.
+      of their cells) through the middle of the line between them. On two maps at 5 cm, paths by
+      straight distances between centres are 3 to 8 % longer than the shortest, with this choice 2
+      to 5 %. The path is the shortest inside the regions of the plan, and so no longer than
+      Thrun's, which joins plans for three regions at a time.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ class ThrunMap:
         The map whose free cells are planned on.
     epsilon_cells
         Steps along the diagram within which a critical point has the least clearance, >= 1. Larger
-        values leave fewer, larger regions.
+        values make fewer, larger regions.
 
     Raises
     ------
@@ -98,12 +99,12 @@ class ThrunMap:
 
 
 def critical_points(free: BoolArray, epsilon_cells: int) -> tuple[LongArray, LongArray]:
-    """Critical points of the Voronoi diagram of free space, and two basis points of each.
+    """Return the critical points of free space's Voronoi diagram, and two basis points of each.
 
     Parameters
     ----------
     free
-        bool (rows, cols), free space; what lies outside is not free.
+        bool (rows, cols), free space; cells outside are not free.
     epsilon_cells
         See `ThrunMap`.
 
@@ -126,7 +127,7 @@ def critical_points(free: BoolArray, epsilon_cells: int) -> tuple[LongArray, Lon
 
 
 def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
-    """Voronoi diagram of free space: its integer medial axis, thinned.
+    """Return the Voronoi diagram of free space: its integer medial axis, thinned.
 
     Parameters
     ----------
@@ -149,7 +150,7 @@ def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
     ):
         first, second = basis[:, *here], basis[:, *there]
         apart = first - second
-        # The cell of the two that lies nearer the line on which both basis points are as far away.
+        # The cell of the two that is nearer to the bisector of both basis points.
         side = (apart * (first + second - place[:, *here] - place[:, *there])).sum(axis=0)
         meet = (apart**2).sum(axis=0) > 1
         axis[here] |= meet & (side >= 0)
@@ -162,11 +163,11 @@ def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
 
 
 def basis_pairs(cells: LongArray, basis: IntArray) -> tuple[LongArray, FloatArray]:
-    """Two basis points of each cell: of those of the cell and its neighbours the most opposite.
+    """Return the two most opposite basis points of each cell and its neighbours.
 
-    A cell's own two nearest obstacles are seldom equally near on a grid; one of them is the nearest
-    of a neighbour. Returns int64 (n, 2, 2), and the cosine of the angle between them as seen from
-    the cell, float64 (n,).
+    The two nearest obstacles of a cell are seldom equally near on a grid; one of them is the
+    nearest of a neighbour. Return int64 (n, 2, 2), and the cosine of the angle between them as seen
+    from the cell, float64 (n,).
     """
     around = cells[:, None, :] + _STEPS
     nearest = basis[:, around[..., 0], around[..., 1]].astype(np.int64)
@@ -184,8 +185,7 @@ def basis_pairs(cells: LongArray, basis: IntArray) -> tuple[LongArray, FloatArra
 def least_nearby(
     cells: LongArray, values: FloatArray, shape: tuple[int, ...], steps: int
 ) -> FloatArray:
-    """Least value among the cells that each one reaches in so many 8-neighbour steps from one to
-    the next."""
+    """Return the least value among the cells within some 8-neighbour steps of each cell."""
     index_of = np.full(shape, len(cells))
     index_of[*cells.T] = np.arange(len(cells))
     around = cells[:, None, :] + _STEPS
@@ -197,10 +197,10 @@ def least_nearby(
 
 
 def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArray:
-    """One cell of each 8-connected run of candidates that is a passage, the nearest to its mean.
+    """Return one cell of each 8-connected run of candidates in a passage, the nearest to its mean.
 
-    A passage can be left along the diagram in two ways at least without loss of clearance; a dead
-    end, the middle of a room and the foot of a branch cannot. `clearance` is 0 off the diagram.
+    At least two ways along the diagram lead out of a passage without loss of clearance; a dead end,
+    the middle of a room and the foot of a branch have fewer. `clearance` is 0 off the diagram.
     """
     runs, n_runs = ndimage.label(candidates, structure=_AROUND)
     cells = np.argwhere(candidates)
@@ -225,7 +225,7 @@ def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArr
 
 
 def regions_between(free: BoolArray, cells: LongArray, basis: LongArray) -> IntArray:
-    """Regions that the critical lines cut free space into; the lines' cells go to regions beside.
+    """Return the regions between critical lines; the cells of lines go to regions beside them.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def regions_between(free: BoolArray, cells: LongArray, basis: LongArray) -> IntA
 
 
 def centres_of(region_of: IntArray, n_regions: int) -> FloatArray:
-    """Mean (row, col) of the cells of each region, float64 (n_regions, 2)."""
+    """Return the mean (row, col) of the cells of each region, float64 (n_regions, 2)."""
     rows, cols = np.nonzero(region_of >= 0)
     label = region_of[rows, cols]
     sums = [np.bincount(label, weights=w, minlength=n_regions) for w in (rows, cols)]

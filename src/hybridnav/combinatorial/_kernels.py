@@ -29,7 +29,8 @@ class Darts(NamedTuple):
     """int32, vertex at which the dart starts."""
     sweep: np.ndarray
     """int32, integral of x dy along contracted edges from the surviving cell of the vertex to the
-    cell where the dart's base edge starts, modulo 2^32: it gives the area inside a self-loop."""
+    cell where the dart's base edge starts, modulo 2^32. The area inside a self-loop follows from
+    it."""
     protected: np.ndarray
     """bool, whether the face on the right of the dart is protected."""
     base_edge: np.ndarray
@@ -38,7 +39,7 @@ class Darts(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def step_integral(dart, base_edge, cols):
-    """Line integral of x dy along the base step of a dart: zero for steps east and west."""
+    """Return the integral of x dy along the base step of a dart: zero for steps east and west."""
     base = base_edge[dart >> 1]
     if base & 1 == 0:
         return 0
@@ -48,7 +49,7 @@ def step_integral(dart, base_edge, cols):
 
 @njit(cache=True, nogil=True)
 def loop_area(dart, sweep, base_edge, cols):
-    """Signed area in cells inside a self-loop, positive where the dart runs counter-clockwise."""
+    """Return the signed area in cells inside a self-loop, positive for a counter-clockwise dart."""
     step = step_integral(dart, base_edge, cols)
     return np.int32(sweep[dart] + step - sweep[dart ^ 1])
 
@@ -58,14 +59,16 @@ def loop_area(dart, sweep, base_edge, cols):
 def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touched, cols):
     """Contract the stars of a kernel, in place.
 
-    Returns how many darts of `touched` were filled and whether there is a self-loop.
+    Return how many entries of `touched` are filled, and whether there is a self-loop.
 
-    The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the
-    dart after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
+    The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the dart
+    after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
     `kernel_dart[v]` starts at the parent of v and ends at v; origins become the vertices of the
-    next level, `new_vertex[parent[v]]`. `touched` lists one dart of every ordinary face that lost
-    a dart: no other face can have become redundant, but for those with a self-loop. `shift` is
-    scratch.
+    next level, `new_vertex[parent[v]]`. `touched` lists one dart of every ordinary face that lost a
+    dart: apart from faces with a self-loop, no other face can have become redundant. `parent` and
+    `new_vertex` are int32 by vertex; `state`, uint8 by edge, receives `ALIVE` or `CONTRACTED`,
+    `inverse`, int32 by dart, the inverse of sigma; `shift`, int32 by vertex, is scratch; `cols` are
+    the columns of the grid.
     """
     sigma, origin, sweep, protected, base_edge = darts
     one = np.uint32(1)
@@ -111,8 +114,9 @@ def unlink(dart, sigma, inverse):
 
 @njit(cache=True, nogil=True)
 def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
-    """A dart of the ordinary face of `start` whose edge is redundant, -1 if there is none, and one
-    of the edge that runs beside it.
+    """Return a dart of a redundant edge on the ordinary face of `start`, and a dart beside it.
+
+    The second dart belongs to the edge that runs beside the redundant one; -1 if there is none.
 
     Rules three and four: exactly two distinct edges between the same two vertices and else
     self-loops; nothing but self-loops of one vertex (the one that encloses the others goes).
@@ -142,7 +146,7 @@ def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
 
 @njit(cache=True, nogil=True)
 def start_cell(dart, base_edge, cols):
-    """Row and column of the cell where the base edge of a dart starts."""
+    """Return the row and column of the cell where the base edge of a dart starts."""
     base = base_edge[dart >> 1]
     cell = base >> 1
     if dart & 1:
@@ -152,10 +156,10 @@ def start_cell(dart, base_edge, cols):
 
 @njit(cache=True, nogil=True)
 def start_together(dart, partner, darts, whole_at, level, cols):
-    """Whether two edges between the same vertices start in the same fields.
+    """Return whether two edges between the same vertices start in the same fields.
 
-    They do not where an end is a block in pieces: its cells merge along a quadtree, columns of side
-    2^j at level 2j - 1 and rows at level 2j.
+    They do not if one of them ends at a block in pieces: its cells merge along a quadtree, columns
+    of side 2^j at level 2j - 1 and rows at level 2j.
     """
     for d in (np.int64(dart), np.int64(dart) ^ 1):
         v = darts.origin[d]
@@ -174,12 +178,13 @@ def start_together(dart, partner, darts, whole_at, level, cols):
 def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, all_whole):
     """Remove redundant edges through ordinary faces until none is left, in place.
 
-    An edge that ends at a block in pieces (`whole_at` above `level`, unless `all_whole`) waits for
-    the pieces to merge, so all of those are looked at again.
+    `touched`, `any_loop`, `state`, `inverse` and `cols` are those of `contract`; removed edges
+    become `REMOVED`. An edge that ends at a block in pieces (`whole_at`, uint8 by vertex, above
+    `level`, unless `all_whole`) waits for the pieces to merge, so all of those are looked at again.
 
-    Rules one and two: a face of degree one, a face of degree two. The others need a self-loop,
-    and the lower levels have none. A removal can make the merged face redundant, and no other
-    one, so every face is followed until it is not.
+    Rules one and two: a face of degree one, a face of degree two. Rules three and four need a
+    self-loop, and the lower levels have none. A removal can make only the merged face redundant, so
+    every face is followed until it is not.
     """
     sigma, origin, sweep, protected, base_edge = darts
     n_darts = 2 * base_edge.size if any_loop or not all_whole else 0
@@ -224,10 +229,10 @@ def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, al
 
 @njit(cache=True, nogil=True)
 def compact_darts(darts, state, new_edge, level, edge_end):
-    """Close the gaps that gone edges left, in place; gives the number of edges that stay.
+    """Close the gaps that gone edges left, in place, and return the number of edges that stay.
 
-    `edge_end` takes down what goes, by base edge: 2 * level for a contracted edge, 2 * level + 1
-    for a removed one.
+    The level of each gone edge is written to `edge_end`, by base edge: 2 * level for a contracted
+    edge, 2 * level + 1 for a removed one.
     """
     sigma, origin, sweep, protected, base_edge = darts
     one = np.uint32(1)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 class CombinatorialMap:
     """A plane graph and its dual, both held by one permutation of darts.
 
-    Edge e has the darts 2e and 2e + 1, each the other's half: `alpha(d) = d ^ 1`, not stored.
-    The dual needs nothing of its own: its rotation is `phi = sigma o alpha`.
+    Edge e has the darts 2e and 2e + 1, each the other's half: `alpha(d) = d ^ 1`, not stored. The
+    dual needs no array of its own: its rotation is `phi = sigma o alpha`.
     """
 
     sigma: IntArray

@@ -9,7 +9,7 @@ import numpy as np
 from hybridnav._jit import guarded, njit
 
 _SLIVER_CELLS = 1e-9
-"""Pieces of a line below this are rounding: the line passes the corner of a cell."""
+"""Shorter pieces of a line are rounding: the line passes the corner of a cell."""
 
 
 @njit(cache=True, nogil=True)
@@ -19,8 +19,10 @@ def _is_free(free, row, col):
 
 @njit(cache=True, nogil=True)
 def _free_cell_at(free, row, col):
-    """A free cell that holds a position: where that lies on lines of the lattice the cells beside
-    it are tried in turn."""
+    """Return a free cell that contains a position.
+
+    If the position lies on lines of the lattice, the cells beside it are tried in turn.
+    """
     above, right = math.floor(row), math.floor(col)
     below, left = math.ceil(row) - 1, math.ceil(col) - 1
     if _is_free(free, above, right):
@@ -34,7 +36,7 @@ def _free_cell_at(free, row, col):
 
 @njit(cache=True, nogil=True)
 def _next_cut(start, way, line):
-    """Where a segment meets a line of the lattice, as a part of it; 2 behind its end."""
+    """Return the share of a segment at which it meets a line of the lattice; 2 if it does not."""
     return 2.0 if way == 0.0 else (line - start) / way
 
 
@@ -92,8 +94,10 @@ def polyline_length(points):
 
 @njit(cache=True, nogil=True)
 def polyline_lengths(points, starts):
-    """Return the lengths of many lines, float64 (n,); line k is `points[starts[k]:starts[k + 1]]`,
-    and without points infinitely long."""
+    """Return the lengths of many lines, float64 (n,).
+
+    Line k is `points[starts[k]:starts[k + 1]]`; a line without points is infinitely long.
+    """
     lengths = np.full(len(starts) - 1, np.inf)
     for k in range(len(lengths)):
         if starts[k + 1] > starts[k]:

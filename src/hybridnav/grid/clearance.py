@@ -1,4 +1,4 @@
-"""Distances to obstacles: what the robot's radius takes from the free space."""
+"""Distances to obstacles, and the cells within the robot's radius of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ROUNDING = 1e-9
 
 
 def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
-    """Cells whose centre lies within a radius of the centre of an occupied cell.
+    """Return the cells whose centre lies within a radius of the centre of an occupied cell.
 
     Parameters
     ----------
@@ -73,7 +73,9 @@ def _within_distance(occupied: BoolArray, most: int) -> BoolArray:
 
 
 def clearance_cells(occupied: BoolArray) -> FloatArray:
-    """Distance from the centre of each cell to the centre of the nearest occupied one, in cells.
+    """Return the distance from each cell to the nearest occupied one, in cells.
+
+    Distances are between centres.
 
     Parameters
     ----------
@@ -84,7 +86,7 @@ def clearance_cells(occupied: BoolArray) -> FloatArray:
     -------
     FloatArray
         float64, same shape; 0 in occupied cells, infinite where none is occupied. Exact, by the
-        Euclidean distance transform. What lies beyond the grid is not occupied.
+        Euclidean distance transform. Cells beyond the grid are not occupied.
     """
     if not occupied.any():
         return np.full(occupied.shape, np.inf)

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 _FAR = 1e150
 LEAST_RESOLUTION_M, MOST_RESOLUTION_M = 1e-4, 1e3
-"""Sides that a cell may have: 0.1 mm is finer than any range sensor, in a cell of 1 km no robot
-finds its way; what lies beyond is a mistake of units."""
+"""Sides that a cell may have: 0.1 mm is finer than any range sensor, and a cell of 1 km is too
+coarse for any robot; other values are mistakes of units."""
 FARTHEST_M = 1e9
-"""Metres from the origin of the map frame within which a grid must lie: any place on Earth, in any
-frame, and still the centre of the smallest cell is known to a hundredth of its side."""
+"""Metres from the origin of the map frame within which a grid must lie: this includes any place on
+Earth, in any frame, and keeps the centre of the smallest cell exact to a hundredth of its side."""
 _MANY = 2.0**40
 """More cells than any map has."""
 
@@ -54,7 +54,7 @@ class Frame:
     """Cosine and sine of the yaw, and the origin inside the range of numbers."""
 
     def __post_init__(self) -> None:
-        # Numbers of numpy may be float32, which would spoil every length made from them.
+        # numpy numbers may be float32, which would spoil all lengths computed from them.
         x, y = self.origin_m
         object.__setattr__(self, "resolution_m", float(self.resolution_m))
         object.__setattr__(self, "origin_m", (float(x), float(y)))
@@ -84,7 +84,7 @@ class Frame:
         return (self.resolution_m, *self.origin_m, *turned)
 
     def points_of(self, cells: ArrayLike) -> FloatArray:
-        """Centres of cells in the map frame.
+        """Return the centres of cells in the map frame.
 
         Parameters
         ----------
@@ -99,7 +99,8 @@ class Frame:
         return self.points_of_grid(np.asarray(cells, dtype=np.float64) + 0.5)
 
     def points_of_grid(self, positions: ArrayLike) -> FloatArray:
-        """Map points of positions in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
+        """Return the map points of positions in grid units, where cell (0, 0) spans [0, 1] x [0,
+        1].
 
         Parameters
         ----------
@@ -120,7 +121,7 @@ class Frame:
         return points
 
     def cells_of(self, points: ArrayLike) -> LongArray:
-        """Cells that hold points of the map frame; they may lie outside the grid.
+        """Return the cells that contain points of the map frame; they may lie outside the grid.
 
         A point on the side between two cells belongs to the one with the higher index.
 
@@ -142,19 +143,19 @@ class Frame:
         xy = np.asarray(points, dtype=np.float64)
         if not np.isfinite(xy).all():
             raise InvalidValueError(f"points need finite coordinates in metres, got {points!r:.80}")
-        # Numbers at the end of their range must come out as "outside", not overflow.
+        # Numbers at the end of their range must become "outside" without an overflow.
         offset = np.clip(xy, -_FAR, _FAR) - np.clip(self.origin_m, -_FAR, _FAR)
         cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         along_x = cosine * offset[..., 0] + sine * offset[..., 1]
         along_y = cosine * offset[..., 1] - sine * offset[..., 0]
         with np.errstate(over="ignore"):
             position = np.stack([along_y, along_x], axis=-1) / self.resolution_m
-        # A centre made by points_of must come back to its cell: 1e-9 of a cell absorbs rounding.
+        # A centre from points_of must map back to its cell: 1e-9 of a cell absorbs rounding.
         cells = np.floor(np.clip(position + 1e-9, -_MANY, _MANY))
         return cells.astype(np.int64)
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
-        """The cell that holds one point, as `cells_of` finds it for many; a tenth of its time.
+        """Return the cell that contains one point, like `cells_of` in a tenth of the time.
 
         Parameters
         ----------
@@ -168,7 +169,7 @@ class Frame:
         return math.floor(min(max(row, -_MANY), _MANY)), math.floor(min(max(col, -_MANY), _MANY))
 
     def position_of(self, x: float, y: float) -> tuple[float, float]:
-        """One point as (row, column) in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
+        """Return one point as (row, column) in grid units, where cell (0, 0) spans [0, 1] x [0, 1].
 
         Parameters
         ----------
@@ -182,7 +183,7 @@ class Frame:
         return row, (cosine * along + sine * across) / self.resolution_m
 
     def positions_of(self, points: FloatArray) -> FloatArray:
-        """Many points as (row, column) in grid units, each as `position_of` finds it.
+        """Return many points as (row, column) in grid units, like `position_of`.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Islands: small sets of free or unexplored cells, such as raw scans are full of."""
+"""Islands: small sets of free or unexplored cells, as raw scans contain many."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class DroppedIslands:
-    """How many islands a grid leaves out, and how many cells they have.
+    """Counts of the islands that a grid leaves out, and of their cells.
 
     Parameters
     ----------
@@ -27,7 +27,8 @@ class DroppedIslands:
     unexplored, unexplored_cells
         Unexplored islands, and their cells: closed now.
     closed_cells
-        Cells of both kinds that are closed now: no place, like an obstacle, but not inflated.
+        Cells of both kinds that are closed now: like an obstacle they belong to no place, but they
+        are not inflated.
     """
 
     free: int = 0
@@ -41,24 +42,24 @@ def drop_islands(grid: OccupancyGrid, least_area_m2: float) -> OccupancyGrid:
     """Leave out the islands of a grid that are smaller than an area.
 
     An island is a 4-connected set of cells of one class. A free island below the area becomes
-    unexplored. An unexplored one below it, after that, is closed: it counts as occupied in
-    `classes`, is no place, and is not inflated. It stays where it joins two free areas, so that
-    what is connected for a robot that may enter unexplored cells stays connected. No cell becomes
-    free, no occupied cell anything else, and free sets of that area or more keep every cell: their
-    paths are the same as before.
+    unexplored. After that, an unexplored island below the area is closed: it counts as occupied in
+    `classes`, belongs to no place, and is not inflated. It stays where it joins two free areas, so
+    that connections stay for a robot that may enter unexplored cells. No cell becomes free,
+    occupied cells stay occupied, and free sets of that area or more keep every cell and so their
+    paths.
 
     Parameters
     ----------
     grid
         The map; unchanged.
     least_area_m2
-        Square metres that an island must have to be kept, finite; 0 keeps all of them. What the
-        robot's radius takes does not count.
+        Square metres that an island must have to be kept, finite; 0 keeps all of them. Cells within
+        the robot's radius of an obstacle do not count.
 
     Returns
     -------
     OccupancyGrid
-        The same map with `least_island_m2` set; `dropped` counts what was left out.
+        The same map with `least_island_m2` set; `dropped` counts the islands that were left out.
 
     Raises
     ------
@@ -78,14 +79,14 @@ def without_islands(
     classes
         uint8 `CellClass`, shape `(rows, cols)`.
     least_area_m2, cell_area_m2
-        Square metres that an island must have, >= 0, and that a cell has.
+        Least area of an island, >= 0, and area of a cell, in square metres.
 
     Returns
     -------
     ByteArray
         A new array of the same shape.
     DroppedIslands
-        What was dropped.
+        Counts of the dropped islands.
     """
     least_cells = least_area_m2 / cell_area_m2 * (1 - _ROUNDING)
     free_of, areas = _islands(classes == CellClass.FREE)
@@ -111,7 +112,7 @@ def without_islands(
 
 
 def _islands(cells: BoolArray) -> tuple[IntArray, LongArray]:
-    """4-connected sets of some cells, numbered from 1, 0 elsewhere; and the cells of each."""
+    """Label 4-connected sets of some cells from 1, 0 elsewhere, and count the cells of each."""
     from scipy import ndimage  # noqa: PLC0415 - half a second that most grids do not need
 
     label_of, count = ndimage.label(cells)
@@ -120,7 +121,7 @@ def _islands(cells: BoolArray) -> tuple[IntArray, LongArray]:
 
 
 def _free_neighbours(island_of: IntArray, free_of: IntArray) -> LongArray:
-    """How many free sets are 4-adjacent to each island, int64 (n_islands + 1,)."""
+    """Return the number of free sets that are 4-adjacent to each island, int64 (n_islands + 1,)."""
     pairs = []
     for axis in (0, 1):
         island, free = np.moveaxis(island_of, axis, 0), np.moveaxis(free_of, axis, 0)

@@ -15,7 +15,7 @@ __all__ = ["cells_of_line", "polyline_length", "polyline_lengths"]
 
 
 def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:
-    """Find the cells that a polyline passes which stays on free cells.
+    """Find the cells that a polyline on free cells passes.
 
     Parameters
     ----------
@@ -28,9 +28,9 @@ def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:
     -------
     LongArray
         int64 (m, 2), (row, col), each a neighbour of the one before, diagonally where the line
-        passes a corner. Where it runs between two cells, a free one.
+        passes a corner. Where the line runs between two cells, a free one.
     """
-    # One layout for the kernel, whoever asks.
+    # One memory layout, so that the kernel is compiled once.
     cells = np.ascontiguousarray(free).view()
     cells.flags.writeable = False
     found: LongArray = passed_cells(cells, np.ascontiguousarray(positions, dtype=np.float64))

@@ -1,4 +1,4 @@
-"""Occupancy grids: probabilities, thresholds and the classes of cells they make."""
+"""Occupancy grids: probabilities, thresholds, and the classes of cells."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class CellClass(IntEnum):
-    """What a cell is to a planner; occupied cells are no vertices of any graph."""
+    """Class of a cell for planners; occupied cells are not vertices of any graph."""
 
     OCCUPIED = 0
     FREE = 1
@@ -32,7 +32,7 @@ class CellClass(IntEnum):
 
 
 class _RobotRadius:
-    """The radius of a grid: may be set to None, for the default, and is a number when read."""
+    """The radius of a grid: None, which stands for the default, is read as a number."""
 
     @overload
     def __get__(self, grid: None, owner: type[OccupancyGrid]) -> None: ...
@@ -41,7 +41,7 @@ class _RobotRadius:
     def __get__(self, grid: OccupancyGrid, owner: type[OccupancyGrid]) -> float: ...
 
     def __get__(self, grid: OccupancyGrid | None, owner: type[OccupancyGrid]) -> float | None:
-        if grid is None:  # dataclass asks for the default of its parameter
+        if grid is None:  # read by dataclass as the default of the parameter
             return None
         radius_m: float | None = grid.__dict__["robot_radius_m"]
         return DEFAULT_ROBOT_RADIUS_M if radius_m is None else radius_m
@@ -53,7 +53,7 @@ class _RobotRadius:
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class OccupancyGrid:
-    """A grid of occupancy probabilities and the classes its two thresholds make (Moravec-Elfes).
+    """A grid of occupancy probabilities, classified by two thresholds (Moravec and Elfes).
 
     A cell with `p <= free_threshold` (U1) is free, with `p >= occupied_threshold` (U2) occupied,
     and unexplored between; NaN means "never measured" and is unexplored whatever the thresholds.
@@ -75,13 +75,13 @@ class OccupancyGrid:
         Radius in metres by which occupied cells are inflated; 0, for a robot that is a point,
         blocks the occupied cells alone. None is the default, 0.25 m.
     corner_cutting
-        Whether a diagonal move may pass between two cells of which one, or both, are not free. With
-        it the grid and the topological map are no longer consistent.
+        Whether a diagonal move may pass between two cells if one or both are not free. If True, the
+        grid and the topological map are not consistent.
     name
-        What to call the map in messages and pictures.
+        Name of the map in messages and pictures.
     radius_is_default
-        Whether nobody gave the radius: set where it is None, and kept by `dataclasses.replace`,
-        even with a radius that equals the default; give False too to choose that radius.
+        Whether the radius is the default: set if it is None, and kept by `dataclasses.replace`,
+        even with a radius that equals the default; pass False to choose that radius.
     least_island_m2
         Square metres that an island must have to be kept; see `drop_islands`. 0 keeps all.
 
@@ -104,10 +104,10 @@ class OccupancyGrid:
     measured: ByteArray = field(init=False, repr=False)
     """Class of each cell by the thresholds alone, uint8 `CellClass`."""
     classes: ByteArray = field(init=False, repr=False)
-    """Class of each cell after inflation and without dropped islands, uint8 `CellClass`: what
-    graphs and planners see."""
+    """Class of each cell after inflation and without dropped islands, uint8 `CellClass`, as graphs
+    and planners use it."""
     dropped: DroppedIslands | None = field(init=False, repr=False, default=None)
-    """What `least_island_m2` left out; None when that is 0."""
+    """Islands left out by `least_island_m2`; None when that is 0."""
 
     def __post_init__(self) -> None:
         probability = np.array(self.probability, dtype=np.float32, order="C")
@@ -164,7 +164,7 @@ class OccupancyGrid:
 
     @classmethod
     def restored(cls, **attributes: Any) -> OccupancyGrid:
-        """Make a grid of the attributes of another one: nothing is computed, nothing checked.
+        """Make a grid from the attributes of another one, without computation or checks.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class OccupancyGrid:
         return self.frame.resolution_m
 
     def enterable(self, *, allow_unexplored: bool = False) -> BoolArray:
-        """Cells that paths may use, bool (rows, cols): free ones, and unexplored ones if allowed.
+        """Return the cells that paths may use, bool (rows, cols): free and, if allowed, unexplored.
 
         Parameters
         ----------
@@ -203,8 +203,11 @@ class OccupancyGrid:
         return cells
 
     def class_counts(self) -> dict[str, int]:
-        """Cells per class; `blocked` are those that only inflation took; `closed`, where islands
-        are dropped, those of islands."""
+        """Return the number of cells of each class.
+
+        `blocked` counts the cells that only inflation occupies; `closed`, where islands are
+        dropped, those of islands.
+        """
         counts = np.bincount(self.classes.ravel(), minlength=3)
         occupied = int((self.measured == CellClass.OCCUPIED).sum())
         closed = {} if self.dropped is None else {"closed": self.dropped.closed_cells}

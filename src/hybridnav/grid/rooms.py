@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import IntArray
 
 MAX_ROOMS = 10_000
-"""Rooms a map may have at most."""
+"""Most rooms of a map."""
 
 NO_ROOM = -1
 """Label of cells without a room."""
@@ -30,7 +30,7 @@ Point = tuple[float, float]
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class RoomLabels:
-    """Which room each cell belongs to, and points that have names of their own.
+    """The room of each cell, and points with names of their own.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ class RoomLabels:
     label_of
         int32 (rows, cols), the room of each cell as an index into `names`, -1 for none; copied.
     points
-        Named points, `(x, y)` in metres, map frame. One with the name of a room is the point that
-        stands for the room.
+        Named points, `(x, y)` in metres, map frame. A point with the name of a room represents the
+        room.
     doors
-        Numbers of doors that are known, each with a point of its boundary, `(x, y)` in metres: a
-        door keeps its number when rooms are written, read, or planned on for another robot.
+        Known numbers of doors, each with a point of its boundary, `(x, y)` in metres: a door keeps
+        its number when rooms are written, read, or planned on for another robot.
 
     Raises
     ------
@@ -84,12 +84,12 @@ class RoomLabels:
             object.__setattr__(self, name, value)
 
     def index(self, name: str) -> int:
-        """Label of a room.
+        """Return the label of a room.
 
         Raises
         ------
         InvalidValueError
-            When no room has this name; suggests the nearest ones.
+            When no room has this name; the message suggests the nearest ones.
         """
         if name in self.names:
             return self.names.index(name)

@@ -29,7 +29,7 @@ _LINK_WALL_CELLS = 2
 
 
 def figure1_world() -> World:
-    """Two regions that meet twice, and one inside another: the map of the paper's Fig. 1.
+    """Return two regions that meet twice, and a third inside one: the map of the paper's Fig. 1.
 
     The free region A fills the left, the unexplored region B the right of a walled field of 40 x
     30 cells. An obstacle lies across the line between them, so that A and B meet along two
@@ -39,8 +39,8 @@ def figure1_world() -> World:
 
     * 3 places: A (free), B and C (unexplored);
     * 4 arcs: two between A and B, one between A and C, and the self-loop of A round C;
-    * 3 faces: the two protected ones (the obstacle's and the wall's) and the one between C's arc
-      and the self-loop round it, so that V - E + F = 2.
+    * 3 faces: two protected ones (the obstacle and the wall) and the face between the arc of C and
+    the self-loop round it, so that V - E + F = 2.
 
     Returns
     -------
@@ -58,18 +58,18 @@ def figure1_world() -> World:
 
 
 def tiled(world: World, *, rows: int, cols: int) -> World:
-    """Large world of copies of a small one, neighbours joined by a passage 1 m wide.
+    """Return a large world of copies of a small one, joined by passages 1 m wide.
 
     A passage runs straight, along the line on which the free space of the two copies is nearest,
-    through walls and unexplored margins alike, and is walled where it crosses unexplored ground.
-    What is connected in one copy, and so joined, is connected in all of them.
+    through walls and unexplored margins, and has walls where it crosses unexplored ground. The
+    connected space of all copies is connected.
 
     Parameters
     ----------
     world
-        What to repeat.
+        The world to repeat.
     rows, cols
-        How many copies along y and along x, >= 1.
+        Number of copies along y and along x, >= 1.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def _join(tiles: ByteArray, pixels: ByteArray, link_cells: int) -> None:
 
 
 def _nearest_link(pixels: ByteArray, link_cells: int) -> tuple[int, int, int]:
-    """First row of the best passage; it spares the columns from the second to the third value."""
+    """Return the first row of the best passage, and the columns between which nothing is cut."""
     square = np.pad(pixels == FREE, (0, link_cells - 1))
     for axis in (0, 1):  # whether a free square of link_cells begins at the cell
         square = np.all(sliding_window_view(square, link_cells, axis=axis), axis=-1)
@@ -134,8 +134,8 @@ def _nearest_link(pixels: ByteArray, link_cells: int) -> tuple[int, int, int]:
     left = inner.argmax(axis=1)
     right = inner.shape[1] - 1 - inner[:, ::-1].argmax(axis=1) + link_cells
     length = np.where(usable, left - right, pixels.shape[1])
-    # Ragged walls make one row shorter than the next by chance; of all about as short, take the
-    # middle one, which is no corner of a room.
+    # Ragged walls make one row shorter than the next by chance; take the middle one of all that are
+    # about as short, away from the corners of a room.
     short = np.flatnonzero(length <= length.min() + link_cells // 4)
     row = int(short[len(short) // 2])
     return row + _LINK_WALL_CELLS, int(left[row]), int(right[row])
@@ -147,9 +147,9 @@ def write_world(world: World, folder: PathLike, name: str) -> Path:
     Parameters
     ----------
     world
-        What to write; equal worlds give equal bytes.
+        The world to write; equal worlds produce equal bytes.
     folder
-        Where to, created when it is not there.
+        Target folder, created if it does not exist.
     name
         File name without an ending, of letters, digits, `_`, `-` and dots.
 
@@ -173,7 +173,7 @@ def write_world(world: World, folder: PathLike, name: str) -> Path:
     header = f"P5\n{width} {height}\n255\n".encode("ascii")
     replace_file(target / f"{name}.pgm", header + world.pixels.tobytes())
     frame = world.frame
-    # Positional, for YAML reads 1e-05 as a string.
+    # Positional, because YAML reads 1e-05 as a string.
     resolution, x, y, yaw, occupied, free = (
         np.format_float_positional(value, trim="0")
         for value in (

@@ -1,4 +1,4 @@
-"""What a generated world is: the pixels of a map file, their frame and their thresholds."""
+"""Generated worlds: the pixels of a map file, their frame and their thresholds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OCCUPIED = np.uint8(0)
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class World:
-    """A generated map, as a map_server file would hold it.
+    """A generated map, as in a map_server file.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class World:
     frame
         Resolution and pose of the map; cell (0, 0) is the lower-left pixel.
     name
-        What to call the map in messages and pictures.
+        Name of the map in messages and pictures.
     free_threshold, occupied_threshold
         U1 and U2 of the paper: `free_thresh` and `occupied_thresh` of the map file.
 
@@ -61,7 +61,7 @@ class World:
         object.__setattr__(self, "pixels", pixels)
 
     def grid(self, *, robot_radius_m: float | None = None) -> OccupancyGrid:
-        """Occupancy grid of the world, of the classes its map file has when it is loaded.
+        """Return the occupancy grid of the world, with the same classes as its loaded map file.
 
         Parameters
         ----------

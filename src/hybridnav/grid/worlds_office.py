@@ -27,7 +27,7 @@ _SHAPE = (580, 960)
 _WALL_M = 0.2
 _JAMB_M = 0.1
 _STEP_M = 0.4
-"""No noise reaches a doorway: but for 0.1 m of its width it is clear, 0.4 m to either side."""
+"""A doorway has no noise: it is clear but for 0.1 m of its width, 0.4 m to either side."""
 
 
 class _Door(NamedTuple):
@@ -83,12 +83,12 @@ _DOORS: tuple[_Door, ...] = (
     _Door(11.2, 18.8, along_x=True),
     _Door(12.4, 23.4, along_x=False),  # between secretary and director
     _Door(16.3, 18.8, along_x=True),
-    _Door(19.4, 18.8, along_x=True),  # store, which nobody entered
+    _Door(19.4, 18.8, along_x=True),  # store, never entered
     _Door(22.7, 18.8, along_x=True),
     _Door(8.0, 10.2, along_x=False, width_m=1.4),  # kitchen
     _Door(15.9, 8.6, along_x=True),
     _Door(26.8, 14.8, along_x=False),
-    _Door(29.2, 7.5, along_x=False),  # hall, from the corridor, three times
+    _Door(29.2, 7.5, along_x=False),  # hall, three doors from the corridor
     _Door(29.2, 12.5, along_x=False, width_m=1.8),
     _Door(29.2, 17.5, along_x=False),
     _Door(37.2, 18.7, along_x=False),  # reception
@@ -152,7 +152,7 @@ _ISLAND: tuple[tuple[float, float, float], ...] = (
     (35.9, 12.6, 0.8),
     (35.2, 12.9, 0.7),
 )
-"""Discs `(x, y, radius)` in metres that nobody drove round close enough to see."""
+"""Discs `(x, y, radius)` in metres that were never seen from close by."""
 _GLIMPSES: tuple[tuple[Point, tuple[Point, Point], float], ...] = (
     ((19.5, 17.7), ((19.85, 18.8), (18.95, 18.8)), 5.6),  # into the store
     ((35.9, 5.6), ((34.8, 3.4), (36.4, 3.4)), 4.8),  # out of the hall
@@ -162,18 +162,18 @@ _HALL_VIEW: Point = (35.6, 11.0)
 
 
 def office_world(*, seed: int = 0) -> World:
-    """Office floor of 42 x 25 m at 5 cm, as a scan with SLAM would have mapped it.
+    """Build an office floor of 42 x 25 m at 5 cm, as a SLAM scan would map it.
 
     A corridor makes a loop round a core of rooms; the seminar room has two doors onto it, the hall
-    three; secretary and director are joined by an inner door; the sealed archive has no door at
-    all; the store was only looked into; the hall has pillars, an unexplored island and a way out.
-    The unexplored ground outside belongs to the map: 960 x 580 cells, origin (-3, -2) m.
+    three; an inner door joins secretary and director; the sealed archive has no door; the store was
+    only seen from outside; the hall has pillars, an unexplored island and a way out. The unexplored
+    ground outside belongs to the map: 960 x 580 cells, origin (-3, -2) m.
 
     Parameters
     ----------
     seed
-        Of the scanner's noise; the floor plan itself is always the same. Equal seeds give equal
-        bytes.
+        Seed of the scanner's noise; the floor plan itself is always the same. Equal seeds produce
+        equal bytes.
 
     Returns
     -------
@@ -210,7 +210,7 @@ def _painted() -> ByteArray:
 
 
 def _build(cells: ByteArray, rects: tuple[Rect, ...], *, inside: np.uint8) -> None:
-    """Wall in the union of rectangles: all their walls first, then all that is inside."""
+    """Build walls round the union of rectangles: all their walls first, then their insides."""
     for rect in rects:
         _fill(cells, rect, OCCUPIED, grow_m=_WALL_M / 2)
     for rect in rects:
@@ -222,7 +222,7 @@ def _fill(cells: ByteArray, rect: Rect, value: np.uint8, *, grow_m: float = 0.0)
 
 
 def _opening(door: _Door, *, width_m: float, depth_m: float) -> Rect:
-    """Rectangle in the middle of a door, `depth_m` deep on either side of the wall's middle."""
+    """Return the rectangle in the middle of a door, `depth_m` deep to either side of the wall."""
     half, depth = width_m / 2, depth_m
     if door.along_x:
         return door.x - half, door.y - depth, door.x + half, door.y + depth
@@ -230,7 +230,7 @@ def _opening(door: _Door, *, width_m: float, depth_m: float) -> Rect:
 
 
 def _scan(cells: ByteArray, rng: np.random.Generator) -> None:
-    """Free what was seen of unexplored ground, and hide what was not seen of the hall."""
+    """Free the part of unexplored ground that was seen, and hide the unseen part of the hall."""
     points = _FRAME.points_of(np.moveaxis(np.indices(_SHAPE), 0, -1))
     unexplored = cells == UNEXPLORED
     for view, jambs, reach_m in _GLIMPSES:

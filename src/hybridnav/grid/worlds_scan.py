@@ -1,4 +1,4 @@
-"""What a laser scanner makes of a floor plan: glimpses, shadows, thin walls, noise.
+"""Effects of a laser scanner on a floor plan: glimpses, shadows, thin walls, noise.
 
 Masks are drawn with sums, products, quotients and square roots only, which IEEE 754 rounds alike
 everywhere: sines differ in the last digit between processors, and the committed maps must not.
@@ -26,7 +26,7 @@ _WOBBLES = ((7, 0.12), (3, 0.06))
 
 
 def window(frame: Frame, rect: Rect, *, grow_m: float = 0.0) -> tuple[slice, slice]:
-    """Rows and columns of a rectangle whose sides lie on cell sides."""
+    """Return the rows and columns of a rectangle whose sides lie on cell sides."""
     x0, y0, x1, y1 = rect
     corners = [(x0 - grow_m, y0 - grow_m), (x1 + grow_m, y1 + grow_m)]
     (row0, col0), (row1, col1) = frame.cells_of(corners).tolist()
@@ -41,20 +41,20 @@ def glimpse(
     reach_m: float,
     rng: np.random.Generator,
 ) -> BoolArray:
-    """Cells seen from a point through a gap, with the uneven far end of single laser beams.
+    """Return the cells seen from a point through a gap, with an uneven far end.
 
     Parameters
     ----------
     points
         Cell centres, shape `(rows, cols, 2)`, metres.
     view
-        Where the scanner stood.
+        Position of the scanner.
     jambs
-        The ends of the gap, the right one as seen from there first.
+        The ends of the gap, the right one as seen from the scanner first.
     reach_m
-        How far the longest beam goes; the shortest goes seven tenths of it.
+        Reach of the longest beam; the shortest reaches seven tenths of it.
     rng
-        Draws the length of each of 24 beams.
+        Generator for the lengths of 24 beams.
     """
     offset = points - np.asarray(view)
     from_right = _cross(np.asarray(jambs[0]) - np.asarray(view), offset)
@@ -70,12 +70,12 @@ def glimpse(
 def shadow(
     points: FloatArray, view: Point, centre: Point, *, width_m: float, length_m: float
 ) -> BoolArray:
-    """Cells behind a pillar that were never seen: a wedge that ends at a length from its centre."""
+    """Return the cells behind a pillar that were never seen, a wedge of a given length."""
     axis = np.asarray(centre) - np.asarray(view)
     offset = points - np.asarray(centre)
     distance = math.sqrt(float((axis**2).sum()))
     behind = (offset * axis).sum(axis=-1)
-    # Other views of the robot reach in from both sides, so the wedge narrows to a point.
+    # Other views of the robot cover it from both sides, so the wedge narrows to a point.
     half_width = width_m / 2 * (distance - behind / length_m)
     hidden: BoolArray = (behind > 0) & (np.abs(_cross(axis, offset)) < half_width)
     return hidden
@@ -92,7 +92,7 @@ def wobble(cells: ByteArray, rng: np.random.Generator) -> ByteArray:
 
 
 def hide_depths(cells: ByteArray, rng: np.random.Generator) -> ByteArray:
-    """Leave of every obstacle the skin that the scan can have hit, 2 or 3 cells deep."""
+    """Keep only the skin of every obstacle that the scan can have hit, 2 or 3 cells deep."""
     seen = grown(cells == FREE, 2)
     seen |= grown(seen, 1) & (_patches(cells.shape, 6, rng) < 0.3)  # noqa: PLR2004
     return np.where((cells == OCCUPIED) & ~seen, UNEXPLORED, cells)
@@ -113,7 +113,7 @@ def speckle(cells: ByteArray, rng: np.random.Generator) -> ByteArray:
 
 
 def grown(mask: BoolArray, steps: int) -> BoolArray:
-    """Cells at most so many king's moves from a cell of the mask."""
+    """Return the cells within `steps` king's moves of a cell of the mask."""
     for axis in (0, 1):
         spread = mask.copy()
         for step in range(1, steps + 1):

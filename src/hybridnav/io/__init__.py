@@ -1,6 +1,6 @@
-"""Maps in: ROS maps, MovingAI benchmarks, examples, rooms, what is closed; rooms out; models.
+"""Readers of ROS maps, MovingAI benchmarks, examples, rooms and closed areas; rooms out; models.
 
-Names load on first use: rooms need scipy, models and what is closed numba, a map file neither.
+Names load on first use: rooms need scipy, models and closed areas numba, a map file neither.
 """
 
 from __future__ import annotations

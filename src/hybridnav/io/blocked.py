@@ -1,4 +1,4 @@
-"""Files of what is closed: GeoJSON in metres of the map frame, or a mask of the map's size."""
+"""Files of closed areas: GeoJSON in metres of the map frame, or a mask of the map's size."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 LIMITS = Limits(max_bytes=2**22, max_values=100_000)
-"""Bytes of a GeoJSON file, and values in it."""
+"""Most bytes of a GeoJSON file, and most values in it."""
 _MOST_OUTLINE_CELLS = 50_000
-"""Length of all outlines on the map; to find what they close takes time in proportion to it: five
+"""Most cells of all outlines on the map; the time to find their closed cells is proportional: five
 seconds for the longest, with a radius of five cells."""
 
 _GEOJSON = (".geojson", ".json")
@@ -38,7 +38,7 @@ _FEWEST = {"LineString": 2, "Polygon": 3}
 
 
 def load_blocked(path: PathLike, grid: OccupancyGrid) -> Blocked:
-    """Read what is closed on a map from a file.
+    """Read the closed areas of a map from a file.
 
     Parameters
     ----------
@@ -46,25 +46,25 @@ def load_blocked(path: PathLike, grid: OccupancyGrid) -> Blocked:
         A GeoJSON file (`.geojson`, `.json`) or an image. GeoJSON is a `FeatureCollection`, a
         `Feature` or a geometry, of `Polygon`, `MultiPolygon`, `LineString` and `MultiLineString`;
         coordinates are `[x, y]` in metres, map frame, and the robot keeps its radius off the areas.
-        An image is a mask of one pixel a cell, turned as the map's image is: a pixel closes its
-        cell when it is opaque and its darkness, 1 - brightness in [0, 1], is at least the map's
-        occupied threshold; lighter and transparent pixels close nothing. The middle of the robot
-        does not enter these cells.
+        An image is a mask of one pixel a cell, in the orientation of the map's image: a pixel
+        closes its cell when it is opaque and its darkness, 1 - brightness in [0, 1], is at least
+        the map's occupied threshold; lighter and transparent pixels close nothing. The centre of
+        the robot does not enter these cells.
     grid
         The map.
 
     Returns
     -------
     Blocked
-        With `polygons`, or with `cells`.
+        The closed areas, with `polygons` or with `cells`.
 
     Raises
     ------
     MapNotFoundError
-        When the file is not there.
+        When the file does not exist.
     MapError
-        When it cannot be read, closes nothing, an area closes no cell of the map, or a mask is not
-        of the map's size; one line.
+        When the file cannot be read, closes nothing, an area closes no cell of the map, or a mask
+        is not of the map's size.
     """
     if Path(path).suffix.lower() in _GEOJSON:
         return _areas(path, grid)
@@ -121,7 +121,7 @@ def _areas(path: PathLike, grid: OccupancyGrid) -> Blocked:
 
 
 def _outline_cells(parts: list[BaseGeometry], grid: OccupancyGrid) -> float:
-    """Length of outlines and lines on the map, in cells."""
+    """Return the length of outlines and lines on the map, in cells."""
     rows, cols = grid.shape
     lines = [part if part.geom_type == "LineString" else part.boundary for part in parts]
     return float(shapely.length(shapely.clip_by_rect(lines, 0, 0, cols, rows)).sum())
@@ -132,7 +132,7 @@ def _read_json(path: PathLike, where: str) -> Any:
         content = stream.read(LIMITS.max_bytes + 1)
     if len(content) > LIMITS.max_bytes:
         raise MapError(f"{where}: GeoJSON of more than {LIMITS.max_bytes} bytes is not read")
-    # Every number but the last of a list or a position has a comma behind it.
+    # Every number except the last one of a list or a position has a comma behind it.
     if content.count(b",") > LIMITS.max_values:
         raise MapError(f"{where}: GeoJSON of more than {LIMITS.max_values} values is not read")
     try:
@@ -155,7 +155,7 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _geometries(data: Any, where: str) -> Iterator[tuple[str, Any]]:
-    """The geometries of a file, each with its place in it."""
+    """Yield the geometries of a file, each with its place in the file."""
     kind = data.get("type") if isinstance(data, dict) else None
     if kind == "Feature":
         yield where, data.get("geometry")
@@ -209,7 +209,7 @@ def _list_of(value: Any, at: str) -> list[Any]:
 
 
 def _point(position: Any, at: str) -> tuple[float, float]:
-    """The position `[x, y]`, or `[x, y, height]`."""
+    """Return x and y of a position `[x, y]` or `[x, y, height]`."""
     x = y = math.nan
     if isinstance(position, list) and len(position) >= 2:  # noqa: PLR2004
         x, y = (_number(value) for value in position[:2])

@@ -1,4 +1,4 @@
-"""The project's own maps, made in memory: an installed package has no map files."""
+"""The project's own maps, made in memory because an installed package has no map files."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def example_map(name: str = "office", *, robot_radius_m: float | None = None) ->
     Parameters
     ----------
     name
-        `"office"`, a floor of 42 x 25 m as a scan would show it, or `"figure1"`, the small map of
-        the source paper's Fig. 1.
+        `"office"`, a floor of 42 x 25 m as in a scan, or `"figure1"`, the small map of the source
+        paper's Fig. 1.
     robot_radius_m
         Radius in metres: a cell is blocked when its centre lies within it of the centre of an
         occupied cell; 0 for a point. None is the default, 0.25 m.

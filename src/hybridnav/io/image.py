@@ -1,4 +1,4 @@
-"""Map images: how bright and how opaque each pixel is, whatever the file format."""
+"""Map images of any format: brightness and opacity of each pixel."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 _FORMATS = ("PNG", "PPM", "BMP", "TIFF", "GIF", "JPEG", "WEBP", "TGA", "PCX")
 """Raster formats; some of Pillow's others start programs (EPS) or hold whole documents."""
 _MOST_PIXELS_PER_BYTE = {"PPM": 8, "PNG": 8 * 1032}
-"""One bit per pixel; deflate packs at most 1032 to 1. More pixels than that cannot be there, and
-are refused before memory is taken for them."""
+"""One bit per pixel; deflate packs at most 1032 to 1. A header with more pixels is refused before
+memory is taken for them."""
 _MOST_COMMENTS = 10_000
-"""Pillow copies up to a megabyte per comment of an ASCII PNM: a file full of them takes hours."""
+"""Most comments of an ASCII PNM: Pillow copies up to a megabyte for each, in hours for many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Raster:
     white
         Level of white: 255, 3 * 255 (a colour is the sum of its channels) or 65535.
     opaque
-        Where the image is fully opaque, same shape; None when that is everywhere.
+        Mask of the fully opaque pixels, same shape; None if all are opaque.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16]
@@ -58,11 +58,11 @@ def read_raster(path: PathLike, *, what: str, check_size: Callable[[int, int], N
     Parameters
     ----------
     path
-        The image file; of an animation the first frame.
+        The image file; for an animation, its first frame is read.
     what
-        What the image is to its reader, as messages begin with it.
+        Name of the image in messages, which begin with it.
     check_size
-        Called with columns and rows before any pixel is read: raises when there are too many.
+        Called with columns and rows before any pixel is read, to raise if there are too many.
 
     Returns
     -------
@@ -72,16 +72,17 @@ def read_raster(path: PathLike, *, what: str, check_size: Callable[[int, int], N
     Raises
     ------
     MapNotFoundError
-        When the file is not there.
+        When the file does not exist.
     MapError
-        When it is no image, damaged, larger than a grid may be, or has pixels of more than 16 bits.
+        When the file is no image, damaged, larger than a grid may be, or has pixels of more than 16
+        bits.
     """
     where = f"{what} {printable(path)}"
     with (
         open_file(path, what=what, error=MapError, missing=MapNotFoundError) as stream,
         warnings.catch_warnings(),
     ):
-        # What Pillow warns of (size, stray metadata) is either checked here or of no consequence.
+        # Pillow's warnings (size, stray metadata) are either checked here or harmless.
         warnings.simplefilter("ignore")
         image = _open(stream, where)
         _check_extent(image, stream, where)
@@ -166,7 +167,7 @@ def _decode(image: Image.Image) -> Raster:
 
 
 def _decode_deep(image: Image.Image) -> Raster:
-    """Grey of 16 bits: mode I;16, or I where Pillow widened it (PNG and PGM only)."""
+    """Return grey of 16 bits: mode I;16, or I where Pillow widened it (PNG and PGM only)."""
     if image.mode == "I" and image.format not in ("PNG", "PPM"):
         raise _UnsupportedPixelsError("pixels have 32 bits, expected 8 or 16")
     level = np.asarray(image).astype(np.uint16)

@@ -36,14 +36,14 @@ def load_map(
         map of a model (.hnm).
     robot_radius_m
         Radius in metres: a cell is blocked when its centre lies within it of the centre of an
-        occupied cell. 0 for a robot that is a point; None is the default, 0.25 m, and with a model
-        that of the model.
+        occupied cell. 0 for a robot that is a point; None is the default: 0.25 m, or for a model
+        the radius of the model.
     free_threshold, occupied_threshold
-        U1 and U2: occupancy up to U1 is free, from U2 on occupied. By default what the file says.
+        U1 and U2: occupancy up to U1 is free, from U2 on occupied. By default those of the file.
     max_cells
-        The most cells that the map may have, to be known from the header before memory is taken:
-        a small file may hold a huge map. A cell takes about 50 bytes while the map is read, and up
-        to 300 for planning.
+        The most cells of the map, checked in the header before memory is taken: a small file may
+        hold a huge map. A cell takes about 50 bytes while the map is read, and up to 300 for
+        planning.
 
     Returns
     -------
@@ -53,10 +53,10 @@ def load_map(
     Raises
     ------
     MapNotFoundError
-        When the file, or the image that it names, is not there.
+        When the file, or the image that it names, does not exist.
     MapError
-        When a file cannot be read, or holds more than `max_cells`; one line that says what is wrong
-        and where.
+        When a file cannot be read, or holds more than `max_cells`; the message is one line with the
+        fault and its place.
     InvalidValueError
         When the radius, a threshold or the limit is out of range.
 

@@ -37,13 +37,13 @@ class Scenario:
     bucket
         Length class of the benchmark: the optimum divided by 4, rounded down.
     map_name
-        The map's name as the file gives it.
+        Name of the map in the file.
     rows, cols
         Size of the map that the problem was made for.
     start, goal
-        Cells `(row, col)`, row 0 at the lowest y, that is the last line of the map file.
+        Cells `(row, col)`; row 0 has the lowest y and is the last line of the map file.
     optimum_cells
-        Length of a shortest octile path in cells, without corner cutting, as the file rounds it.
+        Length of a shortest octile path in cells, without corner cutting, as rounded in the file.
     """
 
     bucket: int
@@ -70,10 +70,11 @@ def load_movingai_map(
     path
         The .map file. Its last line is row 0.
     robot_radius_m
-        Radius in metres by which blocked cells are inflated; None is the default, 0.25 m. Less than
-        a cell, as that is, blocks no further cells.
+        Radius in metres by which blocked cells are inflated; None is the default, 0.25 m. A radius
+        below one cell, like the default, blocks no further cells.
     free_threshold, occupied_threshold
-        U1 and U2 of the grid; every cell has the occupancy 0 or 1, so none changes the classes.
+        U1 and U2 of the grid; every cell has the occupancy 0 or 1, so they do not change the
+        classes.
     max_cells
         The most cells that the map may have; see `load_map`.
 
@@ -87,7 +88,7 @@ def load_movingai_map(
     MapNotFoundError
         When the file is not there.
     MapError
-        When it is no such map, or holds too many cells; the text names the line.
+        When the file is no such map, or holds too many cells; the text names the line.
     InvalidValueError
         When the radius, a threshold or the limit is out of range.
     """
@@ -96,7 +97,7 @@ def load_movingai_map(
     with open_file(path, what="map", error=MapError, missing=MapNotFoundError) as stream:
         rows, cols, line = _read_header(stream, where)
         check_size(cols, rows, max_cells=max_cells, where=where)
-        # Two bytes may end a line; a few more than fit are read, to notice what does not belong.
+        # Two bytes may end a line; a few more bytes than fit are read, to notice extra content.
         body = stream.read(rows * (cols + 2) + _MAX_LINE)
     occupied = _occupied(body, (rows, cols), line + 1, where)
     return OccupancyGrid(
@@ -111,7 +112,7 @@ def load_movingai_map(
 
 
 def _read_header(stream: BinaryIO, where: str) -> tuple[int, int, int]:
-    """Rows, columns and the number of the line that says `map`."""
+    """Return the rows, the columns and the number of the line `map`."""
     fields: dict[bytes, bytes] = {}
     for number in range(1, _MAX_HEADER_LINES + 1):
         words = stream.readline(_MAX_LINE).split()
@@ -133,14 +134,14 @@ def _extent(fields: dict[bytes, bytes], key: bytes, where: str) -> int:
     text = fields.get(key, b"")
     if not (text.isdigit() and len(text) <= 9 and int(text) > 0):  # noqa: PLR2004
         raise MapError(
-            f"{where}: the header must give a positive {key.decode()}, "
+            f"{where}: the header must state a positive {key.decode()}, "
             f"got {text.decode('latin-1')!a}"
         )
     return int(text)
 
 
 def _occupied(body: bytes, shape: tuple[int, int], first_line: int, where: str) -> ByteArray:
-    """1 where a cell is blocked, 0 where it is passable, the top row first."""
+    """Return 1 for blocked and 0 for passable cells, the top row first."""
     rows, cols = shape
     body = body.replace(b"\r\n", b"\n").rstrip(b"\r\n") + b"\n"
     text = np.frombuffer(body, dtype=np.uint8)
@@ -189,14 +190,14 @@ def read_scenarios(path: PathLike) -> list[Scenario]:
     MapNotFoundError
         When the file is not there.
     MapError
-        When it is no such file; the text names the line.
+        When the file is no such file; the text names the line.
     """
     where = f"scenarios {printable(path)}"
     with open_file(path, what="scenarios", error=MapError, missing=MapNotFoundError) as stream:
         content = stream.read(_MAX_SCENARIO_BYTES + 1)
     if len(content) > _MAX_SCENARIO_BYTES:
         raise MapError(f"{where}: more than {_MAX_SCENARIO_BYTES} bytes")
-    # Any byte is a character of latin-1; what is no number is noticed below.
+    # Any byte is a character of latin-1; words that are no numbers are noticed below.
     lines = content.decode("latin-1").split("\n")
     if lines[0].split() not in (["version", "1"], ["version", "1.0"]):
         raise MapError(f"{where}, line 1: expected 'version 1', got {lines[0][:30]!a}")

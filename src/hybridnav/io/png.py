@@ -19,20 +19,20 @@ _PIECE = 2**20
 
 
 class DamagedPngError(Exception):
-    """A PNG is not as it was written; the text says how."""
+    """Error of a damaged PNG; the text states the damage."""
 
 
 def check_png(stream: BinaryIO) -> None:
     """Check the structure and every checksum of a PNG.
 
-    Each chunk must match its CRC-32, the header come first and the end be there, and the pixel data
-    inflate, with the Adler-32 that it states, to exactly the bytes of the image. Any single flipped
-    bit is found. What follows the end is not read.
+    Each chunk must match its CRC-32, the header must come first, the end must exist, and the pixel
+    data must inflate, with its Adler-32, to exactly the bytes of the image. Any single flipped bit
+    is found. Bytes behind the end are not read.
 
     Parameters
     ----------
     stream
-        The file, seekable; left where it was.
+        The file, seekable; its position is restored.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def _chunk(stream: BinaryIO, name: bytes, size: int, pixels: _Pixels | None) -> 
 
 
 class _Pixels:
-    """The pixel data as it comes, counted against what the header promises."""
+    """The stream of pixel data, counted against the size in the header."""
 
     def __init__(self, header: bytes) -> None:
         width, height, depth, colour, _, _, interlaced = struct.unpack(">IIBBBBB", header)
@@ -97,7 +97,7 @@ class _Pixels:
                 for col, row, col_step, row_step in _ADAM7
             ]
             parts.append((width, height // 2))
-        # Each row has a byte in front that names its filter.
+        # Each row begins with a byte for its filter.
         self._left = sum(
             rows * (1 + -(-cols * bits // 8)) for cols, rows in parts if cols > 0 and rows > 0
         )
@@ -107,7 +107,8 @@ class _Pixels:
         """Take the next bytes of the compressed data."""
         try:
             inflated = _PIECE
-            # Output may be waiting though all input is taken, if what came filled the piece.
+            # Output may be pending although all input is consumed, if the last output filled the
+            # piece.
             while (piece or inflated == _PIECE) and not self._stream.eof:
                 inflated = len(self._stream.decompress(piece, _PIECE))
                 self._left -= inflated

@@ -28,17 +28,17 @@ if TYPE_CHECKING:
 
 _ROOM_KEYS = ("name", "polygon", "polygons", "seed", "point")
 _OUTSIDE_CELLS = 1.0
-"""How far an outline may reach over the rim of the map."""
+"""Greatest distance that an outline may reach over the rim of the map."""
 _FEWEST_CORNERS = 3
 _LEAST_AREA_CELLS = 1e-6
 
 LIMITS = Limits(max_bytes=2**22, max_values=100_000)
-"""Of a file of rooms; hostile ones cost three seconds."""
+"""Limits of a file of rooms; hostile files take three seconds."""
 
 
 @dataclass
 class _Read:
-    """What a file says: rings of outlines in cells, x along columns and y along rows."""
+    """Contents of a file: rings of outlines in cells, x along columns and y along rows."""
 
     where: str
     names: list[str] = field(default_factory=list)
@@ -60,13 +60,13 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
     path
         A YAML file of one of two forms. `rooms:` is a list of rooms with a `name` and either a
         `polygon` (a ring of [x, y] in metres, map frame), `polygons` (rings: parts and holes) or a
-        `seed` [x, y], which names the room that segmentation finds there; and a `point` [x, y] that
-        stands for the room, if wanted. Rings are filled by the even-odd rule, also where one
-        crosses itself. Beside it `points:` is a list of named points, and `doors:` one of the
+        `seed` [x, y], which names the room that segmentation finds there; and optionally a `point`
+        [x, y] that represents the room. Rings are filled by the even-odd rule, also where a ring
+        crosses itself. In addition, `points:` is a list of named points, and `doors:` a list of
         numbers of doors, each with a `point` of its boundary: the door nearest to it, within a
-        metre, keeps the number. Or `locations:` is a list of
-        names, with an image `data:` whose pixel values index it, the size of the map's, or flat
-        `polygons:` in pixels of that image; these win where both are given.
+        metre, keeps the number. In the other form `locations:` is a list of names, with an image
+        `data:` of the size of the map's, whose pixel values index the list, or flat `polygons:` in
+        pixels of that image; polygons win if both are present.
     grid
         The map.
 
@@ -78,11 +78,11 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
     Raises
     ------
     RoomsNotFoundError
-        When the file or the image is not there.
+        When the file or the image does not exist.
     RoomsError
-        When one of them cannot be read, or a room has no name or one that is taken, leaves the map,
-        overlaps another or has no free cell, a named point lies outside the map or in an obstacle,
-        or the number of a door is none or is given twice; one line.
+        When one of them cannot be read; a room has no name or the name of another one, leaves the
+        map, overlaps another or has no free cell; a named point lies outside the map or in an
+        obstacle; or the number of a door is invalid or occurs twice.
     """
     values = read_yaml(
         path, what="rooms", error=RoomsError, missing=RoomsNotFoundError, limits=LIMITS
@@ -126,7 +126,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
-    """The form with rooms."""
+    """Read the form with rooms."""
     read = _Read(where)
     _check_keys(values, ("rooms", "points", "doors", "map"), where)
     for number, entry in enumerate(_list_of(values["rooms"], f"{where}: rooms")):
@@ -162,7 +162,7 @@ def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
 
 
 def _doors(entries: Any, where: str) -> dict[int, tuple[float, float]]:
-    """Numbers of doors, each with a point of its boundary."""
+    """Return the numbers of doors, each with a point of its boundary."""
     doors: dict[int, tuple[float, float]] = {}
     for entry in _list_of(entries, f"{where}: doors"):
         if not isinstance(entry, dict) or "number" not in entry:
@@ -182,7 +182,7 @@ def _doors(entries: Any, where: str) -> dict[int, tuple[float, float]]:
 
 
 def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGrid) -> _Read:
-    """The form with a label image, whose polygons are flat lists of x, y in pixels, y down."""
+    """Read the form with a label image, whose polygons are flat lists of x, y in pixels, y down."""
     read = _Read(where)
     for name in _list_of(values["locations"], f"{where}: locations"):
         if not isinstance(name, str):
@@ -223,7 +223,7 @@ def _label_image(data: Any, path: Path, where: str, grid: OccupancyGrid, n_rooms
 
 
 def _checked(rings: list[FloatArray], at: str, grid: OccupancyGrid) -> list[FloatArray]:
-    """Rings that have corners, an area, and a place on the map."""
+    """Return the rings after a check that they have corners, an area, and a place on the map."""
     for ring in rings:
         if len(ring) < _FEWEST_CORNERS:
             raise RoomsError(f"{at}: a polygon needs at least three corners, got {len(ring)}")
@@ -236,7 +236,7 @@ def _checked(rings: list[FloatArray], at: str, grid: OccupancyGrid) -> list[Floa
 
 
 def _is_straight(ring: FloatArray) -> bool:
-    """Whether all corners lie on one line."""
+    """Return whether all corners lie on one line."""
     offset = ring - ring[0]
     far = offset[np.argmax(np.abs(offset).sum(axis=1))]
     cross = offset[:, 0] * far[1] - offset[:, 1] * far[0]
@@ -244,8 +244,10 @@ def _is_straight(ring: FloatArray) -> bool:
 
 
 def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
-    """Rooms that segmentation finds round the seeds; where several seeds lie in one, each takes the
-    cells that are nearest to it."""
+    """Return the rooms that segmentation finds round the seeds.
+
+    If several seeds lie in one room, each takes the cells nearest to it.
+    """
     # Loads scipy and numba.
     from hybridnav.topology.segmentation import divide_rooms, find_rooms  # noqa: PLC0415
 
@@ -265,14 +267,14 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
         if found[row, col] == NO_ROOM:
             raise RoomsError(f"{read.of(room)}: no room is found round the seed, draw a polygon")
         seeded[row, col] = room
-    # All at once: each spreads inside the room that was found round it, and stops at outlines.
+    # All at once: each seed spreads inside the room that was found round it, and stops at outlines.
     region = np.where(label_of == NO_ROOM, found, np.int32(NO_ROOM))
     divided = divide_rooms(region, {room: cell for cell, room in seeded.items()})
     return np.where(label_of == NO_ROOM, divided, label_of)
 
 
 def check_rooms(names: Sequence[str], label_of: IntArray, where: str, grid: OccupancyGrid) -> None:
-    """Refuse rooms without a free cell, as measured: robots come in all sizes."""
+    """Refuse rooms without a cell that was measured as free, whatever the robot's radius."""
     free = label_of[(grid.measured == CellClass.FREE) & (label_of >= 0)]
     for room in np.flatnonzero(np.bincount(free, minlength=len(names)) == 0).tolist():
         raise RoomsError(f"{where}: room {names[room]!r}: holds no free cell of the map")
@@ -298,7 +300,7 @@ def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -
 
 
 def in_cells(points: FloatArray, grid: OccupancyGrid) -> FloatArray:
-    """Points in metres as x along columns and y along rows, in cells."""
+    """Convert points in metres to cells, x along columns and y along rows."""
     frame = grid.frame
     offset = (points - np.array(frame.origin_m)) / frame.resolution_m
     cosine, sine = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
@@ -319,13 +321,13 @@ def _list_of(value: Any, at: str) -> list[Any]:
 
 
 def _ring(value: Any, at: str) -> FloatArray:
-    """Corners in metres, float64 (n, 2), none of an empty list."""
+    """Return the corners in metres, float64 (n, 2), without rows for an empty list."""
     corners = [_xy(corner, at) for corner in _list_of(value, at)]
     return np.array(corners, dtype=np.float64).reshape(-1, 2)
 
 
 _FARTHEST = 1e9
-"""Metres or pixels beyond which a coordinate is taken for a mistake."""
+"""Metres or pixels beyond which a coordinate counts as a mistake."""
 
 
 def _number(value: Any, at: str) -> float:

@@ -1,4 +1,4 @@
-"""Files of rooms out: outlines in metres that a person edits."""
+"""Writer of files of rooms, with outlines in metres that a person can edit."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid, RoomLabels
 
 _MOST_CORNERS = 20_000
-"""Corners in a file at most where outlines can be made simpler."""
+"""Most corners in a file, if outlines can be simplified."""
 _TOLERANCE_M = 0.15
 _KEPT = 0.7
-"""Share of its cells that a simplified outline leaves every room at least."""
+"""Least share of its cells that every room keeps with simplified outlines."""
 _DECIMALS = 3
 
 
@@ -34,9 +34,9 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     """Write rooms as a file that `load_rooms` reads and a person can edit.
 
     Outlines are simplified together, so that neighbours keep their common border: by 15 cm, up to
-    60 cm where the file would else have more than 20,000 corners, and not at all where a room would
-    lose much by it. The doors of these outlines are written with the numbers that they have for
-    `rooms`, so that lists and pictures of the file, and plans with it, tell them by the same ones.
+    60 cm if the file would otherwise have more than 20,000 corners, and not at all if a room would
+    lose too much. The doors of these outlines are written with their numbers in `rooms`, so that
+    lists, pictures and plans of the file use the same numbers.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
 def _rings_to_write(
     rooms: RoomLabels, where: str, grid: OccupancyGrid
 ) -> tuple[list[list[FloatArray]], IntArray]:
-    """Rings of each room in metres, float64 (n, 2), that read as the rooms they were; and the
-    labels that they read as."""
+    """Return the rings of each room in metres, float64 (n, 2), and the labels that they read back
+    as."""
     boxes = ndimage.find_objects(rooms.label_of + 1, len(rooms.names))
     shapes = [_outline(rooms.label_of, label, *box) for label, box in enumerate(boxes)]
     simple = [_rings(s, grid) for s in _simplified(shapes, _TOLERANCE_M / grid.resolution_m)]
@@ -99,7 +99,7 @@ def _rings_to_write(
 def _written(
     rooms: RoomLabels, rings_of: list[list[FloatArray]], grid: OccupancyGrid
 ) -> tuple[str, int]:
-    """The text of a file, and how many values it has for a reader."""
+    """Return the text of a file, and the number of values that a reader counts."""
     lines = [
         f"# Rooms of {' '.join(grid.name.split())}: outlines in metres, map frame, [x, y].",
         "# Rename rooms, move corners, or give a room `seed: [x, y]` in place of an outline.",
@@ -122,7 +122,7 @@ def _written(
         lines.append("doors:  # their numbers; a point of each")
         for number, at in rooms.doors.items():
             lines.append(f"- {{number: {number}, point: {_corner(*at)}}}")
-    # A list counts as one value beside its own; a corner is a list of two.
+    # A list counts as one value in addition to its own values; a corner is a list of two.
     n_corners = sum(len(ring) for rings in rings_of for ring in rings)
     n_lists = sum(1 + len(rings) for rings in rings_of)
     n_values = 7 + 4 * len(rooms.names) + n_lists + 3 * n_corners
@@ -135,7 +135,8 @@ def _name(name: str) -> str:
 
 
 def _outline(label_of: IntArray, label: int, rows: slice, cols: slice) -> BaseGeometry:
-    """The area of the cells of a label, x along columns and y along rows, one unit a cell."""
+    """Return the area of the cells of a label, x along columns and y along rows, one unit a
+    cell."""
     steps = np.diff(np.pad(label_of[rows, cols] == label, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, starts = np.nonzero(steps == 1)
     _, ends = np.nonzero(steps == -1)
@@ -144,10 +145,10 @@ def _outline(label_of: IntArray, label: int, rows: slice, cols: slice) -> BaseGe
 
 
 def _simplified(shapes: list[BaseGeometry], tolerance: float) -> list[BaseGeometry]:
-    """Outlines with few corners, common borders kept; the tolerance is in cells."""
+    """Return outlines with few corners and the same common borders; the tolerance is in cells."""
     for factor in (1, 2, 4):
         simple = list(shapely.coverage_simplify(shapes, factor * tolerance))
-        # What is so small that it vanishes keeps its corners.
+        # A shape so small that it would vanish keeps its corners.
         simple = [new if new.area > 0 else old for new, old in zip(simple, shapes, strict=True)]
         if sum(shapely.get_num_coordinates(shape) for shape in simple) <= _MOST_CORNERS:
             break
@@ -159,8 +160,10 @@ def _polygons(shape: BaseGeometry) -> list[shapely.Polygon]:
 
 
 def _rings(shape: BaseGeometry, grid: OccupancyGrid) -> list[FloatArray]:
-    """Outer rings and holes in metres as they are written; filled by the even-odd rule they make
-    the shape again."""
+    """Return the outer rings and holes in metres, rounded as in the file.
+
+    Filled by the even-odd rule they form the shape again.
+    """
     rings = [ring for part in _polygons(shape) for ring in (part.exterior, *part.interiors)]
     corners = [shapely.get_coordinates(ring)[:-1, ::-1] for ring in rings]
     return [grid.frame.points_of_grid(ring).round(_DECIMALS) + 0.0 for ring in corners]

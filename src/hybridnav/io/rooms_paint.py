@@ -1,4 +1,4 @@
-"""Outlines painted on a grid, in time and memory that no file can drive up."""
+"""Outlines painted on a grid, in time and memory that no file can inflate."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 _LEAST_OVERLAP = 0.01
-"""Share of the smaller room that two outlines may have in common: lines drawn by hand."""
+"""Share of the smaller room that two outlines drawn by hand may have in common."""
 _MOST_COVERED = 0.5
-"""Share of a room that may lie in all others together: painting costs twice the map at most."""
+"""Share of a room that may lie in all others together, so that at most twice the map is painted."""
 _LEAST_NAMELESS_M2 = 1.0
-"""Least area of a space of its own that lies in no room; the default of rooms that are found."""
+"""Least area of a space outside rooms; the default for rooms that are found."""
 _MOST_CROSSINGS = 5_000_000
-"""Rows that all sides of a file cross together: a second and 400 MB. Rooms of a real floor cross
-some ten thousand."""
+"""Most rows that all sides of a file cross together: a second and 400 MB. Rooms of a real floor
+cross some ten thousand."""
 
 
 def painted(
@@ -33,9 +33,9 @@ def painted(
     where: str,
     grid: OccupancyGrid,
 ) -> IntArray:
-    """Give each cell the room whose outline holds its centre, by the even-odd rule.
+    """Return for each cell the room whose outline contains its centre, by the even-odd rule.
 
-    Where outlines overlap by a little, the room that comes first has the cells.
+    Where outlines overlap a little, the first room has the cells.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ def painted(
         Rings of each room, float64 (n, 2) in cells, x along columns and y along rows; any ring may
         cross itself and others.
     names
-        Names of all rooms, for what is wrong.
+        Names of all rooms, for messages.
     where
-        The file, for what is wrong.
+        The file, for messages.
     grid
         The map.
 
@@ -57,7 +57,7 @@ def painted(
     Raises
     ------
     RoomsError
-        When two rooms overlap, or outlines have too many sides to be those of rooms.
+        When two rooms overlap, or outlines have too many sides for rooms.
     """
     n_crossings = sum(_n_crossings(ring) for rings in outlines.values() for ring in rings)
     if n_crossings > _MOST_CROSSINGS:
@@ -89,10 +89,10 @@ def painted(
 
 
 def without_slivers(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
-    """Give the slivers that outlines leave over to the rooms beside them.
+    """Assign the slivers between outlines to the rooms beside them.
 
-    Outlines have few corners where the free cells' rim has many, and people leave strips between
-    rooms: each would be nameless space with doors of its own.
+    Outlines have few corners where the rim of the free cells has many, and people leave strips
+    between rooms: each would be nameless space with its own doors.
 
     Parameters
     ----------
@@ -130,7 +130,8 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
 
 
 def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArray:
-    """Cells whose centres lie inside rings by the even-odd rule, a scan line for each row.
+    """Return the cells whose centres lie inside rings by the even-odd rule, a scan line for each
+    row.
 
     Parameters
     ----------
@@ -147,7 +148,7 @@ def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArr
     """
     crossed = [_crossings(ring) for ring in rings]
     row = np.concatenate([rows for rows, _ in crossed])
-    # The first cell whose centre lies to the right of a crossing, or on it.
+    # The first cell whose centre lies on a crossing or to the right of it.
     col = np.concatenate([np.ceil(x - 0.5) for _, x in crossed]).clip(0, shape[1])
     inside = (row >= 0) & (row < shape[0])
     order = np.lexsort((col[inside], row[inside]))
@@ -159,7 +160,7 @@ def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArr
 
 
 def _rows_crossed(ring: FloatArray) -> tuple[LongArray, LongArray]:
-    """The first row whose centre line each side crosses, and the one after the last."""
+    """Return the first row whose centre line each side crosses, and the one after the last."""
     rows = np.ceil(ring[:, 1] - 0.5).astype(np.int64)
     other = np.roll(rows, -1)
     return np.minimum(rows, other), np.maximum(rows, other)
@@ -171,7 +172,7 @@ def _n_crossings(ring: FloatArray) -> int:
 
 
 def _crossings(ring: FloatArray) -> tuple[LongArray, FloatArray]:
-    """Row of each crossing of a ring with a centre line of rows, and where on it that is."""
+    """Return the row of each crossing of a ring with a centre line of rows, and its x in cells."""
     first, last = _rows_crossed(ring)
     counts = last - first
     side = np.repeat(np.arange(len(ring)), counts)

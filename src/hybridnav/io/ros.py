@@ -29,7 +29,7 @@ _BOOLEANS = {"true": True, "yes": True, "on": True, "y": True, "1": True} | {
     "false": False, "no": False, "off": False, "n": False, "0": False,
 }  # fmt: skip
 _UNKNOWN_GREY = 205
-"""The grey that map_saver and every SLAM tool after it writes for "unknown"."""
+"""The grey that map_saver and most SLAM tools write for "unknown"."""
 
 
 def load_ros_map(
@@ -61,17 +61,17 @@ def load_ros_map(
     Returns
     -------
     OccupancyGrid
-        Named after the file, or after its folder when the file is just called map.
+        The grid, named after the file, or after its folder if the file is called map.
 
     Raises
     ------
     MapNotFoundError
-        When the YAML file or the image that it names is not there.
+        When the YAML file or the image that it names does not exist.
     MapError
         When one of them cannot be read, or holds too many cells; the text names the file and the
         key.
     InvalidValueError
-        When the radius, a threshold or the limit that was given is out of range.
+        When the radius, a threshold or the limit is out of range.
 
     Warns
     -----
@@ -123,7 +123,7 @@ def files_of(path: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class _Description:
-    """What the YAML file says, after overrides."""
+    """Contents of the YAML file, after overrides."""
 
     where: str
     image: Path
@@ -165,7 +165,10 @@ def _read_description(
 
 
 def _number(value: Any, key: str, where: str) -> float:
-    """Finite number of a YAML value; PyYAML leaves 5e-2 a text, which Nav2 reads as a number."""
+    """Return the finite number of a YAML value.
+
+    PyYAML reads 5e-2 as a text, Nav2 as a number.
+    """
     number = math.nan
     if isinstance(value, int | float | str) and not isinstance(value, bool):
         try:
@@ -217,7 +220,7 @@ def _image_path(value: Any, path: Path, where: str) -> Path:
         raise MapError(f"{where}: image must be the path of a file, got {reprlib.repr(value)}")
     try:
         image = Path(value).expanduser()
-    except RuntimeError:  # no such user: then it is a name like any other
+    except RuntimeError:  # no such user: an ordinary name
         image = Path(value)
     return path.parent / image
 
@@ -227,7 +230,7 @@ def _name_of(path: Path) -> str:
 
 
 def _probability(raster: Raster, description: _Description) -> NDArray[np.float32]:
-    """Occupancy by a table over the levels, row 0 at the bottom of the image."""
+    """Return the occupancy, from a table over the levels, row 0 at the bottom of the image."""
     level = np.arange(raster.white + 1)
     if description.mode == "raw":
         percent = np.rint(level * 255 / raster.white)
@@ -237,13 +240,13 @@ def _probability(raster: Raster, description: _Description) -> NDArray[np.float3
     else:
         table = (raster.white - level) / raster.white
     probability = table.astype(np.float32)[raster.level[::-1]]
-    if raster.opaque is not None and description.mode != "raw":  # Nav2: raw knows no opacity
+    if raster.opaque is not None and description.mode != "raw":  # Nav2: raw ignores opacity
         probability[~raster.opaque[::-1]] = math.nan
     return probability
 
 
 def _unknown_called_free(raster: Raster, description: _Description) -> int:
-    """Cells of the grey that means unknown, if the thresholds call it free."""
+    """Return the cells of the grey that means unknown, if the thresholds call it free."""
     value = _UNKNOWN_GREY / 255 if description.negate else 1 - _UNKNOWN_GREY / 255
     if description.mode == "raw" or np.float32(value) > np.float32(description.free_threshold):
         return 0

@@ -1,4 +1,4 @@
-"""How large a map may be, said before its cells are read."""
+"""Limits of the size of a map, checked before its cells are read."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.grid import MAX_CELLS
 
 _READING_BYTES = 50
-"""A cell, while a map is read and inflated; measured 42 on 16 million cells."""
+"""Bytes per cell while a map is read and inflated; measured 42 on 16 million cells."""
 _PLANNING_BYTES = 300
-"""A cell, at most, with pyramid and portals; measured 285 on 4 million free cells."""
+"""Most bytes per cell with pyramid and portals; measured 285 on 4 million free cells."""
 _GB = 1e9
 
 
 def check_max_cells(max_cells: int) -> None:
-    """Refuse a limit that is no positive number of cells.
+    """Refuse a limit that is not a positive number of cells.
 
     Raises
     ------
     InvalidValueError
-        When it is not positive.
+        When the limit is not positive.
     """
     if max_cells < 1:
         raise InvalidValueError(f"max_cells must be a positive number of cells, got {max_cells}")
 
 
 def check_size(cols: int, rows: int, *, max_cells: int, where: str) -> None:
-    """Refuse a map with more cells than a grid holds, or than are asked for.
+    """Refuse a map with more cells than a grid holds, or than the limit.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ def check_size(cols: int, rows: int, *, max_cells: int, where: str) -> None:
     max_cells
         The limit.
     where
-        The file, as the message begins with it.
+        The file; the message begins with it.
 
     Raises
     ------
     MapError
-        When there are more; states the cells, the memory that they take, and the option.
+        When there are more; the message states the cells, their memory, and the option.
     """
     cells = cols * rows
     if cells > MAX_CELLS:

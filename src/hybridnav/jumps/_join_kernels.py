@@ -1,4 +1,4 @@
-"""Kernels that join cells to corner cells, by what the tables of a jump-point graph state."""
+"""Kernels that join cells to corner cells, by the tables of a jump-point graph."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from hybridnav.search._kernels import grow, octile_cost
 def join(tables, cell, found):
     """Find the corner cells that are reached from a cell along a diagonal and then a side.
 
-    All that can be the next corner cell on a shortest path are among them: those that no other one
-    lies before. Where a cell is a corner cell it is not found itself.
+    They include every corner cell that can be the next one on a shortest path, with no other one
+    before it. A corner cell does not find itself.
 
     Parameters
     ----------
     tables
-        The index of cells (see `number_cells`), what they see (see `look_ahead`), which corner cell
-        of the graph each is, int32 (n,), and the width of the framed grid.
+        The index of cells (see `number_cells`), the distances ahead of them (see `look_ahead`), the
+        number of each corner cell in the graph, int32 (n,), and the width of the framed grid.
     cell
         Flat free cell.
     found
-        int32, room for the corner cells, as many as there are.
+        int32, room for all corner cells; filled in.
 
     Returns
     -------
     int
-        How many were found.
+        Number of corner cells found.
     """
     index, ahead, order, width = tables
     here = number_of(index, cell)
@@ -41,8 +41,9 @@ def join(tables, cell, found):
         if seen > 0:
             found[n_found] = order[corner_at(index, cell + seen * step_of(side, width))]
             n_found += 1
-    # By turns, for the processor fetches what the four need at the same time: where they stand, or
-    # -1 at their end, and how far something along the sides on their right and left counts.
+    # The four diagonals take turns, so that the processor fetches their data at the same time: `at`
+    # is the position of each, -1 at its end; `limits` how far along its right and left side corner
+    # cells count.
     at, limits = np.full(8, cell), np.empty((8, 2), np.int64)
     for k in range(1, 8, 2):
         limits[k, 0], limits[k, 1] = _limit(ahead[here, k - 1]), _limit(ahead[here, k + 1 & 7])
@@ -74,7 +75,7 @@ def join(tables, cell, found):
 
 @njit(cache=True, nogil=True)
 def step_of(k, width):
-    """From a flat cell to its neighbour in a direction."""
+    """Return the step from a flat cell to its neighbour in a direction."""
     if k == 0:
         return 1
     if k < 4:
@@ -86,14 +87,16 @@ def step_of(k, width):
 
 @njit(cache=True, nogil=True)
 def _limit(seen):
-    """Nothing so far along a side, or further, is the next corner cell further on along a diagonal:
-    a corner cell or a blocked one lies before it."""
+    """Return the distance along a side from which no cell is the next corner cell any more.
+
+    It holds further along the diagonal: a corner cell or a blocked one lies before that distance.
+    """
     return seen if seen > 0 else 1 - seen
 
 
 @njit(cache=True, nogil=True)
 def is_direct(tables, cell, goal):
-    """Whether the way from a cell along a diagonal and then a side to another one is free."""
+    """Return whether the leg from a cell to another one, diagonal first, is free."""
     width = tables[3]
     rows, cols = goal // width - cell // width, goal % width - cell % width
     diagonal = min(abs(rows), abs(cols))
@@ -113,7 +116,7 @@ def is_direct(tables, cell, goal):
 
 @njit(cache=True, nogil=True)
 def _is_free(tables, at, k, distance):
-    """Whether so many moves in a direction are legal."""
+    """Return whether `distance` moves in a direction are legal."""
     index, ahead, _, width = tables
     step = step_of(k, width)
     while True:
@@ -128,7 +131,7 @@ def _is_free(tables, at, k, distance):
 
 @njit(cache=True, nogil=True)
 def _joined(tables, corners):
-    """Join every corner cell to others: where those that each finds begin, and these."""
+    """Join every corner cell to others; return the offsets of those that each finds, and these."""
     n_corners = corners.size
     begin = np.zeros(n_corners + 1, np.int64)
     heads = np.empty(16 * n_corners + 16, np.int32)
@@ -162,10 +165,10 @@ def arcs_of(tables, corners, places):
     -------
     tuple
         int32 (n + 1,), where the arcs of each corner cell begin; int64 (m, 2), the cost of each
-        arc, and its head and classes (see `pack`). With each arc there is its reverse.
+        arc, and its head and classes (see `pack`). Each arc comes with its reverse.
     """
     begin, heads = _joined(tables, corners)
-    # What only one end finds has another corner cell on its way: two arcs make up for it.
+    # An arc that only one end finds passes another corner cell: two arcs replace it.
     is_kept = np.zeros(heads.size, np.bool_)
     first = np.zeros(corners.size + 1, np.int32)
     for corner in range(corners.size):

@@ -1,4 +1,4 @@
-"""Kernels of legs: the moves between two cells of which neither is in the other's way.
+"""Kernels of legs: the moves between two cells without an obstacle in between.
 
 A leg has moves along one diagonal and along one side next to it, in any order. Its *class* is
 2 * k where all its moves go in direction k, 2 * k + 1 where they go in k and in k + 1.
@@ -11,14 +11,14 @@ import numpy as np
 from hybridnav._jit import njit
 
 FAR = np.int64(1) << 62
-"""More than any path costs."""
+"""Cost above that of any path."""
 COLUMN_BITS = 24
 KIND_BITS = 4
 
 
 @njit(cache=True, nogil=True)
 def class_of(rows, cols):
-    """Return the class of a leg by its offsets, of which one at least is not 0."""
+    """Return the class of a leg by its offsets, at least one of which is not 0."""
     if rows == 0:
         return 0 if cols > 0 else 8
     if cols == 0:
@@ -33,19 +33,19 @@ def class_of(rows, cols):
 
 @njit(cache=True, nogil=True)
 def reverse(leg):
-    """Return the class of a leg that is walked backwards."""
+    """Return the class of a leg when it is walked backwards."""
     return leg + 8 & 15
 
 
 @njit(cache=True, nogil=True)
 def legs_that_follow():
-    """Return which legs may follow which at a corner cell on a shortest path.
+    """Return the legs that may follow each leg at a corner cell on a shortest path.
 
     Any move of the one leg may come right before any of the other. Two moves that turn by 45
-    degrees or less are as short as can be; two along sides that turn by 90 are where the cell
-    between them is blocked. All others are longer than a way that does without the corner cell, and
-    its moves are legal because theirs are. So what is left out is never on a shortest path, even
-    where there are several.
+    degrees or less are as short as possible; so are two along sides that turn by 90 degrees if the
+    cell between them is blocked. All others are longer than a path past the corner cell, whose
+    moves are legal because theirs are. So an excluded pair is never on a shortest path, even where
+    there are several.
 
     Returns
     -------

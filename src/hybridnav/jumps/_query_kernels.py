@@ -18,8 +18,10 @@ def _step(rows, cols):
 
 @njit(cache=True, nogil=True)
 def _walk(cells, n_cells, rows, cols, is_side_first):
-    """Append the cells of a leg, by its offsets from the cell before; return their number and the
-    leg's moves along a side and along a diagonal."""
+    """Append the cells of a leg, by its offsets from the cell before.
+
+    Return their number and the moves of the leg along a side and along a diagonal.
+    """
     diagonal = min(abs(rows), abs(cols))
     straight = max(abs(rows), abs(cols)) - diagonal
     row, col = cells[n_cells - 1, 0], cells[n_cells - 1, 1]
@@ -41,8 +43,12 @@ def _walk(cells, n_cells, rows, cols, is_side_first):
 
 @njit(cache=True, nogil=True)
 def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
-    """Append the cells of a path to `cells`; return these, another array where there was no room,
-    their number, and the path's moves along sides and along diagonals."""
+    """Append the cells of a path to `cells`.
+
+    Return the cells (a new array if there was no room), their number, and the moves of the path
+    along sides and along diagonals. `graph`, `ends` and `meeting` are those of `shortest`, `nodes`
+    the corner cells on the path, `origin` as in `paths`.
+    """
     (_, _, _, width), places = graph[:2]
     row, col = ends[0] // width, ends[0] % width
     cells = _with_room(cells, n_cells, 1 + _moves(places, width, ends, nodes))
@@ -79,10 +85,10 @@ def _moves(places, width, ends, nodes):
 
 @njit(cache=True, nogil=True)
 def _with_room(cells, n_cells, more):
-    """Return cells with room for some more, a copy where they have none."""
+    """Return an array of cells with room for `more`: the same one, or a copy."""
     if n_cells + more <= cells.shape[0]:
         return cells
-    # One path gets what it needs; of many the room doubles.
+    # The first path gets the room that it needs; after that the room doubles.
     larger = np.empty((2 * n_cells + more, 2), np.int64)
     larger[:n_cells] = cells[:n_cells]
     return larger
@@ -98,7 +104,8 @@ def paths(graph, middles, origin, ends, work):
     graph
         See `shortest`.
     middles
-        int64 (m,), what the arcs of a contracted graph lead past; empty for another one.
+        int64 (m,), the corner cells that the arcs of a contracted graph lead past; empty for a
+        graph that is not contracted.
     origin
         Row and column of the framed grid's first cell.
     ends

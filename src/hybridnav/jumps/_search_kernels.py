@@ -13,16 +13,16 @@ from hybridnav.search._kernels import octile_cost
 from hybridnav.search._unpack_kernels import NO_ARC
 
 FROM_START, FROM_GOAL = -2, -3
-"""What `shortest` returns for the corner cell where the path is one leg: free in the order of the
-start, the diagonal first, or in that of the goal."""
+"""Returned by `shortest` as the corner cell when the path is one leg: free with the diagonal first
+from the start, or with the diagonal first from the goal."""
 
 
 @njit(cache=True, nogil=True)
 def _begin(graph, ends, side, work, is_queued):
-    """Give the corner cells that an end is joined to their costs, on the side of this end.
+    """Queue the corner cells that an end is joined to, with their costs from this end.
 
-    Returns how many are queued, how many cells got their first cost, and their component, -1 where
-    the end is joined to none.
+    Return the number of queued corner cells, the number that got their first cost, and their
+    component, -1 where the end is joined to none.
     """
     tables, places, component, _, _ = graph
     index, _, order, width = tables
@@ -54,30 +54,29 @@ def _begin(graph, ends, side, work, is_queued):
 def shortest(graph, ends, is_contracted, work):
     """Search for a shortest path between two cells.
 
-    A* from the start; in a hierarchy from both ends, up to corner cells contracted later. A corner
-    cell that both sides reach makes a path, and whatever is no better need not be looked at any
-    more.
+    A* runs from the start; in a hierarchy from both ends, up to corner cells contracted later. A
+    corner cell that both sides reach completes a path, and entries that are not better are pruned.
 
     Parameters
     ----------
     graph
-        Tables (see `join`), int64 (n,) places, int32 (n,) components, which legs may follow, and
-        arcs: where those of each corner cell begin, int64 (m, 2) cost and head (see `arcs_of` and
-        `contract`).
+        Tables (see `join`), int64 (n,) places, int32 (n,) components, the legs that may follow (see
+        `legs_that_follow`), and arcs: where those of each corner cell begin, int64 (m, 2) cost and
+        head (see `arcs_of` and `contract`).
     ends
         Flat cells of start and goal.
     is_contracted
         Whether the arcs are those of a hierarchy.
     work
         Records, int64 (n, 4), the first two columns `FAR`: costs from the start and from the goal,
-        and by what tail and arc each was reached; two heaps with room for n and m entries; room for
-        n corner cells, int64; the same, int32.
+        and the tail and arc by which each was reached; two heaps with room for n and m entries;
+        room for n corner cells, int64; the same, int32.
 
     Returns
     -------
     tuple
         Cost, `FAR` where there is no path; the corner cell where both sides meet, `FROM_START` or
-        `FROM_GOAL`; corner cells expanded; how many records must be cleared.
+        `FROM_GOAL`; corner cells expanded; number of records to clear.
     """
     tables, places, _, follow, (first, arcs) = graph
     records, heaps, touched, found = work

@@ -1,4 +1,4 @@
-"""Kernels of the tables of a jump-point graph: corner cells, and what each cell sees where.
+"""Kernels of the tables of a jump-point graph: corner cells, and the distances to them.
 
 Directions are those of `search._kernels`: 0 east (column + 1), 1 north-east, counter-clockwise, row
 + 1 being north. Cells lie in a frame of blocked ones, so that no neighbour is off the map; a flat
@@ -48,8 +48,8 @@ def corner_at(index, cell):
 def number_cells(free):
     """Number the free cells, and the corner cells among them, in the order of rows.
 
-    A corner cell has a blocked cell at one of its corners, and both cells beside that one are free:
-    there shortest paths turn.
+    A corner cell has a blocked cell at one of its corners, and both cells beside the blocked one
+    are free: shortest paths turn there.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def number_cells(free):
 
 @njit(cache=True, nogil=True)
 def _kind(number, width, cell):
-    """Which corners of a free cell are blocked while both cells beside them are free."""
+    """Return the corners of a free cell that are blocked while both cells beside them are free."""
     east, north = number[cell + 1] != BLOCKED, number[cell + width] != BLOCKED
     west, south = number[cell - 1] != BLOCKED, number[cell - width] != BLOCKED
     kind = 0
@@ -114,23 +114,24 @@ def _kind(number, width, cell):
 
 @njit(cache=True, nogil=True)
 def look_ahead(number, width, index, ahead):
-    """Fill in what each free cell sees in the eight directions.
+    """Fill in the distances ahead of each free cell in the eight directions.
 
     Parameters
     ----------
     number, index
-        Of `number_cells`.
+        Results of `number_cells`.
     width
         Columns of the framed grid.
     ahead
         int16 or int32 (n_free, 8), filled in. Along a side: the distance to the next corner cell,
         or 0 or less, minus the free cells before a blocked one. Along a diagonal: the distance to
         the next cell that is a corner cell or sees one along either side of that diagonal, or minus
-        the legal moves before there are none.
+        the number of legal moves.
     """
     for flip in (1, -1):
         first, last = (0, number.size) if flip == 1 else (number.size - 1, -1)
-        # Up the rows what lies west and south is known before, down them what lies north and east.
+        # Upwards, the cells to the west and south are done before; downwards, those to the north
+        # and east.
         towards = ((4, -1), (6, -width)) if flip == 1 else ((0, 1), (2, width))
         for cell in range(first, last, flip):
             here = number[cell]

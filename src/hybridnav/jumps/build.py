@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 _SHORT = 32_000
 """Longest side of a map whose distances fit 16 bits."""
 _SETTLED = 1
-"""Corner cells that a search for another way settles at most when the graph is contracted: it sees
-other arcs alone. With 10 there are 4 to 13 % fewer shortcuts, and it takes twice as long."""
+"""Most corner cells that a witness search settles during contraction, so that it sees single arcs.
+With 10 there are 4 to 13 % fewer shortcuts, in twice the time."""
 _MOST_LOOKED = 400
-"""Arcs for each free cell that the contraction looks at before it is given up. Most maps take fewer
-than 50, the worst of 43 real ones 250; noise, a tenth of all cells blocked one by one, would take
-minutes."""
+"""Arcs per free cell that the contraction may examine before it is given up. Most maps need fewer
+than 50, the worst of 43 real ones 250; noise, with a tenth of all cells blocked one by one, would
+take minutes."""
 
 
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class JumpGraph:
-    """Corner cells, arcs between those with no other one on their way, and what each cell sees.
+    """Corner cells, arcs between those without another one in between, and distances to them.
 
-    A corner cell has a blocked cell at one of its corners and is free beside that one: there
-    shortest paths turn. An arc is a leg: moves along one diagonal and one side next to it, which
-    may come in any order. Cells are those of the smallest rectangle that holds all free ones, in a
-    frame of blocked ones; a flat cell is its place in there.
+    A corner cell has a blocked cell at one of its corners, with free cells beside it: shortest
+    paths turn there. An arc is a leg: moves along one diagonal and one side next to it, which may
+    come in any order. Cells are those of the smallest rectangle round all free ones, in a frame of
+    blocked ones; a flat cell is its place in that rectangle.
 
     Contracted, arcs lead from each corner cell to those that were contracted after it, and corner
     cells are numbered from the last one contracted to the first.
@@ -48,12 +48,12 @@ class JumpGraph:
     shape: tuple[int, int]
     """Rows and columns of the framed rectangle."""
     index: LongArray
-    """int64 (words, 3), for every 64 flat cells which are free, which are corner cells, and how
-    many of each come before, free ones in the high half."""
+    """int64 (words, 3), for every 64 flat cells: the free ones, the corner cells, and the counts of
+    both before them, free ones in the high half."""
     ahead: NDArray[np.int16 | np.int32]
     """int16 or int32 (n_free, 8), by free cell in the order of rows and by direction: along a side
-    the distance to the next corner cell, along a diagonal to the next cell that is one or sees one
-    along a side; where there is none, minus the moves that are legal."""
+    the distance to the next corner cell, along a diagonal to the next cell that is a corner cell or
+    sees one along a side; where there is none, minus the number of legal moves."""
     order: IntArray
     """int32 (n,), the number of each corner cell in the order of rows."""
     places: LongArray
@@ -92,12 +92,12 @@ def build_jump_graph(free: BoolArray) -> JumpGraph:
     Parameters
     ----------
     free
-        bool (rows, cols); what lies outside is blocked.
+        bool (rows, cols); cells outside are blocked.
 
     Returns
     -------
     JumpGraph
-        Without a corner cell where no path turns. Work and memory are linear in cells, but for the
+        Without corner cells if no path turns. Work and memory are linear in cells, except for the
         arcs.
 
     Notes
@@ -128,17 +128,17 @@ def build_jump_graph(free: BoolArray) -> JumpGraph:
 def contract_graph(graph: JumpGraph) -> JumpGraph:
     """Contract a jump-point graph, which makes queries several times faster.
 
-    Where there are several shortest paths a contracted graph may find another one.
+    If there are several shortest paths, a contracted graph may find another one.
 
     Parameters
     ----------
     graph
-        Not contracted; it stays as it is.
+        A graph that is not contracted; unchanged.
 
     Returns
     -------
     JumpGraph
-        The graph itself where contracting it takes too long.
+        The contracted graph, or the graph itself if contraction takes too long.
 
     Notes
     -----

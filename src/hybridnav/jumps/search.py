@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 
 _LEAST = 64
-"""Queries that are worth a thread."""
+"""Least number of queries that justifies a thread."""
 
 
 @dataclass(frozen=True, eq=False)
 class JumpPath:
-    """A shortest path between two cells; None for its cells where there is none."""
+    """A shortest path between two cells; its cells are None if there is none."""
 
     cells: LongArray | None
     """int64 (n, 2), (row, col) of the cells passed."""
     length_cells: float
-    """Its length, a + b sqrt 2 of its moves; infinite for none."""
+    """Length of the path, a + b sqrt 2 of its moves; infinite for none."""
     expanded: int
     """Corner cells that the search expanded."""
 
@@ -57,7 +57,7 @@ class _Work:
 
     def __init__(self, n_corners: int, n_arcs: int) -> None:
         records = np.full((n_corners, 4), FAR, dtype=np.int64)
-        # A corner cell is expanded once at most, so that each arc is queued once at most.
+        # A corner cell is expanded at most once, so each arc is queued at most once.
         heaps = tuple(np.empty((n_corners + n_arcs + 1, 2), dtype=np.int64) for _ in range(2))
         touched, found = np.empty(n_corners, np.int64), np.empty(n_corners, np.int32)
         self.arrays = records, heaps, touched, found
@@ -72,7 +72,7 @@ class JumpSearch:
     Parameters
     ----------
     graph
-        Of the map's free cells, contracted or not.
+        The graph of the map's free cells, contracted or not.
 
     Notes
     -----
@@ -114,7 +114,7 @@ class JumpSearch:
         return JumpPaths(length, path_start, cells, counts[:, 2])
 
     def _paths(self, ends: LongArray) -> tuple[Any, Any, Any]:
-        """Return where the cells of each path begin, these, and moves and expansions of each."""
+        """Return the offsets of the paths, their cells, and the moves and expansions of each."""
         with self._works.lent() as work:
             found: tuple[Any, Any, Any] = kernels.paths(
                 self._arrays, self.graph.middles, self.graph.origin, ends, work.arrays

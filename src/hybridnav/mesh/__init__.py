@@ -1,5 +1,4 @@
-"""Exact any-angle paths: the convex mesh of free space, the search of its intervals, the graph of
-its corners."""
+"""Exact any-angle paths: the convex mesh of free space, its intervals, the graph of its corners."""
 
 from hybridnav.mesh.build import ConvexMesh, build_mesh
 from hybridnav.mesh.corner_graph import CornerGraph

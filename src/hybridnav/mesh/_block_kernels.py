@@ -1,7 +1,7 @@
-"""Kernels of blocks: parts of a mesh that hang together by more than one polygon.
+"""Kernels of blocks: parts of a mesh that no single polygon disconnects.
 
 A shortest path passes no convex polygon twice, so it stays in the blocks between its ends: a part
-of the map that hangs on one polygon is entered only towards an end.
+of the map behind a single polygon is entered only towards an end.
 """
 
 from __future__ import annotations
@@ -14,10 +14,8 @@ from hybridnav._jit import guarded, njit
 @guarded
 @njit(cache=True, nogil=True)
 def blocks_of(first, twins, polygon_of):
-    """Blocks (biconnected components) of the graph of polygons, and their tree.
+    """Return the blocks (biconnected components) of the graph of polygons, and their tree.
 
-    A shortest path passes no polygon twice, for it is convex: so it stays in the blocks between its
-    ends, and a part of the map that hangs on one polygon is entered only towards an end.
     J. Hopcroft, R. Tarjan: Algorithm 447, efficient algorithms for graph manipulation, 1973.
 
     Returns
@@ -39,7 +37,7 @@ def blocks_of(first, twins, polygon_of):
     at = first[:-1].copy()
     came_by = np.full(n, -1, np.int32)
     path = np.empty(n, np.int32)
-    waiting = np.empty(len(twins) // 2 + 1, np.int32)  # slots of sides seen, one of each twins
+    waiting = np.empty(len(twins) // 2 + 1, np.int32)  # slots of seen sides, one of each pair
     n_waiting = n_blocks = n_components = clock = 0
     for root in range(n):
         if number[root] >= 0:
@@ -102,8 +100,12 @@ def blocks_of(first, twins, polygon_of):
 
 @njit(cache=True, nogil=True)
 def open_blocks(block_head, block_up, depth, start, goal, is_open, marked, n):
-    """Open the blocks between two polygons of one component, and put those that were not open into
-    `marked` from place n on; returns where they end."""
+    """Open the blocks between two polygons of one component.
+
+    `block_head`, int32 (b,), `block_up` and `depth`, int32 (p,), are those of `blocks_of`; `start`
+    and `goal` are polygons; `is_open`, bool (b,), is changed. Newly opened blocks are written to
+    `marked`, int32, from index n on; return the index behind the last one.
+    """
     while start != goal:
         if depth[start] < depth[goal]:
             start, goal = goal, start

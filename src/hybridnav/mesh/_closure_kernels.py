@@ -1,8 +1,8 @@
-"""Kernels of closed cells: whether a segment of free space meets them, and where walls turn anew.
+"""Kernels of closed cells: whether a segment of free space meets them, and their new corners.
 
 Points are x = column, y = row in grid units, as for the search of intervals: the ends of a query
-are rounded so that every side test is exact (see `turn_of`). Floats choose the cells that are
-looked at, with a margin; whether a segment meets a cell is decided by side tests alone.
+are rounded so that every side test is exact (see `turn_of`). Floats choose the candidate cells,
+with a margin; side tests alone decide whether a segment meets a cell.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from hybridnav._jit import guarded, njit
 from hybridnav.search._exact_kernels import turn_of
 
 _MARGIN = 1e-6
-"""Rounding of where a segment meets a row of cells, in cells."""
+"""Rounding of the point where a segment meets a row of cells, in cells."""
 
 
 @guarded
@@ -33,8 +33,8 @@ def closure_of(flat, polygon_at):
     Returns
     -------
     tuple
-        int64 (4,) first and last row, first and last column of the closed cells; int64 where the
-        cells of each of these rows begin; int64 their columns.
+        int64 (4,) first and last row, first and last column of the closed cells; int64 offsets of
+        the cells of each of these rows; int64 their columns.
     """
     n_cols = polygon_at.shape[1]
     cols = np.empty(len(flat), np.int64)
@@ -58,8 +58,7 @@ def closure_of(flat, polygon_at):
 
 @njit(cache=True, nogil=True)
 def _first_from(closure, row, col):
-    """Where the closed cells of a row begin that lie in a column or behind it, and where they
-    end."""
+    """Return the range of the closed cells of a row that lie in a column or behind it."""
     box, starts, cols = closure
     low, high = starts[row - box[0]], starts[row - box[0] + 1]
     end = high
@@ -74,7 +73,7 @@ def _first_from(closure, row, col):
 
 @njit(cache=True, nogil=True)
 def is_closed(closure, row, col):
-    """Whether a cell is closed that was free."""
+    """Return whether a cell was free and is closed."""
     box, _, cols = closure
     if row < box[0] or row > box[1] or col < box[2] or col > box[3]:
         return False
@@ -84,7 +83,7 @@ def is_closed(closure, row, col):
 
 @njit(cache=True, nogil=True)
 def is_shut(closure, polygon_at, row, col):
-    """Whether a cell is not free, closed or blocked; what lies outside is blocked."""
+    """Return whether a cell is closed or blocked; cells outside the map are blocked."""
     if not (0 <= row < polygon_at.shape[0] and 0 <= col < polygon_at.shape[1]):
         return True
     return polygon_at[row, col] < 0 or is_closed(closure, row, col)
@@ -92,7 +91,7 @@ def is_shut(closure, polygon_at, row, col):
 
 @njit(cache=True, nogil=True)
 def is_at_closed(closure, x, y):
-    """Whether a lattice point is a corner of a closed cell."""
+    """Return whether a lattice point is a corner of a closed cell."""
     box = closure[0]
     if y < box[0] or y > box[1] + 1 or x < box[2] or x > box[3] + 1:
         return False
@@ -107,7 +106,7 @@ def is_at_closed(closure, x, y):
 
 @njit(cache=True, nogil=True)
 def is_at_shut(closure, polygon_at, x, y):
-    """Whether a point is a corner of a cell that is not free."""
+    """Return whether a point is a corner of a cell that is not free."""
     if x != math.floor(x) or y != math.floor(y):
         return False
     row, col = int(y), int(x)
@@ -121,9 +120,11 @@ def is_at_shut(closure, polygon_at, x, y):
 
 @njit(cache=True, nogil=True)
 def _meets_cell(closure, polygon_at, segment, row, col):
-    """Whether a cell that is not free keeps a segment from being a way: the segment passes its
-    inside, or between it and another one, along their side or through the corner where they
-    meet."""
+    """Return whether a cell that is not free makes a segment illegal.
+
+    The segment passes its inside, or between it and another such cell, along their common side or
+    through the corner where they meet.
+    """
     ax, ay, bx, by = segment
     if min(ax, bx) > col + 1 or max(ax, bx) < col or min(ay, by) > row + 1 or max(ay, by) < row:
         return False
@@ -149,7 +150,7 @@ def _meets_cell(closure, polygon_at, segment, row, col):
 
 @njit(cache=True, nogil=True)
 def _columns(segment, row):
-    """First and last column of the cells of a row that a segment may touch."""
+    """Return the first and last column of the cells of a row that a segment may touch."""
     ax, ay, bx, by = segment
     if ay == by:
         return math.floor(min(ax, bx) - _MARGIN) - 1, math.floor(max(ax, bx) + _MARGIN)
@@ -163,8 +164,10 @@ def _columns(segment, row):
 
 @njit(cache=True, nogil=True)
 def is_beside(box, ax, ay, bx, by):
-    """Whether a segment comes so near to closed cells that it may touch one; `box` is their first
-    and last row, first and last column."""
+    """Return whether a segment comes so near to closed cells that it may touch one.
+
+    `box` holds their first and last row, first and last column.
+    """
     return (
         max(ay, by) >= box[0]
         and min(ay, by) <= box[1] + 1
@@ -175,14 +178,14 @@ def is_beside(box, ax, ay, bx, by):
 
 @njit(cache=True, nogil=True)
 def crosses(closure, polygon_at, ax, ay, bx, by):
-    """Whether a segment that is a way in free space is none with cells closed.
+    """Return whether a segment that is legal in free space is illegal with cells closed.
 
     Parameters
     ----------
     closure, polygon_at
         See `closure_of`.
     ax, ay, bx, by
-        The segment. Its ends are not looked at: a way that goes on in another direction must be
+        The segment. Its ends are not tested: a path that goes on in another direction must be
         tested there.
     """
     box, starts, cols = closure
@@ -206,7 +209,7 @@ def crosses(closure, polygon_at, ax, ay, bx, by):
 
 @njit(cache=True, nogil=True)
 def is_clear(closure, polygon_at, ax, ay, bx, by):
-    """Whether a segment is a way with cells closed; see `crosses`."""
+    """Return whether a segment is legal with cells closed; see `crosses`."""
     segment = (ax, ay, bx, by)
     if ax == bx and ay == by:
         return True
@@ -223,8 +226,9 @@ def is_clear(closure, polygon_at, ax, ay, bx, by):
 @guarded
 @njit(cache=True, nogil=True)
 def way_crosses(closure, polygon_at, way):
-    """Whether a shortest path of free space is none with cells closed, or may be none: an end at a
-    corner of a closed cell is left to those who know its cell.
+    """Return whether a shortest path of free space is, or may be, illegal with cells closed.
+
+    An end at a corner of a closed cell counts, because the cell of the end decides.
 
     Parameters
     ----------
@@ -246,8 +250,10 @@ def way_crosses(closure, polygon_at, way):
 @guarded
 @njit(cache=True, nogil=True)
 def ways_cross(closure, polygon_at, positions, starts):
-    """Which of many ways cross closed cells, bool (n,): see `way_crosses`. Way k is
-    `positions[starts[k]:starts[k + 1]]`."""
+    """Return which of many paths cross closed cells, bool (n,); see `way_crosses`.
+
+    Path k is `positions[starts[k]:starts[k + 1]]`.
+    """
     found = np.empty(len(starts) - 1, np.bool_)
     for k in range(len(found)):
         found[k] = way_crosses(closure, polygon_at, positions[starts[k] : starts[k + 1]])
@@ -257,13 +263,14 @@ def ways_cross(closure, polygon_at, positions, starts):
 @guarded
 @njit(cache=True, nogil=True)
 def corners_of_closure(closure, polygon_at):
-    """Find the corners that closed cells make, at which paths may bend: three cells round them are
-    free, and before all four were.
+    """Find the corners of closed cells at which paths may bend.
+
+    Three cells round such a corner are free; before the closure all four were.
 
     Returns
     -------
     tuple
-        float64 (n,) x, float64 (n,) y, uint8 (n,) kinds as of `kinds_of`; int64 (n, 2) the closed
+        float64 (n,) x, float64 (n,) y, uint8 (n,) kinds as in `kinds_of`; int64 (n, 2) the closed
         cell (row, col) at each.
     """
     box, starts, cols = closure

@@ -11,15 +11,17 @@ from hybridnav.mesh._view_kernels import distance, see_from_corner
 
 @njit(cache=True, nogil=True)
 def _doubled(array):
-    """A copy with room for twice as many rows."""
+    """Return a copy with room for twice as many rows."""
     return np.concatenate((array, array))
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def edges_of(mesh, component, limit):
-    """Find the edges of the graph: two corners at which a path along the segment between them may
-    bend, and which see each other.
+    """Find the edges of the graph.
+
+    An edge joins two corners that see each other, and at both of which a path along the segment
+    between them may bend.
 
     Parameters
     ----------
@@ -28,14 +30,14 @@ def edges_of(mesh, component, limit):
     component
         int32 (p,), below 0 for polygons that were cut out.
     limit
-        Edges at most.
+        Most edges.
 
     Returns
     -------
     tuple
         int64 (2 n + 1,) first edge of each corner and quadrant, see `lobe_of`; int32 (m,) the
-        corner at which each edge ends. Each edge is there in both directions. Where there are more
-        than the limit the last whole number of the first is -1.
+        corner at which each edge ends. Each edge occurs in both directions. If there are more edges
+        than the limit, the last entry of the first array is -1.
     """
     kinds, begins, twins, polygon_of = mesh[2], mesh[4], mesh[6], mesh[7]
     n = len(kinds)
@@ -70,18 +72,18 @@ def edges_of(mesh, component, limit):
 
 @njit(cache=True, nogil=True)
 def distances_from(points, graph, source, distances):
-    """Compute the distances of all corners from one in the graph, infinite where none is reached.
+    """Compute the distances of all corners from one in the graph, infinite if not reached.
 
     Parameters
     ----------
     points
         float64 x and y of corners.
     graph
-        Of `edges_of`.
+        The graph of `edges_of`.
     source
         The corner.
     distances
-        float64 (n,), the result.
+        float64 (n,), filled in.
     """
     cx, cy = points
     first, heads = graph
@@ -107,17 +109,18 @@ def distances_from(points, graph, source, distances):
 
 @njit(cache=True, nogil=True)
 def landmarks_of(points, graph, source, table):
-    """Compute the distances of all corners from landmarks: a given corner, and then each the corner
-    farthest from those before.
+    """Compute the distances of all corners from landmarks.
+
+    The first landmark is a given corner, each other one the corner farthest from those before.
 
     Parameters
     ----------
     points, graph
         See `distances_from`.
     source
-        The first landmark: the others are in the part of the graph that holds it.
+        The first landmark: the others are in the same part of the graph.
     table
-        float64 (n, landmarks), the result.
+        float64 (n, landmarks), filled in.
     """
     n, number = table.shape
     distances = np.empty(n)

@@ -12,16 +12,16 @@ from hybridnav._jit import guarded, njit
 
 NO_CORNER = 6
 MANY = 4
-"""Kind of a corner that no path bends round: not one cell of four is blocked there."""
+"""Kind of a corner that no path bends round: the number of blocked cells of four is not one."""
 
 
 @njit(cache=True, nogil=True)
 def kinds_of(free):
-    """Kind of each lattice point, uint8 (rows + 1, cols + 1).
+    """Return the kind of each lattice point, uint8 (rows + 1, cols + 1).
 
-    0 to 3 where one cell of four is blocked: bit 1 for the upper row, bit 0 for the upper column;
-    `MANY` where three are, or two that meet there alone; else `NO_CORNER`. What lies outside the
-    map is blocked.
+    0 to 3 if one cell of four is blocked: bit 1 for the upper row, bit 0 for the upper column;
+    `MANY` if three are, or two that meet there alone; else `NO_CORNER`. Cells outside the map are
+    blocked.
     """
     rows, cols = free.shape
     kinds = np.empty((rows + 1, cols + 1), np.uint8)
@@ -45,7 +45,7 @@ def kinds_of(free):
 @guarded
 @njit(cache=True, nogil=True)
 def walls_of(free, kinds, n_corners):
-    """Corners, and the walls between them.
+    """Return the corners, and the walls between them.
 
     A wall is a straight run of sides between free and blocked cells, from a corner to the next.
 
@@ -54,9 +54,9 @@ def walls_of(free, kinds, n_corners):
     free
         bool (rows, cols).
     kinds
-        Of `kinds_of`.
+        Kinds of `kinds_of`.
     n_corners
-        How many of them are corners.
+        Number of corners among them.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def walls_of(free, kinds, n_corners):
             if kinds[row, col] == NO_CORNER:
                 continue
             corners[count, 0], corners[count, 1] = row, col
-            # Free space bounds a corner: a side that parts two classes there leads to another one.
+            # A side between two classes that starts at a corner leads to another corner.
             if col > 0:
                 down = row > 0 and free[row - 1, col - 1]
                 up = row < rows and free[row, col - 1]

@@ -35,7 +35,7 @@ _SLACK = 1e-9
 @guarded
 @njit(cache=True, nogil=True)
 def query_corners(mesh, graph, where, ends, work, effort):
-    """Find a shortest path between two points, or go on with it.
+    """Find a shortest path between two points, or resume the search.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def query_corners(mesh, graph, where, ends, work, effort):
     where
         See `look_from_ends`.
     work
-        Of one query: room for the polygons of the ends; room of `see_from_point`; cost of corners
-        (infinite), estimate, corner before, way to the goal (infinite), corners touched; keys and
-        values of the heap; float64 (2, landmarks) of the goal's bounds; counts and bounds.
+        Arrays of one query: room for the polygons of the ends; room of `see_from_point`; cost of
+        corners (infinite), estimate, corner before, length to the goal (infinite), corners touched;
+        keys and values of the heap; float64 (2, landmarks) bounds of the goal; counts and bounds.
     effort
         See `query`.
 
@@ -115,7 +115,7 @@ def _seed(mesh, graph, ends, seen, work):
 
 @njit(cache=True, nogil=True)
 def _advance(mesh, graph, ends, work, factor, limit):
-    """Search on, until the answer is good enough or enough corners are expanded: see `advance`."""
+    """Search until the answer is good enough or enough corners are expanded; see `advance`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, heads, table = graph
     _, _, _, corners, heap, _, counts, bounds = work
@@ -143,7 +143,7 @@ def _advance(mesh, graph, ends, work, factor, limit):
             break
         counts[SIZE] = pop(heap, counts[SIZE])
         counts[EXPANDED] += 1
-        # The blocked cell lies on the left of the way here, or on the right.
+        # The blocked cell lies on the left of the path here, or on the right.
         side = dx * (1.0 if kind & 2 else -1.0) - dy * (1.0 if kind & 1 else -1.0)
         _relax(mesh, table, ends, work, here, (px, py, x, y, side), costs[here], heads[low:high])
     least = min(keys[0], bounds[UPPER]) if counts[SIZE] else bounds[UPPER]
@@ -153,10 +153,11 @@ def _advance(mesh, graph, ends, work, factor, limit):
 
 @njit(cache=True, nogil=True)
 def _relax(mesh, table, ends, work, before, way, cost_before, heads):
-    """Reach corners from one, or from the start, where that is cheaper than before.
+    """Reach corners from a corner, or from the start, if that is cheaper than before.
 
     `way` is the point before, that corner, and the side to which a path bends there: 1 for the
-    left, 0 for either.
+    left, 0 for either. `table`, float64 (n, landmarks), is that of `landmarks_of`; `before` is the
+    number of the corner, `cost_before` its cost in cells, `heads` are the corners to reach.
     """
     cx, cy = mesh[0], mesh[1]
     px, py, x, y, side = way
@@ -196,7 +197,7 @@ def _relax(mesh, table, ends, work, before, way, cost_before, heads):
 
 @njit(cache=True, nogil=True)
 def _way(mesh, ends, came, corner):
-    """The path by way of a corner, see `way_to`; -1 for a path of one segment."""
+    """Return the path through a corner, see `way_to`; -1 for a path of one segment."""
     sx, sy, tx, ty = ends
     at, room = corner, 2
     while at >= 0:

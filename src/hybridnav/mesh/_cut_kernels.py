@@ -1,4 +1,4 @@
-"""Kernels that cut closed cells out of a mesh: the polygons that they touch, and what stays.
+"""Kernels that cut closed cells out of a mesh: the polygons that they touch, and the rest.
 
 Points are (row, col) in grid units, as for `merge_triangles`.
 """
@@ -13,7 +13,7 @@ from hybridnav.mesh._corner_kernels import MANY, NO_CORNER
 
 @njit(cache=True, nogil=True)
 def _cross(a_row, a_col, b_row, b_col, row, col):
-    """Twice the area of a, b and a point, positive where that lies to the left."""
+    """Return twice the signed area of a, b and a point, positive if the point lies to the left."""
     return (np.int64(b_col) - a_col) * (np.int64(row) - a_row) - (np.int64(b_row) - a_row) * (
         np.int64(col) - a_col
     )
@@ -21,7 +21,7 @@ def _cross(a_row, a_col, b_row, b_col, row, col):
 
 @njit(cache=True, nogil=True)
 def _touches_cell(corners, begins, low, high, row, col):
-    """Whether a convex polygon has a point in common with the closed square of a cell."""
+    """Return whether a convex polygon has a point in common with the closed square of a cell."""
     bottom = left = np.int64(1) << 40
     top = right = -bottom
     for slot in range(low, high):
@@ -48,14 +48,14 @@ def _touches_cell(corners, begins, low, high, row, col):
 @guarded
 @njit(cache=True, nogil=True)
 def touched_polygons(corners, sides, polygon_at, closed):
-    """Polygons that share a point with a closed cell, reached from inside it.
+    """Return the polygons that share a point with a closed cell, reached from inside it.
 
     Parameters
     ----------
     corners
         int32 (n, 2).
     sides
-        first, begins, twins, polygon_of of the mesh.
+        Arrays first, begins, twins, polygon_of of the mesh.
     polygon_at
         int32 (rows, cols), the polygon at the centre of each cell, -1 for none.
     closed
@@ -102,7 +102,7 @@ def touched_polygons(corners, sides, polygon_at, closed):
 
 @njit(cache=True, nogil=True)
 def kind_at(free, row, col):
-    """Kind of a lattice point, as of `kinds_of`."""
+    """Return the kind of a lattice point, as in `kinds_of`."""
     rows, cols = free.shape
     a = row > 0 and col > 0 and free[row - 1, col - 1]
     b = row > 0 and col < cols and free[row - 1, col]
@@ -117,7 +117,8 @@ def kind_at(free, row, col):
 @guarded
 @njit(cache=True, nogil=True)
 def corners_of_cells(free, closed):
-    """Lattice points at closed cells, each once, int64 (n,) flat, and their kinds, uint8 (n,)."""
+    """Return the lattice points at closed cells, each once, int64 (n,), and their kinds, uint8
+    (n,)."""
     cols = free.shape[1]
     found = np.empty(4 * len(closed), np.int64)
     for k in range(len(closed)):
@@ -134,7 +135,7 @@ def corners_of_cells(free, closed):
 @guarded
 @njit(cache=True, nogil=True)
 def walls_of_closed(free, closed, points):
-    """Walls between closed cells and free ones, from vertex to vertex.
+    """Return the walls between closed cells and free ones, from vertex to vertex.
 
     Parameters
     ----------
@@ -157,7 +158,7 @@ def walls_of_closed(free, closed, points):
     for cell in closed:
         row, col = cell // cols, cell % cols
         for side in range(4):
-            # Its other cell, and from where to where it runs.
+            # The other cell of the side, and the two ends of the side.
             down = row - 1 if side == 0 else row + 1 if side == 1 else row
             across = col - 1 if side == 2 else col + 1 if side == 3 else col
             if not (0 <= down < rows and 0 <= across < cols and free[down, across]):
@@ -166,7 +167,7 @@ def walls_of_closed(free, closed, points):
             step = 1 if side < 2 else wide
             begin = np.searchsorted(points, at)
             if begin == len(points) or points[begin] != at:
-                continue  # a straight wall goes on through here
+                continue  # a straight wall continues here
             end = at + step
             stop = np.searchsorted(points, end)
             while stop == len(points) or points[stop] != end:
@@ -180,7 +181,7 @@ def walls_of_closed(free, closed, points):
 @guarded
 @njit(cache=True, nogil=True)
 def rim_of(sides, is_touched, touched):
-    """Slots of touched polygons that are walls or lead to polygons which are not touched, int64."""
+    """Return the slots of touched polygons that are walls or lead to other polygons, int64."""
     first, _, twins, polygon_of = sides
     n = 0
     for polygon in touched:
@@ -198,14 +199,14 @@ def rim_of(sides, is_touched, touched):
 @guarded
 @njit(cache=True, nogil=True)
 def pieces_of_rim(sides, rim, point_of, points, wide):
-    """Sides of a rim, divided where they pass a vertex, int64 (w, 2), indices of `points`.
+    """Return the sides of a rim, divided at vertices, int64 (w, 2), indices of `points`.
 
     Parameters
     ----------
     sides
-        first, begins, twins, polygon_of of the mesh.
+        Arrays first, begins, twins, polygon_of of the mesh.
     rim
-        Of `rim_of`. Walls run along rows or columns; no other side passes a vertex.
+        Slots of `rim_of`. Walls run along rows or columns; no other side passes a vertex.
     point_of
         int64 (n,), flat lattice point of each corner of the mesh.
     points
@@ -241,12 +242,12 @@ def pieces_of_rim(sides, rim, point_of, points, wide):
 @guarded
 @njit(cache=True, nogil=True)
 def are_inside(corners, first, begins, touched, triples):
-    """Whether the middle of each triangle lies in one of some polygons.
+    """Return whether the middle of each triangle lies in one of some polygons.
 
     Parameters
     ----------
     corners, first, begins
-        Of the mesh.
+        Arrays of the mesh.
     touched
         int32, numbers of the polygons.
     triples

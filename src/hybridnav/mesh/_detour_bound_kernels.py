@@ -1,8 +1,8 @@
-"""Kernels of lower bounds on what is left of a path round closed cells.
+"""Kernels of lower bounds on the rest of a path round closed cells.
 
-A lower bound on what is left cannot be read off the graph's landmarks alone: a path round a corner
-that closed cells make is none of the graph. So it is the lesser of two: the landmarks' where the
-rest bends at corners of the graph only, and the way to such a corner and on from it where not.
+The landmarks of the graph alone do not bound the rest, because a path round a corner of closed
+cells is not in the graph. So the bound is the lesser of two: that of the landmarks, if the rest
+bends at corners of the graph only; else the distance to a corner of closed cells and on from it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ _SLACK = 1e-9
 
 @njit(cache=True, nogil=True)
 def bounds_of_goal(table, seen, to_goal, goal_bounds):
-    """What is known of the way from each landmark to the goal, see `groups_of_closure`."""
+    """Fill in the bounds on the distance from each landmark to the goal; see
+    `groups_of_closure`."""
     goal_bounds[0], goal_bounds[1] = np.inf, -np.inf
     for corner in seen:
         for mark in range(table.shape[1]):
@@ -33,7 +34,7 @@ def bounds_of_goal(table, seen, to_goal, goal_bounds):
 
 @njit(cache=True, nogil=True)
 def left_behind(made, groups, to_goal, goal_bounds, tx, ty):
-    """The least that is left of a path behind the corners of each group, float64 (g,)."""
+    """Return the least length of a path behind the corners of each group, float64 (g,)."""
     xs, ys, _, _ = made
     group, circles, reach, _ = groups
     n = len(to_goal) - len(group)
@@ -58,10 +59,10 @@ def left_behind(made, groups, to_goal, goal_bounds, tx, ty):
 
 @njit(cache=True, nogil=True)
 def estimate(marks, corner, x, y, tx, ty):
-    """A lower bound on what is left of a path behind a corner, -1 for one that closed cells make.
+    """Return a lower bound on the rest of a path behind a corner, -1 for a corner of closed cells.
 
-    `marks` are distances from landmarks, what is known of the goal's, circles round the groups of
-    corners that closed cells make, what is known of theirs, and the least left behind each group.
+    `marks` are the distances from landmarks, the bounds of the goal, the circles round groups of
+    corners of closed cells, the bounds of these groups, and the least rest behind each group.
     """
     table, goal_bounds, circles, around, left = marks
     straight = distance(x, y, tx, ty)

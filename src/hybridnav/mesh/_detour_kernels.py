@@ -1,6 +1,6 @@
-"""Kernels of the corners that closed cells make: how they hang on the graph of corners.
+"""Kernels of the corners of closed cells, and their edges to the graph of corners.
 
-Corners of the graph keep their numbers; those that closed cells make follow behind them.
+Corners of the graph keep their numbers; those of closed cells follow behind them.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from hybridnav.search._exact_kernels import turn_of
 
 @njit(cache=True, nogil=True)
 def still_there(mesh, graph, closure, x, y, corner):
-    """A corner seen from a point where closed cells leave it one that paths may bend round, else
-    the next one on the line behind it, -1 where there is none."""
+    """Return a corner seen from a point if paths may still bend round it with cells closed.
+
+    Else return the next corner on the line behind it, -1 if there is none.
+    """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, heads = graph[0], graph[1]
     while corner >= 0 and is_at_closed(closure, cx[corner], cy[corner]):
@@ -32,7 +34,7 @@ def still_there(mesh, graph, closure, x, y, corner):
 
 @njit(cache=True, nogil=True)
 def is_in_sight(mesh, closure, polygon_at, polygon, segment):
-    """Whether a segment from a point in a polygon is a way with cells closed."""
+    """Return whether a segment from a point in a polygon is legal with cells closed."""
     ax, ay, bx, by = segment
     cx, cy, _, first, begins, stops, twins, polygon_of = mesh
     while True:
@@ -42,7 +44,7 @@ def is_in_sight(mesh, closure, polygon_at, polygon, segment):
             if turn_of(ax, ay, bx, by, cx[u], cy[u]) < 0 < turn_of(ax, ay, bx, by, cx[w], cy[w]):
                 leaves = slot
         if leaves < 0:
-            # Through a corner of the mesh, or along a side: the cells tell.
+            # Through a corner of the mesh, or along a side: the cells decide.
             return is_clear(closure, polygon_at, ax, ay, bx, by)
         u, w = begins[leaves], stops[leaves]
         if turn_of(cx[u], cy[u], cx[w], cy[w], bx, by) >= 0:
@@ -55,27 +57,27 @@ def is_in_sight(mesh, closure, polygon_at, polygon, segment):
 @guarded
 @njit(cache=True, nogil=True)
 def edges_of_closure(mesh, polygon_at, graph, closure, made):
-    """Find the edges of the corners that closed cells make.
+    """Find the edges of the corners of closed cells.
 
     Parameters
     ----------
     mesh
-        See `successors`; of free space before.
+        See `successors`; the mesh of free space before the closure.
     polygon_at
         int32 (rows, cols), the polygon at the centre of each cell.
     graph
         int64 (2 n + 1,) and int32 (m,) of `edges_of`, float64 (n, landmarks) of `landmarks_of`.
     closure
-        Of `closure_of`.
+        Result of `closure_of`.
     made
-        Of `corners_of_closure`.
+        Result of `corners_of_closure`.
 
     Returns
     -------
     tuple
-        int64 (k + 1,) where the edges of each corner begin; int32 the corners at which they end;
-        then the edges to corners of the graph the other way round: int32 these corners, sorted,
-        and int32 the new ones.
+        int64 (k + 1,) offsets of the edges of each corner; int32 the corners at which they end;
+        then the reversed edges from corners of the graph: int32 these corners, sorted, and int32
+        the new ones.
     """
     cx, cy = mesh[0], mesh[1]
     xs, ys, kinds_made, cells = made
@@ -116,7 +118,7 @@ def edges_of_closure(mesh, polygon_at, graph, closure, made):
             if i == j or not touches(kinds_made[i], dx, dy) or not touches(kinds_made[j], dx, dy):
                 continue
             if crosses(closure, polygon_at, x, y, xs[j], ys[j]):
-                continue  # soon found out, for corners of one area
+                continue  # a quick test for corners of one area
             if is_clear(closure, polygon_at, x, y, xs[j], ys[j]):
                 heads[m] = n + j
                 m += 1
@@ -135,26 +137,26 @@ def edges_of_closure(mesh, polygon_at, graph, closure, made):
 @guarded
 @njit(cache=True, nogil=True)
 def groups_of_closure(points, table, made, edges, most):
-    """Put the corners that closed cells make into groups of near ones.
+    """Put the corners of closed cells into groups of near ones.
 
     Parameters
     ----------
     points
         float64 x and y of the corners of the graph.
     table
-        float64 (n, landmarks), of `landmarks_of`.
+        float64 (n, landmarks) of `landmarks_of`.
     made, edges
-        Of `corners_of_closure` and `edges_of_closure`.
+        Results of `corners_of_closure` and `edges_of_closure`.
     most
-        Groups at most.
+        Most groups.
 
     Returns
     -------
     tuple
         int64 (k,) the group of each corner; float64 (g, 3) x, y and radius of a circle round each
-        group; float64 (2, k, landmarks) and float64 (2, g, landmarks): the least length of a way
-        from a landmark to a corner, and the most that its distance lies above the way to the
-        corner from the last but one corner of such a way.
+        group; float64 (2, k, landmarks) and float64 (2, g, landmarks): the least length of a path
+        from a landmark to a corner, and the greatest difference between the distance of the
+        landmark and the path to the corner from the last but one corner of such a path.
     """
     cx, cy = points
     xs, ys = made[0], made[1]

@@ -1,5 +1,6 @@
-"""Kernels of the search round closed cells: A* over the graph of corners, whose edges are refused
-where they meet a closed cell, and over the corners that closed cells make.
+"""Kernels of the search round closed cells: A* over the graph of corners.
+
+Edges that meet a closed cell are refused, and the corners of closed cells are added.
 """
 
 from __future__ import annotations
@@ -35,26 +36,26 @@ from hybridnav.mesh._view_kernels import distance, lobe_of, see_from_point, touc
 from hybridnav.search._exact_kernels import turn_of
 
 UNSURE = 3
-"""What ends a query whose start or goal lies at a corner of a cell that is not free."""
+"""Status of a query whose start or goal lies at a corner of a cell that is not free."""
 _LOOKS = N
-"""Where counts hold how many corners are expanded when a search looks, next, for a goal cut off."""
+"""Index in counts of the number of expansions at which the search next tests for a cut-off goal."""
 _LISTED, _BEGUN = 1, 2
-"""How far a query is: the corners that its start sees are listed; they are reached."""
+"""Stages of a query: the corners that its start sees are listed; they are reached."""
 _FLOOD = 64
-"""Corners that a search expands before it looks whether the goal is cut off, for the first time."""
+"""Corners that a search expands before it first tests whether the goal is cut off."""
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def query_round(mesh, graph, detour, where, ends, work, effort):
-    """Find a shortest path between two points round closed cells, or go on with it.
+    """Find a shortest path between two points round closed cells, or resume the search.
 
     Parameters
     ----------
     mesh, graph, where, ends, work, effort
-        See `query_corners`; the arrays of corners have room for those that closed cells make.
+        See `query_corners`; the arrays of corners have room for those of closed cells.
     detour
-        Of `closure_of`, `corners_of_closure`, `edges_of_closure`, `groups_of_closure`.
+        Results of `closure_of`, `corners_of_closure`, `edges_of_closure`, `groups_of_closure`.
 
     Returns
     -------
@@ -97,8 +98,10 @@ def query_round(mesh, graph, detour, where, ends, work, effort):
 
 @njit(cache=True, nogil=True)
 def _begin(mesh, graph, detour, where, ends, work):
-    """Mark the corners that see the goal, and list those that the start sees; returns `PAUSED`
-    where there is something to search."""
+    """Mark the corners that see the goal, and list those that the start sees.
+
+    Return `PAUSED` if a search is needed.
+    """
     closure, (xs, ys, kinds, _) = detour[0], detour[1]
     starts, goals, room, corners, heap, _, counts, bounds = work
     component, polygon_at, cells = where
@@ -142,7 +145,7 @@ def _begin(mesh, graph, detour, where, ends, work):
             if is_in_sight(mesh, closure, polygon_at, first, (sx, sy, x, y)):
                 seen[n_all] = n + at
                 n_all += 1
-    # The start's corners stand behind the goal's.
+    # The start's corners are listed behind the goal's.
     counts[MARKED], counts[STARTS], counts[GOALS] = n_marked, n_seen, n_all
     counts[BEGUN], counts[_LOOKS] = _LISTED, _FLOOD
     bounds_of_goal(graph[2], seen[:n_marked], to_goal, work[5])
@@ -151,9 +154,10 @@ def _begin(mesh, graph, detour, where, ends, work):
 
 @njit(cache=True, nogil=True)
 def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
-    """Search on, until the answer is good enough or enough corners are expanded: see `advance`.
+    """Search until the answer is good enough or enough corners are expanded; see `advance`.
 
-    All in one function: a call that passes all arrays takes as long as an expansion.
+    All is in one function, because a call with all arrays takes as long as an expansion. Arguments
+    are those of `query_round`, with `polygon_at`, int32 (rows, cols), from `where`.
     """
     cx, cy, kinds, n = mesh[0], mesh[1], mesh[2], len(mesh[0])
     first, heads, table = graph
@@ -203,7 +207,7 @@ def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
             if counts[EXPANDED] >= limit:
                 status = PAUSED
                 break
-            # The blocked cell lies on the left of the way here, or on the right.
+            # The blocked cell lies on the left of the path here, or on the right.
             side = (x - px) * (1.0 if kind & 2 else -1.0) - (y - py) * (1.0 if kind & 1 else -1.0)
             size = pop(heap, size)
             counts[EXPANDED] += 1
@@ -257,7 +261,7 @@ def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
 
 @njit(cache=True, nogil=True)
 def _place_of(numbers, number):
-    """How many of sorted whole numbers are less than one."""
+    """Return how many of sorted whole numbers are less than a given one."""
     low, high = 0, len(numbers)
     while low < high:
         middle = (low + high) >> 1
@@ -270,10 +274,10 @@ def _place_of(numbers, number):
 
 @njit(cache=True, nogil=True)
 def _flood(mesh, graph, detour, polygon_at, work, most):
-    """Follow all edges back from the goal, over so many corners at most.
+    """Follow all edges back from the goal, over at most `most` corners.
 
-    Returns -1 where no corner is found that the search has reached, so that there is no path, 0
-    where one is found, and 4 where nothing is known.
+    Return -1 if no corner found was reached by the search, so that there is no path, 0 if one was,
+    and 4 if it remains unknown.
     """
     closure, (xs, _, _, _), (first_made, heads_made, back_of, back_to), _ = detour
     first, heads, _ = graph
@@ -316,7 +320,7 @@ def _flood(mesh, graph, detour, polygon_at, work, most):
 
 @njit(cache=True, nogil=True)
 def _wait(is_seen, waiting, size, corner):
-    """Put a corner behind others, once; returns how many there are."""
+    """Append a corner to others, once, and return their number."""
     if is_seen[corner]:
         return size
     is_seen[corner] = True
@@ -326,7 +330,7 @@ def _wait(is_seen, waiting, size, corner):
 
 @njit(cache=True, nogil=True)
 def _way(points, ends, came, corner):
-    """The path by way of a corner, see `way_to`; -1 for a path of one segment."""
+    """Return the path through a corner, see `way_to`; -1 for a path of one segment."""
     cx, cy, (xs, ys, _, _) = points
     at, room = corner, 2
     while at >= 0:

@@ -1,4 +1,4 @@
-"""Kernels of the ends of a query: the polygons that hold them, the corners that they see."""
+"""Kernels of the ends of a query: the polygons that contain them, the corners that they see."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from hybridnav.mesh._view_kernels import see_from_point
 from hybridnav.search._exact_kernels import turn_of
 
 APART, MET, SPLIT = -1, 1, 0
-"""How the ends of a query lie: not connected, in one polygon, in several."""
+"""Positions of the ends of a query: not connected, in one polygon, in several."""
 
 
 @njit(cache=True, nogil=True)
 def look_from_ends(mesh, where, ends, rooms, bounds):
-    """Find the corners that the ends of a query see, or the answer where that needs none.
+    """Find the corners that the ends of a query see, or the answer if that needs no corner.
 
     Parameters
     ----------
     mesh, ends
         See `successors`.
     where
-        Component of polygons, the polygon of each cell, and `cells`: of `polygons_of_ends`.
+        Component of polygons, the polygon of each cell, and `cells`; see `polygons_of_ends`.
     rooms
         int32 room for the polygons of start and goal, room of `see_from_point`.
     bounds
-        Becomes the answer's length and lower bound: infinite where the ends are not connected,
-        their distance where they see each other.
+        Receives the length and lower bound of the answer: infinite if the ends are not connected,
+        their distance if they see each other.
 
     Returns
     -------
     tuple
-        `DONE` with the answer, `NO_ROOM`, or `PAUSED`; then the room holds the corners that the
-        goal sees, and then those that the start sees: where either end.
+        `DONE` with the answer, `NO_ROOM`, or `PAUSED`, when the room holds the corners that the
+        goal sees and then those that the start sees; the indices at which both lists end.
     """
     sx, sy, tx, ty = ends
     component, polygon_at, cells = where
@@ -63,14 +63,14 @@ def look_from_ends(mesh, where, ends, rooms, bounds):
 
 @njit(cache=True, nogil=True)
 def polygons_of_ends(mesh, component, polygon_at, cells, ends, starts, goals):
-    """Find the polygons that hold the ends of a query.
+    """Find the polygons that contain the ends of a query.
 
     Parameters
     ----------
     mesh, ends
         See `successors`.
     component
-        int32 (p,), of `blocks_of`.
+        int32 (p,) of `blocks_of`.
     polygon_at
         int32 (rows, cols), the polygon at the centre of each cell.
     cells
@@ -81,7 +81,7 @@ def polygons_of_ends(mesh, component, polygon_at, cells, ends, starts, goals):
     Returns
     -------
     tuple
-        `APART`, `MET` or `SPLIT`; how many polygons hold the start, and the goal.
+        `APART`, `MET` or `SPLIT`; the numbers of polygons that contain the start and the goal.
     """
     sx, sy, tx, ty = ends
     from_row, from_col, to_row, to_col = cells
@@ -100,7 +100,7 @@ def polygons_of_ends(mesh, component, polygon_at, cells, ends, starts, goals):
 
 @njit(cache=True, nogil=True)
 def _polygon_in(mesh, component, polygon_at, row, col):
-    """A polygon that holds the centre of a free cell; where a mesh was cut, one of the last."""
+    """Return a polygon with the centre of a free cell; in a cut mesh, one of the last."""
     cx, cy, _, first, begins, stops, _, _ = mesh
     polygon = polygon_at[row, col]
     if component[polygon] >= 0:
@@ -117,7 +117,7 @@ def _polygon_in(mesh, component, polygon_at, row, col):
 
 @njit(cache=True, nogil=True)
 def polygons_with(mesh, inner, row, col, x, y, found):
-    """Polygons that hold a point of a free cell, also on their sides, and are reached inside it.
+    """Find the polygons with a point of a free cell, also on their sides, reached inside the cell.
 
     Parameters
     ----------
@@ -128,15 +128,15 @@ def polygons_with(mesh, inner, row, col, x, y, found):
     row, col
         The cell.
     x, y
-        The point, in the cell's closed square: where two free cells meet at a corner alone, it
-        belongs to the one cell.
+        The point, in the closed square of the cell: where two free cells meet only at a corner, it
+        belongs to this cell.
     found
         int32, room for the polygons, as many as the mesh has.
 
     Returns
     -------
     int
-        How many were found.
+        Number of polygons found.
     """
     cx, cy, _, first, begins, stops, twins, polygon_of = mesh
     found[0] = inner
@@ -151,7 +151,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
                 continue
             u = begins[slot]
             w = stops[slot]
-            # The segment from the centre to the point meets no wall: its polygons hang together.
+            # The segment from the centre to the point meets no wall: its polygons are connected.
             if not _touch(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5, x, y):
                 continue
             other = polygon_of[twins[slot]]
@@ -178,7 +178,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
 
 @njit(cache=True, nogil=True)
 def _touch(ax, ay, bx, by, px, py, qx, qy):
-    """Whether two segments have a point in common."""
+    """Return whether two segments have a point in common."""
     if max(ax, bx) < min(px, qx) or max(px, qx) < min(ax, bx):
         return False
     if max(ay, by) < min(py, qy) or max(py, qy) < min(ay, by):

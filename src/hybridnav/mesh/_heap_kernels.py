@@ -7,7 +7,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def push(heap, size, key, value):
-    """Put an entry into a binary heap; returns its size."""
+    """Put an entry into a binary heap; return the new size."""
     keys, values = heap
     at = size
     while at > 0:
@@ -22,7 +22,7 @@ def push(heap, size, key, value):
 
 @njit(cache=True, nogil=True)
 def pop(heap, size):
-    """Take the least entry out of a binary heap; returns its size."""
+    """Take the least entry out of a binary heap; return the new size."""
     keys, values = heap
     size -= 1
     key, value = keys[size], values[size]

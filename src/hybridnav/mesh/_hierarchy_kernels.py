@@ -1,7 +1,7 @@
-"""Kernels of the hierarchy of corners: the arcs that are contracted, and which may follow which.
+"""Kernels of the hierarchy of corners: the arcs to contract, and those that may follow each other.
 
-Costs are whole numbers, distances in `UNIT`, rounded down: so sums of them are exact, and never
-exceed the distance.
+Costs are whole numbers, distances in 1 / `UNITS` cells, rounded down: sums of them are exact and
+never exceed the distance.
 """
 
 from __future__ import annotations
@@ -13,22 +13,24 @@ from hybridnav.mesh._view_kernels import distance, lobe_of
 from hybridnav.search._contract_kernels import pack
 
 UNITS = float(1 << 34)
-"""Parts of a cell in which costs are counted: a path of 100,000 segments is right to 1e-5 cells,
-and one of 5e8 cells fits."""
+"""Units of cost per cell: a path of 100,000 segments is exact to 1e-5 cells, and one of 5e8 cells
+fits."""
 _SECTORS = 32
-"""Parts of a quadrant that directions are sorted into."""
+"""Sectors of a quadrant, by which directions are sorted."""
 
 
 @njit(cache=True, nogil=True)
 def cost_of(ax, ay, bx, by):
-    """Cost of the segment between two points."""
+    """Return the cost of the segment between two points."""
     return np.int64(distance(ax, ay, bx, by) * UNITS)
 
 
 @njit(cache=True, nogil=True)
 def class_of(kind, dx, dy):
-    """Class of a direction that leads away from a corner and touches its blocked cell: its quadrant
-    (see `lobe_of`), and in there its sector by slope."""
+    """Return the class of a direction from a corner that touches its blocked cell.
+
+    The class is its quadrant (see `lobe_of`) and, in there, its sector by slope.
+    """
     across = abs(dy)
     sector = min(int(across / (abs(dx) + across) * _SECTORS), _SECTORS - 1)
     return lobe_of(kind, dx, dy) * _SECTORS + sector
@@ -36,11 +38,11 @@ def class_of(kind, dx, dy):
 
 @njit(cache=True, nogil=True)
 def ways_that_follow():
-    """Return which classes may follow which at a corner on a shortest path, see `contract`.
+    """Return the classes that may follow each class at a corner on a shortest path.
 
-    A path goes from one quadrant beside the blocked cell to the other, and does not bend away from
-    that cell. Of two neighbouring sectors it is not said that it does: then what is left out is
-    longer than the shortest way by more than costs are rounded.
+    See `contract`. A path goes from one quadrant beside the blocked cell to the other, and does not
+    bend away from that cell. Two neighbouring sectors always may follow each other: every excluded
+    path is then longer than the shortest one by more than the rounding of costs.
 
     Returns
     -------
@@ -65,12 +67,12 @@ def arcs_of(mesh, first, heads):
     mesh
         See `successors`.
     first, heads
-        Of `edges_of`.
+        Results of `edges_of`.
 
     Returns
     -------
     tuple
-        int64 (n + 1,), where the arcs of each corner begin; int64 (m, 2), these arcs.
+        int64 (n + 1,), offsets of the arcs of each corner; int64 (m, 2), these arcs.
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     arcs = np.empty((len(heads), 2), np.int64)

@@ -1,8 +1,8 @@
 """Kernels of the search of the hierarchy of corners: shortest any-angle paths.
 
-R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. A* from both
-ends, up to corners contracted later. A corner that both reach makes a path, and what is no better
-by its straight distance need not be looked at any more.
+R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. A* runs from both
+ends, up to corners contracted later. A corner that both sides reach completes a path, and entries
+that are not better by their straight distance are pruned.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ from hybridnav.search._heap_kernels import pop, push
 from hybridnav.search._unpack_kernels import NO_ARC, corners_between
 
 FAR = np.int64(1) << 62
-"""More than any path costs."""
+"""Cost above that of any path."""
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def query_hierarchy(mesh, hierarchy, where, ends, work, effort):
-    """Find a shortest path between two points, or go on with it.
+    """Find a shortest path between two points, or resume the search.
 
     Parameters
     ----------
     mesh, ends
         See `successors`.
     hierarchy
-        Of `contract`, and `ways_that_follow`.
+        Results of `contract` and `ways_that_follow`.
     where
         See `look_from_ends`.
     work
-        Of one query: room for the polygons of the ends; room of `see_from_point`; records of
-        corners, int64 (n, 4), costs from the start and from the goal (`FAR`) and by what tail and
-        arc they were reached; corners touched; two heaps; counts and bounds.
+        Arrays of one query: room for the polygons of the ends; room of `see_from_point`; records of
+        corners, int64 (n, 4), costs from the start and from the goal (`FAR`), and the tail and arc
+        by which each was reached; corners touched; two heaps; counts and bounds.
     effort
         See `query`.
 
@@ -98,7 +98,7 @@ def query_hierarchy(mesh, hierarchy, where, ends, work, effort):
 
 @njit(cache=True, nogil=True)
 def _seed(mesh, ends, seen, side, work):
-    """Reach the corners that an end sees, on its side; returns how many are queued."""
+    """Reach the corners that an end sees, on its side, and return the number queued."""
     cx, cy = mesh[0], mesh[1]
     _, _, _, records, touched, heaps, counts, _ = work
     sx, sy, tx, ty = ends
@@ -120,7 +120,7 @@ def _seed(mesh, ends, seen, side, work):
 
 @njit(cache=True, nogil=True)
 def _advance(mesh, hierarchy, ends, work, factor, limit):
-    """Search on, until the answer is good enough or enough corners are expanded: see `advance`."""
+    """Search until the answer is good enough or enough corners are expanded; see `advance`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, arcs, _, follow = hierarchy
     _, _, _, records, touched, heaps, counts, bounds = work
@@ -180,7 +180,7 @@ def _advance(mesh, hierarchy, ends, work, factor, limit):
         else:
             to_start = size
     counts[SIZE], counts[MARKED], counts[TOUCHED] = to_start, to_goal, n_touched
-    # A path that is not found yet passes a corner that waits in one of the heaps.
+    # A path that is not found yet passes a corner in one of the heaps.
     if counts[LAST] >= 0:
         bounds[UPPER] = best / UNITS
     bounds[LOWER] = max(bounds[LOWER], least / UNITS if least < best else bounds[UPPER])
@@ -189,7 +189,7 @@ def _advance(mesh, hierarchy, ends, work, factor, limit):
 
 @njit(cache=True, nogil=True)
 def _way(mesh, ends, nodes):
-    """The path by way of some corners, see `way_to`."""
+    """Return the path through some corners, see `way_to`."""
     sx, sy, tx, ty = ends
     n = len(nodes) + 1
     way = np.empty((n + 1, 2))

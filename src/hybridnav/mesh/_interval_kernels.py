@@ -1,9 +1,9 @@
-"""Kernels of intervals: what is seen of a side from a root, and which intervals follow behind it.
+"""Kernels of intervals: the part of a side seen from a root, and the intervals behind it.
 
 Points are x = column, y = row in grid units: corners are whole numbers, the two ends of a query are
 rounded to 2^-24 of a cell, so that every side test is exact (see `turn_of`). An interval on a side
-is never computed: it is what two rays from its root leave of the side, and a ray is the root and a
-corner that limits the view, or a corner's mirror image of a root.
+is never computed: it is the part of the side between two rays from its root. A ray is the root and
+a corner that limits the view, or the mirror image of a root in a corner.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from hybridnav.search._exact_kernels import turn_of
 
 # Columns of a node's whole numbers.
 SLOT, ROOT, PARENT, ENDS = 0, 1, 2, 3
-# Bits of ENDS: the interval ends at the left, at the right corner of its side. Below zero, where
-# the root is an end of its side: the path bends at corner -1 - ENDS too, on its way to the root.
+# Bits of ENDS: the interval ends at the left, at the right corner of its side. Below zero the root
+# is an end of its side, and the path also bends at corner -1 - ENDS on its way to the root.
 _LEFT, _RIGHT = 1, 2
 WHOLE_SIDE = _LEFT | _RIGHT
 # Columns of a node's reals: cost of the root, points on the rays.
@@ -27,8 +27,11 @@ _CX, _CY, _KINDS, _FIRST, _BEGINS, _STOPS, _TWINS, _POLYGON_OF = 0, 1, 2, 3, 4, 
 
 @njit(cache=True, nogil=True)
 def turns(kind, dx, dy, side):
-    """Return whether a path that arrives at a corner in a direction may bend to a side round it, 1
-    for the left: the corner's one blocked cell must lie on that side."""
+    """Return whether a path may bend round a corner to a side, 1 for the left.
+
+    The path arrives in the direction (dx, dy); the one blocked cell of the corner must lie on that
+    side.
+    """
     if kind >= 4:
         return False
     ex = 1.0 if kind & 1 else -1.0
@@ -38,7 +41,11 @@ def turns(kind, dx, dy, side):
 
 @njit(cache=True, nogil=True)
 def _cut(px, py, qx, qy, ax, ay, bx, by):
-    """Where the line from p through q meets that from a to b, rounded: for estimates alone."""
+    """Return where the line from p through q meets the line from a to b, rounded: for estimates
+    only.
+
+    All arguments are x and y in cells.
+    """
     ux, uy = qx - px, qy - py
     vx, vy = bx - ax, by - ay
     cross = ux * vy - uy * vx
@@ -51,7 +58,10 @@ def _cut(px, py, qx, qy, ax, ay, bx, by):
 
 @njit(cache=True, nogil=True)
 def estimate(x, y, lx, ly, rx, ry, tx, ty):
-    """Length of the shortest way from a root through an interval to the goal."""
+    """Return the length of the shortest path from a root through an interval to the goal.
+
+    `x`, `y` are the root, `lx` to `ry` the ends of the interval, `tx`, `ty` the goal, in cells.
+    """
     # The goal on the near side is seen in the mirror of the side.
     vx, vy = lx - rx, ly - ry
     near = vx * (y - ry) - vy * (x - rx)
@@ -68,7 +78,7 @@ def estimate(x, y, lx, ly, rx, ry, tx, ty):
 
 @njit(cache=True, nogil=True)
 def estimate_of(mesh, ends, whole, real, node):
-    """Estimate of what is left from a node's root."""
+    """Return the estimate of the rest of a path from a node's root."""
     cx, cy = mesh[_CX], mesh[_CY]
     sx, sy, tx, ty = ends
     slot, root, marks = whole[node, SLOT], whole[node, ROOT], whole[node, ENDS]
@@ -86,7 +96,11 @@ def estimate_of(mesh, ends, whole, real, node):
 
 @njit(cache=True, nogil=True)
 def put(nodes, n, slot, root, parent, marks, g, lx, ly, rx, ry):
-    """Write a node; returns the number of nodes."""
+    """Write node n and return the number of nodes.
+
+    `nodes` holds the arrays int32 (m, 4) and float64 (m, 5); the other arguments are its columns:
+    slot, root, parent, ENDS, cost of the root, points on the left and right ray.
+    """
     whole, real = nodes
     whole[n, SLOT], whole[n, ROOT], whole[n, PARENT], whole[n, ENDS] = slot, root, parent, marks
     real[n, G] = g
@@ -96,14 +110,17 @@ def put(nodes, n, slot, root, parent, marks, g, lx, ly, rx, ry):
 
 @njit(cache=True, nogil=True)
 def _put_goal(nodes, n, root, parent, length):
-    """Write a node that is the goal, reached from a root."""
+    """Write a node for the goal, reached from a root."""
     return put(nodes, n, -1, root, parent, 0, length, 0.0, 0.0, 0.0, 0.0)
 
 
 @njit(cache=True, nogil=True)
 def along(mesh, x, y, u, w):
-    """The end of a side that is nearer to a point on the line of that side, and to which side of
-    the way there the path bends that goes on behind it: to the right at its right end."""
+    """Return the end of a side nearer to a point on its line, and the side to which a path bends
+    there.
+
+    A path that continues behind the side bends to the right at its right end.
+    """
     cx, cy = mesh[_CX], mesh[_CY]
     from_u = abs(cx[u] - x) + abs(cy[u] - y)
     from_w = abs(cx[w] - x) + abs(cy[w] - y)
@@ -112,7 +129,7 @@ def along(mesh, x, y, u, w):
 
 @njit(cache=True, nogil=True)
 def successors(mesh, blocks, ends, is_goal, nodes, node, n):
-    """Write the successors of a node; returns the number of nodes.
+    """Write the successors of a node and return the number of nodes.
 
     Parameters
     ----------
@@ -123,9 +140,9 @@ def successors(mesh, blocks, ends, is_goal, nodes, node, n):
     ends
         sx, sy, tx, ty.
     is_goal
-        Whether the polygon behind the node's side holds the goal.
+        Whether the goal is in the polygon behind the node's side.
     nodes
-        int32 (n, 4) and float64 (n, 5), with room for three more a side, and the goal.
+        int32 (m, 4) and float64 (m, 5), with room for three more nodes a side, and the goal.
     """
     cx, cy, kinds, first, begins, stops, twins, polygon_of = mesh
     block_of, is_open = blocks
@@ -196,9 +213,13 @@ def successors(mesh, blocks, ends, is_goal, nodes, node, n):
 
 @njit(cache=True, nogil=True)
 def _hidden(mesh, corner, near, far, is_cut, side):
-    """How a path bends round a corner to a side behind it, whose end `near` is the one closer to
-    the wall: its root, -1 where it may not bend; the way from the corner to the root; the marks of
-    the interval, without that of its near end where the far end is cut off."""
+    """Return how a path bends round a corner to a side behind it, with the end `near` closer to the
+    wall.
+
+    The result holds the root of the interval, -1 if the path may not bend; the distance from the
+    corner to the root; the marks of the interval, without that of its near end if the far end is
+    cut off.
+    """
     cx, cy = mesh[_CX], mesh[_CY]
     if is_cut:
         return corner, 0.0, 0
@@ -216,7 +237,11 @@ def _hidden(mesh, corner, near, far, is_cut, side):
 
 @njit(cache=True, nogil=True)
 def _all_seen(mesh, blocks, ends, is_goal, nodes, node, n):
-    """The successors of a node whose root is an end of its side: all of the polygon is seen."""
+    """Write the successors of a node whose root is an end of its side, so that it sees all of the
+    polygon.
+
+    See `successors` for the arguments.
+    """
     cx, cy, kinds, first, begins, stops, twins, polygon_of = mesh
     block_of, is_open = blocks
     _, _, tx, ty = ends

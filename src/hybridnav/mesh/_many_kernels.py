@@ -9,39 +9,39 @@ from hybridnav.mesh._polyanya_kernels import DONE, LOWER, NO_ROOM, UPPER
 from hybridnav.mesh._query_kernels import query
 
 FULL = 3
-"""What `many` returns where there are more positions than room."""
+"""Status of a run that ends because there are more positions than room."""
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def many_by_intervals(mesh, blocks, place, asked, work, bounds, effort, answers, begin, n):
-    """Answer queries from one on by `query`, until all are answered or room is short.
+    """Answer queries from `begin` on by `query`, until all are answered or there is no room.
 
     Parameters
     ----------
     mesh
         See `successors`.
     blocks
-        Block of each slot, and the tree, of `query`.
+        Block of each slot, and the tree; see `query`.
     place
         Component of polygons, and the polygon of each cell.
     asked
-        int64 (q, 4) cells and float64 (q, 4) ends of all queries, as `query` takes them.
+        int64 (q, 4) cells and float64 (q, 4) ends of all queries, as in `query`.
     work, effort
         See `query`.
     bounds
-        The last array of the work.
+        The last array of `work`.
     answers
         See `_kept`.
     begin
-        The query to begin, or to go on with.
+        The first query, or the one to resume.
     n
         Positions written.
 
     Returns
     -------
     tuple
-        The query to go on with, positions written, and `DONE`, `NO_ROOM` or `FULL`.
+        The query to resume, positions written, and `DONE`, `NO_ROOM` or `FULL`.
     """
     cells, ends = asked
     for k in range(begin, len(cells)):
@@ -59,7 +59,7 @@ def many_by_intervals(mesh, blocks, place, asked, work, bounds, effort, answers,
 @guarded
 @njit(cache=True, nogil=True)
 def many_by_corners(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
-    """Answer queries from one on by `query_corners`; see `many_by_intervals`."""
+    """Answer queries from `begin` on by `query_corners`; see `many_by_intervals`."""
     cells, ends = asked
     for k in range(begin, len(cells)):
         where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
@@ -77,7 +77,7 @@ def many_by_corners(mesh, graph, place, asked, work, bounds, effort, answers, be
 @guarded
 @njit(cache=True, nogil=True)
 def many_by_hierarchy(mesh, hierarchy, place, asked, work, bounds, effort, answers, begin, n):
-    """Answer queries from one on by `query_hierarchy`; see `many_by_intervals`."""
+    """Answer queries from `begin` on by `query_hierarchy`; see `many_by_intervals`."""
     cells, ends = asked
     for k in range(begin, len(cells)):
         where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
@@ -94,10 +94,10 @@ def many_by_hierarchy(mesh, hierarchy, place, asked, work, bounds, effort, answe
 
 @njit(cache=True, nogil=True)
 def _kept(answers, k, n, way, bounds):
-    """Write an answer where there is room for its path, and return whether there was.
+    """Write an answer if there is room for its path, and return whether there was.
 
-    `answers` are float64 (q,) lengths, float64 (q,) bounds, int64 (q + 1,) where the positions of
-    each path begin, float64 (room, 2) positions.
+    `answers` are float64 (q,) lengths, float64 (q,) bounds, int64 (q + 1,) offsets of the positions
+    of each path, float64 (room, 2) positions.
     """
     lengths, least, starts, positions = answers
     if n + len(way) > len(positions):

@@ -17,7 +17,7 @@ WALL = -1
 @guarded
 @njit(cache=True, nogil=True)
 def are_free(corners, vertices, free):
-    """Whether triangles between walls, (m, 3) corners, lie in free space, bool (m,)."""
+    """Return whether triangles between walls, (m, 3) corners, lie in free space, bool (m,)."""
     rows, cols = free.shape
     found = np.zeros(len(vertices), np.bool_)
     for triangle in range(len(vertices)):
@@ -25,7 +25,7 @@ def are_free(corners, vertices, free):
         for k in range(3):
             row += corners[vertices[triangle, k], 0]
             col += corners[vertices[triangle, k], 1]
-        # No wall passes the middle of a triangle: all cells that it touches there are of one class.
+        # No wall passes the middle of a triangle: all cells at that point are of one class.
         row, col = row // 3, col // 3
         found[triangle] = row < rows and col < cols and free[row, col]
     return found
@@ -49,7 +49,7 @@ def sides_of_triangles(corners, triangles, neighbours):
     -------
     tuple
         int32 (3 n,) twin of each side, the side after it and the one before it; int64 (3 n,) the
-        squared lengths of common sides at one of each twins, else 0.
+        squared length of a common side at one of its two twins, else 0.
     """
     n = len(triangles)
     twin = np.empty(3 * n, np.int32)
@@ -78,7 +78,7 @@ def sides_of_triangles(corners, triangles, neighbours):
 @guarded
 @njit(cache=True, nogil=True)
 def merge_across(corners, tail, sides, order):
-    """Merge triangles across some sides, in their order, where the union is convex.
+    """Merge triangles across some sides, in their order, if the union is convex.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def merge_across(corners, tail, sides, order):
     tail
         int32 (s,), the corner at which each side begins.
     sides
-        Of `sides_of_triangles`; this changes what comes after and before a side.
+        Arrays of `sides_of_triangles`; the sides after and before each side are changed.
     order
         int64, the sides.
 
@@ -100,7 +100,7 @@ def merge_across(corners, tail, sides, order):
     is_gone = np.zeros(len(tail), np.bool_)
     for side in order:
         other = twin[side]
-        # The corners that see their angles add up: before the side and behind its twin, and back.
+        # The corners whose angles add up: before the side and behind its twin, and the reverse.
         if _is_left(corners, tail, before[side], following[other]) and _is_left(
             corners, tail, before[other], following[side]
         ):
@@ -114,8 +114,7 @@ def merge_across(corners, tail, sides, order):
 
 @njit(cache=True, nogil=True)
 def _is_left(corners, tail, incoming, outgoing):
-    """Whether the path along two sides, the second beginning where the first ends, turns left or
-    goes straight on."""
+    """Return whether the path along two consecutive sides turns left or goes straight on."""
     a, b, c = tail[incoming], tail[outgoing], _head(tail, outgoing)
     rows = np.int64(corners[b, 0]) - corners[a, 0]
     cols = np.int64(corners[b, 1]) - corners[a, 1]
@@ -125,13 +124,14 @@ def _is_left(corners, tail, incoming, outgoing):
 
 @njit(cache=True, nogil=True)
 def _head(tail, side):
-    """Corner at which a side of a triangle ends: sides are not moved when triangles merge."""
+    """Return the corner at which a side of a triangle ends: sides are not moved when triangles
+    merge."""
     return tail[side - 2] if side % 3 == 2 else tail[side + 1]
 
 
 @njit(cache=True, nogil=True)
 def _compact(tail, following, twin, is_gone):
-    """Slots of the polygons that are left, one polygon after the other."""
+    """Return the slots of the polygons that are left, one polygon after the other."""
     n = len(tail)
     slot_of = np.full(n, -1, np.int32)
     first = np.empty(n // 3 + 2, np.int32)
@@ -164,9 +164,9 @@ def _compact(tail, following, twin, is_gone):
 
 @njit(cache=True, nogil=True)
 def polygons_of_cells(first, begins, corners, shape):
-    """The polygon that holds the centre of each cell, int32 (rows, cols), -1 for none.
+    """Return the polygon that holds the centre of each cell, int32 (rows, cols), -1 for none.
 
-    Where a side passes the centre either of its polygons is taken.
+    If a side passes the centre, either of its polygons is taken.
     """
     found = np.full(shape, -1, np.int32)
     for polygon in range(len(first) - 1):

@@ -28,19 +28,19 @@ from hybridnav.mesh._interval_kernels import (
 from hybridnav.search._exact_kernels import turn_of
 
 DONE, PAUSED, NO_ROOM = 0, 1, 2
-"""What ended a run of the search: its answer is good enough; it expanded as many nodes as it was
-allowed; there are more nodes than room."""
+"""Status of a run of the search: the answer is good enough; the limit of expansions is reached;
+there are more nodes than room."""
 
-# Whole numbers that a search keeps from run to run: nodes written, entries of the heap, corners
-# touched, nodes expanded, the last node of the best path (-1 where it is not the search's own); and
-# of a query: whether it began, polygons of start and goal, blocks or corners marked.
+# Whole numbers that a search keeps between runs: nodes written, entries of the heap, corners
+# touched, nodes expanded, the last node of the best path (-1 if the search did not find it); and
+# for a query: its stage, polygons of start and goal, blocks or corners marked.
 N, SIZE, TOUCHED, EXPANDED, LAST, BEGUN, STARTS, GOALS, MARKED = range(9)
 N_COUNTS = 9
 # Reals: the length of the best path known, a lower bound on every path.
 UPPER, LOWER = 0, 1
 
 _SAME = 1e-9
-"""Costs of a root that differ by less are taken for equal, in cells."""
+"""Difference of two costs of a root that counts as none, in cells."""
 
 
 @njit(cache=True, nogil=True)
@@ -52,7 +52,7 @@ def seed(mesh, blocks, ends, starts, work):
     mesh, blocks, ends
         See `successors`.
     starts
-        int32 polygons that hold the start.
+        int32 polygons that contain the start.
     work
         Nodes as int32 (n, 4) and float64 (n, 5), keys and values of the heap, best cost of each
         corner (infinite), int32 corners touched, counts and bounds.
@@ -96,24 +96,24 @@ def seed(mesh, blocks, ends, starts, work):
 
 @njit(cache=True, nogil=True)
 def advance(mesh, blocks, ends, goals, work, factor, limit):
-    """Search on, until the answer is good enough or enough nodes are expanded.
+    """Search until the answer is good enough or enough nodes are expanded.
 
-    Nodes persist in `work`: what was paused, or had no room, goes on with the next call. At the end
-    of each run `bounds` holds the length of the best path so far and a lower bound on every path,
-    which never falls.
+    Nodes persist in `work`: the next call resumes a search that was paused or had no room. At the
+    end of each run `bounds` holds the length of the best path so far and a lower bound on every
+    path, which never falls.
 
     Parameters
     ----------
     mesh, blocks, ends
         See `successors`.
     goals
-        int32 polygons that hold the goal.
+        int32 polygons that contain the goal.
     work
         See `seed`.
     factor
-        The answer is good enough when it is at most so many times the lower bound; >= 1.
+        The answer is good enough when it is at most this factor times the lower bound; >= 1.
     limit
-        Pause when so many nodes are expanded, counted from the start.
+        Expansions, counted from the start, at which to pause.
 
     Returns
     -------
@@ -139,7 +139,7 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
         # A node with one successor is followed at once.
         while top >= 0:
             polygon = polygon_of[whole[top, SLOT]]
-            # Three successors for each side at most, and the goal.
+            # At most three successors for each side, and the goal.
             if counts[N] + 3 * (first[polygon + 1] - first[polygon]) + 1 > len(whole):
                 size = push(heap, size, key, top)
                 status = NO_ROOM
@@ -166,8 +166,11 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
 
 @njit(cache=True, nogil=True)
 def _keep(work, made, n):
-    """Keep of the new nodes those that no cheaper way to their root rules out, and the goal where
-    it makes the best path; returns the only one that is to be expanded, -1 for none or several."""
+    """Keep the new nodes that no cheaper path to their root rules out, and the goal if its path is
+    best.
+
+    Return the only node to expand, -1 for none or several.
+    """
     whole, real, _, _, best, touched, counts, bounds = work
     kept = made
     n_open = 0
@@ -202,8 +205,9 @@ def _keep(work, made, n):
 
 @njit(cache=True, nogil=True)
 def way_to(mesh, ends, whole, node):
-    """The path to a node, float64 (n, 2) as (row, col): the start, the corners at which it turns,
-    the goal.
+    """Return the path to a node, float64 (n, 2) as (row, col).
+
+    It holds the start, the corners at which it turns, and the goal.
 
     Parameters
     ----------
@@ -212,7 +216,7 @@ def way_to(mesh, ends, whole, node):
     whole
         Nodes, see `seed`.
     node
-        The last node of the path, -1 where it is one segment.
+        The last node of the path, -1 if the path is one segment.
     """
     cx, cy = mesh[0], mesh[1]
     sx, sy, tx, ty = ends
@@ -237,8 +241,10 @@ def way_to(mesh, ends, whole, node):
 
 @njit(cache=True, nogil=True)
 def put_corner(way, n, x, y):
-    """Put a point before place n of a way, in place of the next one if that is on the line from it
-    to the one after: there the path does not turn. Returns its place."""
+    """Write a point of a path before index n, and return its index.
+
+    It replaces the next point if the path does not turn there.
+    """
     if n + 1 < len(way):
         (by, bx), (cy, cx) = way[n], way[n + 1]
         if turn_of(x, y, bx, by, cx, cy) == 0:

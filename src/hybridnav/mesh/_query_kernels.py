@@ -1,4 +1,4 @@
-"""Kernels of one query on a mesh: the polygons of its ends, the search, what it leaves behind."""
+"""Kernels of one query on a mesh: the polygons of its ends, the search, and its clean-up."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from hybridnav.mesh._polyanya_kernels import (
 )
 
 _OPENED, _SEEDED = 1, 2
-"""How far a query is: its blocks are opened; its first nodes are written."""
+"""Stages of a query: its blocks are opened; its first nodes are written."""
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
-    """Find a shortest path between two points, or go on with it.
+    """Find a shortest path between two points, or resume the search.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
     blocks
         int32 (s,), the block of each slot.
     tree
-        Head and depth of blocks, component of polygons: of `blocks_of`.
+        Head and depth of blocks, component of polygons; see `blocks_of`.
     polygon_at
         int32 (rows, cols), the polygon at the centre of each cell.
     cells
         Row and column of the start's cell, then of the goal's; free ones.
     work
-        Of one query: room for the polygons of the ends, blocks that may be entered, those marked,
-        and what `seed` describes.
+        Arrays of one query: room for the polygons of the ends, blocks that may be entered, those
+        marked, and the work of `seed`.
     effort
         Length of the best path known before, and `factor` and `limit` of `advance`; a limit below
         zero ends the query.
@@ -55,8 +55,8 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
     Returns
     -------
     tuple
-        `DONE`, `PAUSED` or `NO_ROOM`; when done the path, float64 (n, 2) as (row, col), without a
-        row where the search found none better than the bound that it began with.
+        `DONE`, `PAUSED` or `NO_ROOM`; when done the path, float64 (n, 2) as (row, col), without
+        rows if the search found no path better than its initial bound.
     """
     block_head, block_up, component, depth = tree
     starts, goals, is_open, marked, nodes = work

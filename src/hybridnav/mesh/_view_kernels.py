@@ -1,8 +1,8 @@
 """Kernels of views: the corners seen from a point of a mesh at which a path may bend.
 
-A view spreads over the polygons from side to side, each time between two rays. A corner that lies
-on a line behind another one is left out where a path may bend at the other: the way to it is made
-of two.
+A view spreads over the polygons from side to side, between two rays. A corner that lies on a line
+behind another one is left out if a path may bend at the other: the path to it consists of two
+edges.
 """
 
 from __future__ import annotations
@@ -15,19 +15,21 @@ from hybridnav.search._exact_kernels import turn_of
 # Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
 _LEFT, _RIGHT = 1, 2
 _BENDING = 4
-"""Kinds of corners below this are those that paths may bend round."""
+"""Paths may bend round corners of kinds below this one."""
 
 
 @njit(cache=True, nogil=True)
 def distance(ax, ay, bx, by):
-    """Distance of two points."""
+    """Return the distance between two points."""
     return math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
 
 
 @njit(cache=True, nogil=True)
 def touches(kind, dx, dy):
-    """Return whether a line through a corner in a direction touches the one blocked cell there, so
-    that a path may bend round it."""
+    """Return whether a line through a corner in a direction touches the one blocked cell there.
+
+    A path in that direction may bend round the cell.
+    """
     if kind >= _BENDING:
         return False
     ex = 1.0 if kind & 1 else -1.0
@@ -37,8 +39,11 @@ def touches(kind, dx, dy):
 
 @njit(cache=True, nogil=True)
 def lobe_of(kind, dx, dy):
-    """Which of the two quadrants beside the blocked cell of a corner holds a direction that touches
-    it: 0 or 1. A shortest path leaves the corner into the quadrant in which it arrives there."""
+    """Return the quadrant, 0 or 1, beside a corner's blocked cell that contains a direction.
+
+    The direction touches the cell. A shortest path leaves the corner into the quadrant in which it
+    arrives there.
+    """
     ex = 1.0 if kind & 1 else -1.0
     ey = 1.0 if kind & 2 else -1.0
     return 0 if dx * ex >= 0.0 and dy * ey <= 0.0 else 1
@@ -46,7 +51,7 @@ def lobe_of(kind, dx, dy):
 
 @njit(cache=True, nogil=True)
 def _axes(kind, lobe):
-    """The right and the left limit of such a quadrant, as directions."""
+    """Return the right and the left limit of a quadrant of `lobe_of`, as directions."""
     ex = 1.0 if kind & 1 else -1.0
     ey = 1.0 if kind & 2 else -1.0
     qx, qy = (ex, -ey) if lobe == 0 else (-ex, ey)
@@ -55,7 +60,11 @@ def _axes(kind, lobe):
 
 @njit(cache=True, nogil=True)
 def _pend(room, n, slot, marks, lx, ly, rx, ry):
-    """Put an interval on a side aside; returns how many there are."""
+    """Append an interval to those pending, and return their number.
+
+    `room` holds int32 (m, 2) slots and marks and float64 (m, 4) points on the left and right ray;
+    `n` is the number before.
+    """
     whole, real = room[0], room[1]
     whole[n, 0], whole[n, 1] = slot, marks
     real[n, 0], real[n, 1], real[n, 2], real[n, 3] = lx, ly, rx, ry
@@ -73,19 +82,19 @@ def see_from_point(mesh, x, y, starts, target, room, found):
     x, y
         The point.
     starts
-        int32 polygons that hold it.
+        int32 polygons that contain it.
     target
-        x and y of another point, and int32 polygons that hold it: not those that hold the first.
+        x and y of another point, and int32 polygons that contain it, none of which contains the
+        first point.
     room
         int32 (n, 2) and float64 (n, 4) for pending intervals, int32 for the corners.
     found
-        Corners that are in there already.
+        Number of corners already in the room.
 
     Returns
     -------
     tuple
-        How many corners there are then, -1 where the room is too small; whether the other point is
-        seen.
+        Number of corners afterwards, -1 if the room is too small; whether the other point is seen.
     """
     cx, cy, kinds, first, begins, stops, twins, _ = mesh
     seen = room[2]
@@ -116,14 +125,14 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
     corner
         One that paths may bend round.
     slot
-        The wall that begins there: round the corner, its polygon is the first.
+        The wall that begins there: its polygon is the first one round the corner.
     lobe
         See `lobe_of`.
 
     Returns
     -------
     int
-        How many corners there are then, -1 where the room is too small.
+        Number of corners afterwards, -1 if the room is too small.
     """
     cx, cy, kinds, first, begins, _, twins, polygon_of = mesh
     x, y = cx[corner], cy[corner]
@@ -145,8 +154,12 @@ def see_from_corner(mesh, corner, slot, lobe, target, room, found):
 
 @njit(cache=True, nogil=True)
 def _see_round(mesh, x, y, quadrant, sides, room, n, found):
-    """What is seen in a quadrant of a polygon of which the point is a corner: its corners, but for
-    those behind others; pending intervals on the sides opposite to the point."""
+    """Note the view in a quadrant of a polygon, from one of its corners.
+
+    The view holds the corners of the polygon, except those behind others, and pending intervals on
+    the sides opposite to the point. `quadrant` and `sides` are the limits and the slots round the
+    corner; the other arguments are those of `see_from_point`, with `n` pending intervals.
+    """
     cx, cy, kinds, first, _, stops, twins, polygon_of = mesh
     rx, ry, lx, ly = quadrant
     # The corners beside the point; the far one is the near one of the next polygon.
@@ -185,8 +198,7 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
 
 @njit(cache=True, nogil=True)
 def _is_behind(mesh, x, y, corner, other):
-    """Whether a corner lies on one line behind another that paths may bend round, as seen from a
-    point."""
+    """Return whether a corner lies, seen from a point, behind another that paths may bend round."""
     cx, cy = mesh[0], mesh[1]
     ux, uy, wx, wy = cx[corner], cy[corner], cx[other], cy[other]
     if mesh[2][corner] >= _BENDING or turn_of(x, y, ux, uy, wx, wy) != 0:
@@ -196,7 +208,10 @@ def _is_behind(mesh, x, y, corner, other):
 
 @njit(cache=True, nogil=True)
 def _spread(mesh, x, y, target, room, n, found):
-    """Follow the pending intervals; returns what `see_from_point` does."""
+    """Follow the pending intervals; return the result of `see_from_point`.
+
+    The arguments are those of `see_from_point`, with `n` pending intervals.
+    """
     cx, cy, kinds, first, _, stops, twins, polygon_of = mesh
     whole, real, seen = room
     tx, ty, goals = target

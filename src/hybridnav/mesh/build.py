@@ -1,4 +1,4 @@
-"""The convex mesh of free space: polygons, who is beside whom, and the blocks that they form."""
+"""The convex mesh of free space: polygons, their neighbours, and the blocks that they form."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 _BLOCK_CELLS = 64
-"""Side of the squares in whose order corners and polygons are kept."""
+"""Side of the squares by which corners and polygons are ordered."""
 
 
 @copies_alike
@@ -35,8 +35,8 @@ class ConvexMesh:
     corners: IntArray
     """int32 (n, 2), (row, col) in grid units: every vertex is a lattice corner of free space."""
     kinds: ByteArray
-    """uint8 (n,), where one cell of four is blocked at a corner which one: bit 1 for the upper row,
-    bit 0 for the upper column; 4 at corners that no path bends round."""
+    """uint8 (n,), the one blocked cell of four at a corner: bit 1 for the upper row, bit 0 for the
+    upper column; 4 at corners that no path bends round."""
     first: IntArray
     """int32 (p + 1,), polygon i has the slots `first[i]` to `first[i + 1]`."""
     begins: IntArray
@@ -46,13 +46,13 @@ class ConvexMesh:
     polygon_of: IntArray
     """int32 (s,), the polygon of each slot."""
     polygon_at: IntArray
-    """int32 (rows, cols), a polygon that holds the centre of each free cell, -1 elsewhere."""
+    """int32 (rows, cols), a polygon with the centre of each free cell, -1 elsewhere."""
     block_of: IntArray
     """int32 (s,), the block of the graph of polygons that each side belongs to, -1 for a wall."""
     block_head: IntArray
-    """int32 (b,), the polygon by which each block hangs on the rest."""
+    """int32 (b,), the polygon that joins each block to its parent."""
     block_up: IntArray
-    """int32 (p,), the block by which each polygon hangs on the rest, -1 for none."""
+    """int32 (p,), the block that joins each polygon to its parent, -1 for none."""
     component: IntArray
     """int32 (p,), the connected part of free space that each polygon belongs to."""
     depth: IntArray
@@ -74,18 +74,18 @@ class ConvexMesh:
 def build_mesh(free: BoolArray) -> ConvexMesh:
     """Build the convex mesh of free cells.
 
-    The constrained Delaunay triangulation of the corners and walls, its triangles merged while
-    their union is convex.
+    The mesh is the constrained Delaunay triangulation of the corners and walls, with triangles
+    merged while their union is convex.
 
     Parameters
     ----------
     free
-        bool (rows, cols); what lies outside is blocked.
+        bool (rows, cols); cells outside are blocked.
 
     Returns
     -------
     ConvexMesh
-        Without a polygon where no cell is free. Work and memory are linear in cells, but for the
+        Without polygons if no cell is free. Work and memory are linear in cells, except for the
         triangulation's n log n in corners.
 
     Notes
@@ -97,7 +97,7 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
     kinds = kinds_of(cells)
     kind_of = kinds[kinds != NO_CORNER]
     corners, walls = walls_of(cells, kinds, len(kind_of))
-    # What is near is near in memory, too: on large maps queries take a quarter less.
+    # Neighbours on the map are near in memory too: on large maps, queries take 25 % less time.
     order = np.lexsort(tuple((corners // _BLOCK_CELLS).T[::-1]))
     corners, kind_of = corners[order], kind_of[order]
     walls = np.argsort(order).astype(np.int32)[walls]

@@ -15,17 +15,18 @@ if TYPE_CHECKING:
     from hybridnav.mesh.build import ConvexMesh
 
 _LANDMARKS, _MORE_LANDMARKS, _MANY_CORNERS = 8, 32, 200_000
-"""Landmarks of a map, and of one with many corners. On 49 offices side by side, queries expand 40 %
-fewer corners with 32 of them than with 16, in 20 % less time."""
+"""Landmarks of a map, those of a map with many corners, and the least number of such corners. On 49
+offices side by side, queries expand 40 % fewer corners with 32 of them than with 16, in 20 % less
+time."""
 _MOST_EDGES = 200
-"""Edges a corner, on average, above which the graph is not worth its memory: real maps have 13 to
+"""Mean number of edges a corner above which the graph is not worth its memory: real maps have 13 to
 35."""
 
 
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class CornerGraph:
-    """Corners that see each other, where a path along the segment between them may bend at both.
+    """Corners that see each other, with segments at both of whose ends a path may bend.
 
     A shortest path bends at such corners alone, and every segment of it between two of them is an
     edge, or several on one line.
@@ -36,9 +37,9 @@ class CornerGraph:
     are `first[2 i]` to `first[2 i + 1]`, those into the other `first[2 i + 1]` to
     `first[2 i + 2]`."""
     heads: IntArray
-    """int32 (m,), the corner at which each edge ends; every edge is there in both directions."""
+    """int32 (m,), the corner at which each edge ends; every edge occurs in both directions."""
     landmark_distances: FloatArray
-    """float64 (n, landmarks), distances in the graph in cells, infinite where there is no way."""
+    """float64 (n, landmarks), distances in the graph in cells, infinite if there is no path."""
 
     @property
     def arrays(self) -> tuple[LongArray, IntArray, FloatArray]:
@@ -54,12 +55,12 @@ def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray,
     mesh
         The mesh.
     arrays
-        Of the kernel `successors`.
+        Arrays for the kernel `successors`.
 
     Returns
     -------
     tuple or None
-        See `CornerGraph`. None where sights are so far and free that there are too many edges.
+        See `CornerGraph`. None if there are too many edges, as on wide open maps.
 
     Notes
     -----
@@ -84,9 +85,9 @@ def add_landmarks(
     mesh
         The mesh.
     arrays
-        Of the kernel `successors`.
+        Arrays for the kernel `successors`.
     edges
-        Of `find_edges`.
+        Edges of `find_edges`.
 
     Notes
     -----

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh:
     """Cut closed cells out of a mesh.
 
-    The polygons that share a point with a closed cell are triangulated and merged anew; all others
-    stay, so that the work grows with what is closed, but for the blocks, which are found anew.
+    The polygons that share a point with a closed cell are triangulated and merged again; all others
+    stay, so that the work grows with the closed area. Only the blocks are always found again.
 
     Parameters
     ----------
     mesh
-        Of the map's free space.
+        The mesh of the map's free space.
     free
         bool (rows, cols), the free cells without the closed ones.
     closed
@@ -36,8 +36,8 @@ def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh
     Returns
     -------
     ConvexMesh
-        The polygons that were cut are still there, walled in, with -1 as their `component`; those
-        in their place come last. `polygon_at` is that of `mesh`.
+        The polygons that were cut stay as walled-in ones, with -1 as their `component`; those in
+        their place come last. `polygon_at` is that of `mesh`.
     """
     closed = closed[mesh.polygon_at.ravel()[closed] >= 0]
     if not len(closed):
@@ -50,7 +50,7 @@ def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh
     anew = _polygons_in(mesh, hole, vertices, free, closed)
     polygons = _with_hole_filled(mesh, hole, slots, anew)
     blocks = blocks_of(polygons[0], *polygons[2:])
-    blocks[3][cut] = -1  # of no component
+    blocks[3][cut] = -1  # without a component
     arrays = (vertices.corners, vertices.kinds, *polygons, mesh.polygon_at, *blocks)
     for array in arrays:
         array.flags.writeable = False
@@ -59,7 +59,7 @@ def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh
 
 @dataclass(frozen=True, eq=False)
 class _Hole:
-    """Polygons that are taken out, and the slots of them round the hole that they leave."""
+    """Polygons that are removed, and their slots round the hole that remains."""
 
     polygons: IntArray
     rim: LongArray
@@ -67,8 +67,11 @@ class _Hole:
 
 @dataclass(frozen=True, eq=False)
 class _Vertices:
-    """Vertices of the polygons in a hole: flat lattice points, sorted, and their corners; and all
-    corners of the mesh with their kinds, new ones last."""
+    """Vertices of the polygons in a hole, and all corners of the mesh with their kinds, new ones
+    last.
+
+    The vertices are flat lattice points, sorted, with their corners.
+    """
 
     points: LongArray
     number_of: IntArray
@@ -79,7 +82,7 @@ class _Vertices:
 def _vertices_of(
     mesh: ConvexMesh, slots: LongArray, free: BoolArray, closed: LongArray
 ) -> _Vertices:
-    """The corners of polygons that are taken out, and where walls turn now."""
+    """Return the corners of the removed polygons, and the points at which walls turn now."""
     wide = free.shape[1] + 1
     old = np.unique(mesh.begins[slots])
     known = mesh.corners[old] @ np.array([wide, 1], dtype=np.int64)
@@ -101,7 +104,7 @@ def _vertices_of(
 def _polygons_in(
     mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray, closed: LongArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Fill a hole: first slots, corners, twins and polygons of slots of the new polygons."""
+    """Fill a hole; return first slots, corners, twins and polygons of slots of the new polygons."""
     sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
     wide = free.shape[1] + 1
     around = mesh.corners @ np.array([wide, 1], dtype=np.int64)
@@ -124,7 +127,7 @@ def _with_hole_filled(
     slots: LongArray,
     anew: tuple[IntArray, IntArray, IntArray, IntArray],
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """The polygons of a mesh, those in a hole behind the others; those taken out are walled in."""
+    """Return the polygons of a mesh, those in a hole last; the removed ones are walled in."""
     first, begins, twins, polygon_of = anew
     n_slots = len(mesh.begins)
     all_twins = np.concatenate([mesh.twins, np.where(twins >= 0, twins + n_slots, -1)])
@@ -143,7 +146,8 @@ def _with_hole_filled(
 def _joined(
     mesh: ConvexMesh, doors: LongArray, anew: tuple[IntArray, IntArray, IntArray]
 ) -> tuple[IntArray, LongArray]:
-    """Slots of the rest of a mesh, and the slots in new polygons that take their twins' place."""
+    """Return the slots of the rest of a mesh, and the slots of new polygons that replace their
+    twins."""
     first, begins, twins = anew
     after = np.arange(1, len(begins) + 1)
     after[first[1:] - 1] = first[:-1]

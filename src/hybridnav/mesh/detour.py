@@ -31,22 +31,22 @@ Cell = tuple[int, int]
 Position = tuple[float, float]
 
 _GROUPS = 4
-"""Groups of corners that closed cells make, at most: each costs a bound at every corner reached."""
+"""Most groups of corners of closed cells: each costs a bound at every corner reached."""
 
 
 @copies_alike
 class DetourSearch:
     """Exact shortest any-angle paths round closed cells; threads may share it.
 
-    Closing cells leaves of the graph of corners all edges that do not meet them, and adds corners
-    of closed cells. So nothing is built anew: edges are tested when the search comes upon them, and
-    the graph's landmarks still bound what is left. Where the mesh has no such graph, the closed
-    cells are cut out of it.
+    Closed cells remove the edges of the graph of corners that meet them, and add corners of their
+    own. So the graph is not rebuilt: the search tests edges as it reaches them, and the graph's
+    landmarks still bound the rest. If the mesh has no such graph, the closed cells are cut out of
+    it.
 
     Parameters
     ----------
     search
-        Of the map with these cells open.
+        The search of the map with these cells open.
     flat
         int64 (m,), the closed cells, sorted, each once.
     """
@@ -59,15 +59,15 @@ class DetourSearch:
         self._cut: MeshSearch | None = None
 
     def is_met_by(self, path: MeshPath) -> bool:
-        """Return whether a shortest path between open cells is none with these cells closed.
+        """Return whether a shortest path between open cells is illegal with these cells closed.
 
-        True also where that takes more than the path to decide: where an end of it, or a bend, is a
+        The result is also True if the path alone does not decide: if an end of it, or a bend, is a
         corner of a closed cell.
 
         Parameters
         ----------
         path
-            Of the search with these cells open, between ends that stay open.
+            A path of the search with these cells open, between ends that stay open.
         """
         if path.positions is None:
             return False
@@ -75,7 +75,7 @@ class DetourSearch:
         return bool(closures.way_crosses(self._closure, at, path.positions))
 
     def are_met_by(self, paths: MeshPaths) -> BoolArray:
-        """Return which of many shortest paths, bool (n,): see `is_met_by`."""
+        """Return which of many shortest paths meet the closed cells, bool (n,); see `is_met_by`."""
         at = self._search.mesh.polygon_at
         met: BoolArray = closures.ways_cross(self._closure, at, paths.positions, paths.path_start)
         return met
@@ -93,7 +93,7 @@ class DetourSearch:
         found = self._round(cells, positions, 1.0 + epsilon, until)
         if found is not None:
             return found
-        # Without a lock: two threads may cut the same, and what is interrupted leaves nothing held.
+        # Without a lock: two threads may cut the same mesh, and an interrupt leaves no lock held.
         if self._cut is None:
             mesh = self._search.mesh
             free = mesh.polygon_at >= 0
@@ -109,8 +109,11 @@ class DetourSearch:
         factor: float,
         until: float,
     ) -> MeshPath | None:
-        """A shortest path in the graph of corners; None where there is no such graph, where closed
-        cells make too many corners, or where an end lies at a corner of a cell that is not free."""
+        """Return a shortest path in the graph of corners, or None.
+
+        The result is None if there is no such graph, if closed cells make too many corners, or if
+        an end lies at a corner of a cell that is not free.
+        """
         search = self._search
         landmarked = search.landmarked()
         if landmarked is None:
@@ -146,7 +149,8 @@ class DetourSearch:
 
 
 def _detour_of(search: MeshSearch, graph: CornerGraph, closure: Any) -> tuple[Any, ...]:
-    """What `query_round` needs of closed cells; without edges where they make too many corners."""
+    """Return the arrays of closed cells for `query_round`, without edges if there are too many
+    corners."""
     polygon_at, table = search.mesh.polygon_at, graph.landmark_distances
     made = closures.corners_of_closure(closure, polygon_at)
     if len(made[0]) > MOST_MADE:

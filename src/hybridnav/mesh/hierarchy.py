@@ -1,4 +1,4 @@
-"""The graph of the corners of a mesh, contracted: what queries of large maps are answered in."""
+"""The contracted graph of the corners of a mesh, for queries on large maps."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from hybridnav.mesh.build import ConvexMesh
 
 _SETTLED = 1
-"""Corners that a search for another way settles at most: it sees other arcs alone. With 10 there
-are up to 2 % fewer shortcuts, and it takes five times as long."""
+"""Most corners that a witness search settles, so that it sees single arcs. With 10 there are up to
+2 % fewer shortcuts, in five times the time."""
 _MOST_LOOKED = 100
-"""Arcs for each free cell that the contraction looks at before it is given up: some 0.7
-microseconds. Buildings take 20 to 100; raw scans full of speckle would take 1,000."""
+"""Arcs per free cell that the contraction may examine before it is given up: some 0.7 microseconds
+a cell. Buildings need 20 to 100; raw scans full of speckle would need 1,000."""
 _LOOKED_AN_EDGE = 110
-"""Arcs that it is expected to look at for each edge of the graph. Where that is too much already it
-does not begin: on five real maps of the six on which it would be given up."""
+"""Expected number of arcs to examine per edge of the graph. If that exceeds the limit, contraction
+does not begin: on five of the six real maps on which it would be given up."""
 
 
 @copies_alike
@@ -36,14 +36,14 @@ class CornerHierarchy:
     """
 
     first: IntArray
-    """int32 (n + 1,), where the arcs of each corner begin."""
+    """int32 (n + 1,), offsets of the arcs of each corner."""
     arcs: LongArray
     """int64 (u, 2), cost in 2^-34 of a cell; head and classes, see `pack` in the kernels."""
     middles: LongArray
     """int64 (u,), the corner that a shortcut leads past and two of its arcs, see `contract` in the
     kernels; -1 for an edge of the graph of corners."""
     follow: LongArray
-    """int64 (4, 64), which classes may follow which on a shortest path."""
+    """int64 (4, 64), the classes that may follow each class on a shortest path."""
 
     @property
     def arrays(self) -> tuple[IntArray, LongArray, LongArray, LongArray]:
@@ -61,20 +61,20 @@ def contract_corners(
     mesh
         The mesh.
     arrays
-        Of the kernel `successors`.
+        Arrays for the kernel `successors`.
     edges
-        Of the kernel `edges_of`.
+        Edges of the kernel `edges_of`.
 
     Returns
     -------
     CornerHierarchy or None
-        None where that takes too long, for corners see too many others.
+        None if contraction takes too long because corners see too many others.
 
     Notes
     -----
     R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies: faster and simpler
-    hierarchical routing in road networks, 2008. A shortcut is put in only where a path may bend at
-    both its corners; without that there are five times as many, and it takes 60 times as long.
+    hierarchical routing in road networks, 2008. A shortcut is added only if a path may bend at both
+    its corners; otherwise there are five times as many, in 60 times the time.
     """
     most = _MOST_LOOKED * np.count_nonzero(mesh.polygon_at >= 0)
     if _LOOKED_AN_EDGE * len(edges[1]) > most:

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from hybridnav.mesh.search import MeshSearch
 
 _ROOM = 16
-"""Positions of a path that there is room for at first, in the mean."""
+"""Initial room for positions, per path."""
 _LEAST = 64
-"""Queries that are worth a thread."""
+"""Least number of queries that justifies a thread."""
 _MANY = 1000
-"""Queries that are worth the graph of corners."""
+"""Least number of queries that justifies the graph of corners."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class MeshPaths:
     lower_bound_cells: FloatArray
     """float64 (n,)."""
     path_start: LongArray
-    """int64 (n + 1,), where the positions of each path begin."""
+    """int64 (n + 1,), offsets of the positions of each path."""
     positions: FloatArray
     """float64 (m, 2), (row, col) in grid units, of all paths."""
 
@@ -53,14 +53,14 @@ def shortest_paths(
     *,
     epsilon: float = 0.0,
 ) -> MeshPaths:
-    """Find a shortest path for each of many pairs, what `MeshSearch.path` answers.
+    """Find a shortest path for each of many pairs, as `MeshSearch.path` does.
 
     Parameters
     ----------
     search
-        Of the map.
+        The search of the map.
     cells
-        int64 (n, 2), the free cells (row, col) that hold the starts, and the goals.
+        int64 (n, 2), the free cells (row, col) of the starts, and of the goals.
     positions
         float64 (n, 2), starts and goals, (row, col) in grid units, in the closed squares of these
         cells.
@@ -96,7 +96,7 @@ def shortest_paths(
 def _one_by_one(
     search: MeshSearch, where: LongArray, ends: FloatArray, epsilon: float
 ) -> MeshPaths:
-    """The answers of one thread; rooms are doubled until they are large enough."""
+    """Return the answers of one thread; arrays are doubled until they are large enough."""
     count = len(where)
     length, bound = np.empty(count), np.empty(count)
     starts = np.zeros(count + 1, dtype=np.int64)

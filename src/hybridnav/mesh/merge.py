@@ -11,7 +11,7 @@ from hybridnav.mesh._merge_kernels import WALL, merge_across, sides_of_triangles
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, BoolArray, IntArray
 
-# numpy sorts: a sort that is compiled into a kernel takes more than a second to compile.
+# Sort with numpy: a sort in a kernel takes more than a second to compile.
 
 
 def select_triangles(
@@ -22,10 +22,10 @@ def select_triangles(
     Parameters
     ----------
     vertices, neighbours
-        (m, 3) corners of all triangles, and the triangle across the side from corner k to k + 1,
-        none where there are not so many.
+        (m, 3) corners of all triangles, and the triangle across the side from corner k to k + 1, at
+        least m for none.
     is_kept
-        bool (m,); a wall parts those that are from those that are not.
+        bool (m,); a wall separates kept triangles from the others.
 
     Returns
     -------
@@ -43,8 +43,9 @@ def select_triangles(
 def merge_triangles(
     corners: IntArray, triangles: IntArray, neighbours: IntArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Merge triangles into convex polygons, as long as a union is convex (S. Hertel, K. Mehlhorn,
-    1983), longest common sides first.
+    """Merge triangles into convex polygons, longest common sides first.
+
+    Two parts merge as long as their union is convex (S. Hertel, K. Mehlhorn, 1983).
 
     Parameters
     ----------

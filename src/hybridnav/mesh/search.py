@@ -31,33 +31,33 @@ Cell = tuple[int, int]
 Position = tuple[float, float]
 
 _ROOM = 4096
-"""Nodes that a query has room for at first."""
+"""Initial room for nodes of a query."""
 _FRACTION = float(1 << 24)
-"""Positions are rounded to this part of a cell: then every side test is exact."""
+"""Positions are rounded to this part of a cell, so that every side test is exact."""
 _SLICE = 256
-"""Nodes that a query with a budget expands before it looks at the clock, some 0.2 ms."""
+"""Nodes that a query with a budget expands between looks at the clock, some 0.2 ms."""
 NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
 SURE = 1.0 - 1e-12
-"""A search that is stopped takes its lower bound this many times: sums of lengths are rounded."""
+"""Factor on the lower bound of a stopped search, because sums of lengths are rounded."""
 MOST_MADE = 128
-"""Corners that closed cells may make, for a query to go round them in the graph of corners."""
+"""Most corners of closed cells for which a query uses the graph of corners."""
 _WORTH = 20_000
-"""Intervals that the queries of a mesh expand, at least, before its graph of corners is built."""
+"""Least number of intervals that queries expand before the graph of corners is built."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPath:
-    """The shortest path found between two positions; None for its positions where none was."""
+    """The shortest path found between two positions; its positions are None if none was found."""
 
     positions: FloatArray | None
     """float64 (n, 2), (row, col) in grid units: the start, the corners at which it turns, the
     goal."""
     length_cells: float
-    """Its length, infinite for none."""
+    """Length of the path, infinite for none."""
     lower_bound_cells: float
-    """No path is shorter: its length where it is proved the shortest, infinite where it is proved
-    that there is none."""
+    """No path is shorter: equal to the length of a path that is proved shortest, infinite if it is
+    proved that there is no path."""
     expanded: int
     """Intervals, or corners, that the search expanded."""
 
@@ -143,15 +143,15 @@ class _HierarchyWork(_Work):
 class MeshSearch:
     """Exact shortest any-angle paths on a mesh; threads may share it.
 
-    The first queries search intervals of the mesh (Polyanya). Once these have taken about as long,
-    the graph of corners is built, and contracted where that is soon done: all later queries are
-    answered in there, up to ten times as fast, and in large buildings far more than that.
-    Which of several paths of one length is found may differ between the two.
+    The first queries search intervals of the mesh (Polyanya). Once these have taken about as long
+    as the graph of corners takes to build, it is built, and contracted if that is quick. All later
+    queries use it, up to ten times as fast, and in large buildings far more than that. The two may
+    find different paths of equal length.
 
     Parameters
     ----------
     mesh
-        Of the map's free space.
+        The mesh of the map's free space.
 
     Notes
     -----
@@ -175,7 +175,7 @@ class MeshSearch:
         """Whether the graph of corners is built, or found not to be worth its memory."""
         self._lock = threading.Lock()
         self.expanded = 0
-        """Intervals that its queries have expanded so far."""
+        """Number of intervals that queries have expanded so far."""
 
     @property
     def graph(self) -> CornerGraph | CornerHierarchy | None:
@@ -183,12 +183,12 @@ class MeshSearch:
         return self._graph
 
     def prepare(self, progress: Progress = no_progress) -> None:
-        """Build the graph of corners now, if it is not there yet: up to a microsecond a cell.
+        """Build the graph of corners now, if it does not exist yet: up to a microsecond a cell.
 
         Parameters
         ----------
         progress
-            Called after each step with the number of steps done and of all.
+            Called after each step with the number of steps done and of all steps.
         """
         if self.is_prepared:
             return
@@ -210,8 +210,10 @@ class MeshSearch:
         edges: tuple[LongArray, IntArray] | None,
         graph: CornerGraph | CornerHierarchy | None,
     ) -> None:
-        """Answer queries from now on in a graph of corners that was built of the same mesh, with
-        these edges; None where it was found not to be worth its memory."""
+        """Use a graph of corners of the same mesh, with its edges, for all later queries.
+
+        None stands for a graph that was found not to be worth its memory.
+        """
         if isinstance(graph, CornerHierarchy):
             self.corner_works = Pool(partial(_HierarchyWork, self.mesh))
         elif graph is not None:
@@ -221,8 +223,11 @@ class MeshSearch:
         self.is_prepared = True
 
     def landmarked(self) -> tuple[CornerGraph, Pool[Any]] | None:
-        """Return the graph of corners with landmarks, and work arrays for it: what searches round
-        closed cells need. It is built when the first asks; None until the graph of corners is."""
+        """Return the graph of corners with landmarks, and its work arrays, for searches round
+        closed cells.
+
+        The landmarks are built on first use; None until the graph of corners exists.
+        """
         if self.edges is None:
             return None
         if self._landmarked is None:
@@ -250,23 +255,23 @@ class MeshSearch:
         Parameters
         ----------
         cells
-            The free cells (row, col) that hold start and goal.
+            The free cells (row, col) of start and goal.
         positions
             Start and goal, (row, col) in grid units, in the closed squares of these cells.
         epsilon
             The search may end as soon as its path is at most 1 + epsilon times as long as the lower
             bound.
         budget_s
-            Seconds after which the search ends with the best path so far, None for no end.
+            Seconds after which the search ends with the best path so far, None for no limit.
         known
-            float64 (n, 2), a path from start to goal that is in free space: the answer until the
-            search finds a shorter one. With epsilon the search ends as soon as that is proved good
-            enough; without, it saves next to nothing.
+            float64 (n, 2), a path from start to goal in free space: the answer until the search
+            finds a shorter one. With epsilon the search ends as soon as this path is proved good
+            enough; without epsilon it saves little.
 
         Returns
         -------
         MeshPath
-            A shortest path, but for epsilon and budget.
+            A shortest path, unless epsilon or the budget ends the search earlier.
         """
         until = math.inf if budget_s is None else perf_counter() + budget_s
         if budget_s is None and self.expanded >= max(_WORTH, len(self.mesh.corners)):

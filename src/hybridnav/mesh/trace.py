@@ -1,4 +1,4 @@
-"""What a search of the mesh looked at, to be drawn and counted."""
+"""The intervals of a search of the mesh, to draw and count."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ _LEFT, _RIGHT = 1, 2
 
 @dataclass(frozen=True, eq=False)
 class SearchTrace:
-    """The intervals that a search of the mesh made, in the order in which it made them.
+    """The intervals that a search of the mesh made, in order.
 
-    An interval is a part of a side that is all seen from one point, its root.
+    An interval is a part of a side that is visible as a whole from one point, its root.
     """
 
     mesh: ConvexMesh
     """The mesh."""
     path: MeshPath
-    """What was found."""
+    """The path that was found."""
     ends: FloatArray
     """float64 (2, 2), (row, col) of start and goal in grid units."""
     intervals: FloatArray
-    """float64 (n, 2, 2), (row, col) of the left and the right end of each interval, as its root
-    sees them."""
+    """float64 (n, 2, 2), (row, col) of the left and the right end of each interval, as seen from
+    its root."""
     roots: FloatArray
-    """float64 (n, 2), (row, col) of each interval's root: the start, or a corner at which the
+    """float64 (n, 2), (row, col) of each interval's root: the start, or the corner at which the
     path to the interval turns last."""
     costs_cells: FloatArray
     """float64 (n,), length of the path from the start to each root."""
@@ -45,8 +45,8 @@ class SearchTrace:
 
     @property
     def is_followed(self) -> BoolArray:
-        """bool (n,), whether an interval was found behind each: not behind those that were left in
-        the open list, that another way to their root beat, or that lead nowhere."""
+        """bool (n,), whether an interval was found behind each: not behind those that stayed in the
+        open list, lost to a shorter path to their root, or lead nowhere."""
         followed = np.zeros(len(self.parents), dtype=np.bool_)
         followed[self.parents[self.parents >= 0]] = True
         return followed
@@ -55,26 +55,26 @@ class SearchTrace:
 def trace_search(
     mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
 ) -> SearchTrace:
-    """Search a shortest path as `MeshSearch.path` does, and keep what was looked at.
+    """Search a shortest path as `MeshSearch.path` does, and keep the intervals.
 
     Parameters
     ----------
     mesh
-        Of the map's free space.
+        The mesh of the map's free space.
     cells
-        The free cells (row, col) that hold start and goal.
+        The free cells (row, col) of start and goal.
     positions
         Start and goal, (row, col) in grid units, in the closed squares of these cells.
 
     Returns
     -------
     SearchTrace
-        Without intervals where start and goal lie in one polygon or are not connected.
+        Without intervals if start and goal lie in one polygon or are not connected.
     """
     ends = np.array([_inside(*end) for end in zip(cells, positions, strict=True)])
     path, whole, real = _nodes(mesh, cells, positions)
     slots, roots, parents, marks = whole.T
-    # Nodes that are the goal itself have no side.
+    # Nodes for the goal itself have no side.
     kept = slots >= 0
     number = np.append(np.cumsum(kept) - 1, -1)
     sides = _sides(mesh, slots[kept])
@@ -94,10 +94,10 @@ def trace_search(
 def _nodes(
     mesh: ConvexMesh, cells: tuple[Cell, Cell], positions: tuple[Position, Position]
 ) -> tuple[MeshPath, IntArray, FloatArray]:
-    """Return what a search finds, and its nodes: see the columns of `_interval_kernels`."""
+    """Return the path of a search, and its nodes; see the columns in `_interval_kernels`."""
     search = MeshSearch(mesh)
     path = search.path(cells, positions)
-    # Nobody else has this search: it lends again what the query has just returned.
+    # No other code has this search: it lends the arrays that the query has just returned.
     with search.works.lent() as work:
         n = work.counts[N]
         whole, real = work.nodes
@@ -105,7 +105,8 @@ def _nodes(
 
 
 def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
-    """Return the corners of sides, float64 (n, 2, 2): the one on the left of who comes through."""
+    """Return the corners of sides, float64 (n, 2, 2), the left one in the direction of passage
+    first."""
     ends = np.stack([mesh.begins, mesh.stops], axis=1)[slots]
     pairs: FloatArray = mesh.corners[ends].astype(np.float64)
     return pairs

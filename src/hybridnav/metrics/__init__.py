@@ -1,4 +1,4 @@
-"""The judges: paths, optima and losses, by code that shares nothing with the planners."""
+"""The judges of paths, optima and losses, whose code shares nothing with the planners."""
 
 from hybridnav.metrics.anyangle import (
     MAX_CORNERS,

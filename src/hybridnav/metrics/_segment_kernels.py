@@ -1,9 +1,9 @@
 """Kernels of the judge: exact tests of segments against the cells of a grid, and shortest paths.
 
 Positions are (row, col) in grid units: cell (r, c) spans [r, r + 1] x [c, c + 1], its corners are
-whole numbers. `free_of` says for each cell class whether it is free; no kernel needs a copy of the
-map. The tests are exact for coordinates that are multiples of 2^-24 below 2^28: differences of such
-numbers fit a float64, and products are compared with their rounding errors.
+whole numbers. `free_of` states for each cell class whether it is free, so that no kernel needs a
+copy of the map. The tests are exact for coordinates that are multiples of 2^-24 below 2^28:
+differences of such numbers fit a float64, and products are compared with their rounding errors.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ import numpy as np
 from hybridnav._jit import njit
 
 CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
-"""What a segment does: stays in the free space, leaves the map, enters a cell that is not free,
-passes between two that meet at a corner, runs along the side that two of them share."""
+"""Codes of a segment: it stays in the free space, leaves the map, enters a cell that is not free,
+passes between two such cells that meet at a corner, runs along a side that two of them share."""
 
 
 @njit(cache=True, nogil=True)
 def _rounding_error(first, second, product):
-    """What rounding took from a product (T. J. Dekker: A floating-point technique, 1971)."""
+    """Return the rounding error of a product (T. J. Dekker: A floating-point technique, 1971)."""
     scaled = 134217729.0 * first
     first_high = scaled - (scaled - first)
     first_low = first - first_high
@@ -35,9 +35,9 @@ def _rounding_error(first, second, product):
 
 @njit(cache=True, nogil=True)
 def compare_products(first, second, third, fourth):
-    """Sign of first * second - third * fourth, exact."""
+    """Return the sign of first * second - third * fourth, exact."""
     left, right = first * second, third * fourth
-    # Rounding keeps order: only equal rounded products need their errors.
+    # Rounding preserves order: only equal rounded products need their errors.
     if left == right:
         left = _rounding_error(first, second, left)
         right = _rounding_error(third, fourth, right)
@@ -46,7 +46,7 @@ def compare_products(first, second, third, fourth):
 
 @njit(cache=True, nogil=True)
 def _is_free(classes, free_of, row, col):
-    """Whether a cell is in the map and free."""
+    """Return whether a cell is in the map and free."""
     if row < 0 or col < 0 or row >= classes.shape[0] or col >= classes.shape[1]:
         return False
     return free_of[classes[row, col]]
@@ -54,10 +54,10 @@ def _is_free(classes, free_of, row, col):
 
 @njit(cache=True, nogil=True)
 def crossing_at(classes, free_of, row, col):
-    """Whether two free and two blocked cells face each other across a corner of the lattice.
+    """Return whether two free and two blocked cells face each other across a corner of the lattice.
 
-    Returns 0 for no, 1 where the free cells are the ones with both or neither index lower (south-
-    west and north-east), -1 where they are the other two.
+    Return 0 for no, 1 if the free cells are the south-west and north-east ones, -1 for the other
+    two.
     """
     south_west = _is_free(classes, free_of, row - 1, col - 1)
     south_east = _is_free(classes, free_of, row - 1, col)
@@ -103,10 +103,10 @@ def _level_code(classes, free_of, fixed, low, high, along_row):
 
 @njit(cache=True, nogil=True)
 def segment_code(classes, free_of, row0, col0, row1, col1):
-    """First thing that a segment does wrong, 0 for nothing; the ends count as touched only.
+    """Return the code of a segment's first fault, 0 for none; its ends count as touched only.
 
-    Walks the cells whose interior the segment enters (J. Amanatides, A. Woo: A fast voxel traversal
-    algorithm for ray tracing, 1987) with exact comparisons of the crossings.
+    The walk visits the cells whose interior the segment enters (J. Amanatides, A. Woo: A fast voxel
+    traversal algorithm for ray tracing, 1987) with exact comparisons of the crossings.
     """
     rows, cols = classes.shape
     if min(row0, row1) < 0 or max(row0, row1) > rows or min(col0, col1) < 0:
@@ -149,7 +149,7 @@ def segment_code(classes, free_of, row0, col0, row1, col1):
 
 @njit(cache=True, nogil=True)
 def segment_codes(classes, free_of, positions):
-    """Code of each segment of a polyline; of a single point, its own."""
+    """Return the code of each segment of a polyline; a single point has one code."""
     n = positions.shape[0]
     codes = np.zeros(max(n - 1, 1), np.int8)
     for i in range(codes.size):
@@ -162,9 +162,9 @@ def segment_codes(classes, free_of, positions):
 
 @njit(cache=True, nogil=True)
 def crossed_joints(classes, free_of, positions):
-    """Whether a polyline turns at each point from one free cell into another across a corner.
+    """Return for each point whether the polyline crosses a corner there between two free cells.
 
-    Points that repeat count once, as the last of them.
+    Repeated points count once, as the last of them.
     """
     n = positions.shape[0]
     crossed = np.zeros(n, np.bool_)
@@ -189,7 +189,7 @@ def crossed_joints(classes, free_of, positions):
 
 @njit(cache=True, nogil=True)
 def _sees(classes, free_of, positions, i, j):
-    """Whether a segment between two of some positions is legal."""
+    """Return whether a segment between two of some positions is legal."""
     return (
         segment_code(
             classes, free_of, positions[i, 0], positions[i, 1], positions[j, 0], positions[j, 1]
@@ -200,7 +200,7 @@ def _sees(classes, free_of, positions, i, j):
 
 @njit(cache=True, nogil=True)
 def visible_pairs(classes, free_of, corners, slopes):
-    """Pairs i < j of corners that see each other and may follow each other on a shortest path.
+    """Return the pairs i < j of corners that see each other and can be adjacent on a shortest path.
 
     A shortest path bends round a corner, so no segment of it points into the blocked cell there
     or straight away from it: `slopes` is the sign of (row offset * col offset) of that cell.
@@ -226,7 +226,7 @@ def visible_pairs(classes, free_of, corners, slopes):
 
 @njit(cache=True, nogil=True)
 def visible_from(classes, free_of, row, col, corners, slopes):
-    """Distance from a position to each corner that it sees, infinite to the others."""
+    """Return the distance from a position to each corner that it sees, infinite to the others."""
     distances = np.full(corners.shape[0], np.inf)
     for i in range(corners.shape[0]):
         there_row, there_col = corners[i]
@@ -239,9 +239,14 @@ def visible_from(classes, free_of, row, col, corners, slopes):
 
 @njit(cache=True, nogil=True)
 def cheapest_corners(offsets, heads, lengths, from_start, to_goal, to_goal_bound):
-    """Corners on a shortest path between two positions, in order; empty where there is no path.
+    """Return the corners on a shortest path between two positions, in order; empty if none.
 
-    A* with the straight distance to the goal as its bound.
+    The search is A* with the straight distance to the goal as its bound. A shortest path is empty
+    too if it needs no corner.
+
+    `offsets`, int64 (n + 1,), `heads` and `lengths`, float64, are the graph of n corners in CSR
+    form; `from_start`, `to_goal` and `to_goal_bound`, float64 (n,), are distances, infinite where
+    an end does not see the corner. All lengths are in cells.
     """
     n = from_start.size
     best = from_start.copy()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 MAX_CORNERS = 2000
-"""Corners up to which a visibility graph is built unless more are asked for."""
+"""Default limit of the corners of a visibility graph."""
 
 Point = tuple[int, int]
 
@@ -49,7 +49,7 @@ class VisibilityGraph:
     allow_unexplored
         Whether unexplored cells may be entered.
     max_corners
-        Corners that the map may have at most; time and memory grow with their square.
+        Most corners of the map; time and memory grow with their square.
 
     Raises
     ------
@@ -83,7 +83,7 @@ class VisibilityGraph:
         offset = self.corners[pairs[:, 0]] - self.corners[pairs[:, 1]]
         lengths = np.hypot(offset[:, 0], offset[:, 1])
         tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
-        # Corners of one place do not exist twice, so no length is 0 and every entry is kept.
+        # No two corners are at one place, so no length is 0 and every entry is kept.
         graph = sparse.coo_array((np.tile(lengths, 2), (tails, heads)), shape=(n, n)).tocsr()
         self._offsets = graph.indptr.astype(np.int64)
         self._heads = graph.indices.astype(np.int32)
@@ -100,7 +100,7 @@ class VisibilityGraph:
         Returns
         -------
         AnyAnglePath
-            Without points where there is no path, also when a cell is not free.
+            Without points if there is no path or a cell is not free.
 
         Raises
         ------
@@ -148,7 +148,7 @@ def anyangle_optimum(
     Parameters
     ----------
     grid
-        A map with at most `MAX_CORNERS` convex corners; for several queries on one map build a
+        A map with at most `MAX_CORNERS` convex corners; for several queries on one map, build a
         `VisibilityGraph`.
     start_cell, goal_cell
         (row, col), inside the map.
@@ -158,7 +158,7 @@ def anyangle_optimum(
     Returns
     -------
     AnyAnglePath
-        Without points where there is no path.
+        Without points if there is no path.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def anyangle_optimum(
 
 
 def _convex_corners(free: BoolArray) -> tuple[FloatArray, LongArray]:
-    """Lattice corners with one blocked cell of four, and the sign of the diagonal it lies on."""
+    """Return the lattice corners with one blocked cell of four, and the sign of its diagonal."""
     blocked = ~free
     here = blocked[:-1, :-1], blocked[:-1, 1:], blocked[1:, :-1], blocked[1:, 1:]
     row, col = np.nonzero(np.sum(here, axis=0, dtype=np.int8) == 1)

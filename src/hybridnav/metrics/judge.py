@@ -1,4 +1,4 @@
-"""Paths judged by code that no planner shares: legal cells, legal segments, lengths by Euclid."""
+"""Judges of paths that share no code with planners: legal cells, segments, lengths."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _FAR = 2.0**28
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the judge found on a path."""
+    """Findings of the judge on a path."""
 
     faults: tuple[str, ...]
-    """One line for each kind of fault, naming the first place and how many there are."""
+    """One line for each kind of fault, with its first place and the number of others."""
     length_m: float
     """Length of the polyline through the centres of the cells, in metres."""
 
@@ -63,19 +63,18 @@ def judge_path(
     cells
         The path, whole numbers (n, 2) of (row, col).
     start, goal
-        The cells it should run between.
+        The cells that the path should join.
     allow_unexplored
         Whether unexplored cells count as free.
 
     Returns
     -------
     Verdict
-        Faults: wrong first or last cell; cells outside the map or not free; a step that does not
-        go to one of the 8 neighbours; a segment between centres that enters a blocked cell or
-        passes between two that meet at a corner; a diagonal step with one blocked side cell
-        ("cuts a corner": legal for a line, not for a move of the octile grid). A cell that is not
-        free counts as blocked in all of these. On a grid with `corner_cutting` the faults about
-        corners are none.
+        Faults: wrong first or last cell; cells outside the map or not free; a step that does not go
+        to one of the 8 neighbours; a segment between centres that enters a blocked cell or passes
+        between two that meet at a corner; a diagonal step with one blocked side cell ("cuts a
+        corner": legal for a line, not for a move of the octile grid). A cell that is not free
+        counts as blocked. On a grid with `corner_cutting` there are no faults about corners.
 
     Raises
     ------
@@ -90,10 +89,10 @@ def judge_path(
     inside: BoolArray = np.all((path >= 0) & (path < (rows, cols)), axis=1)
     free = inside.copy()
     free[inside] = free_of[grid.classes[path[inside, 0], path[inside, 1]]]
-    # As floats: whatever numbers a faulty planner hands out, nothing overflows.
+    # As floats, so that no number from a faulty planner overflows.
     steps = np.diff(path.astype(np.float64), axis=0)
     near = np.abs(steps).max(axis=1, initial=0.0) == 1
-    # Halves are exact in float64, so are the tests of segments between centres.
+    # Halves are exact in float64, and so are the tests of segments between centres.
     centres = np.clip(path.astype(np.float64), -_FAR, _FAR) + 0.5
     codes = kernels.segment_codes(grid.classes, free_of, centres)[: len(steps)]
     cut = _cut_corners(grid, path, near & inside[1:], free_of)
@@ -117,17 +116,17 @@ def judge_path(
 def segment_faults(
     grid: OccupancyGrid, points: ArrayLike, *, allow_unexplored: bool = False
 ) -> tuple[str, ...]:
-    """Faults of any polyline against the free space of a map.
+    """Return the faults of any polyline against the free space of a map.
 
     Free space is the union of the closed squares of the free cells; outside the map nothing is
-    free. A segment may touch the side or corner of a blocked cell, not enter it, not run along a
-    side that two blocked cells share, and not pass between two blocked cells that meet at a
-    corner, neither straight nor with a bend there.
+    free. A segment may touch the side or corner of a blocked cell. It may not enter one, run along
+    a side that two of them share, or pass between two of them that meet at a corner, straight or
+    with a bend there.
 
-    Points are brought to grid units and rounded to 2^-24 of a cell, so that corners and centres
-    of cells, the bends of shortest paths, come back exactly; from there on every test is exact.
-    A point put by interpolation on a segment that grazes a corner can come to lie on its wrong
-    side: judge a path before it is resampled.
+    Points are converted to grid units and rounded to 2^-24 of a cell, so that corners and centres
+    of cells, the bends of shortest paths, are exact again; every test after that is exact. A point
+    interpolated on a segment that grazes a corner can lie on the wrong side of it: judge a path
+    before it is resampled.
 
     Parameters
     ----------
@@ -165,7 +164,7 @@ def segment_faults(
 
 
 def checked_points(points: ArrayLike) -> FloatArray:
-    """Points as float64 (n, 2).
+    """Return the points as float64 (n, 2).
 
     Raises
     ------
@@ -181,7 +180,7 @@ def checked_points(points: ArrayLike) -> FloatArray:
 
 
 def free_classes(*, allow_unexplored: bool) -> BoolArray:
-    """Whether a cell of each `CellClass` is free.
+    """Return whether a cell of each `CellClass` is free.
 
     Parameters
     ----------
@@ -209,8 +208,8 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
 
 
 def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
-    """Positions (row, col) of points, rounded to 2^-24 of a cell and held near the map."""
-    # The frame at the origin gives the two axes without the rounding of a far origin.
+    """Return the positions (row, col) of points, rounded to 2^-24 of a cell, held near the map."""
+    # A frame at the origin yields the two axes without the rounding of a far origin.
     axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
     positions = (xy - frame.origin_m) @ axes.T / frame.resolution_m**2
     rounded: FloatArray = np.rint(np.clip(positions, -_FAR, _FAR) / _QUANTUM) * _QUANTUM
@@ -243,7 +242,7 @@ def _about_steps(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
 def _cut_corners(
     grid: OccupancyGrid, path: LongArray, judged: BoolArray, free_of: BoolArray
 ) -> BoolArray:
-    """Steps to a neighbour, diagonal, with exactly one of the two side cells blocked."""
+    """Return the diagonal steps to a neighbour with exactly one of two side cells blocked."""
     cut = np.zeros(len(path) - 1, dtype=np.bool_)
     diagonal = np.flatnonzero(judged & (path[1:] != path[:-1]).all(axis=1))
     tail, head = path[diagonal], path[diagonal + 1]
@@ -256,7 +255,7 @@ def _cut_corners(
 
 
 def _length_in_cells(steps: FloatArray) -> float:
-    # Equal steps are counted, not added up: a + b sqrt 2, rounded once for each kind of step.
+    # Count equal steps instead of adding them: a + b sqrt 2, rounded once for each kind of step.
     lengths, counts = np.unique(np.hypot(steps[:, 0], steps[:, 1]), return_counts=True)
     return math.fsum((lengths * counts).tolist())
 
@@ -270,5 +269,5 @@ def _at(point: FloatArray) -> str:
 
 
 def more(count: int) -> str:
-    """How many others there are beside the first of some faults, in brackets."""
+    """Return the number of further faults beside the first one, in brackets."""
     return "" if count == 1 else f" (and {count - 1} more)"

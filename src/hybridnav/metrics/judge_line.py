@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 
 _NEAR_CELLS = 2.0**-20
-"""How far from the centre of its cell an end may be."""
+"""Greatest distance of an end from the centre of its cell."""
 
 
 def judge_line(
@@ -46,14 +46,14 @@ def judge_line(
     points
         `(x, y)` in metres, map frame, shape (n, 2), n >= 1, finite.
     start, goal
-        The cells between whose centres it should run.
+        The cells whose centres the path should join.
     allow_unexplored
         Whether unexplored cells count as free.
 
     Returns
     -------
     Verdict
-        Faults: the first or last point is not the centre of its cell; what `segment_faults` finds.
+        Faults: the first or last point is not the centre of its cell; those of `segment_faults`.
 
     Raises
     ------
@@ -71,16 +71,16 @@ def judge_line(
 def line_cells(
     grid: OccupancyGrid, points: ArrayLike, *, allow_unexplored: bool = False
 ) -> LongArray:
-    """Cells that a legal any-angle path passes.
+    """Return the cells that a legal any-angle path passes.
 
-    Of a piece along the side between two cells only one cell is named, a free one.
+    Along the side between two cells, one free cell of them is listed.
 
     Parameters
     ----------
     grid
         The map.
     points
-        A path in which `segment_faults` finds nothing.
+        A path without `segment_faults`.
     allow_unexplored
         Whether unexplored cells count as free.
 

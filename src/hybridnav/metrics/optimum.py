@@ -1,4 +1,4 @@
-"""Optimal lengths on the octile grid by scipy: the oracle that shares nothing with the planners."""
+"""Optimal lengths on the octile grid by scipy, an oracle independent of the planners."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
-# In the order of the flat indices they lead to, so that the rows of the matrix come out sorted.
+# In the order of the flat indices that they lead to, so that the matrix has sorted rows.
 _STEPS = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))
 
 
 class ScipyOptimum:
     """The graph of all legal moves of a grid, and Dijkstra's algorithm on it by scipy.
 
-    Moves go to the 8 neighbours; a diagonal needs both side cells free. Holds up to 96 bytes for
-    each free cell.
+    Moves go to the 8 neighbours; a diagonal needs both side cells free. The graph takes up to 96
+    bytes for each free cell.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ScipyOptimum:
         self._resolution_m = grid.resolution_m
 
     def lengths_from(self, start: Cell) -> FloatArray:
-        """Length of the shortest path from a cell to every cell.
+        """Return the length of the shortest path from a cell to every cell.
 
         Parameters
         ----------
@@ -77,12 +77,12 @@ class ScipyOptimum:
 def scipy_optimum(
     grid: OccupancyGrid, start: Cell, goals: ArrayLike, *, allow_unexplored: bool = False
 ) -> FloatArray:
-    """Lengths of the shortest octile paths from one cell to others.
+    """Return the lengths of the shortest octile paths from one cell to others.
 
     Parameters
     ----------
     grid
-        The map; for several starts on one map build a `ScipyOptimum`.
+        The map; for several starts on one map, build a `ScipyOptimum`.
     start
         (row, col).
     goals
@@ -116,7 +116,7 @@ def _check_inside(cells: LongArray, shape: tuple[int, ...]) -> None:
 
 
 def _move_graph(free: BoolArray) -> sparse.csr_array[np.float64, tuple[int, int]]:
-    """Legal moves between the free cells, numbered in the order of the map; lengths in cells."""
+    """Return the legal moves between free cells, numbered in the order of the map; in cells."""
     padded = np.pad(free, 1)
     number = np.cumsum(padded, dtype=np.int32).reshape(padded.shape) - 1
     row, col = (index.astype(np.int32) + 1 for index in np.nonzero(free))

@@ -1,4 +1,4 @@
-"""How well found rooms agree with true ones."""
+"""Agreement of found rooms with true ones."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class RoomAgreement:
-    """Found rooms against true ones, each true room with at most one found room as its partner."""
+    """Agreement of found rooms with true ones, each with at most one partner."""
 
     true_labels: LongArray
     """Labels of the true rooms that were compared, ascending."""
     partners: LongArray
-    """The found label that is each one's partner, -1 for none."""
+    """The found label that is the partner of each true room, -1 for none."""
     precision: FloatArray
     """Share of the partner's cells that lie in the true room; 0 without a partner."""
     recall: FloatArray
     """Share of the true room's cells that lie in the partner; 0 without one."""
     mcc: float
-    """Matthews correlation over all cells and rooms, from -1 to 1; NaN where either side is one
-    single room."""
+    """Matthews correlation over all cells and rooms, from -1 to 1; NaN if either side is one single
+    room."""
     n_found: int
-    """Found rooms that hold compared cells."""
+    """Number of found rooms with compared cells."""
 
 
 def compare_rooms(true: AnyArray, found: AnyArray) -> RoomAgreement:
-    """Set found rooms against true ones, cell by cell.
+    """Compare found rooms with true ones, cell by cell.
 
-    Partners are chosen one to one so that most cells agree; a room that is split counts with its
-    largest part alone, and the others are classes of their own. The coefficient for many classes is
-    that of J. Gorodkin: Comparing two K-category assignments by a K-category correlation
-    coefficient, 2004.
+    Partners are chosen one to one so that most cells agree; a split room counts with its largest
+    part alone, and the other parts are classes of their own. For the coefficient for many classes
+    see J. Gorodkin: Comparing two K-category assignments by a K-category correlation coefficient,
+    2004.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def compare_rooms(true: AnyArray, found: AnyArray) -> RoomAgreement:
     found_labels, col = np.unique(found, return_inverse=True)
     cells = np.zeros((len(true_labels), len(found_labels)))
     np.add.at(cells, (row, col), 1)
-    # No room is nobody's partner.
+    # "No room" is never a partner.
     wanted = np.where(found_labels[None, :] < 0, -1.0, cells)
     rows, cols = linear_sum_assignment(-wanted)
     real = wanted[rows, cols] > 0

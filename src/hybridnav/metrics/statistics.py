@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
 
 TOLERANCE = 1e-9
-"""A loss, or a difference of two, up to this is rounding and counts as none."""
+"""Greatest loss, or difference of two losses, that counts as rounding."""
 
 Interval = tuple[float, float]
 _CHUNK = 2_000_000
@@ -45,7 +45,7 @@ class Summary:
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """How two methods differ on the same pairs."""
+    """Difference of two methods on the same pairs."""
 
     n: int
     """Pairs compared."""
@@ -77,9 +77,9 @@ def summarise(losses: ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Sum
     losses
         Finite numbers, any shape; path length / optimum - 1 for instance.
     seed
-        Seed of the resampling: equal input gives equal output.
+        Seed of the resampling: equal input has equal output.
     resamples
-        Resamples of the bootstrap, >= 1. Time grows with their number times the losses'.
+        Resamples of the bootstrap, >= 1. Time is proportional to resamples times losses.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def summarise(losses: ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Sum
         nan = math.nan
         return Summary(0, nan, nan, nan, nan, nan, nan, (nan, nan), (nan, nan))
     share = float((values <= TOLERANCE).mean())
-    # The share of a resample is binomial: drawing it needs no resample.
+    # The share of a resample is binomial, so it is drawn directly.
     shares = rng.binomial(n, share, size=resamples) / n
     return Summary(
         n=n,
@@ -131,15 +131,15 @@ def paired_difference(
         One number for each pair, shape (n,) each, in the same order. Pairs with a NaN or an
         infinite number are dropped and counted.
     seed
-        Seed of the resampling: equal input gives equal output.
+        Seed of the resampling: equal input has equal output.
     resamples
         Resamples of the bootstrap, >= 1.
 
     Returns
     -------
     PairedDifference
-        First minus second. Differences up to 1e-9 are rounding: the test leaves them out, as it
-        does zeros.
+        First minus second. Differences up to 1e-9 are rounding: the test leaves them out like
+        zeros.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def distance_buckets(optima_m: ArrayLike, *, edges: ArrayLike | None = None) -> 
 
 
 def thrun_count(n_nodes: float, mean_plan_length: float) -> float:
-    """Cost of planning counted in value-iteration backups: nodes times mean plan length.
+    """Return the cost of planning in value-iteration backups: nodes times mean plan length.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The planner that the presets configure, and what may be closed for one of its queries.
+"""The planner that the presets configure, and the closures for single queries.
 
 Names load on first use: alternatives and what is closed load shapely.
 """

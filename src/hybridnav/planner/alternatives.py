@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 MOST = 20
-"""Alternatives that may be asked for."""
+"""Most alternatives of one query."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,18 +33,18 @@ class Alternative:
 
     path: Path
     word: Word
-    """Reduced word of its homotopy class; the same for paths that differ by cells alone."""
+    """Reduced word of its homotopy class; equal for paths that differ only by cells."""
 
 
 @dataclass(frozen=True, eq=False)
 class Alternatives(Sequence[Alternative]):
-    """Paths of different classes, the shortest first, and whether there may be more."""
+    """Paths of different classes, the shortest first, and whether they are complete."""
 
     found: tuple[Alternative, ...]
-    """The paths; none where no path exists."""
+    """The paths; none if no path exists."""
     complete: bool
-    """Whether there are as many as were asked for, or all there are: False where the search gave
-    up, so that there may be more."""
+    """Whether these are as many as requested, or all that exist; False if the search gave up, so
+    that there may be more."""
 
     @overload
     def __getitem__(self, index: int) -> Alternative: ...
@@ -53,11 +53,11 @@ class Alternatives(Sequence[Alternative]):
     def __getitem__(self, index: slice) -> tuple[Alternative, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Alternative | tuple[Alternative, ...]:
-        """One of them, or some."""
+        """Return one alternative, or some."""
         return self.found[index]
 
     def __len__(self) -> int:
-        """How many were found."""
+        """Return the number of paths found."""
         return len(self.found)
 
 
@@ -74,30 +74,30 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
 ) -> Alternatives:
     """Plan paths of different homotopy classes: by another door, on the other side of an obstacle.
 
-    Octile paths, whatever the preset: of the classes only the lengths of cell paths are known. The
-    first is a shortest one, the planner's own where that is octile and shortest. The others follow
-    by length, each a shortest path of its class. Paths that wind are left out: those that, once
-    they have circled a hole, come back to where they were, or within sight of it along a row or a
-    column, nearer than the side of a square hole of the least area (one cell at least, 1 m at most,
-    half the shortest path at most).
+    The paths are octile for every preset, because only the lengths of cell paths are known for
+    classes. The first is a shortest one, the planner's own if that is octile and shortest. The
+    others follow by length, each a shortest path of its class. Winding paths are left out: after a
+    circle round a hole they return to an earlier point, or within sight of it along a row or a
+    column, nearer than the side of a square hole of the least area (at least one cell, at most 1 m
+    and half the shortest path).
 
     Parameters
     ----------
     planner
-        Plans a first path; not with OMPL.
+        Planner of the first path; not with OMPL.
     start, goal
         Points `(x, y)` in metres, or names as in `HybridPlanner.plan`.
     count
-        Alternatives at most, the first included, from 1 to 20.
+        Most alternatives, the first included, from 1 to 20.
     least_hole_m2
         Holes of a smaller area do not count: obstacles and, unless they may be entered, unexplored
         islands, with all that they surround, in square metres.
     at
-        Where in a named room; at the cells that make the shortest way short, other ways would have
-        to start and end too.
+        Position in a named room. With `"anywhere"`, all alternatives start and end at the cells
+        that suit the shortest path.
     blocked
-        What is closed for this query, as in `HybridPlanner.plan`. It makes no hole: ways on both
-        sides of a closed area are of one class where nothing else lies between them.
+        Closures for this query, as in `HybridPlanner.plan`. They make no holes: paths on both sides
+        of a closed area are of one class if nothing else lies between them.
     most_states
         Pairs of a cell and a class that are looked at before the search gives up, from 1 to 2^26;
         more take more time and memory.
@@ -105,15 +105,14 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
     Returns
     -------
     Alternatives
-        Of different classes, the shortest first; none where no path exists. Fewer than `count`
-        where there are no more, or, `complete` being False, where the search gave up.
+        Paths of different classes, the shortest first; none if no path exists. Fewer than `count`
+        if there are no more, or, with `complete` False, if the search gave up.
 
     Raises
     ------
     InvalidValueError
-        When the count is no whole number or out of range, the area is, an end is not valid, what
-        is blocked is not on the map, the planner refines with OMPL, or its grid allows corner
-        cutting.
+        When the count or the area is out of range, an end is not valid, a closed item is not on the
+        map, the planner refines with OMPL, or its grid allows corner cutting.
     """
     wanted = _checked(count)
     if planner.preset.planner.refine == "ompl":
@@ -138,7 +137,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
     length_cells = path_length_in_cells(own.cells)
     if result.metric == "octile" and length_cells <= found.shortest_cells * (1 + 1e-12):
         alternatives[search.classes.word_of_path(own.cells)] = own
-    elif not found.paths:  # it gave up before it came to the goal
+    elif not found.paths:  # the search gave up before it reached the goal
         enterable = topology.grid.enterable(allow_unexplored=allowed)
         grid_search = GridSearch(enterable, corner_cutting=False)
         cells = grid_search.search(first, last, blocked=flat).cells

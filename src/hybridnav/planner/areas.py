@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 _SHAPES = ("Polygon", "MultiPolygon", "LineString", "LinearRing", "MultiLineString")
 _FEWEST_POINTS = 3
 _SLACK_CELLS = 1e-6
-"""Depth to which rounding alone may take an area into a cell: 50 nm of a cell of 5 cm, where
-coordinates 1,000 km from the frame's origin are known to 0.1 nm."""
+"""Greatest depth of an area in a cell by rounding alone: 50 nm in a cell of 5 cm, where coordinates
+1,000 km from the frame's origin are exact to 0.1 nm."""
 _FARTHEST_CELLS = 1e12
-"""Coordinates beyond this many cells from the map are taken for a mistake."""
+"""Cells from the map beyond which coordinates count as a mistake."""
 _CHUNK = 1 << 16
-"""Squares compared with an area in one call; together with the answer it bounds the memory."""
+"""Squares compared with an area in one call, which bounds the memory."""
 _QUARTERS = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
 
 
@@ -36,7 +36,7 @@ def checked_area(area: BaseGeometry | ArrayLike) -> BaseGeometry:
     Raises
     ------
     InvalidValueError
-        When it is not.
+        When the area is not like that.
     """
     shape = area if isinstance(area, BaseGeometry) else _polygon(area)
     if shape.geom_type not in _SHAPES:
@@ -76,7 +76,7 @@ def runs_of(area: BaseGeometry, grid: OccupancyGrid) -> LongArray:
     Raises
     ------
     InvalidValueError
-        When it closes none.
+        When the area closes no cell.
     """
     radius_cells = grid.robot_radius_m / grid.resolution_m
     parts = parts_on(area, grid)
@@ -92,7 +92,7 @@ def parts_on(area: BaseGeometry, grid: OccupancyGrid) -> list[BaseGeometry]:
     Raises
     ------
     InvalidValueError
-        When none comes as near to the map as the robot's radius.
+        When no part comes as near to the map as the robot's radius.
     """
     parts = _in_cells(area, grid.frame)
     whole = shapely.box(0, 0, grid.shape[1], grid.shape[0])
@@ -126,17 +126,17 @@ def _in_cells(area: BaseGeometry, frame: Frame) -> list[BaseGeometry]:
 def _runs_near(part: BaseGeometry, shape: tuple[int, int], radius_cells: float) -> LongArray:
     """Find the flat cells that an area closes, as runs `[start, stop)`, shape (n, 2).
 
-    Squares of cells are quartered as long as the area closes some of their cells and may not close
-    all: work goes with the outline of the area, not with its inside. Distances are exact, where a
-    shapely buffer would cut its arcs short.
+    Squares of cells are quartered as long as the area closes some of their cells and may leave
+    others open: the work grows with the outline of the area, not with its inside. Distances are
+    exact, while a shapely buffer would cut its arcs short.
     """
     left, bottom, right, top = shapely.bounds(part).tolist()
     margin = radius_cells + 1
     low = np.floor(np.clip([bottom - margin, left - margin], 0, shape)).astype(np.int64)
     high = np.ceil(np.clip([top + margin, right + margin], 0, shape)).astype(np.int64)
     shapely.prepare(part)
-    # An area closes cells that it enters deeper than rounding may take it. What is as thin as that
-    # might slip between cells: for it their squares are half open and leave no gap.
+    # An area closes cells that it enters deeper than by rounding. A thinner area might slip between
+    # cells: for it their squares are half open and leave no gap.
     thin = radius_cells == 0 and shapely.is_empty(shapely.buffer(part, -2 * _SLACK_CELLS))
     slack = np.array([-_SLACK_CELLS if thin else _SLACK_CELLS, -_SLACK_CELLS])
     runs = [np.empty((0, 2), dtype=np.int64)]
@@ -158,10 +158,10 @@ def _runs_near(part: BaseGeometry, shape: tuple[int, int], radius_cells: float) 
 
 
 def _near(part: BaseGeometry, low: FloatArray, high: FloatArray, radius_cells: float) -> BoolArray:
-    """Whether boxes come as near to an area as a radius.
+    """Return whether boxes come as near to an area as a radius.
 
-    `intersects`, `covers` and `dwithin` are the predicates that a prepared geometry answers from
-    its index; `relate` would tell inside from rim, but the slack on the boxes does that already.
+    A prepared geometry answers `intersects`, `covers` and `dwithin` from its index; `relate` would
+    separate inside from rim, but the slack on the boxes does that already.
     """
     boxes = shapely.box(low[:, 1], low[:, 0], high[:, 1], high[:, 0])
     if radius_cells == 0:
@@ -172,7 +172,7 @@ def _near(part: BaseGeometry, low: FloatArray, high: FloatArray, radius_cells: f
 def _near_throughout(
     part: BaseGeometry, low: FloatArray, high: FloatArray, radius_cells: float
 ) -> BoolArray:
-    """Whether all points of boxes are surely as near to an area as a radius."""
+    """Return whether all points of boxes are certainly as near to an area as a radius."""
     inside = shapely.covers(part, shapely.box(low[:, 1], low[:, 0], high[:, 1], high[:, 0]))
     reach = radius_cells - np.hypot(*(high - low).T) / 2
     middles = shapely.points((low + high)[:, ::-1] / 2)
@@ -183,7 +183,7 @@ def _near_throughout(
 
 
 def _rows_of(first: LongArray, last: LongArray, cols: int) -> LongArray:
-    """Rows of rectangles of cells as runs of flat cells."""
+    """Return the rows of rectangles of cells as runs of flat cells."""
     heights = last[:, 0] - first[:, 0]
     which = np.repeat(np.arange(len(first)), heights)
     down = np.arange(len(which)) - (np.cumsum(heights) - heights)[which]
@@ -192,5 +192,5 @@ def _rows_of(first: LongArray, last: LongArray, cols: int) -> LongArray:
 
 
 def shown(value: object) -> str:
-    """Return a value in one short line, as messages quote it."""
+    """Return a value in one short line, for messages."""
     return " ".join(f"{value!r:.80}".split())

@@ -1,4 +1,4 @@
-"""Many queries at once: in one kernel what look-ups answer, one by one what is left."""
+"""Many queries at once: those that look-ups answer in one kernel, the others one by one."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ def plan_many(
     smooth: Smooth,
     closed: ClosedCells | None,
 ) -> PlanBatch:
-    """Return what `planner.plan` answers to each pair of points, in arrays.
+    """Return the answers of `planner.plan` to pairs of points, in arrays.
 
     Parameters
     ----------
     planner
-        Plans what is left.
+        Planner of the remaining queries.
     cell_planner
-        Answers what it can alone; None leaves all to `planner`.
+        Planner for many queries at once; None leaves all to `planner`.
     ends
         Starts and goals, float64 (n, 2) each, or poses (n, 3).
     smooth
         `"none"` or `"line-of-sight"`.
     closed
-        What is closed; None for nothing.
+        Closed cells; None for none.
     """
     starts, goals = ends
     n, grid = len(starts), planner.topology.grid
@@ -91,8 +91,10 @@ def _met(
     ends: tuple[LongArray, LongArray],
     grid: OccupancyGrid,
 ) -> BoolArray:
-    """Which answers meet what is closed, with an end or, where paths are of cells, on the way;
-    bool (n,)."""
+    """Return which answers meet closed cells, bool (n,).
+
+    They meet them with an end or, if paths are of cells, on the path.
+    """
     across = np.array([grid.shape[1], 1])
     met: BoolArray = closed.holds(ends[0] @ across) | closed.holds(ends[1] @ across)
     if found.metric != "octile":
@@ -104,7 +106,7 @@ def _met(
 
 
 def _are_free(planner: HybridPlanner, cells: LongArray) -> BoolArray:
-    """Whether cells (n, 2) lie on the map and are free."""
+    """Return whether cells (n, 2) lie on the map and are free."""
     classes = planner.topology.grid.classes
     inside = ((cells >= 0) & (cells < classes.shape)).all(axis=1)
     free = np.zeros(len(cells), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""What is closed for one query, and the cells that it takes away."""
+"""Closures for one query, and the cells that they close."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ if TYPE_CHECKING:
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class Blocked:
-    """What is closed for one query: doors, rooms, arcs, places, cells, and areas in metres.
+    """Closures for one query: doors, rooms, arcs, places, cells, and areas in metres.
 
-    Areas are obstacles: the robot keeps its radius (`grid.robot_radius_m`) off them, as it does off
-    occupied cells. All else closes cells as they are: the middle of the robot does not enter them.
-    Whatever is given must be on the map: an unknown number or name, and an area that closes no cell
-    of the map, are refused. `first | second` closes what either closes.
+    Areas are obstacles: the robot keeps its radius (`grid.robot_radius_m`) off them, as off
+    occupied cells. Everything else closes single cells: the centre of the robot does not enter
+    them. All items must be on the map: an unknown number or name, and an area that closes no cell
+    of the map, are refused. `first | second` is the union of two closures.
 
     Parameters
     ----------
     arcs
         Ids of arcs of the places, or a `LevelArc` for an arc of any level. No move crosses the
-        boundary of a closed arc: of each two cells that face each other across it one is closed.
-        Which ones is chosen to keep other arcs open (a second door between the same places), then
-        to cost few free cells, closed or cut off from the rest of their place; only a cell that two
-        doors share may close both. Moves past a point where four places meet lie on no boundary. A
+        boundary of a closed arc: one of each two cells that face each other across it is closed.
+        The choice first keeps other arcs open (a second door between the same places), then loses
+        few free cells, closed or cut off from the rest of their place; only a cell that two doors
+        share may close both. Moves past a point where four places meet lie on no boundary. A
         self-loop joins a place to itself and cannot be closed.
     places
         Ids of places; all the cells of their receptive fields are closed.
@@ -50,13 +50,13 @@ class Blocked:
         Each a shapely `Polygon`, `MultiPolygon`, `LineString` or `MultiLineString`, or the corners
         of a polygon as `(x, y)`, shape (n, 2); metres, map frame. Holes stay open. A cell is closed
         when the inside of its square lies nearer than the robot's radius to the area, or, with a
-        radius of 0, meets it. A line has no inside: with a radius of 0 a line along a side between
-        two cells closes the one with the higher index (as `Frame.cells_of` does), so that no path
-        passes a line wherever it is drawn.
+        radius of 0, meets it. A line has no inside: with a radius of 0, a line along a side between
+        two cells closes the cell with the higher index (as in `Frame.cells_of`), so that no path
+        passes a line at any position.
     doors
         Numbers of doors, or `Door` objects of this map: no move crosses their boundaries, which
-        close as those of arcs do. Other doors between the same rooms stay open. Where corners may
-        be cut, all cells on both sides close. A diagonal between two cells that were measured as
+        close like those of arcs. Other doors between the same rooms stay open. If corners may be
+        cut, all cells on both sides close. A diagonal between two cells that were measured as
         occupied crosses no door.
     rooms
         Names of rooms; all their cells are closed.
@@ -88,7 +88,7 @@ class Blocked:
             object.__setattr__(self, name, value)
 
     def __or__(self, other: Blocked) -> Blocked:
-        """Close what either closes."""
+        """Return the union of two closures."""
         if not isinstance(other, Blocked):
             return NotImplemented
         both = {
@@ -101,7 +101,7 @@ class Blocked:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What is equal where the same is closed, to look things up by."""
+        """Key for look-ups, equal for equal closures."""
         areas = tuple(area.wkb for area in cast("Sequence[BaseGeometry]", self.polygons))
         cells = np.asarray(self.cells).tobytes()
         return tuple(self.arcs), tuple(self.places), cells, areas, self.doors, self.rooms
@@ -152,7 +152,7 @@ class Blocked:
         return [np.flatnonzero(np.isin(labels.label_of, closed))]
 
     def _on_boundaries(self, topology: TopologicalMap) -> list[LongArray]:
-        """Cells of arcs and doors, level by level, so that none is spared that is closed too."""
+        """Return the cells of arcs and doors, level by level, so that no closed arc is spared."""
         places = topology.pyramid.place_level if self.arcs or self.doors else 0
         ids = [arc for arc in self.arcs if not isinstance(arc, LevelArc)]
         closed = [LevelArc(places, arc) for arc in _found("arc", ids, topology.arc_ids).tolist()]
@@ -163,7 +163,7 @@ class Blocked:
         doors = [_door_on(topology.rooms, door) for door in self.doors]
         whole = []
         if topology.grid.corner_cutting:
-            # Where inflation took both cells beside a diagonal, it crosses the door on no arc.
+            # A diagonal between two cells closed by inflation crosses the door on no arc.
             whole = [topology.rooms.cells_beside(door.number) for door in doors]
         else:
             closed += [arc for door in doors for arc in door.arcs]
@@ -178,12 +178,12 @@ class Blocked:
 
 
 Closable = Blocked | Door | BaseGeometry | Mapping[str, Any]
-"""What a planner accepts as `blocked`: a `Blocked`, one door, one area, or a mapping from the names
-of the fields of a `Blocked`."""
+"""Types that a planner accepts as `blocked`: a `Blocked`, one door, one area, or a mapping from the
+names of the fields of a `Blocked`."""
 
 
 def as_blocked(value: Closable) -> Blocked:
-    """Read what is closed from any form that a caller may give it in.
+    """Convert any accepted form of closures to a `Blocked`.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def as_blocked(value: Closable) -> Blocked:
     Raises
     ------
     InvalidValueError
-        When it is of another kind, has other names, or its content is not valid.
+        When the value is of another kind, has other names, or invalid content.
     """
     if isinstance(value, Blocked):
         return value
@@ -215,7 +215,7 @@ def as_blocked(value: Closable) -> Blocked:
 
 
 def _door_on(rooms: Rooms, door: int | Door) -> Door:
-    """The door of a map that a number or a door means."""
+    """Return the door of a map for a number or a door."""
     if not isinstance(door, Door):
         return rooms.door(door)
     own = rooms.door(door.number)
@@ -294,7 +294,7 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
 
 
 def _found(what: str, ids: Sequence[int], known: LongArray) -> LongArray:
-    """Dense indices of ids."""
+    """Return the dense indices of ids."""
     if not ids:
         return np.empty(0, dtype=np.int64)
     wanted = np.unique(ids)
@@ -316,7 +316,7 @@ def _inside(cells: LongArray, shape: tuple[int, int]) -> LongArray:
 
 
 def _cells_in_runs(runs: LongArray) -> LongArray:
-    """Union of runs, expanded; nothing larger than the answer is made."""
+    """Return the cells of the union of runs, without arrays larger than the result."""
     if not len(runs):
         return np.empty(0, dtype=np.int64)
     start, stop = runs[np.argsort(runs[:, 0])].T

@@ -35,14 +35,14 @@ def cells_on_boundaries(level: Level, arcs: LongArray) -> list[LongArray]:
     Raises
     ------
     InvalidValueError
-        When one is a self-loop.
+        When an arc is a self-loop.
     """
     grid = level.grid
     cols = grid.shape[1]
     loops = arcs[level.is_self_loop[arcs]]
     if len(loops):
         raise InvalidValueError(
-            f"arc {loops[0]} of level {level.index} is a self-loop, closing it would part nothing; "
+            f"arc {loops[0]} of level {level.index} is a self-loop, which separates nothing; "
             "close the place or cells instead"
         )
     closed = []
@@ -66,8 +66,8 @@ def cells_on_boundaries(level: Level, arcs: LongArray) -> list[LongArray]:
 
 
 def _choices(pairs: LongArray, others: list[LongArray]) -> list[LongArray]:
-    """Either side of a boundary, and from each pair the cell that is less to other boundaries."""
-    # The share of each other boundary that a cell closes, summed: a door of one cell counts 1.
+    """Return both sides of a boundary, and the cell of each pair that matters less to others."""
+    # Sum over other boundaries of the share that a cell closes: a door of one cell counts 1.
     cells = np.concatenate([pairs[:0].ravel(), *(other.ravel() for other in others)])
     shares = np.concatenate([[], *(np.full(other.size, 1 / len(other)) for other in others)])
     known, place = np.unique(np.concatenate([pairs.ravel(), cells]), return_inverse=True)
@@ -91,7 +91,7 @@ class _Field:
         self._size = len(rows)
 
     def lost(self, closed: LongArray) -> int:
-        """Cells that are closed, or cut off from most of the field by closed ones."""
+        """Return the number of cells that are closed, or cut off from most of the field."""
         from scipy import ndimage  # noqa: PLC0415 - half a second that areas and cells do not need
 
         rows, cols = closed // self._n_cols - self._corner[0], closed % self._n_cols
@@ -107,7 +107,10 @@ class _Field:
 def _cost_of(
     fields: list[_Field], closed: LongArray, others: list[LongArray]
 ) -> tuple[int, int, int]:
-    """Other arcs closed as well; free cells, and all cells, closed or cut off from their field."""
+    """Return the number of other arcs closed too, and of free and of all cells lost.
+
+    Cells are lost if they are closed or cut off from their field.
+    """
     pairs = np.concatenate([closed[:0].reshape(0, 2), *others])
     of_arc = np.repeat(np.arange(len(others)), [len(other) for other in others])
     is_shut = np.isin(pairs, closed).any(axis=1)

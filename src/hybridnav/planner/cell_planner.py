@@ -1,4 +1,4 @@
-"""Which planner of cell paths a preset asks for."""
+"""The planner of cell paths for a preset."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ def cell_planner(
     settings: PlannerSettings,
     prepared: Prepared | None,
 ) -> CellPlanner:
-    """Make the planner of cell paths that settings ask for.
+    """Make the planner of cell paths for some settings.
 
     Parameters
     ----------
     topology
         The map.
     refiner
-        Finds paths of cells.
+        Search of cell paths.
     settings
         Section `planner` of a preset.
     prepared
-        What another planner of the same map and settings has built; None for nothing.
+        Structures that another planner of the same map and settings has built; None for none.
 
     Raises
     ------
     InvalidValueError
-        When these settings use nothing of the kind that is given.
+        When these settings do not use structures of the given kind.
     """
     grid, coarse = topology.grid, settings.coarse
     if coarse == "portals":

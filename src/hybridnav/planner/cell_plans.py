@@ -1,4 +1,4 @@
-"""How the presets find cell paths: over the whole map, by max-distance arcs, over portals."""
+"""Planners of cell paths: over the whole map, by max-distance arcs, over portals."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ Cell = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class CellPlan:
-    """A path between two cells, None for its cells where there is none."""
+    """A path between two cells; its cells are None if there is none."""
 
     cells: LongArray | None
     metric: Metric = "octile"
     points: FloatArray | None = None
-    """Centres of the cells, where they are known already, or the points of an any-angle path."""
+    """Centres of the cells, if known already, or the points of an any-angle path."""
     length_cells: float | None = None
-    """Length of the path, where it is known already."""
+    """Length of the path, if known already."""
     bound_cells: float = 0.0
-    """No path is shorter; in cells."""
+    """Lower bound on the length of all paths, in cells."""
     route_source: Callable[[], Route] | None = None
     expanded: int = 0
     expanded_places: int = 0
@@ -62,32 +62,32 @@ class CellPlans:
     """Paths of many queries, arrays of n."""
 
     is_done: BoolArray
-    """bool (n,), whether the answer is that of `plan`; False where that is yet to be asked."""
+    """bool (n,), whether the answer is that of `plan`; False if `plan` must still be called."""
     metric: Metric
     cost_m: FloatArray
-    """float64 (n,), lengths in metres, infinite where there is no path."""
+    """float64 (n,), lengths in metres, infinite if there is no path."""
     lower_bound_m: FloatArray
     path_start: LongArray
-    """int64 (n + 1,), where the points of each path begin."""
+    """int64 (n + 1,), offsets of the points of each path."""
     points: FloatArray
     """float64 (m, 2), (x, y) in metres, map frame."""
 
 
 class CellPlanner(Protocol):
-    """Plans between two cells that may be entered."""
+    """Planner between two cells that may be entered."""
 
     @property
     def prepared(self) -> Prepared | None:
-        """What is built for queries and worth to be kept, None while there is nothing."""
+        """The structure for queries that is worth keeping, None until it is built."""
         ...
 
     def prepare(self, progress: Progress = no_progress) -> object:
-        """Build what queries need, once, and report each step; the first query does it
-        otherwise."""
+        """Build the structures for queries, once, and report each step; else the first query does
+        it."""
         ...
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
-        """Find a path, as good as the preset asks for."""
+        """Find a path of the quality that the preset requires."""
         ...
 
 
@@ -99,7 +99,7 @@ class WholeMap:
 
     @property
     def prepared(self) -> None:
-        """Nothing: the legal moves of cells are found in no time; see `CellPlanner`."""
+        """None, because the legal moves of cells are quick to find; see `CellPlanner`."""
         return
 
     def prepare(self, progress: Progress = no_progress) -> object:
@@ -121,8 +121,8 @@ class WholeMap:
 class MaxDistance:
     """The cheapest coarse route by max-distance arcs, and grid A* in its corridor.
 
-    Where corners may be cut a path can pass between fields that no arc joins, so that a missing
-    route proves nothing: the whole map is searched then.
+    If corners may be cut, a path can pass between fields that no arc joins, so that a missing route
+    proves nothing: then the whole map is searched.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class MaxDistance:
 
     @property
     def prepared(self) -> None:
-        """Nothing: what it searches belongs to the topological map; see `CellPlanner`."""
+        """None, because the searched graph belongs to the topological map; see `CellPlanner`."""
         return
 
     def prepare(self, progress: Progress = no_progress) -> MaxDistanceSearch:
@@ -223,7 +223,7 @@ class OverPortals:
 
     @property
     def search(self) -> PortalSearch:
-        """What finds the ways, built if it was not."""
+        """The search over portals, built on first use."""
         return self.prepare()
 
     def plan(self, start: Cell, goal: Cell) -> CellPlan:
@@ -246,7 +246,7 @@ class OverPortals:
         )
 
     def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
-        """The same for many pairs of cells, int64 (n, 2) each, as far as look-ups answer them."""
+        """Plan many pairs of cells, int64 (n, 2) each, as far as look-ups answer them."""
         epsilon = self._settings.epsilon or 0.0
         found = self.search.many(starts, goals, epsilon=epsilon)
         per_cell = self._topology.grid.resolution_m

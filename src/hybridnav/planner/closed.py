@@ -1,4 +1,4 @@
-"""The cells that are closed for some queries, and paths that meet them."""
+"""The cells that are closed for some queries, and tests of paths against them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 
 _KEPT = 16
-"""Closures whose cells are kept: those of a door of a large room take some 10 ms to find."""
+"""Number of closures whose cells are kept: a door of a large room takes some 10 ms."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedCells:
-    """What is closed on one map, found once for several queries."""
+    """The closed cells of one map, computed once for several queries."""
 
     flat: LongArray
     """int64 (n,), flat cells, sorted, each once."""
@@ -38,14 +38,14 @@ class ClosedCells:
         return found
 
     def meets(self, cells: LongArray, grid: OccupancyGrid) -> bool:
-        """Whether a path stands on a closed cell, or passes one on a diagonal where that counts.
+        """Return whether a path stands on a closed cell, or illegally passes one on a diagonal.
 
         Parameters
         ----------
         cells
             int64 (n, 2), legal moves.
         grid
-            The map; where its corners may be cut diagonals need no side cells.
+            The map; if its corners may be cut, diagonals need no side cells.
         """
         cols = grid.shape[1]
         flat = cells[:, 0] * cols + cells[:, 1]
@@ -55,7 +55,7 @@ class ClosedCells:
         return bool(self.holds(flat).any())
 
     def refusal(self, cells: tuple[Cell, Cell], shape: tuple[int, int]) -> PlanStatus | None:
-        """Return the status of a query whose start or goal is closed, None where neither is."""
+        """Return the status of a query whose start or goal is closed, None if neither is."""
         shut = self.holds(np.array(cells) @ [shape[1], 1])
         if not shut.any():
             return None
@@ -64,12 +64,12 @@ class ClosedCells:
 
 @copies_alike
 class Closures:
-    """The cells that were closed for the last queries, so that the next ones need not find them.
+    """A cache of the cells that were closed for the last queries.
 
     Parameters
     ----------
     topology
-        The map that they are closed on.
+        The map of the closures.
     """
 
     def __init__(self, topology: TopologicalMap) -> None:
@@ -77,8 +77,8 @@ class Closures:
         self._known: dict[object, ClosedCells] = {}
 
     def of(self, blocked: Closable) -> ClosedCells:
-        """Return the cells that may not be entered when this is closed."""
-        # Loads shapely, which most queries can do without.
+        """Return the cells that a closure closes."""
+        # Loads shapely, which most queries do not need.
         from hybridnav.planner.blocked import as_blocked  # noqa: PLC0415
 
         closed = as_blocked(blocked)
@@ -86,7 +86,7 @@ class Closures:
         found = self._known.get(key)
         if found is None:
             found = self._known[key] = ClosedCells(closed.cells_of(self._topology))
-            # Without a lock: threads may find the same twice.
+            # Without a lock: two threads may compute the same cells.
             for old in list(self._known)[:-_KEPT]:
                 self._known.pop(old, None)
         return found

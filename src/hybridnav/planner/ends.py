@@ -1,4 +1,4 @@
-"""Starts and goals as they are given, checked."""
+"""Checks of starts and goals."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _REFUSED = (
 def cells_of_ends(
     grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
 ) -> tuple[Cell, Cell] | PlanStatus:
-    """Find the cells that hold start and goal, or what is wrong with one of them."""
+    """Return the cells of start and goal, or the status of one that is not valid."""
     (x, y), (goal_x, goal_y) = points[0].tolist(), points[1].tolist()
     cells = grid.frame.cell_of(x, y), grid.frame.cell_of(goal_x, goal_y)
     classes = grid.classes
@@ -54,7 +54,7 @@ def cells_of_ends(
 
 
 def _numbers(given: ArrayLike) -> FloatArray:
-    """Float64, one NaN for what is no number."""
+    """Convert to float64; a single NaN for a value that is not numeric."""
     try:
         return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -62,7 +62,7 @@ def _numbers(given: ArrayLike) -> FloatArray:
 
 
 def read_point(name: str, point: ArrayLike) -> FloatArray:
-    """A position, float64 (2,)."""
+    """Return a position, float64 (2,)."""
     xy = _numbers(point)
     if xy.shape != (2,) or not (math.isfinite(xy[0]) and math.isfinite(xy[1])):
         raise InvalidValueError(
@@ -72,7 +72,7 @@ def read_point(name: str, point: ArrayLike) -> FloatArray:
 
 
 def read_pose(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray:
-    """Position and heading, float64 (3,); the heading is 0 where none is needed or given."""
+    """Return a position and heading, float64 (3,); the heading is 0 if none is needed or given."""
     pose = _numbers(given)
     if pose.size != 3 and not needs_heading:  # noqa: PLR2004
         return np.append(read_point(name, given), 0.0)
@@ -85,7 +85,7 @@ def read_pose(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray
 
 
 def read_points(name: str, points: ArrayLike, *, needs_heading: bool = False) -> FloatArray:
-    """Positions, float64 (n, 2), or with headings (n, 3); n may be 0."""
+    """Return positions, float64 (n, 2), or with headings (n, 3); n may be 0."""
     rows, width = _numbers(points), 3 if needs_heading else 2
     if rows.shape in {(0,), (0, width)}:
         return np.empty((0, width))

@@ -1,4 +1,4 @@
-"""The way in words: rooms and doors passed, metres per leg."""
+"""Paths in words: rooms and doors passed, metres per leg."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ if TYPE_CHECKING:
     from hybridnav.topology import Door, Rooms
 
 _LOOK_M = 1.5
-"""How far before and behind a door the headings are taken that make a turn."""
+"""Distance before and behind a door at which headings are compared for a turn."""
 _TURN_RAD = math.radians(40.0)
 _SLIVER_M = 0.5
 _AT_ONCE_M = 0.1
 NOWHERE = "unnamed space"
-"""What people are told of cells that lie in no room."""
+"""Description of cells outside rooms."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """The part of a way inside one room."""
+    """The part of a path inside one room."""
 
     room: str | None
-    """The room's name, None for what lies in no room."""
+    """Name of the room, None outside rooms."""
     length_m: float
     door: Door | None = None
-    """The door by which it leaves; None on the last leg, and where it leaves by a boundary that is
-    no door (to or from unexplored cells)."""
+    """The door at the end of the leg; None on the last leg, and at a boundary that is no door (to
+    or from unexplored cells)."""
     turn: str = ""
     """`"left"` or `"right"` behind the door, empty for straight on."""
     stop: str | None = None
-    """What is reached at its end: the name or the coordinates of a stop."""
+    """Stop at the end of the leg: its name or its coordinates."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """Return the plain values for JSON."""
         return {
             "room": self.room,
             "length_m": self.length_m,
@@ -55,12 +55,12 @@ class Leg:
 
 
 class Guide:
-    """Tells ways on a map with rooms.
+    """Descriptions of paths on a map with rooms.
 
     Parameters
     ----------
     rooms
-        The rooms; where their doors cross is computed here, once.
+        The rooms; the crossings of their doors are computed once.
     """
 
     def __init__(self, rooms: Rooms) -> None:
@@ -73,15 +73,15 @@ class Guide:
         Parameters
         ----------
         path
-            A cell path, or an any-angle one: its legs share its length in the proportion of those
-            of the cell path that was shortened.
+            A cell path, or an any-angle one, whose length is divided in the proportions of its cell
+            path.
         stop
-            What is reached at its end.
+            Stop at the end of the path.
 
         Returns
         -------
         list of Leg
-            At least one; their lengths add up to the path's.
+            At least one leg; the lengths sum to that of the path.
         """
         rooms, cells = self._rooms, path.cells
         vertices, arcs, steps = self._walks.crossings(cells)
@@ -93,7 +93,7 @@ class Guide:
         for number, (arc, step) in enumerate(zip(arcs, steps, strict=True)):
             if labels[number] == labels[number + 1]:
                 continue
-            # A diagonal past the corner of a third room crosses twice, both times at its middle.
+            # A diagonal past the corner of a third room crosses two boundaries, both at its middle.
             ended = (along[step] + along[step + 1]) / 2
             legs.append(
                 Leg(
@@ -108,7 +108,7 @@ class Guide:
         return _without_grazes([*legs, Leg(rooms.name_of(labels[-1]), last, stop=stop)])
 
     def _turn(self, cells: LongArray, along: FloatArray, step: int) -> str:
-        """Which way a path bends at a step, seen over a few metres."""
+        """Return the side to which a path bends at a step, over a few metres."""
         reach = _LOOK_M / self._rooms.grid.resolution_m
         before = int(np.searchsorted(along, along[step] - reach))
         behind = int(np.searchsorted(along, along[step + 1] + reach))
@@ -123,8 +123,10 @@ class Guide:
 
 
 def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:
-    """Join what lies on both sides of a leg that only touches a room: it enters by a door and comes
-    back by the same one within half a metre."""
+    """Join the legs on both sides of a leg that only touches a room.
+
+    Such a leg enters by a door and returns by the same one within half a metre.
+    """
     kept: list[Leg] = []
     for leg in legs:
         kept.append(leg)
@@ -138,7 +140,7 @@ def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:
 
 
 def in_words(legs: Sequence[Leg]) -> list[str]:
-    """Tell a way to a person, one line a leg.
+    """Return a description of a path for a person, one line a leg.
 
     Parameters
     ----------
@@ -158,7 +160,7 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
         elif following is None:
             lines.append(f"{metres} to the goal in {leg.room or NOWHERE}")
         elif _is_sliver(following):
-            carried_m = length_m  # who passes a threshold without a name need not hear of it
+            carried_m = length_m  # a threshold without a name is not mentioned
         else:
             into = f"into {following.room or NOWHERE}"
             if leg.door is not None:
@@ -171,5 +173,5 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
 
 
 def _is_sliver(leg: Leg) -> bool:
-    """Whether a leg is too short to speak of: across a gap between two outlines."""
+    """Return whether a leg is too short to mention, as across a gap between two outlines."""
     return leg.room is None and leg.stop is None and leg.length_m < _SLIVER_M

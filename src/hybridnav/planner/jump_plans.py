@@ -1,4 +1,4 @@
-"""How the preset `octile` plans: exact paths of cells on the jump-point graph of the map."""
+"""Planner of the preset `octile`: exact cell paths on the jump-point graph of the map."""
 
 from __future__ import annotations
 
@@ -24,27 +24,27 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 
 CONTRACTED_FROM = 2000
-"""Corner cells of a graph that is contracted: with fewer the search of the graph itself is as
-fast."""
+"""Least number of corner cells for contraction: in smaller graphs a direct search is as fast."""
 
 
 @copies_alike
 class OverJumps:
-    """Shortest paths of cells; the graph is built when the first query needs it, and contracted at
-    once: later it could be another one of several shortest paths that a query gets.
+    """Shortest paths of cells; the graph is built when the first query needs it.
 
-    Where corners may be cut it does not know all moves: A* searches the whole map then.
+    It is contracted at once, so that a query always gets the same one of several shortest paths.
+
+    If corners may be cut, the graph lacks some moves: then A* searches the whole map.
 
     Parameters
     ----------
     grid
         The map.
     refiner
-        Finds paths where corners may be cut.
+        Search of paths where corners may be cut.
     settings
         Whether unexplored cells may be entered.
     search
-        Of the graph of the same cells, where it is built already.
+        Search of the graph of the same cells, if it is built already.
     """
 
     def __init__(
@@ -102,8 +102,10 @@ class OverJumps:
         )
 
     def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
-        """Find a shortest path for each of many pairs of cells, int64 (n, 2) each, on all cores;
-        none where corners may be cut."""
+        """Find a shortest path for each of many pairs of cells, int64 (n, 2) each, on all cores.
+
+        If corners may be cut, no query is answered here.
+        """
         n = len(starts)
         if self._grid.corner_cutting:
             none, nowhere = np.zeros(n, dtype=np.bool_), np.full(n, np.inf)

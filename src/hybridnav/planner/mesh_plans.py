@@ -1,4 +1,4 @@
-"""How the preset `shortest` plans: exact any-angle paths on the convex mesh of free space."""
+"""Planner of the preset `shortest`: exact any-angle paths on the convex mesh."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Position = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Query:
-    """Ends as cells and as (row, col) in grid units, and what is closed."""
+    """Ends as cells and as (row, col) in grid units, and the closed cells."""
 
     cells: tuple[Cell, Cell]
     positions: tuple[Position, Position]
@@ -41,12 +41,12 @@ class _Query:
 
     @property
     def ends(self) -> tuple[tuple[Cell, Cell], tuple[Position, Position]]:
-        """What a search asks for."""
+        """Return the ends in the form of a search's arguments."""
         return self.cells, self.positions
 
 
 _KEPT = 8
-"""Searches round something closed that are kept for the next queries which close the same."""
+"""Number of searches round closed cells that are kept for queries with equal closures."""
 
 
 @copies_alike
@@ -58,11 +58,11 @@ class OverMesh:
     grid
         The map, without corner cutting.
     refiner
-        Finds paths of cells, for queries whose time is up before the search of the mesh has one.
+        Search of cell paths, for queries whose time is up before the search of the mesh has a path.
     settings
-        Whether unexplored cells may be entered, and how near the optimum is near enough.
+        Whether unexplored cells may be entered, and the accepted distance from the optimum.
     search
-        Of the mesh of the same cells, where it is built already.
+        Search of the mesh of the same cells, if it is built already.
 
     Raises
     ------
@@ -112,7 +112,7 @@ class OverMesh:
         return search
 
     def _on_mesh(self) -> MeshSearch:
-        """The search of the mesh, which is built once."""
+        """Return the search of the mesh, which is built once."""
         if self._search is None:
             with self._building:
                 if self._search is None:
@@ -132,17 +132,17 @@ class OverMesh:
     ) -> CellPlan:
         """Find a shortest path between two points.
 
-        When the preset's time is up, and where it has one and the mesh is not built yet, a path of
-        cells that is shortened by line of sight is the answer, with the bound that is proved.
+        When the preset's time is up, or if it has a time limit and the mesh is not built yet, the
+        answer is a cell path shortened by line of sight, with the proved bound.
 
         Parameters
         ----------
         cells
-            Those that hold them; they may be entered.
+            Cells of the points; they may be entered.
         ends
             `(x, y)` in metres, map frame.
         closed
-            What is closed for this query, the ends not; None for nothing.
+            Closed cells for this query, not including the ends; None for none.
         """
         began = time.perf_counter()
         seconds = {}
@@ -169,11 +169,11 @@ class OverMesh:
             seconds=seconds,
         )
         if points is not None or math.isinf(found.lower_bound_cells):
-            return plan  # a path, or none exists
+            return plan  # a path, or the proof of none
         return self._in_sight(query, ends, plan)
 
     def _found(self, query: _Query) -> tuple[MeshPath, LongArray | None, int]:
-        """What the search of the mesh finds, the cells that it passes, and nodes expanded."""
+        """Return the path of the search of the mesh, its cells, and the nodes expanded."""
         search = self._search
         if search is None:
             bound = math.dist(*query.positions)
@@ -192,7 +192,7 @@ class OverMesh:
                 left_s = max(left_s - (time.perf_counter() - began), 0.0)
             found = detours.path(*query.ends, epsilon=self._epsilon, budget_s=left_s)
             expanded += found.expanded
-            # Closing cells makes no path shorter.
+            # Closed cells make no path shorter.
             bound = max(min(bound, found.length_cells), found.lower_bound_cells)
             found = replace(found, lower_bound_cells=bound)
         return found, self._passed(query, found), expanded
@@ -200,7 +200,7 @@ class OverMesh:
     def _in_sight(
         self, query: _Query, ends: tuple[FloatArray, FloatArray], plan: CellPlan
     ) -> CellPlan:
-        """The shortest path of cells, shortened by line of sight, with the bound of a plan."""
+        """Return the shortest path of cells, shortened by line of sight, with a plan's bound."""
         began = time.perf_counter()
         flat = None if query.closed is None else query.closed.flat
         found = self._refiner.search.search(*query.cells, blocked=flat)
@@ -225,7 +225,7 @@ class OverMesh:
         return self._sight(None)
 
     def _sight(self, closed: LongArray | None) -> LineOfSight:
-        """What shortens paths of cells, with some flat cells closed."""
+        """Return the shortener of cell paths, with some flat cells closed."""
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
     def plan_many(
@@ -236,16 +236,16 @@ class OverMesh:
     ) -> CellPlans:
         """Find a shortest path for each of many pairs of points, on all cores.
 
-        Paths that meet something closed are not done.
+        Queries whose paths meet closed cells stay undone.
 
         Parameters
         ----------
         cells
-            int64 (n, 2), those that hold the starts, and the goals; they may be entered.
+            int64 (n, 2), the cells of the starts, and of the goals; they may be entered.
         points
             float64 (n, 2), starts and goals, `(x, y)` in metres, map frame.
         closed
-            What is closed; None for nothing.
+            Closed cells; None for none.
         """
         positions = self._frame.positions_of(points[0]), self._frame.positions_of(points[1])
         search = self._on_mesh()
@@ -271,13 +271,13 @@ class OverMesh:
         )
 
     def _passed(self, query: _Query, found: MeshPath) -> LongArray | None:
-        """Cells that a path passes, from the start's to the goal's; None without a path."""
+        """Return the cells that a path passes, from start to goal; None without a path."""
         if found.positions is None:
             return None
         passed = cells_of_line(self._free, found.positions)
         if query.closed is not None and query.closed.holds(passed @ self._across).any():
             passed = self._passed_beside(query.closed, found.positions)
-        # An end on a side may be named after the cell behind it.
+        # For an end on a side, the cell behind the side may be listed.
         cells = query.cells
         parts = [passed]
         if tuple(passed[0].tolist()) != cells[0]:
@@ -287,7 +287,7 @@ class OverMesh:
         return passed if len(parts) == 1 else np.concatenate(parts)
 
     def _passed_beside(self, closed: ClosedCells, positions: FloatArray) -> LongArray:
-        """Cells that a path passes along sides of closed ones, without these."""
+        """Return the cells that a path along sides of closed cells passes, without these."""
         low = np.maximum(positions.min(axis=0).astype(np.int64) - 1, 0)
         high = positions.max(axis=0).astype(np.int64) + 2
         free = self._free[low[0] : high[0], low[1] : high[1]].copy()
@@ -297,8 +297,8 @@ class OverMesh:
         return passed
 
     def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
-        """The search round closed cells, which is kept for the next queries."""
-        # By identity: `Closures` returns the same for what is closed again.
+        """Return the search round closed cells, which is cached."""
+        # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
             found = self._detours[closed] = DetourSearch(search, closed.flat)

@@ -1,4 +1,4 @@
-"""Stops with names: which cells they mean, and where a way through rooms stops best."""
+"""Stops with names: their cells, and the best positions of stops in rooms."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 At = Literal["anywhere", "point"]
-"""Where in a named room a way starts or ends."""
+"""Position in a named room at which a path starts or ends."""
 
 _ROUNDING_CELLS = 1e-6
 _FACING_M = 1.0
-"""Length of the way that says which way a robot faces at a stop with a name."""
+"""Length of path that determines the heading of a robot at a stop with a name."""
 
 
 def stop_points(
@@ -41,28 +41,28 @@ def stop_points(
     at: At = "anywhere",
     closed: ClosedCells | None = None,
 ) -> list[ArrayLike]:
-    """Find a point for each stop of a way, so that the way through all of them is shortest.
+    """Return a point for each stop, so that the path through all of them is shortest.
 
     Parameters
     ----------
     planner
-        Says what may be entered.
+        Planner, which determines the cells that may be entered.
     stops
         Two or more points `(x, y)` in metres, names of rooms or of named points that passed
-        `check_names`. Where the planner needs headings points are `(x, y, yaw)`, radians.
+        `check_names`. If the planner needs headings, points are `(x, y, yaw)`, radians.
     at
-        Where in a room: anywhere, or at the room's point.
+        Position in a room: anywhere, or at the room's point.
     closed
         Cells that are closed for this query.
 
     Returns
     -------
     list
-        Points `(x, y)` in metres, map frame; those given stay as they are. Where no way visits all
+        Points `(x, y)` in metres, map frame; given points are unchanged. If no path visits all
         stops, or a point cannot be entered, rooms are represented by their points, and so is a room
-        without a cell at whose centre the robot's footprint fits with any heading. Where the
-        planner needs headings, a name becomes `(x, y, yaw)` and faces the shortest way of cells by
-        which it is reached, the first stop the one by which it is left.
+        without a cell at whose centre the robot's footprint fits with any heading. If the planner
+        needs headings, a name becomes `(x, y, yaw)` and faces along the shortest path of cells that
+        leads to it; the first stop faces along the path that leaves it.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def stop_points(
 
 
 def check_names(topology: TopologicalMap, stops: Sequence[ArrayLike | str]) -> None:
-    """Refuse stops with names that a map cannot use, before anything is computed for the others.
+    """Refuse stops with unusable names, before anything is computed for the others.
 
     Raises
     ------
@@ -97,12 +97,12 @@ def check_names(topology: TopologicalMap, stops: Sequence[ArrayLike | str]) -> N
 
 
 def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLike | str]) -> None:
-    """Refuse names that nothing has, and rooms that the robot does not fit in.
+    """Refuse unknown names, and rooms that the robot does not fit in.
 
     Parameters
     ----------
     rooms
-        The rooms, as read or found: no pyramid is needed.
+        The rooms, read or found; no pyramid is needed.
     grid
         The map, inflated by the robot's radius.
     stops
@@ -111,7 +111,7 @@ def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLik
     Raises
     ------
     InvalidValueError
-        With the name, and the nearest ones that are known.
+        When a stop is refused; the message has the name and the nearest known ones.
     """
     for stop in stops:
         if not isinstance(stop, str) or (stop in rooms.points and stop not in rooms.names):
@@ -124,7 +124,7 @@ def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLik
         if not (grid.classes[rooms.label_of == rooms.index(stop)] == CellClass.FREE).any():
             raise InvalidValueError(
                 f"room {stop!r} has no free cell for this robot radius, {grid.robot_radius_m:g} m: "
-                "give a smaller one, or another room"
+                "choose a smaller one, or another room"
             )
 
 
@@ -135,7 +135,7 @@ def _chosen(
     fixed: list[Any],
     radius_m: float,
 ) -> list[Any]:
-    """The points that are given, and for the rooms between those that make the way shortest."""
+    """Return the given points, and for rooms the points that make the path shortest."""
     if all(point is not None for point in fixed):
         return fixed
     grid = topology.grid
@@ -172,7 +172,7 @@ def _facing_the_way(
     stops: Sequence[ArrayLike | str],
     points: list[Any],
 ) -> list[Any]:
-    """Points whose stops are names with the headings of a shortest way of cells."""
+    """Return the points, with headings along a shortest path of cells for stops with names."""
     grid = topology.grid
     search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
     cells = [_cell_at(topology, enterable, point) for point in points]
@@ -199,14 +199,14 @@ def _steps(grid: OccupancyGrid) -> int:
 
 
 def _heading(grid: OccupancyGrid, way: LongArray) -> float:
-    """Direction of a piece of a way in the map frame; NaN where it leads nowhere."""
+    """Return the direction of a piece of a path in the map frame; NaN if it has no length."""
     points = grid.frame.points_of(way[[0, -1]])
     x, y = (points[1] - points[0]).tolist()
     return math.atan2(y, x) if len(way) > 1 else math.nan
 
 
 def _point_of(topology: TopologicalMap, stop: ArrayLike | str, at: At) -> ArrayLike | None:
-    """The point that a stop means by itself; None for anywhere in a room."""
+    """Return the point of a stop by itself; None for anywhere in a room."""
     if not isinstance(stop, str):
         return stop
     rooms = topology.rooms
@@ -221,8 +221,10 @@ def _cells_in_room(topology: TopologicalMap, enterable: BoolArray, name: str) ->
 
 
 def _radius_m(planner: HybridPlanner) -> float:
-    """Radius of the disc about the base that a robot's footprint stays in; 0 for a disc, which the
-    map was inflated by."""
+    """Return the circumscribed radius of a robot's footprint about its base, in metres.
+
+    It is 0 for a disc, by which the map was inflated.
+    """
     ompl = planner.preset.planner.ompl
     if ompl is None or ompl.footprint is None:
         return 0.0
@@ -233,13 +235,15 @@ def _radius_m(planner: HybridPlanner) -> float:
 
 
 def _where_it_fits(grid: OccupancyGrid, cells: LongArray, radius_m: float) -> LongArray:
-    """Of some flat cells those whose centre no occupied cell, as measured, is nearer to than a
-    radius: there a footprint fits with any heading."""
+    """Return the flat cells whose centres are at least a radius away from measured occupied cells.
+
+    At these centres a footprint fits with any heading.
+    """
     if radius_m <= 0 or not len(cells):
         return cells
     radius_cells = radius_m / grid.resolution_m + _ROUNDING_CELLS
     rows, cols = np.divmod(cells, grid.shape[1])
-    # Farther off nothing matters; the window has a cell of slack on every side.
+    # Cells farther away do not matter; the window has a cell of slack on every side.
     reach = min(math.ceil(radius_cells), max(grid.shape)) + 1
     row, col = max(rows.min() - reach, 0), max(cols.min() - reach, 0)
     window = grid.measured[row : rows.max() + reach + 1, col : cols.max() + reach + 1]
@@ -249,9 +253,10 @@ def _where_it_fits(grid: OccupancyGrid, cells: LongArray, radius_m: float) -> Lo
 
 
 def _to_sides(occupied: BoolArray) -> FloatArray:
-    """Distance from the centre of each cell to the nearest occupied square, in cells, exactly.
+    """Return the exact distance from each cell's centre to the nearest occupied square, in cells.
 
-    On points half a cell apart: each square has its nearest one to any centre among its own nine.
+    It is computed on points half a cell apart: the point of a square nearest to any centre is one
+    of its nine.
     """
     rows, cols = occupied.shape
     within = np.zeros((2 * rows + 1, 2 * cols + 1), dtype=np.bool_)
@@ -262,8 +267,10 @@ def _to_sides(occupied: BoolArray) -> FloatArray:
 
 
 def _cell_at(topology: TopologicalMap, enterable: BoolArray, point: ArrayLike) -> LongArray:
-    """The cell that holds a point, none where it cannot be entered: the status of the plan then
-    names the reason."""
+    """Return the cell of a point, or no cell if it cannot be entered.
+
+    The status of the plan then states the reason.
+    """
     try:
         row, col = topology.grid.frame.cells_of(np.asarray(point)[:2]).tolist()
     except (InvalidValueError, TypeError, ValueError, IndexError):

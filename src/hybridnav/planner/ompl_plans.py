@@ -1,4 +1,4 @@
-"""How the presets with OMPL turn a coarse path into one of the robot's state space."""
+"""Planner of the presets with OMPL: from a coarse path to one in the robot's state space."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class OmplPlan:
-    """What came out of a query."""
+    """Result of a query."""
 
     status: PlanStatus
     metric: Metric
@@ -50,7 +50,9 @@ class OmplPlan:
 def ompl_planner(
     topology: TopologicalMap, cells: CellPlanner, settings: PlannerSettings
 ) -> OmplPlanner:
-    """OMPL in the fields that a planner of cell paths goes by; on the whole map where it has none.
+    """Make a planner with OMPL in the fields of a planner of cell paths.
+
+    If that planner has no fields, OMPL searches the whole map.
 
     Raises
     ------
@@ -63,7 +65,7 @@ def ompl_planner(
     elif isinstance(cells, MaxDistance | OverMesh):
         field_of = topology.level.field_of
     free = np.argwhere(topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
-    if len(free):  # kernels that load at the first query would eat up its budget
+    if len(free):  # kernels loaded at the first query would use up its budget
         row, col = free[0].tolist()
         cells.plan((row, col), (row, col))
     return OmplPlanner(topology.grid, settings, field_of)
@@ -71,18 +73,18 @@ def ompl_planner(
 
 @copies_alike
 class OmplPlanner:
-    """OMPL inside the fields that a coarse path passes, and nowhere else.
+    """OMPL restricted to the fields that a coarse path passes.
 
-    Where it finds no path there, the fields beside are taken in; where it still finds none, the
-    grid's own path is shortened by line of sight. A copy, or what comes out of a pickle, starts a
-    process of its own when it is first asked.
+    If OMPL finds no path there, the neighbouring fields are added; if it still finds none, the
+    grid's own path is shortened by line of sight. A copied or unpickled planner starts its own
+    process at its first query.
 
     Parameters
     ----------
     grid
         The map.
     settings
-        With a section `ompl`.
+        Settings with a section `ompl`.
     field_of
         int16 or int32 (rows, cols), the field of each cell; None where the whole map is the
         corridor.
@@ -128,9 +130,9 @@ class OmplPlanner:
         closed
             int64 (m,), flat cells that may not be entered; None for none.
         spent_s
-            Seconds of the budget that are gone already.
+            Seconds of the budget that are spent already.
         tells_search
-            Whether the states and trees of the search are wanted too.
+            Whether to return the states and trees of the search too.
         """
         refused = self._refused(ends)
         if refused is not None:
@@ -148,7 +150,7 @@ class OmplPlanner:
                 tells_search=tells_search,
             )
             self._worker.send(query)
-            # Made while the worker is at it, so that there is a path when its time is over.
+            # Made while the worker plans, so that a path exists when its time is up.
             is_late = self._worker.is_late()
             by_line = self._by_line_of_sight(cells, ends, closed) if is_late else None
             reply = self._worker.reply()
@@ -172,12 +174,12 @@ class OmplPlanner:
         )
 
     def close(self) -> None:
-        """End the process once no query waits for it; the next one waits for another."""
+        """End the process once no query waits for it; the next query starts another one."""
         with self._one_at_a_time:
             self._worker.close()
 
     def _refused(self, ends: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
-        """Status of a query at one of whose ends the footprint does not fit."""
+        """Return the status of a query if the footprint does not fit at one of its ends."""
         if self.ompl.footprint is None:
             return None
         for pose, status in zip(
@@ -188,7 +190,7 @@ class OmplPlanner:
         return None
 
     def _warm_up(self) -> None:
-        """Make what is made once, so that no query's time includes it."""
+        """Build all shared objects, so that no query's time includes them."""
         if self._field_of is not None:
             _ = self._beside
         free = np.argwhere(self._grid.enterable())[:1]
@@ -212,7 +214,7 @@ class OmplPlanner:
         return "reeds-shepp" if self.ompl.space == "reeds-shepp" else "any-angle"
 
     def _bound(self, reply: Reply, path: Path | None, ends: tuple[FloatArray, FloatArray]) -> float:
-        """What no path in the metric is shorter than: the way without obstacles."""
+        """Return a lower bound on the cost of all paths: the path without obstacles."""
         straight = float(np.hypot(*(ends[1] - ends[0])[:2]))
         bound = max(straight, reply.bound_m)
         return bound if path is None else min(bound, path.length_m)
@@ -233,12 +235,12 @@ class OmplPlanner:
 
     @cached_property
     def _n_fields(self) -> int:
-        assert self._field_of is not None  # noqa: S101 - only asked for where it is
+        assert self._field_of is not None  # noqa: S101 - only called if it is set
         return int(self._field_of.max(initial=-1)) + 1
 
     @cached_property
     def _beside(self) -> tuple[LongArray, LongArray]:
-        """Pairs of fields that have cells beside each other, each pair once."""
+        """Return the pairs of neighbouring fields, each pair once."""
         assert self._field_of is not None  # noqa: S101
         fields = self._field_of
         keys = []
@@ -253,7 +255,7 @@ class OmplPlanner:
         return pairs // max(self._n_fields, 1), pairs % max(self._n_fields, 1)
 
     def _path(self, cells: LongArray, reply: Reply) -> Path:
-        """The states of a reply, and along curves poses one cell apart."""
+        """Return the path of a reply; along curves its poses are one cell apart."""
         states, radius_m = reply.points, self.ompl.turning_radius_m
         if radius_m is not None:
             reverses = self.ompl.space == "reeds-shepp"
@@ -269,8 +271,11 @@ class OmplPlanner:
         return Path(passed, points, reply.length_m, headings, is_curved)
 
     def _passed(self, points: FloatArray, cells: LongArray) -> LongArray:
-        """The cells that a path passes; those it was made from where its points, which follow a
-        curve from chord to chord, touch a cell that may not be entered."""
+        """Return the cells that a path passes.
+
+        If its points, which follow a curve from chord to chord, touch a cell that may not be
+        entered, the cells of the coarse path are returned.
+        """
         free = self._free
         positions = np.array([self._grid.frame.position_of(*point) for point in points.tolist()])
         passed = cells_of_line(free, positions)
@@ -280,7 +285,7 @@ class OmplPlanner:
     def _by_line_of_sight(
         self, cells: LongArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
     ) -> Path | None:
-        """The grid's path, shortened; None where the robot cannot drive it."""
+        """Return the shortened path of the grid; None if the robot cannot drive it."""
         if self.ompl.turning_radius_m is not None:
             return None
         sight = self._sight
@@ -301,8 +306,11 @@ class OmplPlanner:
     def _poses_along(
         self, points: FloatArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
     ) -> FloatArray:
-        """Poses of a robot that turns on the spot at every bend of a polyline and drives ahead
-        between, float64 (n, 3); without rows where it cannot."""
+        """Return the poses of a robot along a polyline, float64 (n, 3).
+
+        The robot turns on the spot at every bend and drives ahead in between; without rows if it
+        cannot.
+        """
         check = self._check.confined(closed=closed)
         steps = np.diff(points, axis=0)
         ahead = np.arctan2(steps[:, 1], steps[:, 0])

@@ -1,4 +1,4 @@
-"""The hybrid planner: paths between points by a preset, and the routes that belong to them."""
+"""The hybrid planner: paths between points by a preset, with their routes."""
 
 from __future__ import annotations
 
@@ -40,27 +40,28 @@ Smooth = Literal["none", "line-of-sight"]
 
 
 class HybridPlanner:
-    """Plan paths between points of one map by a preset. Threads may share a planner; queries with
-    OMPL run one after the other. What a preset plans on is built at the first query, or by
-    `prepare`; with OMPL it is built at once, so that no query's time goes into it.
+    """Planner of paths between points of one map by a preset.
+
+    Threads may share a planner; queries with OMPL run one after the other. The structures of a
+    preset are built at the first query, or by `prepare`; with OMPL they are built at once, so that
+    no query's time includes them.
 
     Parameters
     ----------
     topology
-        The topological map, and through it the grid. It may have been built otherwise than the
-        preset's `pyramid` section says: results record how it was.
+        The topological map with its grid. It may have been built with other settings than the
+        preset's `pyramid` section: results record the actual ones.
     preset
         Name of a preset, path to a preset file, or a `Preset`.
     prepared
-        `prepared` of another planner of the same map and preset, which is used instead of building
-        it; None to build it.
+        `prepared` of another planner of the same map and preset, to use; None to build anew.
 
     Raises
     ------
     PresetError
         When the preset does not exist or is not valid.
     InvalidValueError
-        When nobody gave the map's radius, so that it has the default, and the preset names another.
+        When the map has the default radius, not chosen by the caller, and the preset names another.
     """
 
     def __init__(
@@ -79,20 +80,20 @@ class HybridPlanner:
         self._closures = Closures(topology)
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
-            # Loads what only these presets need, and says what to install where it is missing.
+            # Loads modules for these presets only, or reports which one to install.
             from hybridnav.planner.ompl_plans import ompl_planner  # noqa: PLC0415
 
             self._ompl = ompl_planner(topology, self._cells, settings)
 
     @property
     def prepared(self) -> Prepared | None:
-        """What is built of the map for queries: a mesh, a jump-point graph or portals; None before
-        that is built, and with presets that build nothing."""
+        """The structure built for queries: a mesh, a jump-point graph or portals; None before that,
+        and with presets that build none."""
         return self._cells.prepared
 
     @property
     def needs_headings(self) -> bool:
-        """Whether ends are `(x, y, yaw)`: with OMPL in a space with headings."""
+        """Whether ends are `(x, y, yaw)`, as with OMPL in a space with headings."""
         return self._ompl is not None and self._ompl.ompl.has_heading
 
     def plan(
@@ -109,32 +110,32 @@ class HybridPlanner:
         Parameters
         ----------
         start, goal
-            `(x, y)` in metres, map frame. The path runs between the centres of the cells that hold
-            them, an any-angle one between the points; nothing is snapped to free space. On a map
-            with rooms also the name of a room or of a named point. With OMPL
-            in a space with headings `(x, y, yaw)`, radians counter-clockwise from the x axis, and
-            named ends face the way; in its other spaces the third number means nothing.
+            `(x, y)` in metres, map frame. The path runs between the centres of their cells, an
+            any-angle one between the points; nothing is snapped to free space. On a map with rooms
+            also the name of a room or of a named point. With OMPL in a space with headings `(x, y,
+            yaw)`, radians counter-clockwise from the x axis, and named ends face along the path; in
+            other spaces the third number is ignored.
         smooth
-            `"line-of-sight"` shortens the path to an any-angle one; None as the preset says. Of no
-            effect with `shortest` and with OMPL, whose paths are any-angle ones.
+            `"line-of-sight"` shortens the path to an any-angle one; None as in the preset. Without
+            effect for `shortest` and OMPL, whose paths are any-angle ones.
         blocked
-            What is closed for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
-            mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. Where
-            it lies in the way the whole map is searched.
+            Closures for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
+            mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. If they
+            meet the path, the whole map is searched.
         at
-            Where in a named room: `"anywhere"`, the cells that make the way from cell to cell
-            shortest, or at its `"point"`.
+            Position in a named room: `"anywhere"`, at the cells that make the cell path shortest,
+            or at its `"point"`.
 
         Returns
         -------
         PlanResult
-            Solved, or with a status that names what is wrong.
+            A solved result, or one whose status states the reason.
 
         Raises
         ------
         InvalidValueError
-            When a point is not two finite numbers, a name is not known, or what is blocked is not
-            on the map.
+            When a point is not two finite numbers, a name is not known, or a closed item is not on
+            the map.
         """
         began = time.perf_counter()
         if isinstance(start, str) or isinstance(goal, str):
@@ -179,7 +180,7 @@ class HybridPlanner:
         smooth: Smooth | None = None,
         blocked: Closable | ClosedCells | None = None,
     ) -> PlanBatch:
-        """Plan paths between many pairs of points: the answers of `plan`, in arrays.
+        """Plan paths between many pairs of points, with the answers of `plan` in arrays.
 
         Parameters
         ----------
@@ -192,8 +193,7 @@ class HybridPlanner:
         Raises
         ------
         InvalidValueError
-            When the shapes differ, a coordinate is not finite, or what is blocked is not on the
-            map.
+            When the shapes differ, a coordinate is not finite, or a closed item is not on the map.
         """
         first = read_points("starts", starts, needs_heading=self.needs_headings)
         last = read_points("goals", goals, needs_heading=self.needs_headings)
@@ -206,28 +206,29 @@ class HybridPlanner:
         return plan_many(self, cells, (first, last), finish, self.closed(blocked))
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
-        """Build now what queries would build when they need it: the mesh and the graph of its
-        corners, the jump-point graph, or the table of portals.
+        """Build the structures for queries now: mesh and graph of corners, jump-point graph, or
+        portals.
 
-        Nothing happens where that is built already. Threads may call it, and plan meanwhile: what
-        is built is built once.
+        Structures that exist already are kept. Threads may call this, and plan meanwhile: each
+        structure is built once.
 
         Parameters
         ----------
         progress
-            Called after each step with the number of steps done and of all, as for a progress bar.
+            Called after each step with the number of steps done and of all steps, as for a progress
+            bar.
         """
         self._cells.prepare(progress)
 
     def close(self) -> None:
-        """End the process that a preset with OMPL plans in; the next query waits for another."""
+        """End the OMPL process of a preset; the next query waits for another one."""
         if self._ompl is not None:
             self._ompl.close()
 
     def _round(self, closed: ClosedCells, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
-        """The plan itself where nothing closed is in its way, else the best path round it all.
+        """Return the plan itself if it meets no closed cell, else the best path round all of them.
 
-        Closing cells makes no path shorter, so a bound stays one.
+        Closed cells make no path shorter, so a bound stays valid.
         """
         assert plan.cells is not None  # noqa: S101 - the caller has looked
         if not closed.meets(plan.cells, self.topology.grid):
@@ -257,7 +258,7 @@ class HybridPlanner:
         finish: Smooth,
         closed: ClosedCells | None,
     ) -> PlanResult:
-        """The result of a plan on cells or on the mesh, between two points."""
+        """Return the result of a plan on cells or on the mesh, between two points."""
         stats = self._stats_of(plan)
         if plan.cells is None:
             return self._answer(PlanStatus.NO_PATH, poses, metric=plan.metric, stats=stats)
@@ -277,7 +278,7 @@ class HybridPlanner:
             length_m = polyline_length(points)
             points = points if length_m > 0 else points[:1]
         if plan.metric == "any-angle" and plan.length_cells:
-            # A part of the length, so that what is proved optimal has no gap by rounding.
+            # A share of the length, so that a proved optimum has no gap by rounding.
             bound = length_m * (plan.bound_cells / plan.length_cells)
         return self._answer(
             PlanStatus.SOLVED,
@@ -290,7 +291,7 @@ class HybridPlanner:
         )
 
     def _any_angle_bound(self, plan: CellPlan, ends: tuple[FloatArray, FloatArray]) -> float:
-        """No any-angle path between two points is shorter, in metres."""
+        """Return a lower bound on all any-angle paths between two points, in metres."""
         frame = self.topology.grid.frame
         if isinstance(self._cells, OverMesh):
             return plan.bound_cells * frame.resolution_m
@@ -302,7 +303,7 @@ class HybridPlanner:
         return bound * frame.resolution_m
 
     def _pose(self, name: str, given: ArrayLike) -> FloatArray:
-        """Position and, with OMPL, heading; float64 (2,) or (3,)."""
+        """Return a position and, with OMPL, heading; float64 (2,) or (3,)."""
         if self._ompl is None:
             return read_point(name, given)
         return read_pose(name, given, needs_heading=self.needs_headings)
@@ -315,7 +316,7 @@ class HybridPlanner:
         closed: ClosedCells | None,
         began: float,
     ) -> PlanResult:
-        """The coarse path refined by OMPL."""
+        """Return the result of the coarse path refined by OMPL."""
         assert plan.cells is not None  # noqa: S101 - the caller has looked
         ends = poses[0][:2], poses[1][:2]
         now = time.perf_counter()
@@ -339,7 +340,7 @@ class HybridPlanner:
         )
 
     def _sight(self, closed: ClosedCells | None) -> LineOfSight:
-        """What shortens paths; with closed cells one made for the query."""
+        """Return the shortener of paths; with closed cells, one for this query."""
         if closed is None:
             return self._line_of_sight
         allowed = self.preset.planner.allow_unexplored
@@ -364,14 +365,14 @@ class HybridPlanner:
         return Walks(self.topology)
 
     def _walked(self, cells: LongArray) -> Route:
-        """The places and arcs that a path passes."""
+        """Return the places and arcs that a path passes."""
         places, arcs = self._walks.of(cells)
         ids = self.topology.place_ids, self.topology.arc_ids
         passed = [int(ids[1][arc]) if arc >= 0 else -1 for arc in arcs]
         return Route(tuple(ids[0][places].tolist()), tuple(passed))
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
-        """Return the cells that may not be entered when this is closed, None where nothing is."""
+        """Return the cells of a closure, None for no closure."""
         if blocked is None or isinstance(blocked, ClosedCells):
             return blocked
         return self._closures.of(blocked)
@@ -390,8 +391,8 @@ class HybridPlanner:
     def _answer(
         self, status: PlanStatus, poses: tuple[FloatArray, FloatArray], **outcome: Any
     ) -> PlanResult:
-        """A result that records the ends, the preset and how the pyramid was built."""
-        # Each result has its own: whoever changes one must not change the next.
+        """Return a result that records the ends, the preset and the settings of the pyramid."""
+        # Each result has its own settings, so that a change of one does not affect the next.
         settings = {
             key: dict(value) if isinstance(value, dict) else value
             for key, value in self._settings.items()

@@ -1,4 +1,4 @@
-"""The robot's radius, which map and preset both name."""
+"""Check of the robot's radius, which map and preset both state."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 def check_radius(grid: OccupancyGrid, preset: Preset) -> None:
-    """Refuse a map of the default radius under a preset for a robot of another one.
+    """Refuse a map of the default radius with a preset for another radius.
 
-    A radius that the caller gave with the map wins over the preset's, and results record it.
+    A radius that the caller chose for the map wins over the preset's, and results record it.
 
     Raises
     ------
     InvalidValueError
-        When nobody gave the map's radius and the preset names another.
+        When the map has the default radius, not chosen by the caller, and the preset names another.
     """
     wanted_m, radius_m = preset.pyramid.robot_radius_m, grid.robot_radius_m
     if grid.radius_is_default and wanted_m != radius_m:

@@ -1,4 +1,4 @@
-"""Ways with several stops, told by rooms and doors."""
+"""Tours with several stops, described by rooms and doors."""
 
 from __future__ import annotations
 
@@ -34,38 +34,38 @@ _COUNTS = (
 
 @dataclass(frozen=True, eq=False)
 class Tour:
-    """A way through stops: a plan between each two, and the legs of all."""
+    """A tour through stops: a plan between each two, and the legs of all plans."""
 
     results: tuple[PlanResult, ...]
     """Plans from stop to stop, up to the first that is not solved."""
     legs: tuple[Leg, ...]
-    """The way by rooms; none unless it is solved, or where the map has no rooms."""
+    """The tour by rooms; none unless it is solved and the map has rooms."""
 
     @property
     def status(self) -> PlanStatus:
-        """That of the first plan that is not solved, else solved."""
+        """Status of the first plan that is not solved, else solved."""
         return self.results[-1].status
 
     @property
     def solved(self) -> bool:
-        """Whether all plans are."""
+        """Whether all plans are solved."""
         return self.status is PlanStatus.SOLVED
 
     @property
     def length_m(self) -> float:
-        """Length of the whole way in metres, infinite unless it is solved."""
+        """Length of the whole tour in metres, infinite unless it is solved."""
         if not self.solved:
             return math.inf
         return sum(result.path.length_m for result in self.results if result.path is not None)
 
     @property
     def start(self) -> tuple[float, ...] | None:
-        """Where it starts, as `PlanResult.start`."""
+        """Start of the tour, as `PlanResult.start`."""
         return self.results[0].start
 
     @property
     def goal(self) -> tuple[float, ...] | None:
-        """Where the last plan leads."""
+        """Goal of the last plan."""
         return self.results[-1].goal
 
     @property
@@ -75,30 +75,32 @@ class Tour:
 
     @property
     def cost(self) -> float:
-        """Cost of the whole way in the metric, infinite unless it is solved: the length, but where
-        the metric weighs it."""
+        """Cost of the whole tour in the metric, infinite unless it is solved: the length, unless
+        the metric weights it."""
         return sum(result.cost for result in self.results)
 
     @property
     def lower_bound(self) -> float:
-        """A proved bound on the cost of a way between the points of the stops, in their order."""
+        """A proved bound on the cost of a tour of the points of the stops, in their order."""
         return sum(result.lower_bound for result in self.results)
 
     @property
     def gap(self) -> float:
-        """Proved distance from the optimum between the stops, cost / lower bound - 1; NaN unless it
-        is solved."""
+        """Proved distance from the optimum between the stops, cost / lower bound - 1; NaN unless
+        the tour is solved."""
         if not self.solved:
             return math.nan
         return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for strict JSON: those of `PlanResult.to_dict` for the whole way, `legs`,
-        and the `words` for a person.
+        """Return plain values for strict JSON.
 
-        Points and headings, places and arcs are those of all plans, one after the other, the place
-        of a stop once; where the robot turns at a stop its point is there twice. Counts and seconds
-        are sums.
+        These are those of `PlanResult.to_dict` for the whole tour, `legs`, and the `words` for a
+        person.
+
+        Points and headings, places and arcs are those of all plans in order, with the place of a
+        stop once; if the robot turns at a stop, its point occurs twice. Counts and seconds are
+        sums.
         """
         parts = [result.to_dict() for result in self.results]
         points, headings = _joined_points(parts)
@@ -124,22 +126,25 @@ class Tour:
     def _whole(
         self, parts: list[dict[str, Any]], name: str, lists: list[list[Any]]
     ) -> list[Any] | None:
-        """Lists of all parts in one, None where a part has none."""
+        """Return the joined lists of all parts, None if a part has none."""
         if not self.solved or any(part[name] is None for part in parts):
             return None
         return [item for part in lists for item in part]
 
     def in_words(self) -> list[str]:
-        """The way in sentences for a person; no lines where there are no legs."""
+        """Return a description of the tour for a person; no lines without legs."""
         return in_words(self.legs) if self.legs else []
 
 
 def _joined_points(
     parts: list[dict[str, Any]],
 ) -> tuple[list[list[float]], list[float]]:
-    """Return points and headings of all parts; a point that one ends and the next begins with once,
-    unless the robot turns there. A part of one point, to a stop where the robot is, has no heading
-    of its own and is left out unless all are."""
+    """Return points and headings of all parts.
+
+    A point at which one part ends and the next begins occurs once, unless the robot turns there. A
+    part of one point, to a stop at the robot's position, has no heading of its own and is left out
+    unless all parts are like that.
+    """
     parts = [part for part in parts if len(part["points"] or []) > 1] or parts[:1]
     points: list[list[float]] = []
     headings: list[float] = []
@@ -169,18 +174,18 @@ def plan_tour(
     smooth: Smooth | None = None,
     blocked: Closable | None = None,
 ) -> Tour:
-    """Plan a way that visits stops in the order given.
+    """Plan a tour that visits stops in the given order.
 
     Parameters
     ----------
     planner
-        Plans each part.
+        Planner of each part.
     stops
         Two or more: points `(x, y)` in metres, names of rooms or of named points. With OMPL in a
-        space with headings points are `(x, y, yaw)`, and names face the way.
+        space with headings, points are `(x, y, yaw)`, and names face along the path.
     at
-        Where in a room: `"anywhere"`, chosen for all stops together so that the whole way from cell
-        to cell is shortest, or at the room's `"point"`.
+        Position in a room: `"anywhere"`, chosen for all stops together so that the whole cell path
+        is shortest, or at the room's `"point"`.
     smooth, blocked
         As in `HybridPlanner.plan`.
 
@@ -188,7 +193,7 @@ def plan_tour(
     ------
     InvalidValueError
         When there are fewer than two stops, a name is not known, a point is not two finite numbers,
-        or what is blocked is not on the map.
+        or a closed item is not on the map.
     """
     if len(stops) < 2:  # noqa: PLR2004
         raise InvalidValueError(f"a way needs at least two stops, got {len(stops)}")

@@ -11,7 +11,7 @@ _SURVIVES = 255
 
 @njit(cache=True, nogil=True)
 def uniform_squares(classes):
-    """Class of every aligned square of 2x2 entries that are equal, else 0."""
+    """Return the class of every aligned square of 2x2 equal entries, 0 for other squares."""
     rows, cols = classes.shape[0] // 2, classes.shape[1] // 2
     squares = np.empty((rows, cols), classes.dtype)
     for row in range(rows):
@@ -28,7 +28,7 @@ def uniform_squares(classes):
 
 @njit(cache=True, nogil=True)
 def amid_its_class(halves, row, col):
-    """Whether the 4x4 squares of half the side round a square are all of one class."""
+    """Return whether the 4x4 squares of half the side round a square are all of one class."""
     if row == 0 or col == 0 or 2 * row + 2 >= halves.shape[0] or 2 * col + 2 >= halves.shape[1]:
         return False
     of_class = halves[2 * row, 2 * col]
@@ -57,8 +57,13 @@ def raise_powers(power, squares, halves, p):
 @guarded
 @njit(cache=True, nogil=True)
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
-    """Fill the record as if there were only the blocks; gives the numbers of their vertices and
-    edges. `new_edge` takes the numbers of the edges that stay."""
+    """Fill the record for the blocks alone; return the counts of their vertices and edges.
+
+    `classes`, (rows, cols), are the kinds of cells, `power` the powers of blocks (see
+    `block_powers`), `templates` the arrays of `Templates`. Filled in: the record's `vertex_end`,
+    `vertex_parent`, by flat cell, and `edge_end`, by base edge; `new_edge`, int32 by base edge, the
+    new numbers of the edges that stay.
+    """
     ends, offset, inside_east, inside_north, across_east, across_north = templates
     rows, cols = classes.shape
     n_vertices = 0
@@ -97,7 +102,7 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
 
 @njit(cache=True, nogil=True)
 def filled(classes, row, col):
-    """Whether there is a cell and it is a vertex."""
+    """Return whether a cell lies on the map and is a vertex."""
     rows, cols = classes.shape
     return 0 <= row < rows and 0 <= col < cols and classes[row, col] != 0
 
@@ -105,7 +110,7 @@ def filled(classes, row, col):
 @guarded
 @njit(cache=True, nogil=True)
 def block_vertices(classes, power, vertex_end, n_vertices):
-    """Vertices of the map of the blocks and the cells in none, in the order of surviving cells."""
+    """Return the vertices of blocks and single cells, in the order of surviving cells."""
     cols = classes.shape[1]
     cells = np.empty((n_vertices, 2), np.int32)
     boxes = np.empty((n_vertices, 4), np.int32)
@@ -129,9 +134,9 @@ def block_vertices(classes, power, vertex_end, n_vertices):
 @guarded
 @njit(cache=True, nogil=True)
 def block_darts(classes, power, vertices, new_edge, n_edges):
-    """Darts of the map of the blocks and the cells in none: counter-clockwise round each.
+    """Return the darts of the map of blocks and single cells, counter-clockwise round each.
 
-    Corners passed on the way that are no full 2x2 cells make the face of the next dart protected.
+    A corner on the way that is not inside four vertices makes the face of the next dart protected.
     """
     cells, boxes, _, whole_at = vertices
     cols = classes.shape[1]
@@ -188,7 +193,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
 
 @njit(cache=True, nogil=True)
 def protect_faces(sigma, protected):
-    """Make all darts of a face protected where one is."""
+    """Protect all darts of every face that has a protected dart."""
     for d in range(sigma.size):
         if protected[d]:
             follow = sigma[d ^ 1]
@@ -199,9 +204,9 @@ def protect_faces(sigma, protected):
 
 @njit(cache=True, nogil=True)
 def count_bytes(values):
-    """How often each of the 256 values occurs at even and at odd places, int64 (2, 256).
+    """Count the 256 values at even and at odd places, int64 (2, 256).
 
-    Two counts, for runs of equal values wait for each other.
+    There are two counts because increments of one counter in a row wait for each other.
     """
     count = np.zeros((2, 256), np.int64)
     for i in range(values.size):

@@ -16,7 +16,7 @@ from hybridnav._jit import guarded, njit
 @guarded
 @njit(cache=True, nogil=True)
 def label_fields(vertex_end, vertex_parent, level):
-    """Dense vertex of each flat cell at a level (-1: no vertex) and the surviving cells."""
+    """Return the vertex of each flat cell at a level (-1: none), and the surviving cells."""
     n_cells = vertex_end.size
     field_of = np.full(n_cells, np.int32(-1), np.int32)
     count = 0
@@ -32,14 +32,14 @@ def label_fields(vertex_end, vertex_parent, level):
             root = vertex_parent[cell]
             while vertex_end[root] <= level and root > cell:
                 root = vertex_parent[root]
-            field_of[cell] = field_of[root]  # a survivor, or a cell before this one: labelled
+            field_of[cell] = field_of[root]  # labelled: a survivor or an earlier cell
     return field_of, survivors
 
 
 @guarded
 @njit(cache=True, nogil=True)
 def field_extents(field_of, cols, n_vertices):
-    """Cells per field and their bounding boxes (least row, least column, greatest row, column)."""
+    """Return the areas of fields in cells and their boxes: least and greatest rows and columns."""
     areas = np.zeros(n_vertices, np.int64)
     boxes = np.empty((n_vertices, 4), np.int32)
     for cell in range(field_of.size):
@@ -59,7 +59,7 @@ def field_extents(field_of, cols, n_vertices):
 
 @njit(cache=True, nogil=True)
 def find(root, i):
-    """Representative of i in a union-find forest, halving the path."""
+    """Return the representative of i in a union-find forest, halving the path."""
     while root[i] != i:
         root[i] = root[root[i]]
         i = root[i]
@@ -68,14 +68,14 @@ def find(root, i):
 
 @njit(cache=True, nogil=True)
 def edge_ends(base_edge, cols):
-    """The two flat cells of a base edge, lower one first."""
+    """Return the two flat cells of a base edge, the lower one first."""
     cell = base_edge >> 1
     return cell, cell + (cols if base_edge & 1 else 1)
 
 
 @njit(cache=True, nogil=True)
 def other_crack(field_of, cols, corner, base_edge):
-    """The other crack of a full 2x2 block that holds exactly two, -1 where it does not."""
+    """Return the other crack of a full 2x2 block that holds exactly two, else -1."""
     a, b, c, d = corner, corner + 1, corner + cols, corner + cols + 1
     if field_of[a] < 0 or field_of[b] < 0 or field_of[c] < 0 or field_of[d] < 0:
         return -1
@@ -92,7 +92,7 @@ def other_crack(field_of, cols, corner, base_edge):
 
 @njit(cache=True, nogil=True)
 def place_of(edges, edge):
-    """Index of an edge among ascending ones that hold it."""
+    """Return the index of an edge in an ascending array that contains it."""
     low, high = 0, edges.size - 1
     while low < high:
         middle = (low + high) >> 1
@@ -106,7 +106,7 @@ def place_of(edges, edge):
 @guarded
 @njit(cache=True, nogil=True)
 def find_cracks(field_of, rows, cols):
-    """Base edges whose cells lie in different fields, ascending, and the class of each.
+    """Return the base edges between cells of different fields, ascending, and the class of each.
 
     Two cracks belong to one class when they lie in the same full 2x2 block that holds exactly two
     cracks; the class is the position of one of its cracks.
@@ -136,7 +136,7 @@ def find_cracks(field_of, rows, cols):
         root[i] = i
     for i in range(count):
         cell = cracks[i] >> 1
-        # The blocks whose lower-left cell is this one see every pair of cracks at least once.
+        # Every pair of cracks is met in the block whose lower-left cell is this one.
         for back in range(2):
             corner = cell
             if back == 1:
@@ -161,9 +161,10 @@ def find_cracks(field_of, rows, cols):
 
 @njit(cache=True, nogil=True)
 def next_at_cell(cell, direction, edge_end, cols):
-    """First dart of a base cell counter-clockwise after a direction (0 east to 3 south), else -1.
+    """Return the first dart of a base cell counter-clockwise after a direction, else -1.
 
-    Darts of the base are 2 * base edge + side; the full turn ends with the direction itself.
+    Directions are 0 east to 3 south. Darts of the base are 2 * base edge + side; the full turn ends
+    with the direction itself.
     """
     for i in range(1, 5):
         turned = (direction + i) & 3
@@ -182,7 +183,7 @@ def next_at_cell(cell, direction, edge_end, cols):
 
 @njit(cache=True, nogil=True)
 def base_sigma(dart, edge_end, cols):
-    """Next dart counter-clockwise in the base."""
+    """Return the next dart counter-clockwise in the base."""
     edge = dart >> 1
     cell = edge >> 1
     direction = edge & 1  # 0 east, 1 north of the lower cell
@@ -194,7 +195,7 @@ def base_sigma(dart, edge_end, cols):
 
 @njit(cache=True, nogil=True)
 def base_protected(dart, vertex_end, rows, cols):
-    """Whether the base face on the right of a dart is anything but a full 2x2 block."""
+    """Return whether the base face on the right of a dart is anything but a full 2x2 block."""
     edge = dart >> 1
     corner = edge >> 1
     if edge & 1:
@@ -216,11 +217,15 @@ def base_protected(dart, vertex_end, rows, cols):
 @guarded
 @njit(cache=True, nogil=True)
 def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
-    """Sigma, origin and protection of the darts of a level, by walks through the base.
+    """Return sigma, origin and protection of the darts of a level, from walks through the base.
 
-    After a dart comes its successor in the base; where that is removed, the next one, and where
-    it is contracted, the one after its other half. The corners passed on the way are the base
-    corners that make up one corner of the level: a face is protected when one of them is.
+    The walk goes from a dart to its successor in the base; from a removed dart to the next one, and
+    from a contracted dart to the one after its other half. The base corners on the way make up one
+    corner of the level: a face is protected when one of them is.
+
+    `edges`, int32 (n,), are the base edges of the level, ascending; `edge_end`, uint8 (2 n_cells,),
+    and `vertex_end`, uint8 (n_cells,), are the record; `field_of`, int32 (n_cells,), is the vertex
+    of each flat cell.
     """
     n_edges = edges.size
     sigma = np.empty(2 * n_edges, np.int32)
@@ -256,11 +261,12 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
 
 @njit(cache=True, nogil=True)
 def way_to_rim(start, inside, field_of, edge_end, level, cols, came):
-    """Base edges that lead from a face in a field to the nearest block that is no ordinary face or
-    that holds a crack, int64, the last one first.
+    """Return the base edges from a face in a field to the nearest rim, int64, the last one first.
 
-    The search follows removed edges inside the field. A face is named by the cell of its lower
-    left; `came`, uint8 (n_cells + cols,) and zero, is scratch.
+    The rim is a face that is not ordinary or a block that holds a crack. The search follows removed
+    edges inside the field. A face is named by its lower left cell. `start` is a face, `inside` the
+    vertex of the field, `field_of`, int32 (n_cells,), the vertex of each flat cell, `edge_end`,
+    uint8 (2 n_cells,), the record; `came`, uint8 (n_cells + cols,) and zero, is scratch.
     """
     n_cells = field_of.size
     queue = np.empty(64, np.int64)
@@ -295,7 +301,7 @@ def way_to_rim(start, inside, field_of, edge_end, level, cols, came):
     steps = np.empty(size, np.int64)
     count = 0
     while came[corner + cols] < 5:
-        # Against the step that led here, south for north.
+        # Back against the step that led here: south for north.
         edge, corner = edge_and_face_beyond(corner, (came[corner + cols] - 1) ^ 1, cols)
         steps[count] = edge
         count += 1
@@ -306,7 +312,7 @@ def way_to_rim(start, inside, field_of, edge_end, level, cols, came):
 
 @njit(cache=True, nogil=True)
 def edge_and_face_beyond(corner, k, cols):
-    """Base edge between a face and one beside it, 0 south to 3 east, and that face."""
+    """Return the base edge between a face and one beside it, 0 south to 3 east, and that face."""
     if k == 0:
         return 2 * corner, corner - cols
     if k == 1:
@@ -318,11 +324,11 @@ def edge_and_face_beyond(corner, k, cols):
 
 @njit(cache=True, nogil=True)
 def darts_at_corners(cells, direction, edges, edge_end, level, cols):
-    """Dart of a level on whose face a direction at each cell points, -1 where there is none.
+    """Return a dart of the face that a direction at each cell points into, -1 where there is none.
 
-    `direction` is 0 east to 3 south, and no vertex lies there: the corner it points into belongs
-    to one face of the base. The walk goes on counter-clockwise round the vertex of the level to
-    the dart that follows the corner, and that dart bounds the same face.
+    `direction` is 0 east to 3 south, and no vertex lies there: the corner belongs to one face of
+    the base. The walk goes on counter-clockwise round the vertex of the level to the dart that
+    follows the corner, and that dart bounds the same face.
     """
     found = np.full(cells.size, np.int64(-1), np.int64)
     for i in range(cells.size):

@@ -9,7 +9,7 @@ from hybridnav._jit import guarded, njit
 
 @njit(cache=True, nogil=True)
 def turn(points, i, j, row, col):
-    """Cross product of the steps i -> j and j -> (row, col); positive is counter-clockwise."""
+    """Return the cross product of the steps i -> j and j -> (row, col); positive to the left."""
     ax = np.int64(points[j, 1] - points[i, 1])
     ay = np.int64(points[j, 0] - points[i, 0])
     bx = np.int64(col - points[j, 1])
@@ -33,7 +33,7 @@ def chain(rows, cols, count, side, points, start):
 @guarded
 @njit(cache=True, nogil=True)
 def field_hulls(field_of, cols, boxes):
-    """Convex hulls of connected fields, from the first and last cell of each of their rows."""
+    """Return the convex hulls of connected fields, from the first and last cell of each row."""
     n_vertices = boxes.shape[0]
     first_row = np.zeros(n_vertices + 1, np.int64)
     for v in range(n_vertices):
@@ -64,8 +64,10 @@ def field_hulls(field_of, cols, boxes):
 @guarded
 @njit(cache=True, nogil=True)
 def hulls_of_points(offset, points):
-    """Convex hulls of sets of points: points[offset[v]:offset[v + 1]] are one, sorted by row and
-    then by column."""
+    """Return the convex hulls of the sets `points[offset[v]:offset[v + 1]]`.
+
+    The points of a set are sorted by row and then by column.
+    """
     start = np.zeros(offset.size, np.int64)
     hulls = np.empty((2 * points.shape[0], 2), np.int32)
     rows = np.empty(points.shape[0], np.int64)
@@ -88,7 +90,7 @@ def hulls_of_points(offset, points):
 
 @njit(cache=True, nogil=True)
 def hull_distances(start, points, arcs):
-    """Largest squared distance between a cell of one field and a cell of the other, per arc."""
+    """Return for each arc the largest squared distance between cells of its two fields."""
     squared = np.zeros(arcs.shape[0], np.int64)
     for a in range(arcs.shape[0]):
         u, v = arcs[a, 0], arcs[a, 1]

@@ -16,10 +16,10 @@ SECOND_MAY_SURVIVE = 2
 EITHER_MAY_SURVIVE = 3
 
 SURVIVOR, RADIUS, DIAMETER = 0, 1, 2
-"""Linkages: what stays below the limit."""
+"""Linkages: the distance that stays below the limit."""
 
 UNDECIDED = -1
-"""Count that says: a bounding box cannot decide an edge, hulls are needed."""
+"""Returned instead of a count when bounding boxes cannot decide an edge and hulls are needed."""
 
 _NO_KEY = np.uint64(0xFFFFFFFFFFFFFFFF)
 # A key holds the attribute (13 bits), a seeded hash (21 bits) and the position (30 bits).
@@ -38,7 +38,7 @@ class Vertices(NamedTuple):
     classes: np.ndarray
     """uint8 or uint16 (n,), the kind of each vertex: only equal ones merge (see `decimation`)."""
     whole_at: np.ndarray
-    """uint8 (n,), the level from which the vertex is there: until then its block is in pieces."""
+    """uint8 (n,), the level from which the vertex is whole: below it, its block is in pieces."""
 
 
 class Hulls(NamedTuple):
@@ -50,7 +50,7 @@ class Hulls(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def make_key(attribute, base_edge, seed, position):
-    """Order of an edge: attribute, then a seeded hash of its base id (MurmurHash3's finaliser)."""
+    """Return the key of an edge: attribute, then a seeded hash (MurmurHash3's finaliser)."""
     h = np.uint64(base_edge) ^ seed  # below 2^32, so no product overflows
     h ^= h >> np.uint64(16)
     h = h * np.uint64(0x85EBCA6B) & _LOW_HALF
@@ -63,7 +63,7 @@ def make_key(attribute, base_edge, seed, position):
 
 @njit(cache=True, nogil=True)
 def far_corner(cells, u, boxes, v):
-    """Squared distance from the surviving cell of u to the farthest corner of the box of v."""
+    """Return the squared distance from the surviving cell of u to the far corner of v's box."""
     row, col = cells[u, 0], cells[u, 1]
     rows = np.int64(max(row - boxes[v, 0], boxes[v, 2] - row))
     cols = np.int64(max(col - boxes[v, 1], boxes[v, 3] - col))
@@ -72,7 +72,7 @@ def far_corner(cells, u, boxes, v):
 
 @njit(cache=True, nogil=True)
 def field_within(cells, u, hull_start, hull_points, v, limit):
-    """Whether the whole field of v lies nearer to the surviving cell of u than the limit."""
+    """Return whether the field of v lies nearer to the surviving cell of u than the limit."""
     for i in range(hull_start[v], hull_start[v + 1]):
         rows = np.int64(hull_points[i, 0] - cells[u, 0])
         cols = np.int64(hull_points[i, 1] - cells[u, 1])
@@ -83,7 +83,7 @@ def field_within(cells, u, hull_start, hull_points, v, limit):
 
 @njit(cache=True, nogil=True)
 def near_enough(u, v, hull_start, hull_points, limit):
-    """Whether every two cells of two fields lie nearer to each other than the limit."""
+    """Return whether every two cells of two fields lie nearer to each other than the limit."""
     for i in range(hull_start[u], hull_start[u + 1]):
         for j in range(hull_start[v], hull_start[v + 1]):
             rows = np.int64(hull_points[i, 0] - hull_points[j, 0])
@@ -95,9 +95,12 @@ def near_enough(u, v, hull_start, hull_points, limit):
 
 @njit(cache=True, nogil=True)
 def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
-    """Which of two vertices may survive their merging, or UNDECIDED.
+    """Return which of two vertices may survive their merging, or UNDECIDED.
 
-    For fields whose common box is too large to decide: the caller has looked at it.
+    The caller has found that the common box of the fields, int32 `boxes` (n, 4), is too large to
+    decide. `cells`, int32 (n, 2), are surviving cells; the hull of v is
+    `hull_points[hull_start[v]:hull_start[v + 1]]`, both empty before hulls are built; `limit` is in
+    squared cells.
     """
     rows = np.int64(cells[u, 0] - cells[v, 0])
     cols = np.int64(cells[u, 1] - cells[v, 1])
@@ -128,20 +131,24 @@ def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
 
 @njit(cache=True, nogil=True)
 def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed, keys, ways, best):
-    """Fill `keys` with the contractible edges; gives their number, or UNDECIDED without hulls.
+    """Fill `keys` with the contractible edges; return their number, or UNDECIDED without hulls.
 
-    The attribute by which edges are matched is the longer side of the box round both fields:
-    small merged fields first keeps fields compact (measured 2 to 5 % fewer places on real maps
-    than the distance between the surviving cells or the merged radius). `ways`, by edge, says who
-    may survive; `best`, by vertex, is the least key.
+    The attribute by which edges are matched is the longer side of the box round both fields: small
+    merged fields first keeps fields compact (measured 2 to 5 % fewer places on real maps than the
+    distance between the surviving cells or the merged radius).
+
+    `origin`, int32 (2 n_edges,), and `base_edge`, int32 (n_edges,), are those of the darts;
+    `vertices` and `hulls` belong to the `level`; `linkage` is one of the constants; `limit` is in
+    squared cells; `seed` orders equal attributes. Out: `keys`, uint64 (n_edges,); `ways`, uint8 by
+    edge, which end may survive; `best`, uint64 by vertex, its least key.
     """
     cells, boxes, classes, whole_at = vertices
     hull_start, hull_points = hulls
     for v in range(classes.size):
         best[v] = _NO_KEY
     count = 0
-    # Two leaves of a star can lie twice as far apart as a leaf and its centre: from there on hulls
-    # must decide about diameters.
+    # Two leaves of a star can lie twice as far apart as a leaf and its centre: fields of half the
+    # diameter already need hulls.
     spread = 4 if linkage == DIAMETER and hull_start.size == 0 else 1
     for e in range(base_edge.size):
         u = np.uint32(origin[2 * e])
@@ -181,10 +188,10 @@ def open_candidates(origin, keys, ways, best):
 
 @njit(cache=True, nogil=True)
 def match(origin, keys, best, matched, rest):
-    """Greedy maximal matching in the order of keys, by rounds of locally best edges (Preis 1999).
+    """Fill `matched` with the greedy maximal matching in the order of keys (Preis 1999).
 
-    `best` is the least key of each vertex; `matched` becomes the matched edge of each vertex, -1
-    where it has none. `rest` is scratch, as long as `keys`.
+    `best` is the least key of each vertex; `matched` becomes the matched edge of each vertex, or
+    -1. `rest` is scratch, as long as `keys`.
     """
     for v in range(matched.size):
         matched[v] = -1
@@ -221,7 +228,11 @@ def match(origin, keys, best, matched, rest):
 
 @njit(cache=True, nogil=True)
 def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
-    """Let every vertex without a partner join the best matched neighbour that may survive it."""
+    """Let every vertex without a partner join the best matched neighbour that may survive it.
+
+    `origin`, `keys`, `ways` and `matched` are those of `contractible` and `match`; `best` is
+    scratch by vertex; `parent` and `kernel_dart`, int32 by vertex, are changed.
+    """
     for v in range(matched.size):
         best[v] = _NO_KEY
     for i in range(keys.size):
@@ -246,9 +257,9 @@ def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
 def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
     """Undo the joins that would make a star's field wider than the limit (linkage "diameter").
 
-    A pair of fields that fits does not make the union fit: each leaf is checked against the leaves
-    that its star already has, matched ones first, then in the order of vertices. The first leaf of
-    a star always stays.
+    Fields that fit in pairs need not fit together: each leaf is checked against the leaves that its
+    star already has, matched ones first, then in the order of vertices. The first leaf of a star
+    always stays.
     """
     hull_start, hull_points = hulls
     last_leaf = np.full(parent.size, np.int32(-1), np.int32)
@@ -271,11 +282,15 @@ def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
 
 @njit(cache=True, nogil=True)
 def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, seed, stars):
-    """Stars from a maximal matching (MIES): the parent of each vertex and the dart to it.
+    """Return the stars of a maximal matching (MIES): the parent of each vertex and the dart to it.
 
-    A matched edge whose ends both gained leaves is dropped, so that no tree has diameter three.
-    Of a pair without leaves the vertex with the smaller merged radius survives, ties broken by
-    the hash. `kernel_dart[v]` starts at the parent of v and ends at v.
+    A matched edge whose ends both gained leaves is dropped, so that no tree has diameter three. In
+    a pair without leaves, the vertex with the smaller merged radius survives; the hash breaks ties.
+    `kernel_dart[v]` starts at the parent of v and ends at v.
+
+    `keys`, `ways` and `matched` are those of `contractible` and `match`; `darts_origin` and
+    `base_edge` belong to the darts; `seed` is that of the keys; `best` is scratch by vertex;
+    `stars` holds `parent`, `kernel_dart` and `has_leaf`, by vertex.
     """
     cells, boxes, _, _ = vertices
     parent, kernel_dart, has_leaf = stars
@@ -319,9 +334,10 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
 
 @njit(cache=True, nogil=True)
 def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vertex_parent):
-    """Merge boxes into survivors and close the gaps, in place; gives the number of survivors.
+    """Merge boxes into survivors and close the gaps, in place; return the number of survivors.
 
-    Takes down, by cell, the level at which a surviving cell goes and the one it goes into.
+    By flat cell, `vertex_end` receives the level at which a surviving cell goes, `vertex_parent`
+    the cell that it goes into. `parent` and `new_vertex` are int32 by vertex.
     """
     cells, boxes, classes, whole_at = vertices
     count = 0

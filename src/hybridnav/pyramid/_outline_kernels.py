@@ -1,8 +1,8 @@
 """Kernels that walk along the sides of cells: outlines of fields, lines of boundaries.
 
-A corner is `(row, col)` in grid units, so that cell (r, c) has the corners (r, c) to
-(r + 1, c + 1). A walk goes from corner to corner with a heading, 0 east, 1 north, 2 west, 3 south,
-and what it goes round lies on its left.
+A corner is `(row, col)` in grid units, so that cell (r, c) has the corners (r, c) to (r + 1, c +
+1). A walk goes from corner to corner with a heading, 0 east, 1 north, 2 west, 3 south, and the
+field that it goes round lies on its left.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from hybridnav._jit import guarded, njit
 
 @njit(cache=True, nogil=True)
 def step(row, col, heading):
-    """The corner one side further."""
+    """Return the corner one side further."""
     if heading == 0:
         return row, col + 1
     if heading == 1:
@@ -26,7 +26,7 @@ def step(row, col, heading):
 
 @njit(cache=True, nogil=True)
 def field_left(field_of, row, col, heading):
-    """Field of the cell to the left of the side that a heading leads along, -1 for none."""
+    """Return the field of the cell to the left of the side along a heading, -1 for none."""
     if heading == 1 or heading == 2:
         col -= 1
     if heading == 2 or heading == 3:
@@ -38,7 +38,7 @@ def field_left(field_of, row, col, heading):
 
 @njit(cache=True, nogil=True)
 def put(corners, at, row, col):
-    """Write a corner, unless the corners are only counted; returns where the next one goes."""
+    """Write a corner, unless corners are only counted, and return the index of the next one."""
     if corners.size:
         corners[at, 0] = row
         corners[at, 1] = col
@@ -47,11 +47,12 @@ def put(corners, at, row, col):
 
 @njit(cache=True, nogil=True)
 def walk_ring(field_of, start, noded, visited, corners, at):
-    """Corners of the ring that starts east along the lower side of a flat cell; the first twice.
+    """Write the corners of the ring that starts east along the lower side of a flat cell.
 
-    They go to `corners` from `at` on unless that is empty; returns where they end. Where a field
-    meets itself at a corner only, the walk crosses over: each ring stays simple, because the two
-    cells are connected on one side of that corner, and what lies between them is another ring's.
+    The first corner is repeated at the end. Corners are written from index `at` on, unless
+    `corners` is empty; the index behind the last one is returned. Where a field meets itself at a
+    corner only, the walk crosses over: each ring stays simple, because the two cells are connected
+    on one side of that corner, and another ring encloses the area between them.
     """
     first_row, first_col = divmod(start, field_of.shape[1])
     own = field_of[first_row, first_col]
@@ -78,9 +79,9 @@ def walk_ring(field_of, start, noded, visited, corners, at):
 @guarded
 @njit(cache=True, nogil=True)
 def find_rings(field_of, noded):
-    """Rings round all fields: flat cell above the start of each, its field, its corners.
+    """Return for each ring round a field: the flat cell above its start, the field, its corners.
 
-    In the order of rows a start is a turn, and the first ring of a field is its outer one.
+    In the order of rows a ring starts at a turn, and the first ring of a field is its outer one.
     """
     rows, cols = field_of.shape
     visited = np.zeros((rows, cols), np.bool_)
@@ -100,7 +101,7 @@ def find_rings(field_of, noded):
 
 @njit(cache=True, nogil=True)
 def ring_corners(field_of, starts, offsets, noded):
-    """Corners of rings, int32 (offsets[-1], 2)."""
+    """Return the corners of rings, int32 (offsets[-1], 2)."""
     visited = np.empty(field_of.shape, np.bool_)
     corners = np.empty((offsets[-1], 2), np.int32)
     for i in range(starts.size):
@@ -110,7 +111,8 @@ def ring_corners(field_of, starts, offsets, noded):
 
 @njit(cache=True, nogil=True)
 def side_at(corner, heading, cols):
-    """Base edge across the side that leads from an inner corner, given the cell south-west of it.
+    """Return the base edge across the side that leads from a corner, given the cell south-west of
+    it.
 
     A base edge is twice its lower flat cell, plus one where it goes north.
     """
@@ -125,18 +127,18 @@ def side_at(corner, heading, cols):
 
 @njit(cache=True, nogil=True)
 def is_crack(flat, cols, edge):
-    """Whether the cells of a base edge lie in different fields."""
+    """Return whether the cells of a base edge lie in different fields."""
     cell = edge >> 1
     return flat[cell] != flat[cell + (cols if edge & 1 else 1)]
 
 
 @njit(cache=True, nogil=True)
 def next_heading(field_of, row, col, heading, members):
-    """Heading in which a line goes on beyond a corner, -1 where it ends.
+    """Return the heading of a line beyond a corner, -1 where it ends.
 
-    A line with members consists of these base edges, ascending; one without goes on along the
+    A line with members consists of these base edges, ascending; one without members follows the
     only other crack of a full 2x2 block. Where a cell of the block is no vertex, two more sides at
-    the corner part different cells, so that counting them is enough.
+    the corner are cracks, so that a count is enough.
     """
     rows, cols = field_of.shape
     if row == 0 or row == rows or col == 0 or col == cols:
@@ -161,13 +163,13 @@ def next_heading(field_of, row, col, heading, members):
 
 @njit(cache=True, nogil=True)
 def line_start(field_of, edge, members):
-    """Corner and heading where the line through a side starts, its lower cell on the left.
+    """Return the corner and heading at which the line through a side starts, its lower cell left.
 
     A closed line starts at the first turn beyond the side.
     """
     cell = edge >> 1
     row, col = divmod(cell, field_of.shape[1])
-    # Backwards first: the side north of the lower cell is walked east, the one east of it south.
+    # Walk back first: the side north of the lower cell leads east, the side east of it south.
     col += 0 if edge & 1 else 1
     row += 1
     heading = 0 if edge & 1 else 3
@@ -190,7 +192,7 @@ def line_start(field_of, edge, members):
 
 @njit(cache=True, nogil=True)
 def walk_line(field_of, start, members, corners, at):
-    """Corners of the line from its start on, written as `walk_ring` does."""
+    """Write the corners of the line from its start on, as `walk_ring` does."""
     row, col, heading = start
     first_row, first_col, first_heading = start
     at = put(corners, at, row, col)
@@ -208,7 +210,7 @@ def walk_line(field_of, start, members, corners, at):
 @guarded
 @njit(cache=True, nogil=True)
 def boundary_corners(field_of, edges, members, bounds):
-    """Lines through given sides: where the corners of each begin, and the corners.
+    """Return the offsets of the lines through given sides, and their corners.
 
     Line i is made of `members[bounds[i] : bounds[i + 1]]`, or of cracks where that is empty.
     """

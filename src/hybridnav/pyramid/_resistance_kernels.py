@@ -12,7 +12,12 @@ _LEAST_ATTRIBUTE = 8191
 
 @njit(cache=True, nogil=True)
 def yielding(origin, base_edge, classes, widths, peaks, share, seed, keys):
-    """Fill `keys` with the arcs that may be contracted, widest first; gives their number."""
+    """Fill `keys` with the arcs that may be contracted, widest first, and return their number.
+
+    `origin`, int32 (2 n_arcs,), the vertices of the darts; `base_edge`, int32 (n_arcs,); `classes`
+    and `peaks`, by vertex; `widths`, float64 (n_arcs,), in the unit of `peaks`; `share` in (0, 1];
+    `keys`, uint64 (n_arcs,).
+    """
     widest = 0.0
     for e in range(base_edge.size):
         widest = max(widest, widths[e])
@@ -30,9 +35,9 @@ def yielding(origin, base_edge, classes, widths, peaks, share, seed, keys):
 
 @njit(cache=True, nogil=True)
 def refuse_narrow_leaves(leaves, parent, kernel_dart, widths, peaks, share):
-    """Keep a leaf only if its arc would not resist what the star has become by then.
+    """Keep a leaf only if its arc does not resist the star as merged so far.
 
-    `leaves` come in the order of falling width. The first of a star always stays: its arc was a
+    `leaves` are in the order of falling width. The first leaf of a star always stays: its arc was a
     candidate.
     """
     peak = peaks.copy()

@@ -3,8 +3,8 @@
 A *block* is an aligned square of 2, 4 or 8 cells a side, all of one class, in the middle of more of
 its class. Its cells are contracted along a quadtree, first pairs along rows (levels 1, 3, 5), then
 pairs of those along columns (levels 2, 4, 6), and until it is whole no other vertex joins it: a
-block of side 2^p is one vertex from level 2p on. When and how each of its cells and edges goes is a
-matter of its place in the block alone, so the darts inside a block are never built.
+block of side 2^p is one vertex from level 2p on. The place of a cell or edge in its block alone
+decides when and how it goes, so the darts inside a block are never built.
 """
 
 from __future__ import annotations
@@ -26,11 +26,12 @@ _PERIOD = 2 << MAX_POWER  # a block's survivor depends on whether its block numb
 
 
 class Templates(NamedTuple):
-    """What becomes of a cell or an edge by the power p of its block (side 2^p) and its place.
+    """Ends of cells and edges by the power p of their block (side 2^p) and their place in it.
 
-    `vertex_end` and the steps to the parent, (p, row mod 16, col mod 16); the other arrays end of
-    edges as `Record.edge_end`: `inside_*` by (p, row mod 8, col mod 8), 0 for an edge that leaves
-    the block; `across_*` of those by (lesser power, row or column mod 8).
+    `vertex_end` and the steps to the parent are indexed by (p, row mod 16, col mod 16). The other
+    arrays hold ends of edges as `Record.edge_end` does: `inside_*` by (p, row mod 8, col mod 8), 0
+    for an edge that leaves the block; `across_*`, for edges that leave it, by (lesser power, row or
+    column mod 8).
     """
 
     vertex_end: ByteArray
@@ -43,8 +44,9 @@ class Templates(NamedTuple):
 
 
 def survivor_offset(power: int, number: int) -> int:
-    """Row or column in a block of the cell that survives: near the middle, on the side where the
-    middle of the next larger block is.
+    """Return the row or column of the surviving cell in a block.
+
+    It is near the middle, on the side where the middle of the next larger block is.
 
     `number` is the row or column of the block among blocks of its size.
     """
@@ -56,13 +58,13 @@ def survivor_offset(power: int, number: int) -> int:
 
 
 def survivor_at(power: int, position: int) -> int:
-    """Row or column of the surviving cell of the block over a row or column."""
+    """Return the row or column of the surviving cell of the block over a row or column."""
     number = position >> power
     return (number << power) + survivor_offset(power, number)
 
 
 def _death(position: int) -> int:
-    """Least power of a block over this row or column with another surviving one."""
+    """Return the least power of a block over a row or column whose surviving one is another."""
     for power in range(1, MAX_POWER + 1):
         if survivor_at(power, position) != position:
             return power
@@ -70,13 +72,15 @@ def _death(position: int) -> int:
 
 
 def _twos(number: int) -> int:
-    """How often two divides a positive number."""
+    """Return how often two divides a positive number."""
     return (number & -number).bit_length() - 1
 
 
 def _across(power: int, position: int, *, upright: bool) -> int:
-    """End of an edge between two blocks by its place along the border: parallel edges go when the
-    cells beside each other are merged on both sides."""
+    """Return the end of an edge between two blocks by its place along the border.
+
+    Parallel edges go when the cells beside each other are merged on both sides.
+    """
     place = position % (1 << power)
     if place == 0:
         return SURVIVES
@@ -85,8 +89,11 @@ def _across(power: int, position: int, *, upright: bool) -> int:
 
 
 def _inside(power: int, along: int, across: int, *, upright: bool) -> int:
-    """End of an edge that runs from `along` to the next inside a block, at `across`: that of an
-    edge between the two halves that it joins, or contracted where those keep it."""
+    """Return the end of an edge from `along` to the next cell inside a block, at `across`.
+
+    It is the end of an edge between the two halves that it joins; it is contracted where they keep
+    it.
+    """
     if (along + 1) % (1 << power) == 0:
         return 0
     halves = _twos(along + 1)
@@ -132,22 +139,25 @@ TEMPLATES = make_templates()
 
 
 def max_power(limit: int) -> int:
-    """Power of the largest blocks: at most half the merge distance a side.
+    """Return the power of the largest blocks: at most half the merge distance a side.
 
-    Every linkage allows those, and they leave room for fields of other shapes. `limit` is the
-    squared distance in cells.
+    Every linkage allows blocks of that size, and they leave room for fields of other shapes.
+    `limit` is the squared distance in cells.
     """
     return sum(4 << 2 * power <= limit for power in range(1, MAX_POWER + 1))
 
 
 def steps_to_parents(cols: int) -> LongArray:
-    """Steps from a cell to the one it is contracted into, as flat cells of a map with so many
-    columns: int64, by power and place as `Templates.parent_rows`."""
+    """Return the steps from each cell to the one it is contracted into.
+
+    They are differences of flat cells on a map with `cols` columns: int64, by power and place as
+    `Templates.parent_rows`.
+    """
     return TEMPLATES.parent_rows * cols + TEMPLATES.parent_cols
 
 
 def block_powers(kinds: AnyArray, largest: int) -> ByteArray:
-    """Return the power of the block of every aligned 2x2 cells, 0 where they are in none.
+    """Return the power of the block of every aligned 2x2 cells, 0 outside blocks.
 
     Parameters
     ----------
@@ -159,12 +169,13 @@ def block_powers(kinds: AnyArray, largest: int) -> ByteArray:
     Returns
     -------
     ByteArray
-        uint8, with one row and column more than there are whole squares, for the cells beyond.
+        uint8, with one row and one column more than there are whole squares, for the cells beyond
+        them.
     """
     power = np.zeros((kinds.shape[0] // 2 + 1, kinds.shape[1] // 2 + 1), np.uint8)
     squares = kinds
     for p in range(1, largest + 1):
         halves, squares = squares, _base_kernels.uniform_squares(squares)
-        squares.flags.writeable = False  # as the kinds are: another type is compiled once more
+        squares.flags.writeable = False  # like the kinds, so that one compilation serves both
         _base_kernels.raise_powers(power, squares, halves, p)
     return power

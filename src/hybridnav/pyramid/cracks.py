@@ -23,8 +23,10 @@ def cell_pairs(base_edges: LongArray, cols: int) -> LongArray:
 
 
 def sides_of(base_edges: LongArray, cols: int) -> FloatArray:
-    """Return the middle of the side that each base edge crosses, float64 (n, 2), in cells: the
-    centre of cell (0, 0) is (0.5, 0.5)."""
+    """Return the middle of the side that each base edge crosses, float64 (n, 2), in cells.
+
+    The centre of cell (0, 0) is (0.5, 0.5).
+    """
     middles: FloatArray = cell_pairs(base_edges, cols).mean(axis=1) + 0.5
     return middles
 
@@ -44,8 +46,8 @@ def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray
     Returns
     -------
     FloatArray
-        float64 (count, 2), the side that is nearest the mean of all sides of its boundary, so that
-        it lies on the boundary; ties go to the side that comes first.
+        float64 (count, 2), the side nearest the mean of all sides of its boundary, so that the
+        point lies on the boundary; ties go to the first side.
     """
     sizes = np.bincount(boundary, minlength=count)
     sums = [np.bincount(boundary, weights=w, minlength=count) for w in sides.T]

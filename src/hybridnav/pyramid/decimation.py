@@ -40,12 +40,12 @@ _ROUNDING = 1e-9
 
 
 def squared_limit(merge_distance_m: float, resolution_m: float) -> int:
-    """Least squared distance in cells that is not strictly below the merge distance."""
+    """Return the least squared distance in cells that is not strictly below the merge distance."""
     ratio = merge_distance_m / resolution_m
     return math.ceil(min(ratio * ratio * (1 - _ROUNDING), 2.0**62))
 
 
-def decimate(  # noqa: PLR0913 - what may merge, each way of saying it by itself
+def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its own
     classes: ByteArray,
     *,
     linkage: Linkage,
@@ -56,16 +56,16 @@ def decimate(  # noqa: PLR0913 - what may merge, each way of saying it by itself
 ) -> tuple[Record, BuildStats]:
     """Contract stars level by level until no edge may be contracted.
 
-    With rooms that happens three times: below the limit and inside rooms, which gives the places;
-    inside rooms without a limit, which gives the rooms; and without rooms. With a resistance it
-    happens twice: below the limit, and then without a limit until every arc resists.
+    With rooms there are three rounds: below the limit and inside rooms, which makes the places;
+    inside rooms without a limit, which makes the rooms; and without rooms. With a resistance there
+    are two: below the limit, and then without a limit until every arc resists.
 
     Parameters
     ----------
     classes
         uint8 `CellClass`, shape `(rows, cols)`.
     linkage
-        What stays below the limit.
+        The distance that stays below the limit.
     limit
         See `squared_limit`.
     seed
@@ -73,7 +73,7 @@ def decimate(  # noqa: PLR0913 - what may merge, each way of saying it by itself
     rooms
         int32, label of each cell's room, -1 for none; same shape.
     resistance
-        Which arcs resist above the places.
+        The rule by which arcs resist above the places.
     """
     kinds = classes if rooms is None else kinds_of(classes, rooms)
     run = _Decimation(kinds, _LINKAGES[linkage], limit, seed)
@@ -92,14 +92,16 @@ def decimate(  # noqa: PLR0913 - what may merge, each way of saying it by itself
 
 
 _N_CLASSES = 2
-"""Classes that vertices have: free and unexplored."""
+"""Classes of vertices: free and unexplored."""
 _MOST_KINDS = 256
-"""Kinds that one byte tells apart."""
+"""Kinds that one byte distinguishes."""
 
 
 def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
-    """Kind of each cell, one number for its class and its room: 0 occupied, `CellClass` outside
-    rooms, and so on, two for each room."""
+    """Return the kind of each cell, one number for its class and its room.
+
+    0 is occupied, `CellClass` outside rooms, and so on, two kinds for each room.
+    """
     n_kinds = _N_CLASSES * (int(rooms.max()) + 2) + 1
     kinds = np.where(classes == 0, 0, _N_CLASSES * (rooms + 1) + classes)
     kinds = kinds.astype(np.uint8 if n_kinds <= _MOST_KINDS else np.uint16)
@@ -109,8 +111,7 @@ def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
 
 @dataclass
 class _Scratch:
-    """Work space of all levels. Passes that follow each other share memory: 17 bytes an edge and
-    21 a vertex."""
+    """Work space of all levels: 17 bytes an edge and 21 a vertex, shared by consecutive passes."""
 
     keys: KeyArray
     rest: KeyArray
@@ -135,7 +136,7 @@ class _Scratch:
         )
 
     def for_level(self, n_vertices: int, n_edges: int) -> _Scratch:
-        """Views as long as a level."""
+        """Return views of the length of a level."""
         return _Scratch(
             self.keys[:n_edges],
             self.rest[:n_edges],
@@ -147,7 +148,7 @@ class _Scratch:
             self.has_leaf[:n_vertices],
         )
 
-    # Once the stars are chosen, keys and matching are done with.
+    # Keys and matching are free once the stars are chosen.
 
     @property
     def inverse(self) -> IntArray:
@@ -214,7 +215,7 @@ class _Decimation:
         return dart_kernels.Darts(*darts), vertices
 
     def exhaust(self) -> None:
-        """Go on until no edge may be contracted, and take down the level that this makes."""
+        """Contract until no edge may be contracted, and record the level reached."""
         while self.step():
             pass
         self.stats.tops.append(self._level)
@@ -229,12 +230,12 @@ class _Decimation:
         self._steering = Steering(resistance)
 
     def forget_rooms(self) -> None:
-        """Leave only the class of each vertex's kind."""
+        """Reduce the kind of each vertex to its class."""
         kinds = self._vertices.classes
         kinds[:] = (kinds - 1) % _N_CLASSES + 1
 
     def step(self) -> bool:
-        """Go from this level to the next one; False when this one is the apex."""
+        """Build the next level; return False if this one is the apex."""
         count = self._find_candidates()
         self._lap("candidates")
         if count == 0 and self._level >= self._whole_at:
@@ -327,7 +328,7 @@ class _Decimation:
         )
 
     def _find_yielding(self, steering: Steering) -> int:
-        """The arcs that do not resist, as `_try_candidates` gives those below the limit."""
+        """Fill the keys with the arcs that do not resist, and return their number."""
         scratch, darts = self._scratch, self._darts
         count = steering.candidates(
             self._field_of(), darts, self._vertices, scratch.keys, self._seed
@@ -337,14 +338,14 @@ class _Decimation:
         return count
 
     def _start_hulls(self) -> None:
-        """Give every vertex its hull: bounding boxes have stopped deciding every edge."""
+        """Build the hull of every vertex, once bounding boxes no longer decide every edge."""
         self._hulls = _kernels.Hulls(
             *_hull_kernels.field_hulls(self._field_of(), self._cols, self._vertices.boxes)
         )
         self._lap("hulls")
 
     def _field_of(self) -> IntArray:
-        """int32 (n_cells,), the vertex of each flat cell now, -1 for none."""
+        """Return the current vertex of each flat cell, int32 (n_cells,), -1 for none."""
         record = self.record
         labels: IntArray = _field_kernels.label_fields(
             record.vertex_end, record.vertex_parent, MAX_LEVELS
@@ -385,7 +386,7 @@ class _Decimation:
         self._loops.append(int((origin[::2] == origin[1::2]).sum()))
 
     def finish(self) -> None:
-        """Take down the sizes of all levels."""
+        """Record the sizes of all levels."""
         vertex_ends = _base_kernels.count_bytes(self.record.vertex_end).sum(axis=0)
         edge_ends = _base_kernels.count_bytes(self.record.edge_end).reshape(2, -1, 2).sum((0, 2))
         vertices, edges = (

@@ -16,21 +16,23 @@ if TYPE_CHECKING:
 
 
 class FaceKind(IntEnum):
-    """What a dual vertex stands for."""
+    """Meaning of a dual vertex."""
 
     ORDINARY = 0
     """A meeting point of boundaries, or a boundary that closes into a ring."""
     PROTECTED = 1
     """A hole: occupied cells, with all that they wall off."""
     OUTSIDE = 2
-    """What lies round a component of the graph; every component has one."""
+    """The surroundings of a component of the graph; every component has one."""
 
 
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class DualGraph:
-    """Dual of one level. Dual vertices are faces, numbered in the order of their first darts; dual
-    edge a crosses arc a."""
+    """Dual of one level.
+
+    Dual vertices are faces, numbered in the order of their first darts; dual edge a crosses arc a.
+    """
 
     face_of: LongArray
     """int64 (2 n_arcs,), face on the right of each dart."""

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 def to_networkx(level: Level) -> nx.MultiGraph[int]:
-    """A level as a multigraph: parallel arcs and self-loops stay what they are.
+    """Return a level as a multigraph, with its parallel arcs and self-loops.
 
-    All attributes are plain numbers, strings and lists, so that `networkx.node_link_data` of the
-    graph goes through JSON unchanged.
+    All attributes are plain numbers, strings and lists, so that JSON preserves
+    `networkx.node_link_data` of the graph.
 
     Parameters
     ----------
@@ -60,10 +60,10 @@ def to_networkx(level: Level) -> nx.MultiGraph[int]:
 
 
 def dual_to_networkx(level: Level) -> nx.MultiGraph[int]:
-    """The dual of a level as a multigraph: meeting points and holes, joined by boundaries.
+    """Return the dual of a level as a multigraph: meeting points and holes, joined by boundaries.
 
-    A vertex without an arc has no face here, though the plane round it is one; the graph's
-    `n_isolated` counts these, so that vertices - edges + faces = 2 components - `n_isolated`.
+    A vertex without an arc has no face here, although the plane round it is one; `n_isolated` of
+    the graph counts these vertices, so that vertices - edges + faces = 2 components - `n_isolated`.
 
     Parameters
     ----------
@@ -74,10 +74,10 @@ def dual_to_networkx(level: Level) -> nx.MultiGraph[int]:
     -------
     networkx.MultiGraph
         Nodes are the faces, by index in `level.dual`: `kind` ("ordinary", "protected" or
-        "outside"). Edges are the dual edges, one for each arc and with its index for a key:
-        `length_m` and `n_cracks` of the boundary (of a self-loop: of the line that its dual edge
-        takes through its own field), and `vertices` [u, v] on the two sides of it. The graph has
-        the attributes of `to_networkx` and `n_isolated`.
+        "outside"). Edges are the dual edges, one for each arc and with its index as key: `length_m`
+        and `n_cracks` of the boundary (for a self-loop, of the line of its dual edge through its
+        own field), and `vertices` [u, v] on its two sides. The graph has the attributes of
+        `to_networkx` and `n_isolated`.
     """
     isolated = level.n_vertices - len(np.unique(level.arcs))
     graph: nx.MultiGraph[int] = nx.MultiGraph(**_of_graph(level), n_isolated=isolated)
@@ -98,7 +98,7 @@ def dual_to_networkx(level: Level) -> nx.MultiGraph[int]:
 
 
 def vertices_with_attributes(level: Level) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Each vertex with the attributes that a node of `to_networkx` has."""
+    """Yield each vertex with the attributes of its node in `to_networkx`."""
     grid = level.grid
     columns = zip(
         level.cells.tolist(),

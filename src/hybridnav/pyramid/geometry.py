@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 
 def field_polygons(level: Level, *, noded: bool = False) -> Geometries:
-    """Receptive field of every vertex as a polygon.
+    """Return the receptive field of every vertex as a polygon.
 
     Parameters
     ----------
     level
         The level of a pyramid.
     noded
-        Whether to keep, on straight sides, the points where three or more fields (or two and what
-        is no vertex) meet. Polygons with them share all their points with their neighbours, so
-        that unions and other overlays of them are exact on a map with any yaw; without them an
-        outline has its turns alone.
+        Whether to keep, on straight sides, the points where three or more fields (or two fields and
+        a cell that is no vertex) meet. Polygons with them share all their points with their
+        neighbours, so that unions and other overlays of them are exact on a map with any yaw;
+        without them an outline has only its turns.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def field_polygons(level: Level, *, noded: bool = False) -> Geometries:
 
 
 def boundary_lines(level: Level) -> Geometries:
-    """Boundary of every arc as a line along the sides between its cell pairs.
+    """Return the boundary of every arc as a line along the sides between its cell pairs.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ def boundary_lines(level: Level) -> Geometries:
     Geometries
         object (n_arcs,) of `shapely.LineString`, `(x, y)` in metres, map frame, without points on
         straight stretches. A line leads from the face `level.dual.edges[arc, 0]` to the face
-        `level.dual.edges[arc, 1]` and has the field of `level.arcs[arc, 0]` on its left; where
-        both are one face it may be closed. The line of a self-loop lies inside its field, its ends
-        on the outline: at what is no vertex, or on another line that leads to that face.
+        `level.dual.edges[arc, 1]` and has the field of `level.arcs[arc, 0]` on its left; where both
+        are one face it may be closed. The line of a self-loop lies inside its field. Its ends lie
+        on the outline, at a cell that is no vertex, or on another line that leads to that face.
     """
     field_of = level.field_of
     loops = level.is_self_loop
@@ -83,7 +83,7 @@ def boundary_lines(level: Level) -> Geometries:
 
 
 def _offsets(sizes: LongArray) -> LongArray:
-    """Where each of consecutive runs starts, and where the last one ends."""
+    """Return the start of each of consecutive runs, and the end of the last one."""
     offsets: LongArray = np.zeros(len(sizes) + 1, dtype=np.int64)
     np.cumsum(sizes, out=offsets[1:])
     return offsets

@@ -14,26 +14,26 @@ if TYPE_CHECKING:
 
 
 def merge_hulls(hulls: Hulls, merged_into: IntArray, n_vertices: int) -> Hulls:
-    """Compute the hulls of fields that are made of others.
+    """Compute the hulls of fields from the hulls of their parts.
 
     Parameters
     ----------
     hulls
-        Those of the parts.
+        Hulls of the parts.
     merged_into
-        int (n_parts,), the field that each part becomes a piece of.
+        int (n_parts,), the field that each part belongs to.
     n_vertices
         Number of fields.
 
     Returns
     -------
     Hulls
-        Those of the fields.
+        Hulls of the fields.
     """
     of_point = np.repeat(merged_into, np.diff(hulls.start))
     rows, cols = hulls.points.T.astype(np.int64)
     row_bits, col_bits = (int(part.max(initial=0)).bit_length() for part in (rows, cols))
-    # numpy sorts: a sort that is compiled into a kernel takes more than a second to compile.
+    # Sort with numpy: a sort in a kernel takes more than a second to compile.
     keys = np.sort((of_point.astype(np.int64) << row_bits | rows) << col_bits | cols)
     points = np.empty((len(keys), 2), np.int32)
     points[:, 0] = keys >> col_bits & (1 << row_bits) - 1

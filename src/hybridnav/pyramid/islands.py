@@ -1,4 +1,4 @@
-"""Obstacles and components of a grid, and which lies in which: what the graph leaves out."""
+"""Obstacles and components of a grid, and their nesting, which the graph does not hold."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Islands:
 
 
 def _first_cells(labels: IntArray, count: int) -> LongArray:
-    """First flat cell of each label from 0, -1 where it has none."""
+    """Return the first flat cell of each label from 0, -1 where it has none."""
     found, at = np.unique(labels.ravel(), return_index=True)
     first = np.full(count, -1, dtype=np.int64)
     first[found[found >= 0]] = at[found >= 0]

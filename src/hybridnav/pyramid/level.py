@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, order=True)
 class LevelArc:
-    """An arc together with its level: a bare index means another arc at every level."""
+    """An arc together with its level: at another level, the same index is another arc."""
 
     level: int
     """Index of the level in its pyramid."""
@@ -47,11 +47,11 @@ class LevelArc:
 
 @copies_alike
 class Level:
-    """A plane graph of connected sets of cells, and its dual; every level answers the same.
+    """A plane graph of connected sets of cells, and its dual.
 
-    Vertices are numbered in the order of their surviving cells, arcs in the order of the base
-    edges that represent them. Everything is computed when it is first asked for and then kept;
-    arrays are not writeable.
+    Vertices are numbered in the order of their surviving cells, arcs in the order of the base edges
+    that represent them. Everything is computed on first use and then kept; arrays are not
+    writeable.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Level:
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The map it was grown from."""
+        """The map that it was grown from."""
         return self._grid
 
     def __repr__(self) -> str:
@@ -109,11 +109,11 @@ class Level:
     def _cells_by_field(self) -> tuple[LongArray, LongArray]:
         """Flat cells sorted by field, and where each field starts among them."""
         order = np.argsort(self._labels[0], kind="stable")
-        order = order[len(order) - int(self.areas.sum()) :]  # the cells of no field come first
+        order = order[len(order) - int(self.areas.sum()) :]  # cells without a field are first
         return order, np.concatenate([[0], np.cumsum(self.areas)])
 
     def receptive_field(self, vertex: int) -> LongArray:
-        """Cells of the receptive field of a vertex, in the order of rows.
+        """Return the cells of the receptive field of a vertex, in the order of rows.
 
         Parameters
         ----------
@@ -200,7 +200,7 @@ class Level:
     def face_darts(
         self, cells: LongArray, direction: int, *, among: BoolArray | None = None
     ) -> LongArray:
-        """One dart on the face that a direction at each cell points into.
+        """Return one dart on the face that a direction at each cell points into.
 
         Parameters
         ----------
@@ -209,8 +209,8 @@ class Level:
         direction
             0 east, 1 north, 2 west, 3 south; no vertex lies there.
         among
-            bool (rows, cols), the vertices that count, whole fields of them; None for all. The
-            face is that of the map without the others.
+            bool (rows, cols), the vertices that count, in whole fields; None for all. The face is
+            that of the map without the other vertices.
 
         Returns
         -------
@@ -230,7 +230,7 @@ class Level:
 
     @property
     def removed_edges(self) -> BoolArray:
-        """bool (2 rows cols,), the base edges that are gone as redundant, not as contracted."""
+        """bool (2 rows cols,), the base edges that were removed as redundant, not contracted."""
         end = self._record.edge_end
         removed: BoolArray = (end & 1 == 1) & (end < min(2 * self.index + 2, SURVIVES))
         return removed
@@ -238,25 +238,27 @@ class Level:
     @cached_property
     def dual(self) -> DualGraph:
         """The dual graph: faces, their kinds, and the dual edge of each arc."""
-        # South of the first cell of a component, in the order of rows, lies what surrounds it.
+        # The outer face lies south of the first cell of a component, in the order of rows.
         outer = self.face_darts(self._islands().component_cell, _SOUTH)
         return DualGraph.of_map(self.darts, outer[outer >= 0])
 
     def to_networkx(self) -> nx.MultiGraph[int]:
-        """The level as a multigraph: see `hybridnav.pyramid.export.to_networkx`."""
+        """Return the level as a multigraph: see `hybridnav.pyramid.export.to_networkx`."""
         from hybridnav.pyramid.export import to_networkx  # noqa: PLC0415 - loads networkx
 
         return to_networkx(self)
 
     def dual_to_networkx(self) -> nx.MultiGraph[int]:
-        """The dual as a multigraph: see `hybridnav.pyramid.export.dual_to_networkx`."""
+        """Return the dual as a multigraph: see `hybridnav.pyramid.export.dual_to_networkx`."""
         from hybridnav.pyramid.export import dual_to_networkx  # noqa: PLC0415 - loads networkx
 
         return dual_to_networkx(self)
 
     def to_simple_graph(self) -> SimpleGraph:
-        """What a simple graph keeps of the level, and a report of what it drops: see
-        `hybridnav.pyramid.simple.to_simple_graph`."""
+        """Return the level as a simple graph, with a report of the arcs that it drops.
+
+        See `hybridnav.pyramid.simple.to_simple_graph`.
+        """
         from hybridnav.pyramid.simple import to_simple_graph  # noqa: PLC0415 - loads networkx
 
         return to_simple_graph(self)
@@ -278,8 +280,8 @@ class Level:
         the other surviving cell. In metres.
 
         Diagonals need both side cells: free ones in a free field, free or unexplored ones in an
-        unexplored field. A self-loop's is the shortest closed walk from its surviving cell across
-        one of the cell pairs of its boundary.
+        unexplored field. For a self-loop it is the shortest closed walk from its surviving cell
+        across one of the cell pairs of its boundary.
         """
         distance = search_kernels.field_distances(
             self._grid.classes, self._labels[0], self._labels[1]
@@ -292,7 +294,7 @@ class Level:
         return _frozen(length_in_cells(least) * self._grid.resolution_m)
 
     def boundary(self, arc: int) -> LongArray:
-        """Cell pairs of the boundary of one arc.
+        """Return the cell pairs of the boundary of one arc.
 
         Parameters
         ----------
@@ -304,7 +306,7 @@ class Level:
         LongArray
             int64 (n_cracks, 2, 2): 4-adjacent cells (row, col), the first in the field of
             `arcs[arc, 0]`, the second in that of `arcs[arc, 1]`. For a self-loop both lie in the
-            same field: the pairs are those that the line of its dual edge passes between.
+            same field, and the line of its dual edge passes between them.
 
         Raises
         ------
@@ -323,7 +325,7 @@ class Level:
 
     @cached_property
     def boundary_middles(self) -> FloatArray:
-        """float64 (n_arcs, 2), the point in the middle of each arc's boundary, to draw it through.
+        """float64 (n_arcs, 2), the middle of each arc's boundary, through which to draw the arc.
 
         `(x, y)` in metres, map frame: the middle of the side between the two cells whose side is
         nearest the mean of all sides of the boundary, so that it lies on the boundary.
@@ -334,7 +336,7 @@ class Level:
 
     @cached_property
     def boundary_table(self) -> tuple[LongArray, LongArray]:
-        """All boundaries at once: int64 base edges, and the arc of each, sorted by arc."""
+        """Return all boundaries at once: int64 base edges, and the arc of each, sorted by arc."""
         rows, cols = self._grid.shape
         cracks, classes = _field_kernels.find_cracks(self._labels[0], rows, cols)
         arc_of_class = np.full(len(cracks), -1, dtype=np.int64)
@@ -352,8 +354,10 @@ class Level:
         return edge[order], arc[order]
 
     def _line_of_loop(self, base_edge: int, came: ByteArray) -> LongArray:
-        """Base edges of the line that the dual edge of a self-loop takes through its field, from
-        the face on either side of it; `came` is scratch."""
+        """Return the base edges of the line of a self-loop's dual edge through its field.
+
+        The line leads to the face on either side; `came` is scratch.
+        """
         field_of, cols = self._labels[0], self._grid.shape[1]
         cell = base_edge >> 1
         where = field_of[cell], field_of, self._record.edge_end, self.index, cols, came

@@ -41,7 +41,7 @@ class DualGraphPyramid:
     stats: BuildStats = field(repr=False)
     """Size of each level and seconds per stage of the build."""
     rooms: RoomLabels | None = field(repr=False)
-    """The rooms that it was built with."""
+    """The rooms that the pyramid was built with."""
     _record: Record = field(repr=False)
     _levels: dict[int, Level] = field(repr=False, default_factory=dict)
 
@@ -56,7 +56,7 @@ class DualGraphPyramid:
         rooms: RoomLabels | None = None,
         resistance: Resistance | None = None,
     ) -> DualGraphPyramid:
-        """Contract the cells of a grid to places, and with rooms on to rooms and a building.
+        """Contract the cells of a grid to places and, with rooms, further to rooms and a building.
 
         At each level the stars of a maximal independent edge set are contracted (MIES; Haxhimusa
         and Kropatsch), and edges that have become redundant are removed, so that every arc of a
@@ -69,21 +69,21 @@ class DualGraphPyramid:
         merge_distance_m
             U_d in metres, positive, infinity allowed: how coarse the apex is.
         linkage
-            What stays strictly below U_d, between cell centres, to 1e-9 of its square.
+            The distance that stays strictly below U_d, between cell centres, to 1e-9 of its square.
             `"survivor"`: the distance between the two surviving cells when one is contracted into
-            the other; it holds for each such link, not for the field. `"radius"`: the distance
-            from every cell of a field to its surviving cell. `"diameter"`: the distance between
-            every two cells of a field (complete linkage).
+            the other; it holds for each such link, not for the field. `"radius"`: the distance from
+            every cell of a field to its surviving cell. `"diameter"`: the distance between every
+            two cells of a field (complete linkage).
         seed
             Breaks ties; equal input and seed give an equal pyramid.
         rooms
             The room of each cell. No two rooms ever merge at the levels of the places. Above them,
-            all places of a class that are connected inside one room merge whatever U_d is (what
-            lies in no room counts as one), which gives `room_level`; above that whatever touches,
-            up to the apex, the building.
+            all places of a class that are connected inside one room merge whatever U_d is, which
+            makes `room_level`; cells outside rooms count as one room. Above that, all fields that
+            touch merge, up to the apex, the building.
         resistance
             Lets contraction go on above the places, whatever U_d is, until every arc of the apex
-            resists: see `Resistance`. Not with rooms, which say themselves what merges.
+            resists: see `Resistance`. Not with rooms, which decide themselves what merges.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class DualGraphPyramid:
 
     @property
     def record(self) -> Record:
-        """When and how each vertex and edge of the base goes, from which all levels are rebuilt."""
+        """Level and kind of the end of each vertex and edge, from which all levels are rebuilt."""
         return self._record
 
     @property
@@ -169,12 +169,12 @@ class DualGraphPyramid:
         at = index + len(self) if index < 0 else index
         if not 0 <= at < len(self):
             raise IndexError(f"the pyramid has levels 0 to {len(self) - 1}, got {index}")
-        if at not in self._levels:  # in one call, so that all threads get the same one
+        if at not in self._levels:  # one call, so that all threads share one level
             self._levels.setdefault(at, Level(self.grid, self._record, at, self._find_islands))
         return self._levels[at]
 
     def ancestor(self, vertices: ArrayLike, *, level: int, to: int) -> IntArray:
-        """Vertices of a higher level whose fields hold those of vertices of a lower one.
+        """Return the vertices of a higher level whose fields contain given vertices of a lower one.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class DualGraphPyramid:
         return found
 
     def descendants(self, vertex: int, *, level: int, to: int) -> LongArray:
-        """Vertices of a lower level whose fields lie in that of a vertex of a higher one.
+        """Return the vertices of a lower level whose fields lie in the field of a higher one.
 
         Parameters
         ----------
@@ -222,29 +222,31 @@ class DualGraphPyramid:
         return np.flatnonzero(upper.field_of[tuple(lower.cells.T)] == _checked(vertex, upper))
 
     def parent(self, level: int) -> IntArray:
-        """int32 (n_vertices of `level`,), the vertex of the next level above each."""
+        """Return the vertex of the next level above each vertex of `level`, int32 (n_vertices,)."""
         below = self[level]
         return self.ancestor(np.arange(below.n_vertices), level=below.index, to=below.index + 1)
 
     def children(self, level: int, vertex: int) -> LongArray:
-        """int64, the reduction window of a vertex of `level`: its sons one level down."""
+        """Return the reduction window of a vertex of `level`, int64: its sons one level down."""
         above = self[level].index
         if above == 0:
             raise InvalidValueError("nothing lies below level 0, the base")
         return self.descendants(vertex, level=above, to=above - 1)
 
     def contraction_kernel(self, level: int) -> LongArray:
-        """int64, arcs of `level` that are contracted on the way to the next level: a forest of
-        stars, one for each reduction window."""
+        """Return the arcs of `level` that are contracted on the way to the next level, int64.
+
+        They form a forest of stars, one for each reduction window.
+        """
         return self._kernel(level, removed=False)
 
     def removal_kernel(self, level: int) -> LongArray:
-        """int64, arcs of `level` that are removed as redundant on the way to the next level."""
+        """Return the arcs of `level` that are removed as redundant below the next level, int64."""
         return self._kernel(level, removed=True)
 
     def _kernel(self, level: int, *, removed: bool) -> LongArray:
         below = self[level]
-        self[below.index + 1]  # the apex has no kernels: the index error says so
+        self[below.index + 1]  # raises at the apex, which has no kernels
         end = self._record.edge_end[below.base_edges]
         return np.flatnonzero(end == 2 * (below.index + 1) + removed)
 
@@ -258,7 +260,7 @@ class DualGraphPyramid:
 
     @cached_property
     def islands(self) -> Islands:
-        """Obstacles and components of the grid, and which lies in which."""
+        """Return the obstacles and components of the grid, with their nesting."""
         from hybridnav.pyramid.islands import Islands  # noqa: PLC0415 - loads scipy.ndimage
 
         return Islands.of_classes(self.grid.classes)
@@ -271,7 +273,7 @@ class DualGraphPyramid:
 
 
 def _checked(vertices: ArrayLike, level: Level) -> LongArray:
-    """Indices of vertices of a level, whole numbers in range."""
+    """Return indices of vertices as an array, after a check of their type and range."""
     found = np.asarray(vertices)
     if found.size == 0:
         return found.astype(np.int64)

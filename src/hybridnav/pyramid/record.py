@@ -1,4 +1,4 @@
-"""The record of a decimation: what every level is rebuilt from."""
+"""The record of a decimation, from which every level is rebuilt."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ if TYPE_CHECKING:
 Linkage = Literal["survivor", "radius", "diameter"]
 
 SURVIVES = 255
-"""End of what is still there at the apex."""
+"""End of a vertex or edge that still exists at the apex."""
 
 MAX_LEVELS = 126
-"""Levels that one byte per edge can tell apart; real maps have 10 to 15."""
+"""Levels that one byte per edge can distinguish; real maps have 10 to 15."""
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """When and how each vertex and edge of the base goes: 7 bytes a cell.
+    """Level and kind of the end of each vertex and edge of the base: 7 bytes a cell.
 
     All arrays are flat, in the order of cells (row-major) and of base edges (two a cell).
     """
@@ -27,7 +27,7 @@ class Record:
     vertex_end: ByteArray
     """0: no vertex; SURVIVES; else the level at which the cell stops being a surviving cell."""
     vertex_parent: IntArray
-    """The surviving cell that the vertex was contracted into, where it was."""
+    """The surviving cell that a contracted vertex went into."""
     edge_end: ByteArray
     """0: no edge; SURVIVES; else 2 * level, plus 1 where the edge is removed, not contracted."""
 
@@ -43,10 +43,9 @@ class LevelSize:
 
 @dataclass
 class BuildStats:
-    """What a build did: sizes from the base to the apex, and seconds of processor-bound stages."""
+    """Statistics of a build: sizes from the base to the apex, seconds of processor-bound stages."""
 
     sizes: list[LevelSize] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
     tops: list[int] = field(default_factory=list)
-    """Levels at which nothing more could be contracted: the places; and with rooms, the rooms and
-    the apex."""
+    """Levels at which contraction ended: the places; with rooms, also the rooms and the apex."""

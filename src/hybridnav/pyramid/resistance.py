@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class Resistance:
-    """Says which arcs resist: those whose boundary is narrow against both of the fields it joins.
+    """The rule by which an arc resists: its boundary is narrow against both fields that it joins.
 
-    The width of an arc is the greatest clearance along its boundary, the peak of a vertex that in
-    its field. An arc is contracted while its width is at least a share of the lower of its two
-    peaks, the widest arcs first. Peaks only grow, so that a door resists once both rooms have grown
-    to it, at every level from there to the apex. It is the saddle and peak of a watershed, on the
-    arcs of a level: two doors between the same rooms are judged one by one.
+    The width of an arc is the greatest clearance along its boundary, the peak of a vertex the
+    greatest clearance in its field. An arc is contracted while its width is at least a share of the
+    lower of its two peaks, the widest arcs first. Peaks only grow, so that a door resists once both
+    rooms have grown to it, at every level from there to the apex. These are the saddles and peaks
+    of a watershed, on the arcs of a level: two doors between the same rooms are judged one by one.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ class Resistance:
         object.__setattr__(self, "clearance", clearance)
 
     def peaks(self, field_of: IntArray, n_vertices: int) -> FloatArray:
-        """float64 (n_vertices,), greatest clearance in each field.
+        """Return the greatest clearance in each field, float64 (n_vertices,).
 
         Parameters
         ----------
         field_of
             int32 (n_cells,), -1 for none.
         n_vertices
-            How many fields there are.
+            Number of fields.
         """
         inside = field_of >= 0
         peaks = np.zeros(n_vertices)
@@ -75,8 +75,9 @@ class Resistance:
         return peaks
 
     def widths(self, field_of: IntArray, base_edges: IntArray) -> FloatArray:
-        """float64 (n_arcs,), greatest clearance along each arc's boundary: of the two cells of a
-        crack the lower one counts. Self-loops have 0.
+        """Return the greatest clearance along each arc's boundary, float64 (n_arcs,).
+
+        The lower clearance of the two cells of a crack counts. Self-loops have 0.
 
         Parameters
         ----------
@@ -109,7 +110,7 @@ class Steering:
     def candidates(
         self, field_of: IntArray, darts: Darts, vertices: Vertices, keys: KeyArray, seed: np.uint64
     ) -> int:
-        """Fill `keys` with the arcs that do not resist; gives their number."""
+        """Fill `keys` with the arcs that do not resist, and return their number."""
         self._peaks = self._resistance.peaks(field_of, len(vertices.cells))
         self._widths = self._resistance.widths(field_of, darts.base_edge)
         return int(
@@ -126,7 +127,7 @@ class Steering:
         )
 
     def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
-        """Undo the joins of stars that would merge two rooms by way of the threshold between."""
+        """Undo the joins of stars that would merge two rooms through the threshold between them."""
         leaves = np.flatnonzero(kernel_dart >= 0)
         widths = self._widths[kernel_dart[leaves] >> 1]
         leaves = leaves[np.argsort(-widths, kind="stable")]

@@ -1,4 +1,4 @@
-"""What a simple graph keeps of a level, and what it loses."""
+"""A level as a simple graph, and the arcs that this loses."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ArcGroup:
 
 @dataclass(frozen=True)
 class SimpleGraphReport:
-    """What a simple graph drops: arcs beyond the first between two vertices, and self-loops."""
+    """Arcs that a simple graph drops: those beyond the first between two vertices, self-loops."""
 
     n_vertices: int
     """Vertices; a simple graph keeps them all."""
@@ -78,7 +78,7 @@ class SimpleGraphReport:
 
 @dataclass(frozen=True, eq=False)
 class SimpleGraph:
-    """A simple graph of a level, beside what was dropped to get there."""
+    """A simple graph of a level, with a report of the arcs that were dropped."""
 
     graph: nx.Graph[int]
     """Nodes are the vertices, with the attributes of `to_networkx`. Edges join adjacent vertices:
@@ -88,7 +88,7 @@ class SimpleGraph:
 
 
 def to_simple_graph(level: Level) -> SimpleGraph:
-    """What a level looks like to a simple graph: at most one edge for two vertices, no self-loop.
+    """Return a level as a simple graph: at most one edge between two vertices, no self-loop.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def to_simple_graph(level: Level) -> SimpleGraph:
     Returns
     -------
     SimpleGraph
-        The graph, and a report of the arcs that it has no room for.
+        The graph, and a report of the arcs that it drops.
     """
     graph: nx.Graph[int] = nx.Graph(
         name=level.grid.name, level=level.index, resolution_m=level.grid.resolution_m
@@ -106,7 +106,7 @@ def to_simple_graph(level: Level) -> SimpleGraph:
     graph.add_nodes_from(vertices_with_attributes(level))
     loops = level.is_self_loop
     plain = np.flatnonzero(~loops)
-    # Stable: of arcs with an equal through_m the one with the lowest index is kept.
+    # Stable: among arcs with an equal through_m, the lowest index is kept.
     by_length = plain[np.argsort(level.through_m[plain], kind="stable")]
     pairs, first = np.unique(np.sort(level.arcs[by_length], axis=1), axis=0, return_index=True)
     for (low, high), arc in zip(pairs.tolist(), by_length[first].tolist(), strict=True):
@@ -121,7 +121,7 @@ def to_simple_graph(level: Level) -> SimpleGraph:
 
 
 def report_of(arcs: IntArray, n_vertices: int) -> SimpleGraphReport:
-    """Report what a simple graph drops of a graph.
+    """Report the arcs of a graph that a simple graph drops.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def report_of(arcs: IntArray, n_vertices: int) -> SimpleGraphReport:
 
 
 def _groups(arcs: IntArray, mask: BoolArray) -> list[ArcGroup]:
-    """Arcs of a mask, those with the same two ends together, in the order of the ends."""
+    """Return the arcs of a mask in groups with the same two ends, in the order of the ends."""
     index: LongArray = np.flatnonzero(mask)
     pairs, group_of = np.unique(np.sort(arcs[index], axis=1), axis=0, return_inverse=True)
     order = np.argsort(group_of.ravel(), kind="stable")
@@ -157,6 +157,6 @@ def _joined(arcs: Sequence[int]) -> str:
 
 
 def _listed(lines: list[str]) -> list[str]:
-    """The first lines, and how many more there are."""
+    """Return the first lines, and how many more there are."""
     more = len(lines) - _LISTED
     return [*lines[:_LISTED], f"  and {more} more"] if more > 0 else lines

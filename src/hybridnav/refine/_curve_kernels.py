@@ -1,7 +1,10 @@
 """Kernels of the shortest curves of a vehicle with a turning circle, forwards or both ways.
 
 A word is a row of pieces: kinds (1 for an arc to the left, 0 for straight on, -1 to the right) and
-signed lengths, negative backwards, in turning radii unless something else is said.
+signed lengths, negative backwards, in turning radii unless stated otherwise. Poses are x, y in
+turning radii and phi in radians; `sine` and `cosine` are those of phi. The functions of words take
+`kinds` and `lengths`, int64 and float64 (5,), of the best word so far, its length `best`, and
+whether to mirror the word and to flip its direction.
 """
 
 from __future__ import annotations
@@ -14,9 +17,9 @@ from hybridnav._jit import njit
 
 _FULL = 2 * math.pi
 _ROUNDING = 1e-9
-"""Angles and lengths below this are none: of an arc of nothing rounding makes a full turn."""
+"""Angles and lengths below this count as 0: rounding could turn an empty arc into a full turn."""
 LARGEST_HEADING = 1e6
-"""Headings in radians above which too few digits are left."""
+"""Headings in radians above which too few digits remain."""
 
 
 @njit(cache=True, nogil=True)
@@ -28,14 +31,17 @@ def _forward(angle):
 
 @njit(cache=True, nogil=True)
 def _wrapped(angle):
-    """Bring an angle to [-pi, pi]; of the two ends the upper one."""
+    """Bring an angle to [-pi, pi]; for the two ends, return the upper one."""
     angle -= _FULL * np.rint(angle / _FULL)
     return angle + _FULL if angle < -math.pi + _ROUNDING else angle
 
 
 @njit(cache=True, nogil=True)
 def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
-    """Keep a word if it is shorter than the best, mirrored, driven the other way, from its end."""
+    """Keep a word if it is shorter than the best one; return the lesser length.
+
+    The word may be mirrored, flipped in direction, and driven from its end (`back`).
+    """
     total = 0.0
     for piece in pieces:
         total += abs(piece)
@@ -52,7 +58,8 @@ def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
 
 @njit(cache=True, nogil=True)
 def _dubins(x, y, phi, kinds, lengths):
-    """Shortest word forwards from the origin to a pose (L. E. Dubins, 1957); its length.
+    """Find the shortest word forwards from the origin to a pose (L. E. Dubins, 1957); return its
+    length.
 
     An arc, then the tangent of two circles or a long arc between them, then an arc.
     """
@@ -80,7 +87,7 @@ def _dubins(x, y, phi, kinds, lengths):
 
 @njit(cache=True, nogil=True)
 def _tau_omega(u, v, xi, eta, phi):
-    """First and last arc of four, the middle two being u and v."""
+    """Return the first and last arc of four whose middle two are u and v."""
     delta = _wrapped(u - v)
     a, b = math.sin(u) - math.sin(delta), math.cos(u) - math.cos(delta) - 1
     tau = math.atan2(eta * a - xi * b, xi * a + eta * b)
@@ -92,7 +99,7 @@ def _tau_omega(u, v, xi, eta, phi):
 
 @njit(cache=True, nogil=True)
 def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
-    """Words of an arc, a straight line and an arc."""
+    """Try the words of an arc, a straight line and an arc; return the least length."""
     xi, eta = x - sine, y - 1 + cosine
     u, t = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
     v = _wrapped(phi - t)
@@ -111,7 +118,7 @@ def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
 
 @njit(cache=True, nogil=True)
 def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
-    """Words of four arcs, the middle two equally long."""
+    """Try the words of four arcs, the middle two equally long; return the least length."""
     xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
     rho = (2 + math.sqrt(squared)) / 4
@@ -133,7 +140,7 @@ def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
 
 @njit(cache=True, nogil=True)
 def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
-    """Words with a straight line between two quarter turns."""
+    """Try the words with a straight line between two quarter turns; return the least length."""
     quarter = math.pi / 2
     xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
@@ -150,7 +157,10 @@ def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
 
 @njit(cache=True, nogil=True)
 def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
-    """Words that may also be driven from their end: three arcs, or one quarter turn."""
+    """Try the words that may be driven from their end: three arcs, or one quarter turn.
+
+    Return the least length; `back` states whether the word is driven from its end.
+    """
     quarter = math.pi / 2
     xi, eta = x - sine, y - 1 + cosine
     distance, angle = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
@@ -181,10 +191,10 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
 
 @njit(cache=True, nogil=True)
 def _reeds_shepp(x, y, phi, kinds, lengths):
-    """Shortest word forwards and backwards from the origin to a pose; its length.
+    """Find the shortest word forwards and backwards from the origin to a pose; return its length.
 
     J. A. Reeds, L. A. Shepp: Optimal paths for a car that goes both forwards and backwards, 1990:
-    the words of section 8, each also mirrored, driven the other way, and from its end.
+    the words of section 8, each also mirrored, flipped in direction, and driven from its end.
     """
     best = np.inf
     sine, cosine = math.sin(phi), math.cos(phi)
@@ -204,10 +214,11 @@ def _reeds_shepp(x, y, phi, kinds, lengths):
 
 @njit(cache=True, nogil=True)
 def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
-    """Shortest curve between two poses, with lengths in the unit of the radius.
+    """Return the shortest curve between two poses, with lengths in the unit of the radius.
 
-    Fills `kinds` and `lengths`, of five each, and returns how many pieces the word has: 0 where
-    there is none, for what is not finite or turns round a million times has none.
+    Fill `kinds` and `lengths`, five each, and return the number of pieces: 0 for poses that are not
+    finite or have headings beyond `LARGEST_HEADING`. `yaw0` and `yaw1` are in radians; `reverses`
+    allows backward pieces.
     """
     if not 0.0 < radius < np.inf:
         return 0

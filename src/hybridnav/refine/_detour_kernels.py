@@ -15,15 +15,15 @@ from hybridnav.refine._taut_kernels import FREE, tighten
 
 _ROUND = 2.0**20
 _WIDEST = 8
-"""Segments of the longest part of a string that is led another way."""
+"""Most segments of a part of a string that is led another way."""
 _SLACK = 0.002
-"""Share of its length by which a part of more than two segments must exceed the straight line to
-be tried; one of two is always tried, so no point stays that can be left out."""
+"""Share of its length by which a part of more than two segments must exceed the straight line to be
+tried; a part of two is always tried, so that no superfluous point stays."""
 
 
 @njit(cache=True, nogil=True)
 def _cell_at(marks, u_row, u_col, w_row, w_col):
-    """Row and column of the free cell touched by u that lies nearest to w; row -1 for none."""
+    """Return the free cell touched by u that lies nearest to w, (row, col); row -1 for none."""
     best, best_row, best_col = np.inf, -1, -1
     rows, cols = marks.shape
     for row in range(max(math.ceil(u_row) - 1, 0), min(math.floor(u_row) + 1, rows)):
@@ -36,7 +36,7 @@ def _cell_at(marks, u_row, u_col, w_row, w_col):
 
 @njit(cache=True, nogil=True)
 def _add(string, size, row, col):
-    """Append a point that may give way; points of no size on the map's scale are rounded off."""
+    """Append a point that may give way, rounded."""
     string[size, 0], string[size, 1] = (
         np.rint(row * _ROUND) / _ROUND,
         np.rint(col * _ROUND) / _ROUND,
@@ -47,12 +47,13 @@ def _add(string, size, row, col):
 
 @njit(cache=True, nogil=True)
 def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
-    """Walk cells straight from u to w, and round what is in the way always on one hand.
+    """Walk cells straight from u to w, and round obstacles always on one hand.
 
     After V. Lumelsky, A. Stepanov: Path-planning strategies for a point mobile automaton, 1987
-    (Bug2). Gives up outside the ellipse in which a path shorter than `limit` stays. Writes the
-    points of the way, returns their number, 0 for none, and the number of steps. The points where
-    the way leaves and meets the straight line are rounded, so what is made of it must be judged.
+    (Bug2). The walk ends outside the ellipse in which a path shorter than `limit` stays. Write the
+    points of the walk to `string`; return their number, 0 for none, and the number of steps. The
+    points where the walk leaves and meets the straight line are rounded, so the result must be
+    tested. `u` and `w` are positions, `limit` is a length in cells, `hand` is 1 or -1.
     """
     rows, cols = marks.shape
     row, col = _cell_at(marks, u_row, u_col, w_row, w_col)
@@ -67,7 +68,7 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     row_turn, col_turn = 1 if to_row > 0 else 3, 0 if to_col > 0 else 2
     reach = (abs(to_row) + abs(to_col)) / 2
     size, last, hit, follows, heading = 1, -1, 0.0, False, 0
-    # A cell's centre may lie a little outside where the string does not.
+    # The centre of a cell may lie a little outside an ellipse that contains the string.
     limit += 0.5
     n_steps = int(3 * limit) + 16
     for step in range(n_steps):
@@ -86,7 +87,7 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
         if follows:
             heading = (heading - hand) & 3
         else:
-            # Where the line leaves the cell, as a share of its length.
+            # Share of the line at which it leaves the cell.
             at_row = (row + row_side) * per_row if to_row != 0.0 else np.inf
             at_col = (col + col_side) * per_col if to_col != 0.0 else np.inf
             at = min(at_row, at_col)
@@ -124,7 +125,7 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
 
 @njit(cache=True, nogil=True)
 def _length(string, first, last):
-    """Length of a part of a string."""
+    """Return the length of a part of a string."""
     total = 0.0
     for i in range(first, last):
         d_row, d_col = string[i + 1, 0] - string[i, 0], string[i + 1, 1] - string[i, 1]
@@ -134,7 +135,7 @@ def _length(string, first, last):
 
 @njit(cache=True, nogil=True)
 def improve(marks, string, n, budget):
-    """Lead parts of a taut string past other sides of obstacles wherever that makes it shorter.
+    """Lead parts of a taut string past other sides of obstacles if that makes it shorter.
 
     Parts of two to `_WIDEST` segments, short ones first, until the budget of steps is used up.
     """

@@ -1,8 +1,9 @@
 """Kernels of the motion check: states and motions of a robot, one call each.
 
-Points are metres and headings radians in the map frame. `place` says where the grid lies there: its
-origin (x, y), then what a metre along x and y is in rows and in columns, its yaw, and cells in a
-metre. `body` is that of `_sweep_kernels`.
+Points are metres and headings radians in the map frame. `place` describes the pose of the grid: its
+origin (x, y), then the length of a metre along x and y in rows and in columns, its yaw, and cells
+in a metre. `marks` is uint8 (rows, cols), one of `BLOCKED`, `OPEN` and `STAND`. `body` is that of
+`_sweep_kernels`.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _LONGEST_TURN = 2 * math.pi + 1e-6
 
 @njit(cache=True, nogil=True)
 def _position(place, x, y):
-    """Position (row, col) of a point, rounded."""
+    """Return the position (row, col) of a point, rounded."""
     x -= place[0]
     y -= place[1]
     return rounded(place[2] * x + place[3] * y), rounded(place[4] * x + place[5] * y)
@@ -39,14 +40,14 @@ def _position(place, x, y):
 
 @njit(cache=True, nogil=True)
 def point_stands(marks, place, x, y):
-    """Whether a point may be stood on."""
+    """Return whether a point may be stood on."""
     row, col = _position(place, x, y)
     return in_map(marks, row, col) and stands(marks, row, col)
 
 
 @njit(cache=True, nogil=True)
 def point_runs(marks, place, x0, y0, x1, y1):
-    """Whether a point may run straight from one place to another."""
+    """Return whether a point may run straight from one place to another."""
     a_row, a_col = _position(place, x0, y0)
     b_row, b_col = _position(place, x1, y1)
     return runs(marks, a_row, a_col, b_row, b_col)
@@ -54,9 +55,9 @@ def point_runs(marks, place, x0, y0, x1, y1):
 
 @njit(cache=True, nogil=True)
 def _legal_bend(marks, positions, i):
-    """Whether a polyline that bends at a corner of the lattice does not change sides there.
+    """Return whether a polyline with a bend at a corner of the lattice stays on one side there.
 
-    Between two cells whose corner may not be passed no line runs, straight or bent.
+    No line, straight or bent, runs between two cells whose corner may not be passed.
     """
     row, col = positions[i]
     rows, cols = marks.shape
@@ -78,12 +79,12 @@ def _legal_bend(marks, positions, i):
 
 @njit(cache=True, nogil=True)
 def polyline_runs(marks, place, points):
-    """Whether a point may run along a polyline of one or more points, bends included."""
+    """Return whether a point may run along a polyline of one or more points, bends included."""
     positions = np.empty((points.shape[0], 2))
     n = 0
     for i in range(points.shape[0]):
         row, col = _position(place, points[i, 0], points[i, 1])
-        # Points that repeat would hide a bend.
+        # Repeated points would hide a bend.
         if n == 0 or positions[n - 1, 0] != row or positions[n - 1, 1] != col:
             positions[n, 0], positions[n, 1] = row, col
             n += 1
@@ -103,7 +104,7 @@ def polyline_runs(marks, place, points):
 
 @njit(cache=True, nogil=True)
 def body_stands(marks, place, body, x, y, yaw):
-    """Whether a body may be at a point with a heading."""
+    """Return whether a body may be at a point with a heading."""
     row, col = _position(place, x, y)
     if not in_map(marks, row, col) or not stands(marks, row, col):
         return False
@@ -114,14 +115,15 @@ def body_stands(marks, place, body, x, y, yaw):
 
 @njit(cache=True, nogil=True)
 def _short_turn(yaw0, yaw1):
-    """Radians from heading to heading the short way, [-pi, pi]."""
+    """Return the radians from heading to heading the short way, [-pi, pi]."""
     turn = yaw1 - yaw0
     return turn - 2 * math.pi * np.rint(turn / (2 * math.pi))
 
 
 @njit(cache=True, nogil=True)
 def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
-    """Whether a body may go straight from one place to another while it turns the short way."""
+    """Return whether a body may go straight from one place to another while it turns the short
+    way."""
     row, col = _position(place, x0, y0)
     b_row, b_col = _position(place, x1, y1)
     if not runs(marks, row, col, b_row, b_col):
@@ -145,7 +147,8 @@ def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
 
 @njit(cache=True, nogil=True)
 def turn_on_the_spot(marks, place, body, x, y, yaw0, yaw1):
-    """Turn in radians by which a body may go from heading to heading on the spot; nan for none."""
+    """Return the radians by which a body may turn on the spot from heading to heading; nan for
+    none."""
     row, col = _position(place, x, y)
     if not in_map(marks, row, col) or not stands(marks, row, col):
         return np.nan
@@ -156,7 +159,7 @@ def turn_on_the_spot(marks, place, body, x, y, yaw0, yaw1):
 
 @njit(cache=True, nogil=True)
 def body_drives_straight(marks, place, body, x0, y0, yaw0, x1, y1, yaw1, backwards):
-    """Whether a body may turn to the direction of travel, drive straight, and turn again.
+    """Return whether a body may turn to the direction of travel, drive straight, and turn again.
 
     Between equal points it only turns. Turns go either way round.
     """
@@ -191,10 +194,11 @@ def body_drives(
     lengths,
     radius,
 ):
-    """Whether a body may drive a curve of arcs and straight lines, tangent to one another.
+    """Return whether a body may drive a curve of tangent arcs and straight lines.
 
-    `kinds` are 1 for an arc to the left, 0 for straight on, -1 to the right; `lengths`, in metres
-    like `radius`, are negative backwards. No arc may be longer than a full turn.
+    The curve starts at `x0`, `y0`, `yaw0`. `kinds`, int64 (n,), are 1 for an arc to the left, 0 for
+    straight on, -1 to the right; `lengths`, float64 (n,), in metres like `radius`, are negative
+    backwards. No arc may be longer than a full turn.
     """
     row, col = _position(place, x0, y0)
     heading = yaw0 - place[6]
@@ -252,7 +256,10 @@ def body_steers(
     radius,
     reverses,
 ):
-    """Whether a body may drive the shortest curve of its turning radius between two poses."""
+    """Return whether a body may drive the shortest curve of a turning radius between two poses.
+
+    `radius` is in metres; `reverses` allows backward pieces.
+    """
     kinds, lengths = np.empty(5, np.int64), np.empty(5)
     n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths)
     if n == 0:

@@ -13,13 +13,13 @@ from hybridnav.search._exact_kernels import turn_of
 
 @njit(cache=True, nogil=True)
 def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
-    """Whether a segment, which is not a point, stays in the closed cells it may stand on; exact.
+    """Return whether a segment stays in the closed cells that it may stand on; exact.
 
-    A cell may be stood on from the mark `stand` upwards, and lets lines pass through its corners
-    from the mark `pass_by` upwards, which is no higher: no line runs between two cells below it.
-    Walks the cells that the segment enters (J. Amanatides, A. Woo: A fast voxel traversal algorithm
-    for ray tracing, 1987); one along a line between cells needs one of the two at each step. Both
-    ends lie in the map.
+    The ends a and b, positions in the map, differ. `marks` is uint8 (rows, cols): a cell may be
+    stood on from the mark `stand` upwards, and lines may pass its corners from the mark `pass_by`
+    <= `stand` upwards: no line runs between two cells below it. The walk visits the cells that the
+    segment enters (J. Amanatides, A. Woo: A fast voxel traversal algorithm for ray tracing, 1987);
+    a segment along a line between cells needs one of the two at each step.
     """
     rows, cols = marks.shape
     if a_row == b_row or a_col == b_col:
@@ -41,7 +41,7 @@ def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
                 second = int(marks[line - 1, k] if lies else marks[k, line - 1])
             if first < stand and second < stand:
                 return False
-            # Out of one cell into the other across the corner between them is no way.
+            # A line may not cross from one cell to the other through their common corner.
             if not (first >= pass_by and past_first) and not (second >= pass_by and past_second):
                 return False
             past_first, past_second = first >= pass_by, second >= pass_by
@@ -55,7 +55,7 @@ def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
     while marks[row, col] >= stand:
         if row == last_row and col == last_col:
             return True
-        # On which side of the segment the corner ahead lies.
+        # The side of the segment on which the corner ahead lies.
         side = turn * turn_of(a_row, a_col, b_row, b_col, row + 0.0 + up, col + 1.0)
         if side == 0 and marks[row, col + 1] < pass_by and marks[row + turn, col] < pass_by:
             return False

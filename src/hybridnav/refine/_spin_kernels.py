@@ -1,9 +1,9 @@
-"""Kernels of bodies that turn on the spot: decided exactly, but for the rounding of positions.
+"""Kernels of bodies that turn on the spot, exact except for the rounding of positions.
 
 A convex polygon that turns about its base begins or ceases to overlap a cell only at a critical
-heading: where one of its corners lies on the line of a side of the cell, or a corner of the cell on
-the line of one of its sides. So one heading between each two critical ones that follow one another
-decides for all. Only the cells in the hull of two headings near each other are asked.
+heading: there one of its corners lies on the line of a side of the cell, or a corner of the cell on
+the line of one of its sides. So one heading between each two consecutive critical ones decides for
+all. Only the cells in the hull of two near headings are tested.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from hybridnav.refine._sweep_kernels import (
 
 _FULL = 2 * math.pi
 _SHORT = 1.0
-"""Cells that a corner may move, and radians, in a part of a turn that is decided cell by cell."""
+"""Most cells that a corner moves, and radians, in a part of a turn that is tested cell by cell."""
 
 
 @njit(cache=True, nogil=True)
 def _note(headings, count, angle, low, high):
-    """Note the heading of an angle if it lies between two others, less than a turn apart."""
+    """Append an angle to `headings` if it lies between two others, less than a turn apart."""
     angle += _FULL * math.ceil((low - angle) / _FULL)
     if angle < high:
         headings[count] = angle
@@ -44,7 +44,7 @@ def _note(headings, count, angle, low, high):
 
 @njit(cache=True, nogil=True)
 def _critical(part, square, low, high, headings):
-    """Sort the critical headings of a polygon and a cell between two headings; their number.
+    """Sort the critical headings of a polygon and a cell between two headings; return their number.
 
     `part` has the corners of the polygon in its own frame, `square` the lowest (row, col) of the
     cell, from the base.
@@ -80,9 +80,9 @@ def _critical(part, square, low, high, headings):
 
 @njit(cache=True, nogil=True)
 def _overlaps(part, square, heading):
-    """Whether a polygon goes deeper into a cell than the rounding of positions.
+    """Return whether a polygon goes deeper into a cell than the rounding of positions.
 
-    It does not where the line of a side of one has the other on its far side.
+    It does not if the line of a side of one has the other on its far side.
     """
     cosine, sine = math.cos(heading), math.sin(heading)
     # The middle of the cell in the polygon's frame.
@@ -118,7 +118,7 @@ def _overlaps(part, square, heading):
 
 @njit(cache=True, nogil=True)
 def _meets_cell(part, square, low, high, headings):
-    """Whether a polygon overlaps a cell at some heading between two."""
+    """Return whether a polygon overlaps a cell at some heading between two."""
     count = _critical(part, square, low, high, headings)
     before = low
     for k in range(count + 1):
@@ -131,7 +131,7 @@ def _meets_cell(part, square, low, high, headings):
 
 @njit(cache=True, nogil=True)
 def _meets(body, base, low, high, places, columns):
-    """Whether a body that turns from one heading to another overlaps an occupied cell.
+    """Return whether a body that turns from one heading to another overlaps an occupied cell.
 
     `places` are its corners at both headings, not far apart.
     """
@@ -159,7 +159,8 @@ def _meets(body, base, low, high, places, columns):
 
 @njit(cache=True, nogil=True)
 def body_spins(body, row, col, heading, turn):
-    """Whether a body meets no occupied cell while it turns on the spot, its base in the map."""
+    """Return whether a body with its base in the map meets no occupied cell while it turns
+    there."""
     ahead, clearance, corners, offsets, radii = body
     if offsets.size == 1:
         return True
@@ -199,7 +200,7 @@ def body_spins(body, row, col, heading, turn):
 
 @njit(cache=True, nogil=True)
 def free_turn(body, row, col, heading, turn):
-    """Turn on the spot to a heading that is free: the short way, else the other; nan for neither.
+    """Return a free turn on the spot to a heading: the short way, else the other; nan for neither.
 
     `turn` is the short way, in radians.
     """

@@ -1,4 +1,4 @@
-"""Kernels of bodies in motion: what convex polygons and points sweep over, against cells.
+"""Kernels of bodies in motion: the areas swept by convex polygons and points, against cells.
 
 Positions are those of `_taut_kernels`; angles are counter-clockwise from the axis of the columns to
 that of the rows. A motion moves the base along a straight line while the heading turns evenly
@@ -7,13 +7,13 @@ is positive.
 
 A body is `(ahead, clearance, corners, offsets, radii)`: columns to the next occupied cell of each
 row, cells from each centre to the nearest occupied one, corners (n, 2) in cells along the heading
-and to its left, where each convex part of them begins and the last ends (none for a disc), and the
-inscribed and the circumscribed radius in cells.
+and to its left, offsets of its convex parts among them (none for a disc), and the inscribed and the
+circumscribed radius in cells.
 
-Between two of its states a body lies in the hull of the two, but for a margin: a chord is nowhere
-farther from its arc than radius * angle^2 / 8. So a motion is free where the hull with its margin
-is, a part of it whose middle state collides is not, and what is neither is halved, until margins
-are smaller than the rounding of positions. No state in between is left out.
+Between two of its states a body lies in the hull of the two, plus a margin: a chord is nowhere
+farther from its arc than radius * angle^2 / 8. So a motion is free if the hull with its margin is
+free, and not free if its middle state collides. Otherwise it is halved, until margins are smaller
+than the rounding of positions. Every state in between is covered.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from hybridnav._jit import njit
 from hybridnav.refine._segment_kernels import is_legal
 
 BLOCKED, OPEN, STAND = 0, 1, 2
-"""What a cell is to a query: not free, free but outside the corridor, or one to stand on."""
+"""Marks of cells in a query: not free, free but outside the corridor, free to stand on."""
 STAYS, SHIFTS, TURNS = 0, 1, 2
-"""What a body does between two of its states."""
+"""Kinds of motion of a body between two of its states."""
 _DIGITS = 2.0**24
 ROUNDING = 1 / _DIGITS
 WIDEST = 1.0
 """Margin in cells above which a motion is halved at once."""
 _HALF_DIAGONAL = 0.7075
-"""Of a cell, with some slack for distances that are stored as float32."""
+"""Half the diagonal of a cell, with some slack for distances stored as float32."""
 _FARTHEST = 255
 
 
@@ -46,13 +46,13 @@ def rounded(value):
 
 @njit(cache=True, nogil=True)
 def in_map(marks, row, col):
-    """Whether a position lies in the map, rim included; what is not a number does not."""
+    """Return whether a position lies in the map, rim included; False for NaN."""
     return 0.0 <= row <= marks.shape[0] and 0.0 <= col <= marks.shape[1]
 
 
 @njit(cache=True, nogil=True)
 def stands(marks, row, col):
-    """Whether a position of the map lies in the closed square of a cell that may be stood on."""
+    """Return whether a position of the map lies in the closed square of a cell to stand on."""
     for r in range(max(math.ceil(row) - 1, 0), min(math.floor(row) + 1, marks.shape[0])):
         for c in range(max(math.ceil(col) - 1, 0), min(math.floor(col) + 1, marks.shape[1])):
             if marks[r, c] >= STAND:
@@ -62,7 +62,7 @@ def stands(marks, row, col):
 
 @njit(cache=True, nogil=True)
 def runs(marks, a_row, a_col, b_row, b_col):
-    """Whether a point may run straight from one position to another; exact for rounded ones."""
+    """Return whether a point may run straight between two positions; exact for rounded ones."""
     if not in_map(marks, a_row, a_col) or not in_map(marks, b_row, b_col):
         return False
     if a_row == b_row and a_col == b_col:
@@ -72,7 +72,7 @@ def runs(marks, a_row, a_col, b_row, b_col):
 
 @njit(cache=True, nogil=True)
 def look_ahead(occupied):
-    """Columns from each cell to the next occupied one of its row, or to none within reach."""
+    """Return the columns from each cell to the next occupied one of its row, within reach."""
     rows, cols = occupied.shape
     ahead = np.empty((rows, cols), np.uint8)
     for row in range(rows):
@@ -85,7 +85,12 @@ def look_ahead(occupied):
 
 @njit(cache=True, nogil=True)
 def moved(row, col, heading, d_row, d_col, turn, radius, share):
-    """Base and heading after a share of a motion."""
+    """Return the base (row, col) and heading after a share of a motion.
+
+    The motion starts at `row`, `col`, `heading` and moves by `d_row`, `d_col` (cells) while the
+    heading turns by `turn` (radians), or along an arc of `radius` (cells, 0 for none); `share` is
+    in [0, 1].
+    """
     now = heading + share * turn
     if radius == 0.0:
         return row + share * d_row, col + share * d_col, now
@@ -96,7 +101,7 @@ def moved(row, col, heading, d_row, d_col, turn, radius, share):
 
 @njit(cache=True, nogil=True)
 def following(part, level):
-    """Part after one that is free, as large as it can be; level 0 where that was the last.
+    """Return the part after a free one, as large as possible; level 0 if that was the last.
 
     A motion has 2^level parts on each level, and a part that is not free is halved.
     """
@@ -109,7 +114,7 @@ def following(part, level):
 
 @njit(cache=True, nogil=True)
 def place(corners, row, col, heading, placed):
-    """Rounded positions of the corners of a body."""
+    """Return the rounded positions of the corners of a body."""
     cosine, sine = math.cos(heading), math.sin(heading)
     for i in range(corners.shape[0]):
         x, y = corners[i, 0], corners[i, 1]
@@ -119,7 +124,11 @@ def place(corners, row, col, heading, placed):
 
 @njit(cache=True, nogil=True)
 def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
-    """Widen the columns that each row from `first` to `end` sees by those of an edge."""
+    """Widen the columns that each row sees by those of an edge.
+
+    The edge goes from a to b, positions (row, col); `columns` holds the lowest and highest column
+    of each row from `first` to `end`; `margin` is in cells.
+    """
     if b_row < a_row:
         a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
     slope = (b_col - a_col) / (b_row - a_row) if b_row > a_row else 0.0
@@ -138,7 +147,8 @@ def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
 
 @njit(cache=True, nogil=True)
 def _turns_right(points, size, row, col):
-    """Whether the way over the last two of some points to another turns right or goes straight."""
+    """Return whether a path over the last two points to another one turns right or goes
+    straight."""
     a_row, a_col = points[size - 2]
     b_row, b_col = points[size - 1]
     return (b_col - a_col) * (row - b_row) - (b_row - a_row) * (col - b_col) <= 0.0
@@ -146,7 +156,7 @@ def _turns_right(points, size, row, col):
 
 @njit(cache=True, nogil=True)
 def _hull(before, after, first, last):
-    """Corners of the convex hull of a polygon in two places, the first again at the end.
+    """Return the corners of the convex hull of a polygon in two places, closed by the first one.
 
     A. M. Andrew: Another efficient algorithm for convex hulls in two dimensions, 1979.
     """
@@ -183,11 +193,14 @@ def _hull(before, after, first, last):
 
 @njit(cache=True, nogil=True)
 def rows_seen(rows, before, after, first, last, margin, moves, columns):
-    """Note the columns of the hull of a convex polygon in two places, with a margin; its rows.
+    """Fill in the columns of the hull of a convex polygon in two places; return its rows.
 
-    Its corners are those from `first` to `last`. Each row of cells sees one run of columns of the
-    hull. Where the polygon does not turn, their ends are those of its edges and of the lines that
-    its corners move on; where it does, an edge of the hull may join two different corners.
+    Corners `first` to `last` of `before` and `after`, float64 (n, 2) positions, are the polygon in
+    the two places; `rows` is the number of rows of the map, `margin` is in cells, `moves` one of
+    `STAYS`, `SHIFTS` and `TURNS`, `columns` the room of `room`. Each row of cells sees one run of
+    columns of the hull. If the polygon does not turn, the ends of a run are those of its edges and
+    of the lines that its corners move on; if it turns, an edge of the hull may join two different
+    corners.
     """
     low, high = np.inf, -np.inf
     for i in range(first, last):
@@ -218,7 +231,10 @@ def rows_seen(rows, before, after, first, last, margin, moves, columns):
 
 @njit(cache=True, nogil=True)
 def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
-    """Whether the hull of a convex polygon in two places meets no occupied cell, with a margin."""
+    """Return whether the hull of a convex polygon in two places meets no occupied cell.
+
+    `ahead` is that of a body; the other arguments are those of `rows_seen`.
+    """
     rows, cols = ahead.shape
     low_row, end_row = rows_seen(rows, before, after, first, last, margin, moves, columns)
     for row in range(low_row, end_row):
@@ -235,7 +251,10 @@ def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
 
 @njit(cache=True, nogil=True)
 def is_free(ahead, offsets, before, after, margin, moves, columns):
-    """Whether the hulls of all convex parts of a body meet no occupied cell."""
+    """Return whether the hulls of all convex parts of a body meet no occupied cell.
+
+    `ahead` and `offsets` are those of a body; the other arguments are those of `rows_seen`.
+    """
     for k in range(offsets.size - 1):
         first, last = offsets[k], offsets[k + 1]
         if not _part_is_free(ahead, before, after, first, last, margin, moves, columns):
@@ -245,13 +264,14 @@ def is_free(ahead, offsets, before, after, margin, moves, columns):
 
 @njit(cache=True, nogil=True)
 def room(rows, reach, length):
-    """Where `rows_seen` notes the columns of a body that moves so far."""
+    """Return room in which `rows_seen` notes the columns of a body that moves by `length` cells."""
     return np.empty((int(min(float(rows), 2 * reach + length)) + 6, 2))
 
 
 @njit(cache=True, nogil=True)
 def near(clearance, row, col):
-    """Bounds on the distance to the nearest occupied square and to its centre from a position."""
+    """Return bounds on the distances from a position to the nearest occupied square and its
+    centre."""
     r = min(max(math.floor(row), 0), clearance.shape[0] - 1)
     c = min(max(math.floor(col), 0), clearance.shape[1] - 1)
     offset = math.hypot(row - r - 0.5, col - c - 0.5)
@@ -260,7 +280,7 @@ def near(clearance, row, col):
 
 @njit(cache=True, nogil=True)
 def body_fits(body, row, col, heading):
-    """Whether a body meets no occupied cell with its base at a position of the map."""
+    """Return whether a body meets no occupied cell with its base at a position of the map."""
     ahead, clearance, corners, offsets, radii = body
     if offsets.size == 1:
         return True
@@ -277,7 +297,10 @@ def body_fits(body, row, col, heading):
 
 @njit(cache=True, nogil=True)
 def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
-    """Whether a body meets no occupied cell all along a motion whose base stays in the map."""
+    """Return whether a body meets no occupied cell on a motion whose base stays in the map.
+
+    See `moved` for the arguments of the motion.
+    """
     ahead, clearance, corners, offsets, radii = body
     if offsets.size == 1:
         return True
@@ -324,7 +347,7 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
 
 @njit(cache=True, nogil=True)
 def _sliver_stands(marks, a_row, a_col, b_row, b_col, margin):
-    """Whether all cells may be stood on that a segment comes nearer to than a margin."""
+    """Return whether all cells nearer to a segment than a margin may be stood on."""
     rows, cols = marks.shape
     low, high = min(a_row, b_row) - margin, max(a_row, b_row) + margin
     if low < 0 or high > rows:
@@ -343,7 +366,7 @@ def _sliver_stands(marks, a_row, a_col, b_row, b_col, margin):
 
 @njit(cache=True, nogil=True)
 def arc_runs(marks, row, col, heading, turn, radius):
-    """Whether a point may run along an arc."""
+    """Return whether a point may run along an arc."""
     part, level = 0, 0
     while True:
         share = 1.0 / (1 << level)

@@ -18,18 +18,20 @@ from hybridnav.search._exact_kernels import turn_of
 FREE = 128
 """Bit of a mark: the cell may be entered."""
 _KINDS = 4
-"""The rest of a mark: below this the cell's lower corner can hold a string and this says which of
-its four cells is blocked, bit 1 the one of the upper row, bit 0 the one of the upper column."""
+"""Number of kinds. The rest of a mark below it means that the lower corner of the cell can hold a
+string; it then states which of the four cells there is blocked, bit 1 for the upper row, bit 0 for
+the upper column."""
 _LONGEST = FREE - _KINDS
-"""Columns to the next such corner, or to none, that the rest of a mark can tell."""
+"""Most columns to the next such corner, or to none, that the rest of a mark can hold."""
 
 
 @njit(cache=True, nogil=True)
 def marks_of(free):
-    """Mark for each cell: whether it is free, and the kind of its lower corner or how far the next.
+    """Mark for each cell whether it is free, and the kind of its lower corner or columns to the
+    next.
 
-    A corner that can hold a string has exactly one blocked cell of four. The map's rim is a wall,
-    so none lies on it, and one byte for each cell is enough.
+    A corner that can hold a string has exactly one blocked cell of four. The rim of the map is a
+    wall, so no such corner lies on it, and one byte for each cell is enough.
     """
     rows, cols = free.shape
     marks = np.empty((rows, cols), np.uint8)
@@ -50,7 +52,7 @@ def marks_of(free):
 
 @njit(cache=True, nogil=True)
 def _faces(d_row, d_col, kind):
-    """On which side of a direction the blocked cell of a corner lies that the line touches."""
+    """Return the side of a direction on which the blocked cell of a touched corner lies."""
     left = d_row if kind & 1 else -d_row
     right = d_col if kind & 2 else -d_col
     return int(left > right) - int(left < right)
@@ -58,7 +60,7 @@ def _faces(d_row, d_col, kind):
 
 @njit(cache=True, nogil=True)
 def grown(array, size):
-    """An array with room for `size` rows."""
+    """Return an array with room for `size` rows."""
     larger = np.empty((max(2 * array.shape[0], size), array.shape[1]), array.dtype)
     larger[: array.shape[0]] = array
     return larger
@@ -66,9 +68,10 @@ def grown(array, size):
 
 @njit(cache=True, nogil=True)
 def _insert(chain, size, side, v_row, v_col, row, col):
-    """Put a corner into the chain that a string from chain[0] to chain[size - 1] hangs on.
+    """Put a corner into the chain that holds a string from chain[0] to chain[size - 1].
 
-    The chain is convex towards v and ordered by angle as seen from there. Returns its new size.
+    The chain, float64 (m, 2) positions, is convex towards v and ordered by angle as seen from
+    there. `side` is 1 or -1, `row` and `col` the corner. Return the new size.
     """
     low, high, above = 0, size - 1, False
     while high - low > 1:
@@ -80,7 +83,7 @@ def _insert(chain, size, side, v_row, v_col, row, col):
         elif turn != 0:
             high = middle
         elif abs(row - v_row) + abs(col - v_col) < abs(m_row - v_row) + abs(m_col - v_col):
-            # Behind one another as seen from v: the nearer one takes the place.
+            # One is behind the other as seen from v: the nearer one stays.
             low, high, above = middle - 1, middle, True
             break
         else:
@@ -112,11 +115,11 @@ def _insert(chain, size, side, v_row, v_col, row, col):
 
 @njit(cache=True, nogil=True)
 def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
-    """Let go of the bend v between u and w: the chain of points that the string then hangs on.
+    """Release the bend v between u and w; fill in the chain of points that then holds the string.
 
-    The corners in the triangle are found row by row. Returns the number of points of the chain,
-    u and w among them; 0 where v itself is a corner that holds the string, -1 where the chain has
-    too little room.
+    The corners in the triangle are found row by row; u, v and w are positions. Return the number of
+    points of the chain, including u and w; 0 if v itself is a corner that holds the string, -1 if
+    the chain has too little room.
     """
     chain[0, 0], chain[0, 1] = u_row, u_col
     chain[1, 0], chain[1, 1] = w_row, w_col
@@ -148,7 +151,7 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
         right = m_col + (row - m_row) * (low_slope if row < m_row else high_slope)
         if left > right:
             left, right = right, left
-        # A margin for the rounding of both: whether a corner is inside is decided exactly.
+        # A margin for the rounding of both: the test whether a corner is inside is exact.
         col = max(math.ceil(left - 1e-6), 1)
         last = min(math.floor(right + 1e-6), cols - 1)
         while col <= last:
@@ -174,10 +177,10 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
 
 @njit(cache=True, nogil=True)
 def tighten(marks, string, n):
-    """Pull a legal string of n points taut; returns it and its number of points.
+    """Pull a legal string of n points taut; return it and its number of points.
 
-    A point is (row, col, whether it may give way). Bends are let go of in rounds, every other one
-    of a run: so the triangles of a round have no more rows together than the string is long.
+    A point is (row, col, whether it may give way). Bends are released in rounds, every other one of
+    a run, so that the triangles of a round have together no more rows than the string is long.
     """
     out = np.empty_like(string)
     chain = np.empty((16, 2))

@@ -32,11 +32,11 @@ class Curve:
 
     @property
     def length_m(self) -> float:
-        """Metres along the curve, backwards counted like forwards."""
+        """Metres along the curve, backward pieces counted like forward ones."""
         return math.fsum(np.abs(self.lengths_m).tolist())
 
     def poses(self, step_m: float) -> FloatArray:
-        """Poses along the curve, no farther apart than a step, ends of pieces among them.
+        """Return poses along the curve, at most a step apart, including the ends of pieces.
 
         Parameters
         ----------
@@ -51,7 +51,8 @@ class Curve:
         Raises
         ------
         InvalidValueError
-            When the step is not positive, or so small that there were more than ten million.
+            When the step is not positive, or so small that there would be more than ten million
+            poses.
         """
         if not step_m > 0 or self.length_m / step_m > _MAX_POSES:
             raise InvalidValueError(
@@ -66,7 +67,7 @@ class Curve:
         return np.concatenate(pieces)
 
     def _ahead(self, pose: FloatArray, kind: int, along_m: FloatArray) -> FloatArray:
-        """Poses so many metres along an arc or a straight line."""
+        """Return the poses at some metres along an arc or a straight line."""
         if not len(along_m):
             return pose[None]
         x, y, yaw = pose.tolist()
@@ -81,7 +82,7 @@ class Curve:
 
 
 def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) -> Curve:
-    """Shortest curve between two poses of a vehicle with a turning radius.
+    """Return the shortest curve between two poses of a vehicle with a turning radius.
 
     L. E. Dubins: On curves of minimal length with a constraint on average curvature, 1957;
     J. A. Reeds, L. A. Shepp: Optimal paths for a car that goes both forwards and backwards, 1990.
@@ -98,8 +99,8 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
     Returns
     -------
     Curve
-        As long as that of OMPL's `DubinsStateSpace` or `ReedsSheppStateSpace`; of several that are
-        equally long, OMPL may take another.
+        As long as that of OMPL's `DubinsStateSpace` or `ReedsSheppStateSpace`; among equally long
+        curves, OMPL may return another one.
 
     Raises
     ------
@@ -112,7 +113,7 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
     3.141593
     """
     kinds, lengths_m = np.empty(5, dtype=np.int64), np.empty(5)
-    # Whole numbers would make another version of the kernel.
+    # Integers would compile another version of the kernel.
     x0, y0, yaw0, x1, y1, yaw1 = map(float, (*start, *goal))
     n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, float(radius_m), bool(reverses), kinds, lengths_m)
     if n == 0:

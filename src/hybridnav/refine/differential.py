@@ -1,4 +1,4 @@
-"""Paths of robots that turn on the spot and drive straight, spelled out."""
+"""Paths of robots that turn on the spot and drive straight, pose by pose."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
     from hybridnav.refine.motions import MotionCheck
 
 _EQUAL_RAD = 1e-9
-"""Drives whose headings differ by less are one, where the robot can drive it at once; a turn
-that differs by less from half a circle has no short way."""
+"""Drives whose headings differ by less are merged, if the robot can drive them as one; a turn that
+differs by less from half a circle has no short way."""
 
 
 def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> FloatArray:
-    """Spell out the turns and drives of a robot that visits some poses.
+    """Return the turns and drives of a robot that visits some poses, pose by pose.
 
-    The robot drives straight from point to point, forwards where it can. At each point it turns
-    from one drive's heading to the next one's, at the ends from or to the pose's. The headings of
-    the poses between are left out: whoever can turn over them can turn without them, one way
-    round or the other.
+    The robot drives straight from point to point, forwards if possible. At each point it turns from
+    one drive's heading to the next one's, at the ends from or to the heading of the pose. The
+    headings of the poses in between are left out: a robot that can turn to them can turn past them,
+    one way round or the other.
 
     Parameters
     ----------
     check
-        Decides on motions.
+        Check of motions.
     poses
         float64 (n, 3), n >= 1, `(x, y, yaw)`, metres and radians, map frame.
     reverses
@@ -39,9 +39,9 @@ def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> 
     -------
     FloatArray
         float64 (m, 3). From each pose to the next the robot either turns on the spot, the short
-        way, or drives straight with one heading: where it turns, a point occurs with the heading
-        before and after, and with one half-way between where it turns by half a circle or the long
-        way round. Without rows where a motion between two of the poses is not valid.
+        way, or drives straight with one heading. Where it turns, a point occurs with the heading
+        before and after, and with one half-way if it turns by half a circle or the long way round.
+        Without rows if a motion between two of the poses is not valid.
     """
     states: list[Pose] = [tuple(pose) for pose in poses.tolist()]
     drives = _drives(check, states, reverses=reverses)
@@ -65,7 +65,7 @@ def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> 
 def _drives(
     check: MotionCheck, poses: list[Pose], *, reverses: bool
 ) -> list[tuple[Pose, Pose]] | None:
-    """Where each drive begins and ends; None where a motion is not valid."""
+    """Return the first and last pose of each drive; None if a motion is not valid."""
     drives: list[tuple[Pose, Pose]] = []
     for first, second in itertools.pairwise(poses):
         if first[:2] == second[:2]:

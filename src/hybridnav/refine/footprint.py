@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
 
 MAX_CORNERS = 1000
-"""Corners that a footprint may have at most."""
+"""Most corners of a footprint."""
 _FARTHEST_M = 1e4
 _ROUNDING = 1e-12
 
@@ -28,8 +28,8 @@ class Footprint:
     Parameters
     ----------
     corners_m
-        The corners of a simple polygon in order, (n, 2) in metres, n >= 3, at most `MAX_CORNERS`,
-        none farther than 10 km; the last may repeat the first. Stored counter-clockwise, each once.
+        The corners of a simple polygon in order, (n, 2) in metres, n from 3 to `MAX_CORNERS`, at
+        most 10 km away; the last may repeat the first. Stored counter-clockwise, each once.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class Footprint:
 
     @classmethod
     def of(cls, shape: Any) -> Footprint:
-        """Footprint from another one, from a shapely polygon or from corners.
+        """Return a footprint from another one, from a shapely polygon or from corners.
 
         Parameters
         ----------
@@ -83,9 +83,9 @@ class Footprint:
         return cls(shapely.get_coordinates(shape.exterior))
 
     def convex_parts(self) -> list[FloatArray]:
-        """Corners of convex polygons that make up the outline, float64 (n, 2) each, metres.
+        """Return the corners of convex polygons that form the outline, float64 (n, 2) each, metres.
 
-        The outline itself where it is convex, otherwise triangles (constrained Delaunay).
+        A convex outline is returned itself, any other as triangles (constrained Delaunay).
         """
         polygon = shapely.Polygon(self.corners_m)
         hull = shapely.convex_hull(polygon)
@@ -96,7 +96,7 @@ class Footprint:
 
 
 def _polygon_of(corners_m: Any) -> shapely.Polygon:
-    """The polygon of some corners, checked, counter-clockwise, each corner once."""
+    """Return the polygon of some corners, checked, counter-clockwise, each corner once."""
     try:
         corners = np.array(corners_m, dtype=np.float64)
     except (TypeError, ValueError):
@@ -106,7 +106,7 @@ def _polygon_of(corners_m: Any) -> shapely.Polygon:
             f"a footprint needs 3 to {MAX_CORNERS} corners [x, y] in metres, "
             f"got {str(corners_m)[:60]!r}"
         )
-    # What is not a number is not within either.
+    # NaN fails this comparison too.
     if not (np.abs(corners) <= _FARTHEST_M).all():
         raise InvalidValueError(f"corners of a footprint must lie within {_FARTHEST_M:g} m")
     distinct = corners[(corners != np.roll(corners, 1, axis=0)).any(axis=1)]

@@ -21,8 +21,8 @@ class Refiner(Protocol):
     ) -> tuple[LongArray | None, int]:
         """Find a path between two cells that stands on cells of the corridor only.
 
-        `None` as the corridor is the whole map. Returns the cells of the path, int64 (n, 2), None
-        where there is none, and the number of expansions.
+        `None` as the corridor is the whole map. Return the cells of the path, int64 (n, 2), None if
+        there is no path, and the number of expansions.
         """
         ...
 
@@ -44,7 +44,7 @@ class GridRefiner:
 
     @cached_property
     def search(self) -> GridSearch:
-        """The search of cells, built when it is first needed."""
+        """The search of cells, built on first use."""
         enterable = self._grid.enterable(allow_unexplored=self._allow_unexplored)
         return GridSearch(enterable, corner_cutting=self._grid.corner_cutting)
 

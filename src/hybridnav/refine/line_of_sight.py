@@ -24,17 +24,17 @@ if TYPE_CHECKING:
 class LineOfSight:
     """Shortens cell paths of one grid to any-angle paths; holds one byte a cell.
 
-    The string start, centres of the inner cells, goal is pulled taut: a bend between two points
-    that are in sight of it gives way to the convex hull of the corners of blocked cells inside
-    the triangle of the three (the triangle step of Hershberger and Snoeyink). What is left bends
-    at corners of blocked cells only, and is the shortest path of those that pass the obstacles on
-    the same sides. Then parts of the string are led past the other sides of what lies on the
-    straight line between their ends, always on one hand (V. Lumelsky, A. Stepanov: Path-planning
-    strategies for a point mobile automaton, 1987), pulled taut, and kept where that is shorter.
+    The string start, centres of the inner cells, goal is pulled taut: a bend between two points in
+    sight of it gives way to the convex hull of the corners of blocked cells inside the triangle of
+    the three (the triangle step of Hershberger and Snoeyink). The taut string bends only at corners
+    of blocked cells, and is the shortest path that passes the obstacles on the same sides. Then
+    parts of the string are led past the other sides of obstacles on the straight line between their
+    ends, always on one hand (V. Lumelsky, A. Stepanov: Path-planning strategies for a point mobile
+    automaton, 1987), pulled taut, and kept if they are shorter.
 
     Turns are decided exactly and new segments are tested exactly, so a path never leaves the union
-    of the closed squares of the enterable cells. Neither does it pass between two blocked cells
-    that meet at a corner, unless the grid allows corner cutting and the cell path does so: there
+    of the closed squares of the enterable cells. It does not pass between two blocked cells that
+    meet at a corner either, unless the grid allows corner cutting and the cell path does so: then
     the path goes through that corner, which stays one of its points.
 
     Parameters
@@ -60,7 +60,7 @@ class LineOfSight:
         if closed is not None:
             free.flat[closed] = False
         self._marks = marks_of(free)
-        # The frame at the origin gives the two axes without the rounding of a far origin.
+        # A frame at the origin yields the two axes without the rounding of a far origin.
         resolution_m = grid.resolution_m
         axes = Frame(resolution_m, yaw_rad=grid.frame.yaw_rad).points_of_grid(np.eye(2))
         self._per_metre = axes / resolution_m**2
@@ -80,8 +80,8 @@ class LineOfSight:
         -------
         FloatArray
             float64 (m, 2), `(x, y)` in metres: `start`, corners of blocked cells, `goal`; one point
-            where the two are the same. Never longer than the line from `start` over the centres of
-            the inner cells to `goal`.
+            if the two are the same. Never longer than the line from `start` over the centres of the
+            inner cells to `goal`.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class LineOfSight:
             When a point does not lie in its cell.
         """
         metres = np.array([start, goal], dtype=np.float64)
-        # Kernels are compiled for each layout, and anew for arrays that are read only.
+        # Kernels are compiled for each memory layout, and again for read-only arrays.
         cells = np.ascontiguousarray(cells).view()
         cells.flags.writeable = False
         positions = kernels.shorten(

@@ -1,4 +1,4 @@
-"""Exact validity of states and motions of a robot against the free space of a grid."""
+"""Exact validity of states and motions of a robot in the free space of a grid."""
 
 from __future__ import annotations
 
@@ -27,20 +27,19 @@ _FARTHEST_CELLS = 5000
 
 @copies_alike
 class MotionCheck:
-    """Exact validity of states and motions of a robot against free space, in the map frame.
+    """Exact validity of states and motions of a robot in free space, in the map frame.
 
-    A disc robot is a point on a grid that was inflated by its radius. It stays in the union of the
-    closed squares of the cells that it may stand on, and never passes between two blocked cells
-    that meet at a corner (unless the grid allows corner cutting). Numbers that are not finite,
-    points outside the map and headings of more than a million are not valid. Points are rounded to
-    2^-24 of a cell; every test of a straight line between rounded points is exact.
+    A disc robot is a point on a grid inflated by its radius. It stays in the union of the closed
+    squares of the cells that it may stand on, and never passes between two blocked cells that meet
+    at a corner (unless the grid allows corner cutting). Numbers that are not finite, points outside
+    the map and headings above a million are not valid. Points are rounded to 2^-24 of a cell; every
+    test of a straight line between rounded points is exact.
 
     With a footprint the base keeps these rules, on a grid inflated by no more than the inscribed
     radius, and the footprint must not meet the inside of a cell that is occupied without inflation
-    (`OccupancyGrid.measured`). As with the disc, unexplored and closed cells and the ground outside
-    the map stop the base alone. A motion is valid only where every state on it is: motions without
-    a turn and turns on the spot are decided exactly, others but for what a hundredth of a cell more
-    would hit.
+    (`OccupancyGrid.measured`). As for the disc, unexplored and closed cells and the ground outside
+    the map stop only the base. A motion is valid only if every state on it is: motions without a
+    turn and turns on the spot are decided exactly, others up to a hundredth of a cell.
 
     Parameters
     ----------
@@ -61,7 +60,8 @@ class MotionCheck:
     ------
     InvalidValueError
         When `inside` does not have the shape of the map, a closed cell lies outside it, or the
-        footprint is refused, reaches more than 5000 cells, or is narrower than the map is inflated.
+        footprint is refused, reaches more than 5000 cells, or is narrower than the inflation of the
+        map.
     """
 
     def __init__(
@@ -81,26 +81,27 @@ class MotionCheck:
         self._marks = self._marks_of(inside, closed)
 
     def confined(self, *, inside: BoolArray | None = None, closed: LongArray | None = None) -> Self:
-        """The same robot on the same map in another corridor, without the work on the footprint.
+        """Return a check of the same robot and map in another corridor, without the work on the
+        footprint.
 
         Parameters
         ----------
         inside, closed
-            As of the class; they replace those of this check.
+            As in the class; they replace those of this check.
         """
         other = copy.copy(self)
         other._marks = self._marks_of(inside, closed)  # noqa: SLF001 - of the same class
         return other
 
     def state_valid(self, x: float, y: float, yaw: float = 0.0) -> bool:
-        """Whether the robot may be at a point.
+        """Return whether the robot may be at a point.
 
         Parameters
         ----------
         x, y
             Metres, map frame.
         yaw
-            Heading in radians, counter-clockwise from the x axis; of no effect on a disc.
+            Heading in radians, counter-clockwise from the x axis; without effect on a disc.
         """
         valid: bool
         if self._is_disc:
@@ -110,7 +111,8 @@ class MotionCheck:
         return valid
 
     def motion_valid(self, x0: float, y0: float, x1: float, y1: float) -> bool:
-        """Whether a disc robot, or the base of another, may drive straight from point to point.
+        """Return whether a disc robot, or the base of another one, may drive straight between two
+        points.
 
         Parameters
         ----------
@@ -123,10 +125,11 @@ class MotionCheck:
     def turn_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float
     ) -> bool:
-        """Whether the robot may go straight from pose to pose while it turns evenly, the short way.
+        """Return whether the robot may go straight from pose to pose in an even turn, the short
+        way.
 
-        The interpolation of OMPL's `SE2StateSpace`: a holonomic robot, which goes in any direction
-        whatever its heading.
+        This is the interpolation of OMPL's `SE2StateSpace`, for a holonomic robot, which moves in
+        any direction with any heading.
 
         Parameters
         ----------
@@ -151,7 +154,7 @@ class MotionCheck:
         *,
         backwards: bool = False,
     ) -> bool:
-        """Whether a robot with differential drive may go from pose to pose.
+        """Return whether a robot with differential drive may go from pose to pose.
 
         It turns on the spot to the direction of travel, drives straight, and turns to its last
         heading; each turn goes as `spin` does. Between equal points it only turns.
@@ -169,7 +172,7 @@ class MotionCheck:
         return valid
 
     def spin(self, x: float, y: float, yaw0: float, yaw1: float) -> float:
-        """Turn on the spot by which the robot gets from one heading to another.
+        """Return the turn on the spot by which the robot gets from one heading to another.
 
         Parameters
         ----------
@@ -181,8 +184,8 @@ class MotionCheck:
         Returns
         -------
         float
-            Radians, counter-clockwise above 0: the short way where that is free, else the other way
-            round; NaN where neither is.
+            Radians, positive counter-clockwise: the short way if it is free, else the other way
+            round; NaN if neither is.
         """
         turn: float = kernels.turn_on_the_spot(
             self._marks, self._place, self._body, x, y, yaw0, yaw1
@@ -198,18 +201,18 @@ class MotionCheck:
         lengths_m: FloatArray,
         radius_m: float,
     ) -> bool:
-        """Whether the robot may drive a curve of arcs and straight lines.
+        """Return whether the robot may drive a curve of arcs and straight lines.
 
         Parameters
         ----------
         x0, y0, yaw0
-            Where it starts, metres and radians, map frame.
+            Start pose, metres and radians, map frame.
         kinds
             int64 (n,), 1 for an arc to the left, 0 for straight on, -1 for an arc to the right.
         lengths_m
             float64 (n,), metres, negative backwards. No arc may exceed a full turn.
         radius_m
-            Of every arc, positive.
+            Radius of every arc, positive.
         """
         valid: bool = kernels.body_drives(
             self._marks, self._place, self._body, x0, y0, yaw0, kinds, lengths_m, radius_m
@@ -219,7 +222,7 @@ class MotionCheck:
     def dubins_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius_m: float
     ) -> bool:
-        """Whether the robot may drive the shortest curve forwards; see `shortest_curve`.
+        """Return whether the robot may drive the shortest curve forwards; see `shortest_curve`.
 
         Parameters
         ----------
@@ -236,7 +239,7 @@ class MotionCheck:
     def reeds_shepp_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius_m: float
     ) -> bool:
-        """Whether the robot may drive the shortest curve that may go backwards too.
+        """Return whether the robot may drive the shortest curve that may go backwards too.
 
         Parameters are those of `dubins_valid`.
         """
@@ -246,13 +249,14 @@ class MotionCheck:
         return valid
 
     def path_valid(self, points: ArrayLike) -> bool:
-        """Whether the robot may go along a polyline.
+        """Return whether the robot may go along a polyline.
 
         Parameters
         ----------
         points
-            `(x, y)` in metres for a disc, (n, 2), n >= 1, bends at corners of cells included; or
-            `(x, y, yaw)` for a robot that turns between them as in `turn_valid`, (n, 3).
+            `(x, y)` in metres for a disc, (n, 2), n >= 1, where bends at corners of cells are
+            judged too; or `(x, y, yaw)` for a robot that turns between them as in `turn_valid`, (n,
+            3).
 
         Raises
         ------
@@ -273,7 +277,7 @@ class MotionCheck:
         return self.state_valid(*poses[0]) and all(self.turn_valid(*a, *b) for a, b in turns)
 
     def _marks_of(self, inside: BoolArray | None, closed: LongArray | None) -> ByteArray:
-        """What each cell is to the base of the robot, uint8 (rows, cols)."""
+        """Return the mark of each cell for the base of the robot, uint8 (rows, cols)."""
         free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
         if closed is not None:
             cells = np.asarray(closed, dtype=np.int64)
@@ -297,15 +301,15 @@ class MotionCheck:
 
 
 def _place_of(frame: Frame) -> FloatArray:
-    """Where a grid lies in the map frame, as the kernels want it, float64 (8,)."""
-    # The frame at the origin gives the two axes without the rounding of a far origin.
+    """Return the pose of a grid in the map frame, float64 (8,); see the kernels."""
+    # A frame at the origin yields the two axes without the rounding of a far origin.
     axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
     per_metre = (axes / frame.resolution_m**2).ravel()
     return np.array([*frame.origin_m, *per_metre, frame.yaw_rad, 1 / frame.resolution_m])
 
 
 def _no_body() -> tuple[Any, ...]:
-    """A disc, as the kernels want it: nothing but its base."""
+    """Return a body of the kernels for a disc, which has only its base."""
     nowhere = np.zeros((0, 0), dtype=np.bool_)
     distance = nowhere.astype(np.float32)
     offsets = np.zeros(1, dtype=np.int64)
@@ -313,7 +317,7 @@ def _no_body() -> tuple[Any, ...]:
 
 
 def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ...]:
-    """A footprint and what it must not meet, as the kernels want it."""
+    """Return a body of the kernels for a footprint, with the cells that it must not meet."""
     from hybridnav.refine.footprint import Footprint  # noqa: PLC0415 - loads shapely
 
     footprint = Footprint.of(shape)
@@ -345,7 +349,8 @@ def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ..
 
 
 def _distance_cells(occupied: BoolArray) -> Any:
-    """Cells from each centre to the nearest occupied one, float32 (rows, cols)."""
+    """Return the distance from each centre to the nearest occupied one in cells, float32 (rows,
+    cols)."""
     if not occupied.any():
         return np.full(occupied.shape, np.inf, dtype=np.float32)
     from scipy import ndimage  # noqa: PLC0415 - half a second that a disc does not need

@@ -1,15 +1,15 @@
 """Kernels that contract a graph of corners into a hierarchy.
 
-R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. One corner after
-the other is taken out, and a shortcut put in between two of its neighbours where the way past it
-may be the only shortest one.
+R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. Corners are
+removed one by one. A shortcut is added between two neighbours of a removed corner if the path
+through it may be the only shortest one.
 
-The arcs that lead from one corner stand beside each other in a pool, int64 (n, 3): the cost; the
-head and the classes at both ends (see `pack`); the middle, which is the corner that a shortcut
-leads past or -1, and the number of legs. With each arc there is its reverse.
+The arcs from one corner are adjacent in a pool, int64 (n, 3): the cost; the head and the classes at
+both ends (see `pack`); the middle, which is the corner that a shortcut leads past or -1, and the
+number of legs. Each arc comes with its reverse.
 
-A *class* sorts the ways that arcs lead away from a corner, and a table states which two a shortest
-path may join there: what bends the wrong way is never on one.
+A *class* groups arcs by the way they leave a corner, and a table states which two classes a
+shortest path may join there: a bend to the wrong side is never on one.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from hybridnav._jit import guarded, njit
 from hybridnav.search._heap_kernels import pop, push
 
 SLACK = 6000
-"""How much later than it should come a corner is still contracted, in thousandths of a level.
-With 0 there are 3 % fewer shortcuts, and it takes twice as long."""
+"""Delay with which a corner may still be contracted, in thousandths of a level. With 0 there are 3
+% fewer shortcuts, in twice the time."""
 _UNKNOWN = -(1 << 40)
 HEAD_SHIFT = 12
 """Bits of the two classes of an arc, see `pack`."""
@@ -31,15 +31,18 @@ HEAD_SHIFT = 12
 def pack(head, near, far):
     """Return an arc's head, its class at its tail, and its class at its head, in one number.
 
-    Classes are below 64, and those of the ways that lead away from the corner.
+    Classes are below 64 and describe how the arc leads away from the corner.
     """
     return head << HEAD_SHIFT | near << 6 | far
 
 
 @njit(cache=True, nogil=True)
 def _pool_of(first, arcs):
-    """Return a pool of the arcs of a graph, with room: begin, size and room of each corner's
-    part, the pool, and how much of it is used."""
+    """Return a pool of the arcs of a graph, with room for more.
+
+    The result holds begin, size and room of each corner's part, the pool, and the used number of
+    its rows.
+    """
     n = first.size - 1
     begin, size, room = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
     pool = np.empty((2 * arcs.shape[0] + 4 * n, 3), np.int64)
@@ -57,28 +60,28 @@ def _pool_of(first, arcs):
 
 @njit(cache=True, nogil=True)
 def _search(graph, node, source, limit, n_wanted, stamp, work):
-    """Search for ways from a neighbour of a corner that do without it.
+    """Search for paths from a neighbour of a corner that avoid the corner (witness search).
 
     Parameters
     ----------
     graph
-        Begin and size of parts of the pool, the pool, kinds of corners, which classes may follow:
+        Begin and size of parts of the pool, the pool, kinds of corners, classes that may follow:
         see `contract`.
     node
-        What ways must do without.
+        The corner that paths must avoid.
     source
-        Its neighbour.
+        The neighbour.
     limit
-        What a way may cost.
+        Greatest cost of a path.
     n_wanted
         Number of corners whose record has the stamp in column 2: the search ends when it has
         settled them.
     stamp
-        Of this search.
+        Number of this search.
     work
-        Records, int64 (n, 3): distance, stamp and class of the way back, stamp of those wanted; a
-        heap; corners that it settles at most. The heap has room for that many times the greatest
-        number of arcs from a corner.
+        Records, int64 (n, 3): distance, stamp and class of the way back, stamp of the wanted
+        corners; a heap; the most corners to settle. The heap has room for that number times the
+        greatest number of arcs from a corner.
     """
     begin, size, pool, kinds, follow = graph
     records, heap, most_settled = work
@@ -110,7 +113,7 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
 
 @njit(cache=True, nogil=True)
 def _shortcuts(graph, node, stamp, work, pairs):
-    """Find the shortcuts that taking a corner out asks for.
+    """Find the shortcuts that the removal of a corner needs.
 
     Parameters
     ----------
@@ -119,9 +122,9 @@ def _shortcuts(graph, node, stamp, work, pairs):
     node
         The corner.
     stamp
-        Of the last search.
+        Number of the last search.
     pairs
-        int64 (n, 2), room for as many as there are pairs of arcs from it: gets those that a
+        int64 (n, 2), room for all pairs of arcs from the corner; filled with the pairs that a
         shortcut joins.
 
     Returns
@@ -159,7 +162,7 @@ def _shortcuts(graph, node, stamp, work, pairs):
 
 @njit(cache=True, nogil=True)
 def _take_out(begin, size, pool, node):
-    """Take the arcs to a corner out of the parts of its neighbours."""
+    """Remove the arcs to a corner from the parts of its neighbours."""
     for arc in range(begin[node], begin[node] + size[node]):
         other = pool[arc, 1] >> HEAD_SHIFT
         last = begin[other] + size[other] - 1
@@ -175,7 +178,7 @@ def _take_out(begin, size, pool, node):
 def _put_in(parts, pool, used, tail, arc):
     """Put an arc into a corner's part of the pool, or improve the one that has its head.
 
-    Returns the pool, which is another one where there was no room, and how much of it is used.
+    Return the pool, a new one if there was no room, and the used number of its rows.
     """
     begin, size, room = parts
     cost, packed, past = arc
@@ -201,8 +204,11 @@ def _put_in(parts, pool, used, tail, arc):
 
 @njit(cache=True, nogil=True)
 def _packed_arcs(begin, size, pool):
-    """Return what is left in the pool without the room: where the arcs of each corner begin,
-    their costs and heads, their middles (see `contract`)."""
+    """Return the arcs left in the pool, packed.
+
+    The result holds the offsets of each corner's arcs, their costs and heads, and their middles
+    (see `contract`).
+    """
     n = begin.size
     first = np.zeros(n + 1, np.int32)
     for node in range(n):
@@ -226,31 +232,31 @@ def _packed_arcs(begin, size, pool):
 @guarded
 @njit(cache=True, nogil=True)
 def contract(kinds, first, arcs, follow, effort):
-    """Contract all corners of a graph, those first that leave few and short shortcuts.
+    """Contract all corners of a graph, first those that leave few and short shortcuts.
 
     Parameters
     ----------
     kinds
         uint8 (n,), kinds of corners.
     first, arcs
-        The graph: where the arcs of each corner begin; int64 (m, 2), the cost of each, and what
-        `pack` returns. With each arc there is its reverse.
+        The graph: offsets of the arcs of each corner; int64 (m, 2), the cost of each, and the
+        result of `pack`. Each arc comes with its reverse.
     follow
         int64 (kinds, classes): bit c is set where a shortest path that passes a corner of this kind
-        along an arc of the one class may go on along one of class c. What is not set must cost
-        more than another way, and by more than costs are rounded.
+        along an arc of the one class may continue along one of class c. If the bit is not set, the
+        two must cost more than another path, by more than the rounding of costs.
     effort
-        Corners that a search for another way settles at most; arcs that are looked at before it is
-        given up.
+        Most corners that a witness search settles; most arcs to examine before contraction is given
+        up.
 
     Returns
     -------
     tuple
-        int32 (n + 1,), where the arcs of each corner to those contracted after it begin; int64
-        (u, 2), these arcs; int64 (u,), the corner that each leads past, in the high half, and
-        which of this one's arcs lead to the tail and to the head, 16 bits each, -1 for an arc of
-        the graph; int32 (n,), the corners in the order in which they were taken out. No arc at all
-        where it is given up.
+        int32 (n + 1,), where the arcs of each corner to those contracted after it begin; int64 (u,
+        2), these arcs; int64 (u,), the corner that each leads past, in the high half, and the
+        positions among its arcs of those to the tail and to the head, 16 bits each, -1 for an arc
+        of the graph; int32 (n,), the corners in the order of their removal. If contraction is given
+        up, there are no arcs.
     """
     n = first.size - 1
     most_settled, most_looked = effort
@@ -310,15 +316,15 @@ def contract(kinds, first, arcs, follow, effort):
 @guarded
 @njit(cache=True, nogil=True)
 def renumbered(first, arcs, middles, order):
-    """Number the corners of a hierarchy anew.
+    """Renumber the corners of a hierarchy.
 
-    A search climbs from anywhere to the corners that were taken out last: where these have the
-    first numbers, and their arcs lie side by side, they stay in the processor's cache.
+    Every search climbs to the corners that were removed last: if these have the first numbers, so
+    that their arcs are adjacent, they stay in the processor's cache.
 
     Parameters
     ----------
     first, arcs, middles
-        Of `contract`.
+        Results of `contract`.
     order
         int32 (n,), the new number of each corner.
 

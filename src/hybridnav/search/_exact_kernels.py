@@ -7,7 +7,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def _rounding_error(first, second, product):
-    """What rounding took from a product (T. J. Dekker: A floating-point technique, 1971)."""
+    """Return the rounding error of a product (T. J. Dekker: A floating-point technique, 1971)."""
     scaled = 134217729.0 * first
     first_high = scaled - (scaled - first)
     first_low = first - first_high
@@ -20,7 +20,7 @@ def _rounding_error(first, second, product):
 
 @njit(cache=True, nogil=True)
 def turn_of(a_row, a_col, b_row, b_col, c_row, c_col):
-    """Return on which side of the line from a to b a point c lies: 1, -1 or 0, exact.
+    """Return the side of the line from a to b on which c lies: 1, -1 or 0, exact.
 
     1 is the right side for points given as (row, col), the left one for (x, y). Differences of
     coordinates must be exact in float64, as those of multiples of 2^-24 below 2^28 are.
@@ -28,7 +28,7 @@ def turn_of(a_row, a_col, b_row, b_col, c_row, c_col):
     p, q = b_row - a_row, c_col - a_col
     r, s = b_col - a_col, c_row - a_row
     left, right = p * q, r * s
-    # Rounding keeps order: only equal rounded products need their errors.
+    # Rounding preserves order: only equal rounded products need their errors.
     if left == right and left != 0.0:
         left, right = _rounding_error(p, q, left), _rounding_error(r, s, right)
     return int(left > right) - int(left < right)

@@ -7,7 +7,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def push(heap, size, key, value):
-    """Put an entry into a heap of `size`, which then has one more."""
+    """Put an entry into a heap of `size`; return the new size."""
     at = size
     while at > 0:
         above = at - 1 >> 2
@@ -20,7 +20,7 @@ def push(heap, size, key, value):
 
 @njit(cache=True, nogil=True)
 def pop(heap, size):
-    """Take the value with the least key out of a heap of `size`, which then has one fewer."""
+    """Take the entry with the least key out of a heap of `size`, which then has one fewer."""
     found = heap[0, 1]
     size -= 1
     key, value = heap[size, 0], heap[size, 1]

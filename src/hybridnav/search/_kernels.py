@@ -22,10 +22,10 @@ _GENERATION_SHIFT = _DIRECTION_BITS + _COST_BITS
 _COST_MASK = (1 << _COST_BITS) - 1
 _SAME_GENERATION = 1 << _GENERATION_SHIFT
 GENERATIONS = (1 << (32 - _GENERATION_SHIFT)) - 1
-"""Searches that one array of records serves before it must be filled with zeros anew."""
+"""Number of searches after which the array of records must be filled with zeros again."""
 
 NO_ROOM = -2
-"""What `astar` returns when a bucket of its open list is full."""
+"""Returned by `astar` when a bucket of its open list is full."""
 
 # Directions in the order east, north-east, north, ... counter-clockwise, row step and column step.
 _ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
@@ -39,7 +39,7 @@ BUCKETS = 8
 
 @njit(cache=True, nogil=True)
 def octile_cost(rows, cols):
-    """Cost of the shortest path between cells without obstacles, from their offsets."""
+    """Return the cost of the shortest path between cells without obstacles, from their offsets."""
     rows, cols = abs(rows), abs(cols)
     if rows < cols:
         rows, cols = cols, rows
@@ -48,10 +48,10 @@ def octile_cost(rows, cols):
 
 @njit(cache=True, nogil=True)
 def legal_moves(enterable, corner_cutting):
-    """Byte mask of the legal moves of each cell, bit k for direction k.
+    """Return the byte mask of the legal moves of each cell, bit k for direction k.
 
-    A diagonal needs both side cells enterable, unless corners may be cut. Moves are judged on the
-    whole grid, once.
+    A diagonal needs both side cells enterable, unless corners may be cut. Moves are judged once, on
+    the whole grid.
     """
     rows, cols = enterable.shape
     moves = np.zeros((rows, cols), np.uint8)
@@ -80,7 +80,7 @@ def legal_moves(enterable, corner_cutting):
 
 @njit(cache=True, nogil=True)
 def grow(array):
-    """A copy of an array with twice the room."""
+    """Return a copy of an array with twice the room."""
     larger = np.empty(2 * array.size, array.dtype)
     larger[: array.size] = array
     return larger
@@ -89,9 +89,9 @@ def grow(array):
 @guarded
 @njit(cache=True, nogil=True)
 def forbid(moves, cols, blocked, corner_cutting):
-    """Take all moves into some flat cells, out of them and past their corners out of the masks.
+    """Remove all moves into, out of and past the corners of some flat cells from the masks.
 
-    Returns the flat cells whose masks may have changed, and these masks as they were.
+    Return the flat cells whose masks may have changed, and their former masks.
     """
     rows = moves.size // cols
     touched = np.empty(9 * blocked.size, np.int64)
@@ -133,31 +133,36 @@ def astar(
     generation,
     waiting,
 ):
-    """Cost below `limit` of the optimal path between two flat cells over the cells of a corridor,
-    -1 for none, `NO_ROOM` when a bucket is full; and the expansions.
+    """Return the cost of the optimal path between two flat cells in a corridor, and the expansions.
 
-    `field_of` None makes the whole map the corridor (the kernel is compiled for both).
-    `successors` and `detours` are those of `grid_search.move_tables`.
+    The cost is -1 if there is no path below `limit`, `NO_ROOM` if a bucket is full.
+
+    `moves`, uint8 (n_cells,), are the legal moves; `ends` the flat cells of start and goal; `limit`
+    an integer cost; `successors` and `detours` those of `grid_search.move_tables`; `field_of`,
+    int16 or int32 (n_cells,), a label for each cell and `in_corridor`, bool by label, whether it
+    may be stood on; `records`, uint32 (n_cells,); `generation` the number of this search, below
+    `GENERATIONS`; `waiting` the open list. `field_of` None makes the whole map the corridor (the
+    kernel is compiled for both).
 
     The open list is a ring of buckets of f, each a stack of cells: the newest comes first, which
-    breaks ties in favour of the deeper cell. A successor in the bucket at hand is expanded next
-    without a stay in its bucket, as the newest one would be. A cell can be expanded again within
-    a bucket; the search ends when no entry below the goal's cost is left, so the cost is optimal.
+    breaks ties in favour of the deeper cell. A successor in the current bucket is expanded next
+    without a stay in its bucket, as the newest one would be. A cell can be expanded again within a
+    bucket; the search ends when no entry below the goal's cost is left, so the cost is optimal.
 
     A record holds the generation of the search that wrote it, so that nothing has to be cleared
     between searches, the direction of arrival, and the cost modulo 2^19. That is enough, W being
     the width of a bucket: (1) A cell p is expanded within W of its least cost g*(p), for its f lies
     in the first bucket that is not empty, and some cell of an optimal path to p waits there or
     later at its least cost. (2) So p offers its neighbour q less than g*(p) + W + DIAGONAL, which
-    is less than W + 2 * DIAGONAL above the record of q. (3) The record of q had an f of less than
-    W + 2 * DIAGONAL above the start of the bucket from which it was written, and no later offer has
-    an f below that start: the offer is less than W + 2 * DIAGONAL below the record. As
-    W + 2 * DIAGONAL < 2^18, the difference modulo 2^19 has the sign of the difference. Likewise
-    the bucket of a waiting cell tells its full cost, and an entry whose cell has been improved
-    since shows as lying outside its bucket, or is as good as the newer one.
+    is less than W + 2 * DIAGONAL above the record of q. (3) The record of q had an f of less than W
+    + 2 * DIAGONAL above the start of the bucket from which it was written, and no later offer has
+    an f below that start: the offer is less than W + 2 * DIAGONAL below the record. As W + 2 *
+    DIAGONAL < 2^18, the difference modulo 2^19 has the sign of the difference. Likewise the bucket
+    of a waiting cell determines its full cost, and an entry whose cell has been improved since is
+    found outside its bucket, or is as good as the newer one.
 
-    Nothing grows in here: with arrays that may be replaced in the loop, numba's code took half as
-    long again. Indices are unsigned because a test for negative ones took 15 % of the time.
+    No array grows here: with arrays that may be replaced in the loop, numba's code took 50 %
+    longer. Indices are unsigned because a test for negative ones took 15 % of the time.
     """
     start, goal = ends
     stamp = np.int64(generation) << _GENERATION_SHIFT
@@ -258,9 +263,9 @@ def astar(
 
 @njit(cache=True, nogil=True)
 def trace(came, cols, start, goal):
-    """Flat cells of the path that a search left behind, from start to goal.
+    """Return the flat cells of the path that a search recorded, from start to goal.
 
-    The lowest three bits of `came` are the direction by which each cell was reached.
+    The lowest three bits of `came` are the direction from which each cell was reached.
     """
     count = 1
     cell = goal
@@ -280,7 +285,7 @@ def trace(came, cols, start, goal):
 
 @njit(cache=True, nogil=True)
 def trace_cells(came, cols, start, goal):
-    """The same path as (row, col), shape (n, 2)."""
+    """Return the path of `trace` as (row, col), shape (n, 2)."""
     flat = trace(came, cols, start, goal)
     cells = np.empty((flat.size, 2), np.int64)
     for i in range(flat.size):
@@ -291,8 +296,9 @@ def trace_cells(came, cols, start, goal):
 
 @njit(cache=True, nogil=True)
 def field_distances(classes, field_of, sources):
-    """Cost of the shortest path inside each field from its source cell to every cell of it, -1
-    where a cell belongs to no field.
+    """Return the cost of the shortest path inside each field from its source to each cell.
+
+    It is -1 for cells without a field.
 
     A diagonal is judged on the whole grid: in a free field both side cells must be free, in an
     unexplored one free or unexplored. Buckets as wide as a straight step make the search
@@ -349,10 +355,11 @@ def field_distances(classes, field_of, sources):
 @guarded
 @njit(cache=True, nogil=True)
 def cheapest_arcs(first, neighbour, arc, costs, ties, allowed, start, goal):
-    """Dijkstra over the arcs of a multigraph: arcs of the cheapest walk, ties by a second cost.
+    """Find the cheapest walk over the arcs of a multigraph (Dijkstra), ties by a second cost.
 
-    The arcs out of vertex v are positions first[v] .. first[v + 1] of `neighbour` and `arc`.
-    Returns the arcs from start to goal, whether there is such a walk, and the expansions.
+    The arcs out of vertex v are positions first[v] .. first[v + 1] of `neighbour` and `arc`, int32
+    or int64; `costs` and `ties`, float64 (n_arcs,), >= 0; `allowed`, bool (n_vertices,). Return the
+    arcs from start to goal, whether there is such a walk, and the expansions.
     """
     n_vertices = first.size - 1
     cost = np.full(n_vertices, np.inf)

@@ -14,10 +14,10 @@ from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
 @guarded
 @njit(cache=True, nogil=True)
 def spread(moves, cols, sources, costs, is_target, all_targets):
-    """Dijkstra's algorithm from cells with costs of their own.
+    """Run Dijkstra's algorithm from cells with costs of their own.
 
-    Returns the cost of each cell, -1 where it was not settled, and the source it came from (an
-    index into `sources`). Ends at the first settled target, or at the last one with `all_targets`.
+    Return the cost of each cell, -1 if it was not settled, and its source (an index into
+    `sources`). The search ends at the first settled target, or at the last one with `all_targets`.
     """
     cost = np.full(moves.size, np.int64(-1), np.int64)
     came = np.full(moves.size, np.int32(-1), np.int32)

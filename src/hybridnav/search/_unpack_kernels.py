@@ -1,4 +1,4 @@
-"""Kernels that read a path off what a search of a contracted graph left behind."""
+"""Kernels that unpack a path from the records of a search of a contracted graph."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import numpy as np
 from hybridnav._jit import njit
 
 NO_ARC = -1
-"""By what a search reached the corners that it began with."""
+"""Arc of the corners that a search began with."""
 
 
 @njit(cache=True, nogil=True)
 def _unpack(arcs, way, nodes, count):
-    """Append the corners on the way of an arc to those of a path, but for its tail.
+    """Append the corners on an arc to those of a path, except its tail.
 
-    `way` is where it is entered, where it is left, and its number, or -1 minus that where it is
-    passed backwards. Returns the corners, another array where there was no room, and their number.
+    `way` holds the corner where the arc is entered, the corner where it is left, and the number of
+    the arc, or -1 minus that number if it is passed backwards. Return the corners, a new array if
+    there was no room, and their number.
     """
     first, middles = arcs
     stack = np.empty((64, 3), np.int64)
@@ -51,13 +52,13 @@ def corners_between(arcs, meeting, records):
     Parameters
     ----------
     arcs
-        Where the arcs of each corner begin, and their middles, of `contract`; no middles in a graph
-        that is not contracted.
+        Offsets of the arcs of each corner, and their middles, from `contract`; no middles in a
+        graph that is not contracted.
     meeting
         The corner where the searches from both ends meet.
     records
-        int64 (n, 4): columns 2 and 3 hold by what tail (in the high half) and arc each corner was
-        reached from the start and from the goal, or `NO_ARC`.
+        int64 (n, 4): columns 2 and 3 hold the tail (in the high half) and arc by which each corner
+        was reached from the start and from the goal, or `NO_ARC`.
 
     Returns
     -------

@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ArcWalk:
-    """Outcome of a search: vertices in the order passed, and the arcs between them; None where no
-    walk joins start and goal."""
+    """Outcome of a search: vertices in the order passed, and the arcs between them.
+
+    Both are None if no walk joins start and goal.
+    """
 
     vertices: LongArray | None
     arcs: LongArray
@@ -35,7 +37,7 @@ class ArcSearch:
     arcs
         int (n_arcs, 2), the vertices that each arc joins.
     costs, ties
-        float64 (n_arcs,), what an arc costs, and a second cost that decides between walks of equal
+        float64 (n_arcs,), the cost of an arc, and a second cost that decides between walks of equal
         cost; >= 0, any unit.
     kept
         Indices of the arcs that walks may use; None for all.
@@ -63,7 +65,7 @@ class ArcSearch:
 
     @property
     def n_vertices(self) -> int:
-        """Vertices, those that may not be passed too."""
+        """Number of vertices, including those that may not be passed."""
         return len(self._allowed)
 
     def search(self, start: int, goal: int) -> ArcWalk:

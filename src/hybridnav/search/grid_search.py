@@ -31,7 +31,7 @@ _ROOM = 1024
 
 @dataclass(frozen=True, eq=False)
 class CellPath:
-    """Outcome of a grid search: the cells of an optimal path, None where there is none."""
+    """Outcome of a grid search: the cells of an optimal path, None if there is none."""
 
     cells: LongArray | None
     expanded: int
@@ -49,12 +49,12 @@ class _Work:
 class GridSearch:
     """A* on the cells of one grid; threads may share it.
 
-    It holds one byte a cell for the legal moves, and for each search that ran at the same time as
-    others four for its record and some 32 kB for its open list, which grows with the longest one
-    that it needed; one byte a cell more where searches had blocked cells.
+    It holds one byte a cell for the legal moves. Each search that runs at the same time as others
+    takes four bytes a cell for its records, some 32 kB for its open list, which grows as needed,
+    and one byte a cell if it had blocked cells.
 
     Moves go to the 8 neighbours; a diagonal needs both side cells enterable (no corner cutting).
-    They are judged once, on the whole grid; a corridor limits only the cells stood on.
+    Moves are judged once, on the whole grid; a corridor limits only the cells stood on.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class GridSearch:
 
     @property
     def memory_bytes(self) -> int:
-        """Bytes that it holds between searches which do not overlap."""
+        """Bytes held between searches that do not overlap."""
         with self._works.lent() as work:
             return int(self._moves.nbytes + work.records.nbytes + work.waiting.nbytes)
 
@@ -99,10 +99,10 @@ class GridSearch:
         in_corridor
             bool, whether the cells of each label may be stood on; goes with `field_of`.
         limit
-            Integer cost: only paths that cost less are looked for; None for all.
+            Integer cost: only cheaper paths are searched; None for all.
         blocked
-            int64 (n,), flat cells of the grid that this search may not enter, nor pass on a
-            diagonal unless corners may be cut; takes time in proportion to n.
+            int64 (n,), flat cells of the grid that this search may not enter, or pass on a diagonal
+            unless corners may be cut; the time is proportional to n.
         """
         first = start[0] * self._cols + start[1]
         last = goal[0] * self._cols + goal[1]
@@ -125,7 +125,7 @@ class GridSearch:
         limit: int,
         corridor: tuple[NDArray[np.int16 | np.int32] | None, BoolArray | None],
     ) -> CellPath:
-        """Find a shortest path between two flat cells; `search` says what the rest means."""
+        """Find a shortest path between two flat cells; see `search`."""
         tables = move_tables(corner_cutting=self._corner_cutting)
         with self._works.lent() as work:
             cost = _kernels.NO_ROOM
@@ -155,13 +155,15 @@ class GridSearch:
 
 @lru_cache
 def move_tables(*, corner_cutting: bool) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Successors of a cell x by the direction d of arrival from p and the mask of its legal moves.
+    """Return the successors of a cell by direction of arrival and mask of legal moves.
 
-    A successor y is left out when a path from p to y that does without x is shorter, or as short
-    and diagonal first. So every cell y is still reached at its least cost, by induction over it:
-    take a cell x before y on a shortest path. Where x leaves y out for a path of the same length,
-    that is p to z along a diagonal, z to y along a side, and then z too lies before y on a shortest
-    path; and a cell never leaves out a successor along a side but for a shorter path.
+    Let x be the cell, p the cell before it, d the direction from p to x.
+
+    A successor y is left out when a path from p to y without x is shorter, or as short and diagonal
+    first. Still, every cell y is reached at its least cost, by induction over that cost: take a
+    cell x before y on a shortest path. If x leaves y out for a path of the same length, that path
+    goes from p to z along a diagonal and from z to y along a side, so z too lies before y on a
+    shortest path; and a cell leaves out a successor along a side only for a shorter path.
 
     Some of these paths stand on a third cell z, next to x: d straight, y one turn of 45 degrees to
     the left or right of d, z two turns; d diagonal, y two turns, z three. These y are the detours,
@@ -179,7 +181,8 @@ def move_tables(*, corner_cutting: bool) -> tuple[NDArray[np.uint32], NDArray[np
     successors = np.zeros((9, 256), dtype=np.uint32)
     detours = np.zeros((9, 256), dtype=np.uint32)
     for d in range(8):
-        # Straight on is put first, so it comes last and is expanded next, before all waiting cells.
+        # The last move in the list is expanded next, before all waiting cells: straight on is put
+        # first.
         for turn in (0, 7, 1, 6, 2, 5, 3, 4):
             k = (d + turn) & 7
             kept, left_out = _after_turn(legal, d, turn, corner_cutting=corner_cutting)
@@ -194,7 +197,7 @@ def move_tables(*, corner_cutting: bool) -> tuple[NDArray[np.uint32], NDArray[np
 def _after_turn(
     legal: list[BoolArray], d: int, turn: int, *, corner_cutting: bool
 ) -> tuple[BoolArray, BoolArray]:
-    """For each mask: whether a move is a successor, and whether it is a detour, if it is legal."""
+    """Return for each mask whether a legal move is a successor, and whether it is a detour."""
     side = 1 if turn < 4 else -1  # noqa: PLR2004 - 8 directions
     turns = min(turn, 8 - turn)
     second, third = (legal[(d + side * n) & 7] for n in (2, 3))

@@ -19,7 +19,7 @@ _INVERSE = DIAGONAL % STRAIGHT
 
 
 def length_in_cells(cost: ArrayLike) -> FloatArray:
-    """Path lengths of integer costs, recounted as a + b sqrt 2 from the moves they stand for.
+    """Return the path lengths of integer costs, recounted as a + b sqrt 2 of their moves.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ def length_in_cells(cost: ArrayLike) -> FloatArray:
 
 
 def length_of_cost(cost: int) -> float:
-    """The same for one cost, without numpy."""
+    """Return the length of one cost, like `length_in_cells` without numpy."""
     diagonal = cost % STRAIGHT * _INVERSE % STRAIGHT
     return (cost - diagonal * DIAGONAL) // STRAIGHT + diagonal * math.sqrt(2.0)
 
 
 def path_length_in_cells(cells: LongArray) -> float:
-    """Length of a path of 8-neighbour moves, counted as a + b sqrt 2.
+    """Return the length of a path of 8-neighbour moves, counted as a + b sqrt 2.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def path_length_in_cells(cells: LongArray) -> float:
 
 
 def cost_of(cells: LongArray) -> int:
-    """Integer cost of a path of 8-neighbour moves; see `_kernels` for its unit.
+    """Return the integer cost of a path of 8-neighbour moves; see `_kernels` for its unit.
 
     Parameters
     ----------
@@ -69,6 +69,6 @@ def cost_of(cells: LongArray) -> int:
 
 
 def octile_distance_in_cells(first: ArrayLike, second: ArrayLike) -> float:
-    """Length of the shortest octile path between two cells without obstacles."""
+    """Return the length of the shortest octile path between two cells without obstacles."""
     rows, cols = np.abs(np.subtract(first, second))
     return float(abs(int(rows) - int(cols)) + min(int(rows), int(cols)) * math.sqrt(2.0))

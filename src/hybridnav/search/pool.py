@@ -1,4 +1,4 @@
-"""Work arrays that queries borrow, so that none writes to what another reads."""
+"""Work arrays that queries borrow, so that no two share them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ T = TypeVar("T")
 class Pool(Generic[T]):
     """Work arrays for as many queries as run at the same time.
 
-    A query that ends in an exception, as when the user interrupts it, does not return what it
-    borrowed: that may be half written.
+    A query that ends in an exception, as when the user interrupts it, does not return its arrays:
+    they may be half written.
 
     Parameters
     ----------
     make
-        Makes the arrays of one query.
+        Function that makes the arrays of one query.
     """
 
     def __init__(self, make: Callable[[], T]) -> None:
@@ -29,8 +29,8 @@ class Pool(Generic[T]):
 
     @contextmanager
     def lent(self) -> Iterator[T]:
-        """Lend the arrays of one query; of those returned the last, which caches may still hold."""
-        # One call, so that no two threads find the same last one.
+        """Lend the arrays of one query: those returned last, which caches may still hold."""
+        # One call, so that no two threads take the same arrays.
         try:
             work = self._idle.pop()
         except IndexError:
@@ -39,5 +39,5 @@ class Pool(Generic[T]):
         self._idle.append(work)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy makes arrays of its own."""
+        """Return the constructor, so that a copy makes arrays of its own."""
         return type(self), (self._make,)

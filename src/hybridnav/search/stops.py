@@ -1,4 +1,4 @@
-"""The cheapest cells to stop at, one from each of some sets that are visited in order."""
+"""The cheapest stops, one cell from each of several sets that are visited in order."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ if TYPE_CHECKING:
 def cheapest_stops(
     enterable: BoolArray, sets: Sequence[LongArray], *, corner_cutting: bool = False
 ) -> list[int] | None:
-    """Choose a cell from each set so that the way through them, in order, is shortest.
+    """Choose a cell from each set so that the path through them, in order, is shortest.
 
-    Dijkstra's algorithm from set to set: what a cell of one set costs is what the search for the
-    next begins with there.
+    Dijkstra's algorithm runs from set to set: the search for the next set begins with the costs of
+    the cells of the last one.
 
     Parameters
     ----------
     enterable
-        bool (rows, cols), cells that the way may use. Moves go to the 8 neighbours; a diagonal
+        bool (rows, cols), cells that the path may use. Moves go to the 8 neighbours; a diagonal
         needs both side cells, unless corners may be cut.
     sets
-        Two or more of int64 (n,), flat enterable cells.
+        Two or more sets, int64 (n,), of flat enterable cells.
     corner_cutting
         Whether a diagonal needs no side cell.
 
     Returns
     -------
     list of int | None
-        A flat cell of each set; None where one of them cannot be reached.
+        A flat cell of each set; None if one of them cannot be reached.
     """
     moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
     sources, costs = sets[0], np.zeros(len(sets[0]), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Dual edges as lines: along their boundaries, and on inside holes to their dual vertices."""
+"""Dual edges as lines along their boundaries, continued inside holes to their dual vertices."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import Level
 
 Corner = tuple[int, int]
-"""A corner of cells: (row, col) in grid units, the lower left one of the cell of that name."""
+"""A corner of cells: (row, col) in grid units, the lower left corner of cell (row, col)."""
 
 _ALL_ROUND = np.ones((3, 3), dtype=np.bool_)
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
 _SAMPLED_ENDS = 8
 _SHORT = 100
-"""Cells of a line that are made smooth; a longer one follows walls and has few bends anyway."""
+"""Most cells of a line that is smoothed; a longer one follows walls and has few bends anyway."""
 _TAUT = 0.5
 """Clearance of a line that is pulled straight as far as its field allows."""
 
 
 def boundary_line(level: Level, arc: int) -> LongArray:
-    """The line of a dual edge, along the sides between the cells of its boundary.
+    """Return the line of a dual edge, along the sides between the cells of its boundary.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def boundary_line(level: Level, arc: int) -> LongArray:
     -------
     LongArray
         int64 (n_cracks + 1, 2), corners (row, col) in grid units, from the face of dart 2 arc to
-        that of dart 2 arc + 1. The line of a ring ends where it began.
+        that of dart 2 arc + 1. The line of a ring ends at its start.
     """
     pairs = np.sort(level.boundary(arc), axis=1)
     sides = [_ends_of_side(*pair) for pair in pairs.tolist()]
@@ -76,13 +76,14 @@ def boundary_line(level: Level, arc: int) -> LongArray:
 
 
 def _ends_of_side(low: Sequence[int], high: Sequence[int]) -> tuple[Corner, Corner]:
-    """Ends of the side between two cells: to the right and to the left of a step up or east."""
+    """Return the ends of the side between two cells, right and left of a step up or east."""
     row, col = high
     return ((row, col), (row + 1, col)) if low[0] == row else ((row, col + 1), (row, col))
 
 
 def _goes_on(level: Level, corner: Corner) -> bool:
-    """Whether the corner is no meeting point of boundaries and touches no hole."""
+    """Return whether a line continues at a corner: no boundaries meet and no hole is touched
+    there."""
     row, col = corner
     block = level.field_of[max(row - 1, 0) : row + 1, max(col - 1, 0) : col + 1]
     if block.shape != (2, 2) or (block < 0).any():
@@ -99,19 +100,19 @@ class Boundaries:
 
     @cached_property
     def _corners(self) -> list[LongArray]:
-        """The line of each dual edge along its boundary, those of self-loops as the level has
-        them: they may end at another boundary whose face they share."""
+        """The line of each dual edge along its boundary; that of a self-loop may end at another
+        boundary whose face it shares."""
         return [boundary_line(self.level, arc) for arc in range(self.level.n_arcs)]
 
     @cached_property
     def _hole_of(self) -> AnyArray:
-        """Hole of each cell of the grid with an occupied ring round it, from 1; 0 elsewhere."""
+        """Hole of each cell of the grid, padded with an occupied ring, from 1; 0 elsewhere."""
         occupied = np.pad(self.level.grid.classes == CellClass.OCCUPIED, 1, constant_values=True)
         return np.asarray(ndimage.label(occupied, structure=_ALL_ROUND)[0])
 
     @cached_property
     def _face_holes(self) -> dict[int, int]:
-        """The hole that each face stands for, ordinary ones excepted."""
+        """The hole of each face that is not ordinary."""
         holes: dict[int, int] = {}
         loops_last = np.argsort(self.level.is_self_loop, kind="stable")
         for arc in loops_last.tolist():
@@ -136,7 +137,7 @@ class Boundaries:
         return corners
 
     def _ends(self, arc: int) -> list[tuple[int, Corner]]:
-        """The faces that a dual edge joins, and where its line ends."""
+        """Return the faces that a dual edge joins, with the ends of its line."""
         ends = self._corners[arc][[0, -1]].tolist()
         faces = self.level.dual.edges[arc].tolist()
         return [(face, (row, col)) for face, (row, col) in zip(faces, ends, strict=True)]
@@ -147,7 +148,7 @@ class Boundaries:
 
     @cached_property
     def lines(self) -> list[FloatArray]:
-        """float64 (n, 2) per dual edge: a boundary, or a way across a place for a self-loop."""
+        """float64 (n, 2) per dual edge: a boundary, or for a self-loop a line across its place."""
         lines = [line.astype(np.float64) for line in self._corners]
         starts: dict[int, FloatArray] = {}
         for loop in np.flatnonzero(self.level.is_self_loop).tolist():
@@ -157,14 +158,16 @@ class Boundaries:
         for arc in np.flatnonzero(~self.level.is_self_loop).tolist():
             face, _ = self._ends(arc)[0]
             if self._is_ring(arc) and face in starts:
-                # A ring begins at its dual vertex, which is where something else meets it.
+                # A ring begins at its dual vertex, where another line meets it.
                 at = int(np.abs(lines[arc] - starts[face]).sum(axis=1).argmin())
                 lines[arc] = np.concatenate([lines[arc][at:-1], lines[arc][: at + 1]])
         return lines
 
     def _way_across(self, loop: int) -> FloatArray:
-        """The shortest way inside its place from one end of a self-loop's dual edge to the
-        other: the line of its boundary may end at another one, half-way along a shared face."""
+        """Return the shortest path inside its place between the ends of a self-loop's dual edge.
+
+        The line of its boundary may end at another one, half-way along a shared face.
+        """
         field = Field(self.level, int(self.level.arcs[loop, 0]), 1.0)
         middles = field.cells + field.corner + 0.5
         ends = []
@@ -184,7 +187,7 @@ class Boundaries:
         return smoothed(whole, field.distance, _TAUT) + field.corner + 0.5
 
     def _tree(self, face: int) -> KDTree:
-        """Where a face may be drawn: its corners, or the middles of the cells of its hole."""
+        """Return the points at which a face may be drawn: its corners, or the cells of its hole."""
         if face not in self._trees:
             if face in self._face_holes:
                 points = np.argwhere(self._hole_of == self._face_holes[face]) - 0.5
@@ -221,7 +224,7 @@ class Boundaries:
             tree, at = self._tree(face), np.array(points)
             name = self._face_holes[face]
             window = windows[name - 1]
-            # A cell each for the ring round the grid and the margin, half a one to its middle.
+            # One cell each for the ring round the grid and the margin, half a cell to its centre.
             low = np.array([part.start for part in window]) - 1.5
             nearest = (tree.data[tree.query(at, p=np.inf)[1]] - low).astype(np.int64)
             outside = self.level.dual.kinds[face] == FaceKind.OUTSIDE
@@ -232,11 +235,11 @@ class Boundaries:
 
 @dataclass(frozen=True, eq=False)
 class Hole:
-    """A hole with its dual vertex, and lines from where dual edges end to that."""
+    """A hole with its dual vertex, and lines from the ends of dual edges to it."""
 
     position: FloatArray
     links: list[FloatArray]
-    """One for each end, from there to the dual vertex."""
+    """One line for each end, from there to the dual vertex."""
 
     @classmethod
     def of(cls, mask: BoolArray, nearest: LongArray, ends: FloatArray, *, outside: bool) -> Hole:
@@ -278,12 +281,12 @@ class Hole:
         return cls(cells[centre].astype(np.float64), links)
 
     def moved(self, by: FloatArray) -> Hole:
-        """The hole somewhere else."""
+        """Return the hole, moved."""
         return Hole(self.position + by, [link + by for link in self.links])
 
 
 def _links(number: LongArray) -> Any:
-    """Moves between 8-neighbours of one hole, and their lengths."""
+    """Return the moves between 8-neighbours of one hole, and their lengths."""
     padded = np.pad(number, 1, constant_values=-1)
     tails, heads, lengths = [], [], []
     for up, right in _STEPS:

@@ -1,4 +1,4 @@
-"""Axes in the map frame: what part of the map to show, the image of the cells, the layout."""
+"""Axes in the map frame: the visible part of the map, the image of the cells, the layout."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 MAX_IMAGE_SIDE = 6000
-"""Cells per side beyond which an image is averaged down first: more than any page resolves."""
+"""Cells per side beyond which an image is averaged first, more than any page resolves."""
 MAX_HEIGHT = 1.1
-"""Height of the map's part of a new figure at most, in figure widths."""
+"""Greatest height of the map in a new figure, in figure widths."""
 PAD_IN = 0.04
 
 
@@ -41,7 +41,7 @@ class View:
         return self.high - self.low
 
     def holding(self, points: FloatArray, margin: float) -> View:
-        """The view grown to hold points; those further off than its own size stay outside."""
+        """Return the view grown to contain points, except those farther off than its own size."""
         reach = self.size.max()
         near = ((points > self.low - reach) & (points < self.high + reach)).all(axis=1)
         inside = points[near]
@@ -52,14 +52,15 @@ class View:
 
 
 def known_view(grid: OccupancyGrid) -> View:
-    """The bounding box, in the map frame, of the cells that are not unexplored, and a margin."""
+    """Return the bounding box in the map frame of the cells that are not unexplored, with a
+    margin."""
     known = grid.measured != CellClass.UNEXPLORED
     if not known.any():
         known = np.ones(grid.shape, dtype=np.bool_)
     rows = np.flatnonzero(known.any(axis=1))
     first = known[rows].argmax(axis=1)
     end = grid.shape[1] - known[rows, ::-1].argmax(axis=1)
-    # With yaw the box of the corners of all rows is tighter than that of the box of all cells.
+    # With yaw, the box round the corners of all rows is tighter than the box round all cells.
     corners = [(rows + up, cols) for up in (0, 1) for cols in (first, end)]
     points = grid.frame.points_of_grid(np.concatenate([np.stack(c, axis=1) for c in corners]))
     low, high = points.min(axis=0), points.max(axis=0)
@@ -73,7 +74,7 @@ def known_view(grid: OccupancyGrid) -> View:
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """Axes that show a view of the map frame, and the sizes to draw with on them."""
+    """Axes that show a view of the map frame, with the sizes of lines on them."""
 
     ax: Axes
     view: View
@@ -83,7 +84,7 @@ class Canvas:
 
     @classmethod
     def opened(cls, ax: Axes | None, width_in: float, view: View) -> Canvas:
-        """The axes given, or else new ones in a new figure of some width, set to a view."""
+        """Return the given axes, or new ones in a new figure of some width, set to a view."""
         is_new = ax is None
         if ax is None:
             if not (math.isfinite(width_in) and width_in > 0):
@@ -99,7 +100,7 @@ class Canvas:
 
     @property
     def room(self) -> float:
-        """Width in points that the figure has for what stands round the map."""
+        """Width of the figure in points, for the items round the map."""
         return 72 * (float(_room_in(self.ax)[0]) - 2 * PAD_IN)
 
     @property
@@ -115,7 +116,7 @@ def _show(ax: Axes, view: View) -> None:
 
 
 def _room_in(ax: Axes) -> FloatArray:
-    """Width and height in inches that the axes have in their figure."""
+    """Return the width and height in inches of the axes in their figure."""
     place, figure = ax.get_position(original=True), ax.figure
     return (
         np.array([place.width * figure.bbox.width, place.height * figure.bbox.height]) / figure.dpi
@@ -125,7 +126,7 @@ def _room_in(ax: Axes) -> FloatArray:
 def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours: ByteArray) -> None:
     """Draw the cells inside a view, turned into the map frame.
 
-    `colours[field_of]` is the colour of a cell; occupied and blocked ones have their own.
+    `colours[field_of]` is the colour of a cell; occupied and blocked cells have their own colours.
     """
     ax, view = canvas.ax, canvas.view
     (left, bottom), (right, top) = view.low, view.high
@@ -143,7 +144,7 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
         origin="lower",
         extent=(float(low[1]), float(end[1]), float(low[0]), float(end[0])),
         transform=to_map + ax.transData,
-        # Averages where the page is coarser than the map: thin walls must not drop out.
+        # Average if the page is coarser than the map: thin walls must not vanish.
         interpolation="antialiased",
         zorder=0,
     )
@@ -154,7 +155,7 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
 def _image(
     measured: ByteArray, classes: ByteArray, field_of: AnyArray, colours: ByteArray, block: int
 ) -> ByteArray:
-    """RGB of each cell, averaged over square blocks of cells."""
+    """Return RGB of each cell, averaged over square blocks of cells."""
     strips = []
     occupied, blocked = style.rgb(style.OCCUPIED, style.BLOCKED)
     for row in range(0, measured.shape[0], 64 * block):

@@ -13,12 +13,12 @@ N_COLOURS = 6
 
 
 def colour_vertices(arcs: IntArray, n_vertices: int) -> LongArray:
-    """Colour a plane graph with six colours; both ends of an arc never have the same one.
+    """Colour a plane graph with six colours, so that the ends of an arc differ.
 
     Vertices of degree at most five are peeled off in layers until none is left (a plane graph
-    always has one) and coloured in the reverse order, so that each sees at most five coloured
-    neighbours (Matula and Beck's smallest-last order, in layers so that numpy can do it: networkx
-    takes minutes on the base of a map with two million cells). Equal input gives equal colours.
+    always has one) and coloured in the reverse order, so that each has at most five coloured
+    neighbours (Matula and Beck's smallest-last order, in layers for numpy: networkx takes minutes
+    on the base of a map with two million cells). Equal input has equal colours.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def _peel(darts: LongArray, n_vertices: int) -> LongArray:
 def _colour_layer(
     members: BoolArray, darts: LongArray, rank: LongArray, wish: LongArray, colours: LongArray
 ) -> None:
-    """Colour a layer in rounds: each takes the vertices of highest rank among their neighbours."""
+    """Colour a layer in rounds; each round takes the vertices of highest rank among neighbours."""
     waiting = members.copy()
     while waiting.any():
         source, target = darts.T
@@ -75,7 +75,7 @@ def _colour_layer(
         taken = np.zeros((len(colours), N_COLOURS), dtype=np.bool_)
         taken[source[beside], colours[target[beside]]] = True
         chosen = np.flatnonzero(ready)
-        # From a random wish on: greedy from colour 0 would leave the last colours unused.
+        # Start at a random wish: greedy from colour 0 would leave the last colours unused.
         order = (wish[chosen, None] + np.arange(N_COLOURS)) % N_COLOURS
         first = np.take_along_axis(taken[chosen], order, axis=1).argmin(axis=1)
         colours[chosen] = order[np.arange(len(chosen)), first]

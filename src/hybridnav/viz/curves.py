@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from hybridnav.viz.fields import Field
 
 _WIDER = 1.5
-"""How much more room arcs are given than self-loops, so that one may pass the other."""
+"""Factor on the clearance of arcs over that of self-loops, so that one may pass the other."""
 _PER_CELL = 4
-"""Points per cell at which a straight arc is looked at."""
+"""Points per cell at which a straight arc is tested."""
 _NEAR_END = 2.0
 """Clearances from its ends within which a straight arc may come close to a wall."""
 _SLIPPED = 2.0
-"""Cells from its boundary beyond which a crossing is one of another boundary."""
+"""Cells from its boundary beyond which a crossing belongs to another boundary."""
 
 
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """An arc between two places, to be drawn inside their fields."""
+    """An arc between two places, drawn inside their fields."""
 
     one: Field
     other: Field
@@ -35,7 +35,7 @@ class Arc:
 
     @property
     def clearance(self) -> float:
-        """How far a curve keeps from what lies in neither field where there is room, in cells."""
+        """Distance that a curve keeps from cells in neither field where there is room, in cells."""
         return _WIDER * self.one.clearance
 
     @cached_property
@@ -58,10 +58,10 @@ class Arc:
         return distance_to_rim(self.owner > 0)
 
     def curve(self) -> FloatArray:
-        """A curve from one surviving cell to the other.
+        """Return a curve from one surviving cell to the other.
 
-        Straight where both fields leave it room, else the shortest walk across the boundary made
-        smooth, so that arcs on two sides of a thing run on two sides of it.
+        The curve is straight if both fields have room for it, else it is the smoothed shortest walk
+        across the boundary, so that arcs on two sides of an obstacle run on two sides of it.
 
         Returns
         -------
@@ -82,14 +82,14 @@ class Arc:
         return np.linspace(start, end, count)
 
     def _has_room(self, line: FloatArray) -> bool:
-        """Whether a straight line keeps off everything else as far as a curve would."""
+        """Return whether a straight line keeps the clearance of a curve."""
         along = np.hypot(*(line - line[0]).T)
         inner = np.minimum(along, along[-1] - along) > _NEAR_END * self.clearance
         room = self.distance[tuple(np.rint(line).astype(np.int64).T)]
         return bool((room > 0).all() and (room[inner] >= self.clearance).all())
 
     def _crosses(self, curve: FloatArray) -> bool:
-        """Whether a curve crosses the boundary, and others there and back if at all."""
+        """Return whether a curve crosses the boundary, and any other boundary there and back."""
         cells = np.rint(curve).astype(np.int64)
         owner = self.owner[tuple(cells.T)]
         cells, owner = cells[owner > 0], owner[owner > 0]
@@ -100,7 +100,7 @@ class Arc:
         return bool(own.sum() % 2 == 1)
 
     def _walk(self) -> FloatArray:
-        """Cells of the shortest walk across the boundary."""
+        """Return the cells of the shortest walk across the boundary."""
         sides = []
         for field, cells in zip((self.one, self.other), self.boundary.swapaxes(0, 1), strict=True):
             sides.append(field.number[tuple((cells - field.corner).T)])

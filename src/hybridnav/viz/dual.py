@@ -1,4 +1,4 @@
-"""Pictures of the dual graph: boundaries, and what they meet at."""
+"""Pictures of the dual graph: boundaries, and the points at which they meet."""
 
 from __future__ import annotations
 
@@ -40,18 +40,19 @@ def plot_dual(
 ) -> Axes:
     """Draw the dual graph over the pale fields of its vertices.
 
-    A dual edge runs along the boundary of its arc, that of a self-loop across the place from what
-    it goes round. Dual vertices are where boundaries meet (dots), holes (diamonds) and the outside
-    (squares); inside the occupied cells of a hole thin lines lead to its dual vertex.
+    A dual edge runs along the boundary of its arc; that of a self-loop crosses the place from the
+    hole that the loop encloses. Dual vertices are meeting points of boundaries (dots), holes
+    (diamonds) and the outside (squares); inside the occupied cells of a hole thin lines lead to its
+    dual vertex.
 
     Parameters
     ----------
     places
         The topological map, or any level of a pyramid.
     ax
-        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+        Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     title
-        Replaces the title that names the map and counts; an empty one leaves it out.
+        Title instead of the map's name and the counts; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -93,7 +94,7 @@ def draw_dual(canvas: Canvas, level: Level) -> None:
         _add_lines(canvas, links, level, colour, 1.0, f"{kind.name.lower()}-links")
     for kind, (marker, size, colour, _) in _MARKERS.items():
         at = frame.points_of_grid(drawn.positions[level.dual.kinds == kind])
-        if kind == FaceKind.OUTSIDE:  # may lie beyond the part of the map that is shown
+        if kind == FaceKind.OUTSIDE:  # may lie outside the visible part of the map
             at = np.clip(at, canvas.view.low, canvas.view.high)
         dots = ax.scatter(
             at[:, 0],
@@ -109,7 +110,7 @@ def draw_dual(canvas: Canvas, level: Level) -> None:
         dots.set_gid(f"{kind.name.lower()}-faces")
 
 
-def _add_lines(  # noqa: PLR0913, PLR0917 - a line has as many properties
+def _add_lines(  # noqa: PLR0913, PLR0917 - independent properties of a line
     canvas: Canvas, lines: list[FloatArray], level: Level, colour: str, width: float, gid: str
 ) -> None:
     points = [level.grid.frame.points_of_grid(line) for line in lines]
@@ -126,7 +127,7 @@ def _add_lines(  # noqa: PLR0913, PLR0917 - a line has as many properties
 
 
 def dual_entries(level: Level, sizes: Sizes) -> list[Entry]:
-    """Legend entries for dual edges and dual vertices."""
+    """Return the legend entries for dual edges and dual vertices."""
     entries: list[Entry] = [
         (Line2D([], [], color=style.INK, lw=1.3 * sizes.line), "boundary (dual edge)")
     ]

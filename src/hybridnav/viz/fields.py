@@ -1,4 +1,4 @@
-"""Walks inside the field of a place, and how they become smooth curves."""
+"""Walks inside the field of a place, and their smoothing to curves."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import Level
 
 _NEAR_RIM = 4.0
-"""What a step at the rim of a field costs more than one far from it, in steps."""
+"""Extra cost of a step at the rim of a field, in steps."""
 _STEPS, _LAST_STEPS = 100, 8
-"""Steps in which a curve is made smooth, and those of them that no longer push."""
+"""Steps of smoothing a curve, and the last of them, which no longer push."""
 _PUSH = 0.3
-"""Share of the missing clearance that a curve is moved in one step."""
+"""Share of the missing clearance by which one step moves a curve."""
 _SPACING, _LEAST_SPACING = 0.3, 0.5
-"""Distance of a curve's points while it is made smooth, in clearances, and in cells at least."""
+"""Spacing of a curve's points while it is smoothed, in clearances, and its least in cells."""
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
     """The field of one place in a window of the grid, with a margin of one cell.
 
-    Cells are (row, col) in the window, as real numbers the middles of cells are integers.
+    Cells are (row, col) in the window; as real numbers, centres of cells are integers.
     """
 
     level: Level
     vertex: int
     clearance: float
-    """How far curves keep from the rim of the field where there is room, in cells."""
+    """Distance that curves keep from the rim of the field where there is room, in cells."""
 
     @cached_property
     def corner(self) -> LongArray:
@@ -68,15 +68,15 @@ class Field:
         return number
 
     def graph(self, lines: LongArray | None = None) -> Any:
-        """Moves between the cells of copies of the field, dearer at the rim.
+        """Return the moves between the cells of copies of the field, dearer at the rim.
 
         Parameters
         ----------
         lines
             int64 (2, rows, cols), a set of bits for the side between each cell and its neighbour
-            north, and that between it and its neighbour east. Walks with different sets of sides
-            crossed an odd number of times are told apart: each set has a copy of the field, and
-            a walk across a side goes on in another copy. By default there is one.
+            north, and that between it and its neighbour east. Walks are distinguished by the set of
+            sides that they cross an odd number of times: each set has a copy of the field, and a
+            walk across a side continues in another copy. By default there is one copy.
         """
         if lines is None:
             lines = np.zeros((2, *self.mask.shape), dtype=np.int64)
@@ -90,7 +90,8 @@ class Field:
         return coo_array((np.tile(cost, copies), ends), shape=(size, size)).tocsr()
 
     def walks_from(self, cells: LongArray, lines: LongArray | None = None) -> Walks:
-        """Shortest walks from the nearest of some cells, by their number, to all cells."""
+        """Return the shortest walks from the nearest of some cells, given by number, to all
+        cells."""
         length, before, _ = dijkstra(
             self.graph(lines),
             directed=False,
@@ -121,7 +122,7 @@ class Walks:
     before: AnyArray
 
     def to(self, cell: int, copy: int = 0) -> FloatArray:
-        """The walk to a cell of a copy of the field, as float64 (n, 2)."""
+        """Return the walk to a cell of a copy of the field, as float64 (n, 2)."""
         at = cell + copy * len(self.cells)
         walk = [at]
         while (at := int(self.before[at])) >= 0:
@@ -131,27 +132,27 @@ class Walks:
 
 
 def distance_to_rim(mask: BoolArray) -> FloatArray:
-    """Distance of each cell of a mask to the nearest cell outside it, in cells."""
+    """Return the distance of each cell of a mask to the nearest cell outside it, in cells."""
     distance: FloatArray = np.asarray(ndimage.distance_transform_edt(mask), dtype=np.float64)
     return distance
 
 
 def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatArray:
-    """A walk as a rubber band held at its ends and pushed off what it may not touch.
+    """Return a walk smoothed like a rubber band that is fixed at its ends and pushed off the rim.
 
     Parameters
     ----------
     walk
         float64 (n, 2), cells.
     distance
-        Distance of each cell to what the band keeps off.
+        Distance of each cell to the cells that the band avoids.
     clearance
-        How far it keeps off where there is room.
+        Distance that the band keeps where there is room.
 
     Returns
     -------
     FloatArray
-        float64 (n, 2), a smooth curve; it may slip over things of a cell or two.
+        float64 (n, 2), a smooth curve; it may slip over obstacles of a cell or two.
     """
     slope = [np.gradient(distance, axis=axis) for axis in (0, 1)]
     field = np.stack([distance, *slope], axis=-1)
@@ -162,7 +163,7 @@ def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatA
         inner = band[1:-1]
         pull = (band[:-2] + band[2:]) / 2 - inner
         push = np.zeros_like(inner)
-        if step < _STEPS - _LAST_STEPS:  # the last ones take out the steps of the cells
+        if step < _STEPS - _LAST_STEPS:  # the last steps smooth the staircase of cells
             at = _between(field, inner)
             push = _PUSH * at[:, 1:] * np.maximum(clearance - at[:, :1], 0)
         band = np.concatenate([band[:1], inner + 0.5 * pull + push, band[-1:]])
@@ -170,7 +171,7 @@ def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatA
 
 
 def _between(values: FloatArray, points: FloatArray) -> FloatArray:
-    """Values between cells, bilinear: a third of the time of `ndimage.map_coordinates`."""
+    """Return bilinear values between cells, in a third of the time of `ndimage.map_coordinates`."""
     low = np.minimum(points.astype(np.int64), np.array(values.shape[:2]) - 2)
     row, col = low.T
     up, right = (points - low).T[..., None]
@@ -187,7 +188,7 @@ def _evenly(line: FloatArray, spacing: float) -> FloatArray:
 
 
 def rounded(line: FloatArray) -> FloatArray:
-    """Chaikin's corner cutting, ends kept."""
+    """Return a line after Chaikin's corner cutting, with the same ends."""
     for _ in range(2):
         early, late = line[:-1] * 0.75 + line[1:] * 0.25, line[:-1] * 0.25 + line[1:] * 0.75
         cut = np.stack([early, late], axis=1).reshape(-1, 2)
@@ -196,7 +197,10 @@ def rounded(line: FloatArray) -> FloatArray:
 
 
 def _moves(number: LongArray, crossed: LongArray) -> tuple[LongArray, LongArray, LongArray]:
-    """Moves between 8-neighbours, both cells beside a diagonal in the field; what each crosses."""
+    """Return the moves between 8-neighbours, and the sides that each crosses.
+
+    Both cells beside a diagonal are in the field.
+    """
     north, east = crossed
     # The window has a margin: rolled arrays wrap round outside the field.
     north_east = north ^ np.roll(east, -1, axis=0)

@@ -1,4 +1,4 @@
-"""Pictures of one step of a pyramid: which arcs are contracted, which are removed."""
+"""Pictures of one step of a pyramid: contracted and removed arcs."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw how a level becomes the next one: the paper's Fig. 2 for any map.
+    """Draw the step from a level to the next one: the paper's Fig. 2 for any map.
 
-    Thick lines are contracted: each is a spoke of a star, whose centre, a black dot, survives.
-    Dashed ones are redundant after that, and removed; thin ones are the arcs of the next level. A
-    colour is the field of one vertex of the next level, a reduction window.
+    Thick lines are contracted arcs: each is a spoke of a star, whose centre, a black dot, survives.
+    Dashed arcs are redundant after that, and removed; thin ones are the arcs of the next level.
+    Each colour is the field of one vertex of the next level, a reduction window.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
     level
         Index of the lower of the two levels; negative ones count from the apex.
     ax
-        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+        Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     removed
-        Draw the arcs that are removed.
+        Whether to draw the removed arcs.
     title
-        Replaces the title that counts; an empty one leaves it out.
+        Title instead of the counts; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -107,7 +107,7 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
 
 
 def _kinds(pyramid: DualGraphPyramid, level: int, n_arcs: int) -> dict[str, BoolArray]:
-    """Masks of the arcs of a level: contracted, removed, kept."""
+    """Return the masks of the arcs of a level: contracted, removed, kept."""
     masks = {label: np.zeros(n_arcs, dtype=np.bool_) for label in _STROKES}
     masks[_CONTRACTED][pyramid.contraction_kernel(level)] = True
     masks[_REMOVED][pyramid.removal_kernel(level)] = True

@@ -1,4 +1,4 @@
-"""Start and goal: markers and their labels, placed where they hide least."""
+"""Markers of start and goal with labels, placed where they hide least."""
 
 from __future__ import annotations
 
@@ -40,8 +40,10 @@ def draw_markers(
     *,
     avoid: Sequence[FloatArray] = (),
 ) -> None:
-    """Draw start and goal, labelled beside boxes to avoid. One outside the view is drawn at its
-    rim, with its coordinates."""
+    """Draw start and goal, with labels that avoid boxes.
+
+    A marker outside the view is drawn at its rim, with its coordinates.
+    """
     ax, view, sizes = canvas.ax, canvas.view, canvas.sizes
     points = [np.clip(marker.point, view.low, view.high) for marker in markers]
     boxes = [_box_round(point, np.full(2, 4.5 * sizes.line), sizes) for point in points]
@@ -90,7 +92,7 @@ def _place_label(
     boxes: Sequence[FloatArray],
     path: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Centre and box of a label on that side of its marker where it hides least."""
+    """Return the centre and box of a label on the side of its marker where it hides least."""
     view, sizes = canvas.view, canvas.sizes
     half = np.array([text_width(label, sizes.font, "bold") / 2, 0.6 * sizes.font])
     reach = 6.5 * sizes.line
@@ -107,7 +109,8 @@ def _place_label(
 
 
 def _box_round(centre: FloatArray, half_points: FloatArray, sizes: Sizes) -> FloatArray:
-    """Lower left and upper right corner, in metres, of a box with half sizes in points."""
+    """Return the lower left and upper right corner, in metres, of a box with half sizes in
+    points."""
     half = half_points / sizes.points_per_metre
     return np.stack([centre - half, centre + half])
 

@@ -1,4 +1,4 @@
-"""What stands round the map: title, scale bar, legend; and the height of a new figure."""
+"""Items round the map: title, scale bar, legend; and the height of a new figure."""
 
 from __future__ import annotations
 
@@ -28,22 +28,24 @@ Entry = tuple[Any, str]
 """A handle of a legend and its label."""
 
 BAR_SHARE = 0.2
-"""Length of the scale bar at most, as a share of the view's width."""
+"""Greatest length of the scale bar, as a share of the view's width."""
 _NARROWER = (0.9, 0.8, 0.7, 0.6, 0.5)
-"""Shares of the room that a title is tried in, to make its lines equally long."""
+"""Shares of the room that are tried for a title, to make its lines equally long."""
 _HANDLE, _GAP, _BETWEEN = 2.2, 0.6, 1.6  # legend measures, in font sizes
 
 
 def text_width(text: str, font: float, weight: str = "normal") -> float:
-    """Width of one line of text in points."""
+    """Return the width of one line of text in points."""
     properties = FontProperties(size=font, weight=weight)
     width, _, _ = text_to_path.get_text_width_height_descent(text, properties, ismath=False)
     return float(width)
 
 
 def wrapped(pieces: Sequence[str], font: float, room: float) -> str:
-    """Pieces joined by dots in as few lines as fit the room, in points, and these about equally
-    long; too long pieces are cut."""
+    """Return pieces joined by dots, in as few and as equal lines as fit the room.
+
+    The room is in points; pieces that are too long are cut.
+    """
     fitting = [_cut(piece, font, room) for piece in filter(None, pieces)]
     lines = _filled(fitting, font, room)
     for share in _NARROWER:
@@ -55,7 +57,7 @@ def wrapped(pieces: Sequence[str], font: float, room: float) -> str:
 
 
 def _filled(pieces: Sequence[str], font: float, room: float) -> list[str]:
-    """Lines as full as they get, one after the other."""
+    """Return lines filled one after the other."""
     lines: list[str] = []
     for piece in pieces:
         longer = f"{lines[-1]}  ·  {piece}" if lines else piece
@@ -78,14 +80,14 @@ def _cut(text: str, font: float, room: float) -> str:
 
 
 def round_length(limit_m: float) -> float:
-    """The largest of 1, 2, 5, 10, ... (and their tenths, ...) metres up to a limit."""
+    """Return the largest of 1, 2, 5, 10, ... (and their tenths, ...) metres up to a limit."""
     power = 10.0 ** math.floor(math.log10(limit_m))
     fitting = (step * power for step in (1, 2, 5) if step * power <= limit_m)
     return max(fitting, default=power)  # log10 may round up past the limit
 
 
 def add_title(canvas: Canvas, pieces: Sequence[str]) -> None:
-    """Put a title over the map, no wider than the room there is."""
+    """Put a title over the map, no wider than the room."""
     font = canvas.sizes.font
     canvas.ax.set_title(
         wrapped(pieces, font, _room_over(canvas)),
@@ -93,12 +95,12 @@ def add_title(canvas: Canvas, pieces: Sequence[str]) -> None:
         pad=0.6 * font,
         linespacing=1.3,
         color=style.INK,
-        parse_math=False,  # a map may be called anything
+        parse_math=False,  # a map may have any name
     )
 
 
 def add_scale_bar(canvas: Canvas) -> float:
-    """Draw a scale bar below the left end of the map; returns its width with its text, points."""
+    """Draw a scale bar below the left end of the map; return its width with its text in points."""
     ax, sizes = canvas.ax, canvas.sizes
     length = round_length(BAR_SHARE * float(canvas.view.size[0]))
     left = float(canvas.view.low[0])
@@ -131,18 +133,18 @@ def add_scale_bar(canvas: Canvas) -> float:
 
 
 def add_legend(canvas: Canvas, entries: Sequence[Entry], *, bar: float, below: float) -> Legend:
-    """Put a legend below the map: beside the scale bar where that takes one row more at most.
+    """Put a legend below the map, beside the scale bar if that takes at most one more row.
 
     Parameters
     ----------
     canvas
-        The axes and the sizes to draw with.
+        The axes, with the sizes of lines.
     entries
         Handles and labels.
     bar
         Width of the scale bar in points, 0 without one.
     below
-        Points below the axes at which other things than the scale bar end.
+        Points below the axes at which items other than the scale bar end.
     """
     font = canvas.sizes.font
     widths = [text_width(label, font) for _, label in entries]
@@ -173,11 +175,11 @@ def add_legend(canvas: Canvas, entries: Sequence[Entry], *, bar: float, below: f
 
 
 def _columns(widths: Sequence[float], font: float, room: float) -> int:
-    """Columns of a legend that fit the room and leave no row short without need; 0 for none."""
+    """Return the number of columns of a legend that fit the room with full rows; 0 for none."""
     best = 0
     for columns in range(1, len(widths) + 1):
         rows = -(-len(widths) // columns)
-        # matplotlib fills columns top down, the first ones with one entry more.
+        # matplotlib fills columns top down, the first ones with one more entry.
         split = np.array_split(np.asarray(widths), columns)
         each = [column.max() + (_HANDLE + _GAP) * font for column in split]
         if sum(each) + (columns - 1) * _BETWEEN * font > room:
@@ -188,7 +190,7 @@ def _columns(widths: Sequence[float], font: float, room: float) -> int:
 
 
 def fit_height(canvas: Canvas, legend: Legend) -> None:
-    """Give the figure of new axes the height that the map and what stands round it take."""
+    """Set the height of a new figure to that of the map and the items round it."""
     if not canvas.is_new:
         return
     ax, view, figure = canvas.ax, canvas.view, canvas.ax.figure.figure
@@ -208,9 +210,9 @@ def fit_height(canvas: Canvas, legend: Legend) -> None:
 
 
 def _room_over(canvas: Canvas) -> float:
-    """Return the width in points of what stands over or under the middle of the map.
+    """Return the width in points of the room over or under the middle of the map.
 
-    `fit_height` moves the map of a new figure aside, to where its ticks have room.
+    `fit_height` moves the map of a new figure aside, so that its ticks have room.
     """
     if not canvas.is_new:
         return canvas.room
@@ -219,9 +221,9 @@ def _room_over(canvas: Canvas) -> float:
 
 
 def _ticks(ax: Axes) -> tuple[float, float]:
-    """Return how far ticks with their labels stand out left and right of the map, in pixels.
+    """Return the widths of ticks with labels left and right of the map, in pixels.
 
-    Of what stands there they alone take room from the map: a title may be wider.
+    Only they take room from the map: a title may be wider.
     """
     if not ax.axison:
         return 0.0, 0.0
@@ -234,5 +236,5 @@ def _ticks(ax: Axes) -> tuple[float, float]:
 
 
 def _shift(ax: Axes, right: float, up: float) -> ScaledTranslation:
-    """A move on the page by so many points."""
+    """Return a translation on the page, in points."""
     return ScaledTranslation(right / 72, up / 72, ax.figure.dpi_scale_trans)

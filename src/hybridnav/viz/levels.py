@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import DualGraphPyramid, Level
 
 GRAPH_UP_TO = 150
-"""Vertices up to which a panel shows the graph too: more would cover their own fields."""
+"""Most vertices of a panel with a graph: more would cover their own fields."""
 _GAP_IN = 0.1
 _STRENGTH = 0.75
 
@@ -38,9 +38,8 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
 ) -> tuple[Axes, ...]:
     """Draw levels of a pyramid side by side, each with its fields and, high up, its graph.
 
-    Neighbouring fields never have the same colour; unexplored ones are grey. Arcs are drawn as
-    `plot_topology` does: parallel ones in blue, self-loops in red
-    dashes.
+    Neighbouring fields never have the same colour; unexplored ones are grey. Arcs are drawn as in
+    `plot_topology`: parallel ones in blue, self-loops in red dashes.
 
     Parameters
     ----------
@@ -50,11 +49,11 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
         Indices of levels, in the order of the panels; negative ones count from the apex. By default
         all.
     axes
-        As many axes to draw on; by default new ones in a new figure.
+        Axes to draw on, one for each level; by default new ones in a new figure.
     columns
         Panels in a row of a new figure, >= 1.
     graph_up_to
-        Levels of more vertices are drawn as fields alone.
+        Most vertices of a level with a graph; other levels are drawn as fields alone.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -90,12 +89,12 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
 
 
 def _words(level: Level) -> list[str]:
-    """Pieces of a panel's title."""
+    """Return the pieces of a panel's title."""
     return [f"level {level.index}", f"{level.n_vertices:,} vertices", f"{level.n_arcs:,} arcs"]
 
 
 def _panels(levels: Sequence[Level], columns: int, width_in: float) -> list[Axes]:
-    """Axes in rows, of the shape of the map, in a new figure that has room for their titles."""
+    """Return axes in rows, of the shape of the map, in a new figure with room for their titles."""
     view = known_view(levels[0].grid)
     rows = math.ceil(len(levels) / columns)
     panel_in = (width_in - (columns - 1) * _GAP_IN - 2 * PAD_IN) / columns

@@ -1,4 +1,4 @@
-"""Self-loops as closed curves: inside their place, round what they enclose."""
+"""Self-loops as closed curves inside their place, round the holes that they enclose."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from hybridnav.viz.fields import Field
 
 _MOST_LINES = 6
-"""Self-loops of a place told apart at most while one is drawn: the work doubles with each."""
+"""Most self-loops that are distinguished while one is drawn: the work doubles with each."""
 _TINY = 0.25
-"""Side of what a petal is enough for, in clearances."""
+"""Side of a hole for which a petal is enough, in clearances."""
 _OUTSIDE = 1
 _PETAL_POINTS = 33
 _ALL_ROUND = np.ones((3, 3), dtype=np.bool_)
@@ -31,7 +31,7 @@ _ALL_ROUND = np.ones((3, 3), dtype=np.bool_)
 class Loops:
     """The self-loops of a place and the holes in its field.
 
-    A hole is an 8-connected set of cells that are not in the field; 1 is what lies outside. Every
+    A hole is an 8-connected set of cells that are not in the field; 1 is the outside. Every
     self-loop joins two holes by the line of its dual edge, and together these make a tree.
     """
 
@@ -39,7 +39,7 @@ class Loops:
 
     @cached_property
     def hole_of(self) -> AnyArray:
-        """Hole of each cell, from 1, 0 in the field; what lies outside is met first."""
+        """Hole of each cell, from 1, 0 in the field; the outside is met first."""
         label, _ = ndimage.label(~self.field.mask, structure=_ALL_ROUND)
         return np.asarray(label)
 
@@ -51,7 +51,7 @@ class Loops:
 
     def _ends_of(self, loop: int) -> list[int]:
         low, high = self._sides(loop)
-        # Ends of the sides between two cells, each by the cell to the upper right of it.
+        # Ends of the sides between two cells, each named by the cell to its upper right.
         corners = np.concatenate([high, high + (high - low)[:, ::-1]])
         found, count = np.unique(corners, axis=0, return_counts=True)
         rows, cols = found[count == 1].T
@@ -59,7 +59,7 @@ class Loops:
         return [int(hole) for hole in around.max(axis=0)]
 
     def _sides(self, loop: int) -> tuple[LongArray, LongArray]:
-        """The lower and the higher cell beside each side of a self-loop's line."""
+        """Return the lower and the higher cell beside each side of a self-loop's line."""
         low, high = np.moveaxis(np.sort(self.field.level.boundary(loop), axis=1), 1, 0)
         return low - self.field.corner, high - self.field.corner
 
@@ -77,7 +77,7 @@ class Loops:
         return {loop: below[hole][self.hole_of] for loop, hole in inner.items()}
 
     def curve(self, loop: int) -> FloatArray:
-        """A closed curve from the surviving cell inside the field round what a loop encloses.
+        """Return a closed curve from the surviving cell round the holes that a loop encloses.
 
         Parameters
         ----------
@@ -88,13 +88,12 @@ class Loops:
         -------
         FloatArray
             float64 (n, 2), (row, col) in grid units, where cell (0, 0) spans [0, 1] x [0, 1]. A
-            petal that only points there, where the enclosed is too small to go round or lies among
-            too many other things.
+            petal that only points at the holes if they are too small or lie among too many others.
         """
         field = self.field
         if self.enclosed[loop].sum() < (_TINY * field.clearance) ** 2:
             return self._petal(loop)
-        # Most curves are right when only the loop's own line counts; others need all nearby lines.
+        # Most curves are right if only the loop's own line counts; others need all nearby lines.
         for loops in ([loop], self._nearest(loop)):
             walk = self._walk(loops)
             curve = smoothed(walk, field.distance, field.clearance)
@@ -103,8 +102,10 @@ class Loops:
         return self._petal(loop)
 
     def is_round(self, curve: FloatArray, loop: int) -> bool:
-        """Whether a closed curve, in cells of the window, holds just those holes that a self-loop
-        encloses, each for the most part."""
+        """Return whether a closed curve surrounds exactly the holes that a self-loop encloses.
+
+        The curve is in cells of the window; most of each hole counts.
+        """
         cells = np.argwhere(self.hole_of > _OUTSIDE)
         hole = self.hole_of[tuple(cells.T)]
         size = int(self.hole_of.max()) + 1
@@ -113,8 +114,11 @@ class Loops:
         return bool(((2 * held > np.bincount(hole, minlength=size)) == (meant > 0)).all())
 
     def _walk(self, loops: list[int]) -> FloatArray:
-        """Cells of a shortest closed walk that crosses the line of the first loop an odd number of
-        times and those of the others an even number of times."""
+        """Return the cells of a shortest closed walk round the first of some loops.
+
+        It crosses the line of the first loop an odd number of times and those of the others an even
+        number of times.
+        """
         field = self.field
         lines = np.zeros((2, *field.mask.shape), dtype=np.int64)
         for bit, loop in enumerate(loops):
@@ -123,7 +127,8 @@ class Loops:
         return field.walks_from(field.start, lines).to(int(field.start[0]), copy=1)
 
     def _nearest(self, loop: int) -> list[int]:
-        """A self-loop of the place and those that join the holes nearest to it in the tree."""
+        """Return a self-loop of the place and those that join the holes nearest to it in the
+        tree."""
         reached, found = set(self.ends[loop]), [loop]
         others = set(self.ends) - {loop}
         while others and len(found) < _MOST_LINES:
@@ -133,7 +138,7 @@ class Loops:
         return found
 
     def _petal(self, loop: int) -> FloatArray:
-        """A closed curve to just behind the middle of what a loop encloses."""
+        """Return a closed curve to just behind the middle of the holes that a loop encloses."""
         field, width = self.field, self.field.clearance
         at = field.level.cells[field.vertex] + 0.5
         to = np.argwhere(self.enclosed[loop]).mean(axis=0) + field.corner + 0.5 - at

@@ -1,4 +1,4 @@
-"""Pictures of maps and of the levels that grow on them."""
+"""Pictures of maps and of the levels of their pyramids."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def plot_map(
     grid
         The map. The picture is cropped to its known part; its axes are metres of the map frame.
     ax
-        Where to draw; by default new axes in a new figure.
+        Axes to draw on; by default new ones in a new figure.
     title
-        Replaces the title that names the map; an empty one leaves it out.
+        Title instead of the map's name; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -54,7 +54,7 @@ def plot_map(
         The axes drawn on; `axes.figure` is the figure.
     """
     canvas = Canvas.opened(ax, width_in, known_view(grid))
-    # Occupied and blocked cells have colours of their own: only two classes are looked up.
+    # Occupied and blocked cells have their own colours: only two classes are looked up.
     colours = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED)
     draw_cells(canvas, grid, grid.classes, colours)
     entries: list[Entry] = [(Patch(fc=style.FREE, ec=style.ARC, lw=0.5), "free")]
@@ -88,13 +88,13 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
     places
         The topological map, or any level of a pyramid.
     ax
-        Where to draw; by default new axes in a new figure.
+        Axes to draw on; by default new ones in a new figure.
     arcs
-        Draw the arcs.
+        Whether to draw the arcs.
     self_loops
-        Draw the self-loops too, as closed curves through the middle of their boundary.
+        Whether to draw the self-loops too, as closed curves through the middle of their boundary.
     title
-        Replaces the title that names the map and counts places; an empty one leaves it out.
+        Title instead of the map's name and the count of places; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -125,14 +125,14 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
 def plot_level(
     level: Level, *, ax: Axes | None = None, width_in: float = style.FULL_WIDTH_IN
 ) -> Axes:
-    """Draw one level of a pyramid as `plot_places` does, and say which it is.
+    """Draw one level of a pyramid as `plot_places` does, with its index in the title.
 
     Parameters
     ----------
     level
         Any level, the base included.
     ax
-        Where to draw; by default new axes in a new figure.
+        Axes to draw on; by default new ones in a new figure.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -147,7 +147,7 @@ def plot_level(
 
 
 def ground_entries(grid: OccupancyGrid) -> list[Entry]:
-    """Legend entries for the cells that are in no place."""
+    """Return the legend entries for the cells that are in no place."""
     occupied = (grid.measured == CellClass.OCCUPIED).any()
     entries: list[Entry] = [(Patch(fc=style.OCCUPIED), "occupied")] if occupied else []
     blocked = []
@@ -161,18 +161,18 @@ def ground_entries(grid: OccupancyGrid) -> list[Entry]:
 
 
 def swatch(colours: Sequence[str], strength: float = 1.0) -> tuple[Patch, ...]:
-    """Legend handle for places: three of their colours side by side."""
+    """Return the legend handle for places: three of their colours side by side."""
     return tuple(Patch(fc=rgb / 255) for rgb in style.rgb(*colours[:3], strength=strength))
 
 
 def arc_handle(sizes: Sizes) -> Line2D:
-    """Legend handle for an arc between two positions."""
+    """Return the legend handle for an arc between two positions."""
     line = 0.9 * sizes.line
     return Line2D([], [], color=style.ARC, lw=line, marker="o", ms=3 * sizes.line, mfc=style.INK)
 
 
 def _finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
-    """Title, axes in metres, legend."""
+    """Add the title, axes in metres and legend."""
     ax, font = canvas.ax, canvas.sizes.font
     ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
     ax.set_xlabel("x in metres", fontsize=font, labelpad=0.3 * font)

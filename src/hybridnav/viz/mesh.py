@@ -51,11 +51,11 @@ def plot_mesh(
     grid
         The map. The picture is cropped to its known part.
     mesh
-        Of the map; None builds that of its free cells.
+        The mesh of the map; None builds that of its free cells.
     ax
-        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+        Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     title
-        Replaces the title that counts polygons and corners; an empty one leaves it out.
+        Title instead of the counts of polygons and corners; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -67,7 +67,7 @@ def plot_mesh(
     Raises
     ------
     InvalidValueError
-        When the mesh is of a map of another size.
+        When the mesh belongs to a map of another size.
     """
     mesh = build_mesh(grid.classes == CellClass.FREE) if mesh is None else mesh
     check_mesh(grid, mesh)
@@ -97,7 +97,7 @@ def plot_mesh(
 
 
 def check_mesh(grid: OccupancyGrid, mesh: ConvexMesh) -> None:
-    """Raise `InvalidValueError` where a mesh is of a map of another size."""
+    """Raise `InvalidValueError` if a mesh belongs to a map of another size."""
     if mesh.polygon_at.shape != grid.shape:
         raise InvalidValueError(
             f"the mesh is of a map of {mesh.polygon_at.shape} cells, the grid has {grid.shape}: "
@@ -108,7 +108,7 @@ def check_mesh(grid: OccupancyGrid, mesh: ConvexMesh) -> None:
 def draw_sides(canvas: Canvas, grid: OccupancyGrid, mesh: ConvexMesh) -> None:
     """Draw the sides that two polygons share, each once."""
     slots = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
-    # The twin begins where the side ends.
+    # The twin begins at the end of the side.
     ends = np.stack([mesh.begins[slots], mesh.begins[mesh.twins[slots]]], axis=1)
     lines = grid.frame.points_of_grid(mesh.corners[ends].reshape(-1, 2)).reshape(-1, 2, 2)
     drawn = LineCollection(
@@ -119,7 +119,7 @@ def draw_sides(canvas: Canvas, grid: OccupancyGrid, mesh: ConvexMesh) -> None:
 
 
 def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> list[Entry]:
-    """Draw what a search saw of each polygon, the roots, and the path; returns legend entries."""
+    """Draw the views of a search, the roots, and the path; return legend entries."""
     line, ax = canvas.sizes.line, canvas.ax
     draw_sides(canvas, grid, trace.mesh)
     n = len(trace.parents)
@@ -154,8 +154,10 @@ def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> l
 
 
 def _views(trace: SearchTrace) -> FloatArray:
-    """Return what each interval adds to what is seen, float64 (n, 4, 2) in grid units: the part of
-    the polygon before it that lies between its rays."""
+    """Return the view that each interval adds, float64 (n, 4, 2) in grid units.
+
+    The view is the part of the polygon before it that lies between its rays.
+    """
     far = trace.intervals
     near = np.repeat(trace.roots[:, None], 2, axis=1)
     later = np.flatnonzero(trace.parents >= 0)
@@ -170,7 +172,8 @@ def _views(trace: SearchTrace) -> FloatArray:
 
 
 def _met(roots: FloatArray, points: FloatArray, intervals: FloatArray) -> FloatArray:
-    """Return where segments from roots to points cross intervals; a root where it lies on one."""
+    """Return the points where segments from roots to points cross intervals; a root that lies on
+    one."""
     along, way = intervals[:, 1] - intervals[:, 0], points - roots
     off = intervals[:, 0] - roots
     cross = way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0]
@@ -181,7 +184,7 @@ def _met(roots: FloatArray, points: FloatArray, intervals: FloatArray) -> FloatA
 
 
 def finish(canvas: Canvas, grid: OccupancyGrid, entries: list[Entry], words: list[str]) -> None:
-    """Frame, title, scale bar and legend."""
+    """Add the frame, title, scale bar and legend."""
     frame_axes(canvas)
     add_title(canvas, words)
     bar = add_scale_bar(canvas)

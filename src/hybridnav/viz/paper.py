@@ -44,12 +44,12 @@ def plot_figure1(
     least_area_m2: float = LEAST_AREA_M2,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> tuple[Axes, ...]:
-    """Draw places, what a simple graph says of them, the graph that tells all, and its dual.
+    """Draw places, their simple graph, the top of the dual graph pyramid, and its dual.
 
     Parameters
     ----------
     places
-        The topological map, or any level of a pyramid; free and unexplored places alike have the
+        The topological map, or any level of a pyramid; both free and unexplored places have the
         colours of surfaces.
     axes
         Four axes to draw on; by default new ones in a new figure. Leave room below the last two for
@@ -103,7 +103,7 @@ def plot_figure1(
 
 
 def _panels(level: Level, width_in: float) -> list[Canvas]:
-    """Two rows of two panels in a new figure, of the shape of the map."""
+    """Return two rows of two panels in a new figure, of the shape of the map."""
     figure = Figure(figsize=(width_in, width_in))
     view = known_view(level.grid)
     share = (width_in - 3 * _GAP_IN) / 2 / width_in
@@ -131,7 +131,7 @@ def _arrange(figure: Figure, canvases: Sequence[Canvas], below_in: float) -> Non
 
 
 def _surfaces(level: Level) -> ByteArray:
-    """Colours of the vertices, free and unexplored alike, and one for the cells of none."""
+    """Return the colours of all vertices, and one for cells without a vertex."""
     index = np.arange(level.n_vertices)
     if level.n_vertices > len(style.PLACES):
         index = colour_vertices(level.arcs, level.n_vertices)

@@ -1,4 +1,4 @@
-"""The parts of a picture that stand for a level: fields, dots, arcs."""
+"""The parts of a picture that represent a level: fields, dots, arcs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LOOP_POINTS = 25
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """A level, ready to be drawn."""
+    """A level, ready to draw."""
 
     level: Level
 
@@ -48,13 +48,14 @@ class Places:
 
     @cached_property
     def large(self) -> BoolArray:
-        """Places that are no specks; all, where all are."""
+        """Mask of the places that are no specks; of all places if all are specks."""
         areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
         large: BoolArray = areas >= min(TINY_M2, areas.max(initial=0.0))
         return large
 
     def colours(self, strong: BoolArray | None = None) -> ByteArray:
-        """RGB per place and one row more, for the cells of none; `strong` are not made pale."""
+        """Return RGB per place and one row more, for cells without a place; `strong` are not
+        pale."""
         index = colour_vertices(self.level.arcs, self.level.n_vertices)
         table = style.rgb(*style.PLACES)[index]
         if strong is not None:
@@ -63,7 +64,8 @@ class Places:
         return np.concatenate([table, style.rgb(style.BLOCKED)])
 
     def dot(self, sizes: Sizes) -> float:
-        """Diameter of a place's dot in points: a share of how far apart the places lie."""
+        """Return the diameter of a place's dot in points, a share of the distance between
+        places."""
         seen = self.free & self.large
         if not seen.any():
             seen = self.large
@@ -73,13 +75,15 @@ class Places:
         return float(np.clip(fitting, 0.6, 3.2 * sizes.line))
 
     def lines(self, arcs: BoolArray) -> list[FloatArray]:
-        """From place to place through the middle of the boundary, for each arc of a mask."""
+        """Return a line from place to place through the middle of the boundary, for each arc of a
+        mask."""
         ends = self.positions[self.level.arcs[arcs]]
         middles = self.level.boundary_middles[arcs]
         return list(np.stack([ends[:, 0], middles, ends[:, 1]], axis=1))
 
     def loops(self, arcs: BoolArray) -> list[FloatArray]:
-        """Closed curves from a place through the middle of its own boundary, for self-loops."""
+        """Return a closed curve from a place through the middle of its boundary, for each
+        self-loop."""
         at = self.positions[self.level.arcs[arcs, 0]][:, None]
         to = (self.level.boundary_middles[arcs][:, None] - at) * 4 / 3
         across = np.stack([-to[..., 1], to[..., 0]], axis=-1) / 2
@@ -92,7 +96,7 @@ class Places:
 def draw_arcs(canvas: Canvas, places: Places, *, self_loops: bool = False) -> None:
     """Draw the arcs between places that are no specks, the fainter the less a route can use them.
 
-    Unexplored places cover most of many a map: their arcs must not hide those between free ones.
+    Unexplored places cover most of many maps: their arcs must not hide those between free ones.
     """
     ax, sizes, level = canvas.ax, canvas.sizes, places.level
     seen = places.large[level.arcs].all(axis=1) & ~level.is_self_loop

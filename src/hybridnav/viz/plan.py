@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _ROUTE_WIDTH, PATH_WIDTH, _CASING = 1.5, 2.0, 1.5
 
 
-def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
+def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     topology: TopologicalMap,
     result: PlanResult,
     *,
@@ -46,8 +46,8 @@ def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
     """Draw a plan: map, places, arcs, route, path, start and goal, scale bar.
 
     Arcs run through the middle of their boundaries, so that two doors are two lines. Places of the
-    route, or of the corridor where the preset searched in one, keep their full colours; the others
-    are pale. Without a path the title says why.
+    route, or of the corridor if the preset searched in one, keep their full colours; the others are
+    pale. Without a path the title states the reason.
 
     Parameters
     ----------
@@ -56,12 +56,11 @@ def plot_plan(  # noqa: PLR0913 - every one is a thing a picture may show
     result
         The plan.
     ax
-        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+        Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     start, goal
         `(x, y)` in metres, map frame; by default the ends of the path.
     title
-        Replaces the title made of the map's name, length, loss and places; an empty one leaves it
-        out.
+        Title instead of the map's name, length, loss and places; empty for none.
     optimum_m
         Length of an optimal path of the same metric in metres, for the loss in the title.
     width_in
@@ -128,7 +127,7 @@ def _checked_point(name: str, given: ArrayLike) -> FloatArray:
 
 
 def _corridor(topology: TopologicalMap, result: PlanResult) -> BoolArray:
-    """Mask of the places to draw in full colours."""
+    """Return the mask of the places to draw in full colours."""
     if result.route is None:
         return np.zeros(topology.n_places, dtype=np.bool_)
     on_route = np.flatnonzero(np.isin(topology.place_ids, result.route.places))
@@ -178,7 +177,7 @@ def draw_path(canvas: Canvas, points: FloatArray) -> None:
 
 
 def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None) -> list[str]:
-    """Pieces of the title."""
+    """Return the pieces of the title."""
     words = [topology.grid.name]
     if result.path is None:
         return [*words, str(result.status)]
@@ -194,7 +193,7 @@ def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None
 
 
 def _entries(result: PlanResult, places: Places, strong: BoolArray, sizes: Sizes) -> list[Entry]:
-    """Legend entries for what is drawn over the cells, and for places."""
+    """Return the legend entries for the items drawn over the cells, and for places."""
     entries: list[Entry] = []
     width = sizes.line
     if result.path is not None:

@@ -1,4 +1,4 @@
-"""What is written on rooms: their names, and numbers at doors, where nothing else is hidden."""
+"""Labels of rooms: their names, and numbers at doors, where they hide nothing else."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from hybridnav.viz.canvas import Canvas
 
 _NAME_SIZES = (0.75, 0.65, 0.55)
-"""Font sizes that a name is tried in, of the picture's."""
+"""Font sizes that are tried for a name, as shares of the picture's font size."""
 _LEAST_FONT = 4.0
-"""Points; nobody reads less."""
+"""Least legible font size, in points."""
 _NUMBER_SIZE = 0.7
 _SIDES = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
 _PARTS = 4
@@ -42,7 +42,7 @@ class RoomWriter:
     Parameters
     ----------
     canvas
-        Where to write.
+        The canvas to write on.
     grid
         The map.
     labels
@@ -54,7 +54,7 @@ class RoomWriter:
         self._grid = grid
         self._labels = labels
         self.taken: list[FloatArray] = []
-        """Boxes of what is written: lower left and upper right corner, `(x, y)` in metres."""
+        """Boxes of all texts: lower left and upper right corner, `(x, y)` in metres."""
 
     def keep_free(self, points: Iterable[ArrayLike], reach: float) -> None:
         """Write nothing nearer to points than a reach in points of the page."""
@@ -69,7 +69,7 @@ class RoomWriter:
         doors
             The doors.
         always
-            Write a number even where it hides another one; else it is left out.
+            Whether to write a number even if it hides another one, rather than leave it out.
         """
         font = _NUMBER_SIZE * self._canvas.sizes.font
         near, far = 1.6 * self._canvas.sizes.line, 5.0
@@ -87,21 +87,21 @@ class RoomWriter:
             self.taken.append(boxes[best])
 
     def write_names(self, first: Collection[str] = (), *, lines: Sequence[FloatArray] = ()) -> int:
-        """Write each name well inside its room, smaller where it must be.
+        """Write each name well inside its room, smaller if necessary.
 
         Parameters
         ----------
         first
             Names that are written before the others, which follow from the largest room down.
         lines
-            Points of lines, float64 (n, 2) each, `(x, y)` in metres. A name hides a line only where
+            Points of lines, float64 (n, 2) each, `(x, y)` in metres. A name hides a line only if
             there is no spot beside it.
 
         Returns
         -------
         int
-            How many rooms are left without their names: those that would reach into another room,
-            over the rim of the picture or over what is written already.
+            Number of rooms without names: their names would reach into another room, over the rim
+            of the picture or over other texts.
         """
         names = self._labels.names
         areas = np.bincount(self._labels.label_of.ravel() + 1, minlength=len(names) + 1)[1:]
@@ -138,7 +138,8 @@ class RoomWriter:
         return True
 
     def _is_in_room(self, box: FloatArray, label: int) -> bool:
-        """Whether a box lies in the picture and covers no other room; walls may be covered."""
+        """Return whether a box lies in the picture and covers no other room; walls may be
+        covered."""
         view = self._canvas.view
         if (box[0] < view.low).any() or (box[1] > view.high).any():
             return False
@@ -153,7 +154,7 @@ class RoomWriter:
         return np.stack([centre - half, centre + half])
 
     def _n_hidden(self, box: FloatArray) -> int:
-        """How much of what is written a box would hide."""
+        """Return the number of texts that a box would hide."""
         if not self.taken:
             return 0
         taken = np.stack(self.taken)
@@ -180,7 +181,7 @@ class RoomWriter:
 
 
 def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
-    """Points of lines, and points between them where they lie far apart; float64 (n, 2)."""
+    """Return the points of lines, with more points between distant ones; float64 (n, 2)."""
     parts = [np.empty((0, 2))]
     for line in lines:
         lengths_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
@@ -190,8 +191,11 @@ def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
 
 
 def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -> list[FloatArray]:
-    """Where a room's rim is farthest, in all of it and in each part of its bounding box; the
-    farthest first."""
+    """Return the points farthest from a room's rim, in the room and in each part of its bounding
+    box.
+
+    The farthest point is first.
+    """
     depth = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
     rows, cols = np.indices((_PARTS, _PARTS)).reshape(2, -1)
     found = []

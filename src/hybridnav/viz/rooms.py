@@ -43,23 +43,23 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     """Draw rooms in colours that differ between neighbours, with names, doors as dots, scale bar.
 
     A name that does not fit its room, or would hide another, is written smaller or left out; the
-    legend counts those left out. Doors have their numbers where there is room for them.
+    legend counts those left out. Doors have their numbers if there is room for them.
 
     Doors that are too narrow for the map's robot radius are hollow dots. Gaps, doors narrower than
-    0.3 m, are left out; the legend counts them, and no number changes by it.
+    0.3 m, are left out; the legend counts them, and the numbers stay.
 
     Parameters
     ----------
     rooms
-        Labels of a grid; or a topological map with rooms, whose doors are then drawn too.
+        Labels of a grid; or a topological map with rooms, whose doors are drawn too.
     grid
-        The map; needed with labels, which come without one.
+        The map; needed with labels only.
     ax
-        Where to draw; by default new axes in a new figure.
+        Axes to draw on; by default new ones in a new figure.
     names
-        Write the names.
+        Whether to write the names.
     title
-        Replaces the title that names the map and counts rooms; an empty one leaves it out.
+        Title instead of the map's name and the count of rooms; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -103,7 +103,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
 def _view_of(
     rooms: RoomLabels | TopologicalMap, grid: OccupancyGrid | None
 ) -> tuple[Rooms | None, RoomLabels, OccupancyGrid]:
-    """The rooms with their doors, where they come from a topological map; labels; the map."""
+    """Return the rooms with doors (None for labels alone), the labels, and the map."""
     if isinstance(rooms, TopologicalMap):
         return rooms.rooms, rooms.rooms.labels, rooms.grid
     if grid is None:
@@ -124,13 +124,13 @@ def draw_room_cells(
 
 
 def room_entry(left_out: int, strength: float = 1.0) -> Entry:
-    """The legend's entry for rooms, some of which are left without their names."""
+    """Return the legend's entry for rooms, with the number of those without names."""
     told = f"rooms ({left_out} without their name)" if left_out else "rooms"
     return swatch(style.PLACES, strength), told
 
 
 def _colours(label_of: IntArray, n_rooms: int, strength: float) -> ByteArray:
-    """RGB per room and one row more, white for no room."""
+    """Return RGB per room and one row more, white for no room."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
     for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
         between = (tail != head) & (tail != NO_ROOM) & (head != NO_ROOM)
@@ -148,11 +148,11 @@ def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> lis
     Parameters
     ----------
     canvas
-        Where to draw.
+        Canvas to draw on.
     doors
         The doors.
     left_out
-        What is left out, for the legend.
+        Description of the omitted doors, for the legend.
     """
     entries: list[Entry] = []
     for gid, passable, told in (

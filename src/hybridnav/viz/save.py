@@ -1,4 +1,4 @@
-"""Pictures to files: the same bytes for the same picture."""
+"""Writer of pictures, with equal bytes for equal pictures."""
 
 from __future__ import annotations
 
@@ -30,17 +30,18 @@ _MAX_PIXELS = 30_000
 def save_figure(picture: Axes | Figure, path: PathLike, *, dpi: float = 200) -> None:
     """Write a picture to a file.
 
-    It has the size of its figure in inches, and grows where something stands out of that, so that
-    nothing is cut off.
+    The picture has the size of its figure in inches, and grows if an item reaches beyond it, so
+    that nothing is cut off.
 
     Parameters
     ----------
     picture
         Axes, whose whole figure is written, or a figure.
     path
-        Where to; the suffix says how: `.pdf`, `.png` or `.svg`. An existing file is replaced.
+        Target file; the suffix determines the format: `.pdf`, `.png` or `.svg`. An existing file is
+        replaced.
     dpi
-        Pixels per inch, in PDF and SVG of the image of the cells alone.
+        Pixels per inch; in PDF and SVG, those of the image of the cells alone.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def picture_bytes(picture: Axes | Figure, suffix: str, *, dpi: float) -> bytes:
     with mpl.rc_context():
         mpl.rcParams["svg.hashsalt"] = "hybridnav"
         mpl.rcParams["pdf.fonttype"] = 42  # journals refuse Type 3 fonts
-        figure.draw_without_rendering()  # lays out, so that the box below is the one to be drawn
+        figure.draw_without_rendering()  # lays out, so that the box below is final
         box = Bbox.union([figure.bbox_inches, figure.get_tightbbox()])
         figure.savefig(
             data, format=suffix[1:], dpi=dpi, bbox_inches=box, metadata=_METADATA[suffix]

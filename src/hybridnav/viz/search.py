@@ -1,4 +1,4 @@
-"""Pictures of a search: what it looked at, and what came of it."""
+"""Pictures of a search: states or intervals, corridor, and path."""
 
 from __future__ import annotations
 
@@ -39,27 +39,27 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw what a search looked at, the corridor that it kept to, and its path.
+    """Draw the states or intervals of a search, its corridor, and its path.
 
-    The states and motions of a search by OMPL; or what a search of the mesh saw through each
-    interval, coloured in the order in which it was found, and the roots from which it was seen.
+    For a search by OMPL, the picture shows states and motions; for a search of the mesh, the view
+    through each interval, coloured in the order of discovery, and the roots of the views.
 
     Parameters
     ----------
     grid
         The map. The picture is cropped to its known part.
     search
-        Of OMPL: states that were drawn and found valid (dots), and motions of trees or roadmaps
-        (lines); None for a search that looked at nothing, as where a straight line will do. Of the
-        mesh: what `trace_search` returned.
+        By OMPL: valid states that were drawn (dots), and motions of trees or roadmaps (lines); None
+        for a search without any, as when a straight line suffices. On the mesh: the result of
+        `trace_search`.
     corridor
-        bool (rows, cols), the cells that the search might stand on; None for all.
+        bool (rows, cols), the cells that the search could stand on; None for all.
     path
         The path found; a search of the mesh has its own.
     ax
-        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+        Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     title
-        Replaces the title that counts what was looked at; an empty one leaves it out.
+        Title instead of the counts of the search; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -103,7 +103,7 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
 
 
 def _draw_states(canvas: Canvas, search: Search | None) -> list[Entry]:
-    """The states and motions of a search by OMPL."""
+    """Draw the states and motions of a search by OMPL; return legend entries."""
     line = canvas.sizes.line
     entries: list[Entry] = []
     if search is not None and len(search.edges):
@@ -124,7 +124,7 @@ def _draw_states(canvas: Canvas, search: Search | None) -> list[Entry]:
 
 
 def _draw_ground(canvas: Canvas, grid: OccupancyGrid, corridor: BoolArray | None) -> None:
-    """The cells by class, those of the corridor tinted."""
+    """Draw the cells by class, with a tint for those of the corridor."""
     index = grid.classes.astype(np.int64)
     if corridor is not None:
         index[corridor] = 3

@@ -27,26 +27,27 @@ SELF_LOOP_DASHES = (0.0, (3.0, 1.2))
 HOLE = "#d55e00"
 OUTSIDE = "#882255"
 ROUTES = (PATH, "#4837b6", "#e49b34", "#110328", "#8c8d8c")
-"""Routes in one picture, the shortest first: as far apart as five can be for every kind of colour
-vision, from each other and from pale places."""
+"""Colours of routes in one picture, the shortest first: as distinct as five can be for every kind
+of colour vision, from each other and from pale places."""
 UNEXPLORED_NODE = "#8a8a8a"
 METHODS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", INK)
 """Okabe and Ito's palette, safe for the colour-blind, without the yellow that white swallows."""
 
 PLACES = ("#3ba2b2", "#e0d59d", "#99a9ea", "#aea160", "#abcdec", "#daada3")
-"""Found by simulated annealing: as far apart as six can be for every kind of colour vision and in
-grey, from each other, from what is pale or unexplored, and from the path's red."""
+"""Colours of places, found by simulated annealing: as distinct as six can be for every kind of
+colour vision and in grey, from each other, from pale and unexplored places, and from the path's
+red."""
 UNEXPLORED_PLACES = ("#c6c6c6", "#d2d2d2", "#cacaca", "#d6d6d6", "#cecece", "#d0d0d0")
 
 PALE = 0.3
-"""Share of its colour that a place keeps where others are the ones to see; the rest is white."""
+"""Share of its colour that a place keeps if others are highlighted; the rest is white."""
 
 FULL_WIDTH_IN = 7.0
 """Width of a picture on two columns of a paper, in inches; sizes below are for it."""
 
 
 def rgb(*colours: str, strength: float = 1.0) -> ByteArray:
-    """Colours `#rrggbb`, mixed with white, as uint8 (n, 3)."""
+    """Return colours `#rrggbb`, mixed with white, as uint8 (n, 3)."""
     levels = np.array([list(bytes.fromhex(colour[1:])) for colour in colours], dtype=np.float64)
     return np.round(255 - strength * (255 - levels)).astype(np.uint8)
 
@@ -62,7 +63,7 @@ class Sizes:
 
     @classmethod
     def fitting(cls, width_in: float, points_per_metre: float) -> Sizes:
-        """Sizes for a picture of some width."""
+        """Return the sizes for a picture of some width."""
         share = width_in / FULL_WIDTH_IN
         font = float(np.clip(8 * share**0.4, 6, 11))
         return cls(font, float(np.clip(share**0.6, 0.5, 1.6)), points_per_metre)

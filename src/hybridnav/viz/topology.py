@@ -1,4 +1,4 @@
-"""Pictures of graphs over their map: the topological map, and what a simple graph leaves of it."""
+"""Pictures of graphs over their map: the topological map, and its simple graph."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 MAX_VERTICES = 20_000
 """Vertices of a level beyond which its graph is not drawn: it would be one grey area."""
 LEAST_AREA_M2 = 0.1
-"""Area in square metres below which a place, and what a self-loop goes round, are noise."""
+"""Area in square metres below which places, and the holes inside self-loops, are noise."""
 FAINT = 0.4
 """Share of its colour that the map keeps under a graph."""
 _CLASSES = (style.BLOCKED, style.FREE, style.UNEXPLORED)
@@ -45,7 +45,7 @@ _LEAST_CLEARANCE = 1.5  # cells: less would follow their steps
 
 @dataclass(frozen=True, eq=False)
 class Graph:
-    """What of a level is drawn: places and arcs that are no noise."""
+    """The visible part of a level: places and arcs that are no noise."""
 
     level: Level
     least_area_m2: float
@@ -57,7 +57,7 @@ class Graph:
 
     @cached_property
     def seen(self) -> BoolArray:
-        """Vertices drawn; the largest is, however small."""
+        """Mask of the drawn vertices, always including the largest."""
         areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
         seen: BoolArray = areas >= min(self.least_area_m2, areas.max(initial=0.0))
         return seen
@@ -70,14 +70,14 @@ class Graph:
 
     @cached_property
     def parallel(self) -> BoolArray:
-        """Arcs of which there are more between the same two vertices."""
+        """Mask of the arcs with others between the same two vertices."""
         groups = report_of(self.level.arcs, self.level.n_vertices).parallel
         parallel = np.zeros(self.level.n_arcs, dtype=np.bool_)
         parallel[[arc for group in groups for arc in group.arcs]] = True
         return parallel & self.plain
 
     def kinds(self) -> list[tuple[BoolArray, str, str]]:
-        """Masks of arcs, their colours and names, those to see best last."""
+        """Return the masks of arcs with colours and names, the most visible ones last."""
         explored = (self.level.classes == CellClass.FREE)[self.level.arcs].all(axis=1)
         single = self.plain & ~self.parallel
         return [
@@ -88,12 +88,12 @@ class Graph:
         ]
 
     def curves(self, clearance_m: float) -> dict[int, FloatArray]:
-        """A curve for each arc and self-loop drawn, `(x, y)` in metres.
+        """Return a curve for each arc and self-loop drawn, `(x, y)` in metres.
 
         Parameters
         ----------
         clearance_m
-            How far curves keep from what they pass, where there is room.
+            Distance that curves keep from obstacles, where there is room.
         """
         level, side = self.level, self.level.grid.resolution_m
         least = self.least_area_m2 / side**2
@@ -124,23 +124,23 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     """Draw the graph of places over a faint map: free places black, unexplored ones grey.
 
     An arc runs from one position to the other inside its two places and across its own boundary,
-    straight where there is room: parallel arcs go round the two sides of what parts them. A
-    self-loop is a closed curve inside its place round what it encloses, or a petal towards that
-    where it is too small to go round. Arcs to unexplored places are lighter.
+    straight if there is room: parallel arcs pass the obstacle between them on different sides. A
+    self-loop is a closed curve inside its place round the holes that it encloses, or a petal
+    towards holes that are too small to go round. Arcs to unexplored places are lighter.
 
     Parameters
     ----------
     places
         The topological map, or any level of a pyramid.
     ax
-        Where to draw; by default new axes in a new figure. Leave room below for the legend.
+        Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     simple
-        Draw what a simple graph keeps: one straight line for two adjacent places, no self-loops.
+        Whether to draw the simple graph: one straight line for two adjacent places, no self-loops.
     least_area_m2
         Places under this area in square metres, their arcs, and self-loops round less than it are
         not drawn; the title counts such places.
     title
-        Replaces the title that names the map and counts; an empty one leaves it out.
+        Title instead of the map's name and the counts; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -165,7 +165,7 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
 
 
 def drawable(places: Level | TopologicalMap) -> Level:
-    """The level to draw, unless it has too many vertices for a picture of a graph."""
+    """Return the level to draw, after a check of its number of vertices."""
     level = places.level if isinstance(places, TopologicalMap) else places
     if level.n_vertices > MAX_VERTICES:
         raise InvalidValueError(
@@ -227,7 +227,7 @@ def _add_lines(
 
 
 def _words(graph: Graph, *, simple: bool) -> list[str]:
-    """Pieces of the title."""
+    """Return the pieces of the title."""
     level = graph.level
     n_free = int((level.classes == CellClass.FREE).sum())
     words = [level.grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]
@@ -245,7 +245,7 @@ def _words(graph: Graph, *, simple: bool) -> list[str]:
 
 
 def graph_entries(graph: Graph, sizes: Sizes, *, simple: bool) -> list[Entry]:
-    """Legend entries for places and arcs."""
+    """Return the legend entries for places and arcs."""
     free = graph.level.classes == CellClass.FREE
     entries: list[Entry] = []
     for mask, colour, label in (
@@ -275,7 +275,7 @@ def frame_axes(canvas: Canvas) -> None:
 
 
 def finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
-    """Title, frame, scale bar, legend."""
+    """Add the title, frame, scale bar and legend."""
     add_title(canvas, words)
     frame_axes(canvas)
     bar = add_scale_bar(canvas)

@@ -1,4 +1,4 @@
-"""Pictures of ways through rooms: tours from stop to stop, and routes beside each other."""
+"""Pictures of paths through rooms: tours from stop to stop, and alternative routes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 
 _TOUR_WIDTH, _STOP_POINTS = 1.6, 5.0
 _ROUTE_WIDTH, _WIDER, _CASING = 1.6, 1.9, 0.6
-"""Longer routes are wider, below the shorter ones: where routes share their way each shows."""
+"""Line widths: longer routes are wider and below the shorter ones, so that all show where they
+overlap."""
 _Dashes = tuple[float, tuple[float, ...]]
 _DASHES: tuple[_Dashes | None, ...] = (
     None,
@@ -46,7 +47,7 @@ _DASHES: tuple[_Dashes | None, ...] = (
     (0.0, (0.8, 0.8)),
     (0.0, (4.0, 1.0, 1.0, 1.0)),
 )
-"""For as many routes as there are colours, each."""
+"""Dashes, each for as many routes as there are colours."""
 
 
 def plot_tour(
@@ -57,20 +58,20 @@ def plot_tour(
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw a way through rooms: the rooms as `plot_rooms` does, and the paths from stop to stop.
+    """Draw a tour: the rooms as in `plot_rooms`, and the paths from stop to stop.
 
-    The doors on the way have their numbers, those of `Tour.in_words`.
+    The doors on the path have their numbers, those of `Tour.in_words`.
 
     Parameters
     ----------
     topology
         The map with rooms.
     tour
-        The way; without a path only the rooms are drawn, and the title says why.
+        The tour; without a path only the rooms are drawn, and the title states the reason.
     ax
-        Where to draw; by default new axes in a new figure.
+        Axes to draw on; by default new ones in a new figure.
     title
-        Replaces the title that names the map and tells the length; an empty one leaves it out.
+        Title instead of the map's name and the length; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -113,20 +114,20 @@ def plot_alternatives(
 ) -> Axes:
     """Draw routes of different homotopy classes, each in its own colour, on rooms or places.
 
-    The legend tells each route's number, the shortest being 1, and its length. Where routes share
-    their way the longer one is the wider line below. With rooms, the doors that any of them passes
-    have their numbers. More than five routes differ by dashes too.
+    The legend shows the number of each route, 1 for the shortest, and its length. Where routes
+    overlap, the longer one is the wider line below. With rooms, all doors that the routes pass have
+    their numbers. More than five routes differ by dashes too.
 
     Parameters
     ----------
     topology
         The map that they were planned on.
     alternatives
-        The routes; without any the title says that there is no path.
+        The routes; without any, the title states that there is no path.
     ax
-        Where to draw; by default new axes in a new figure.
+        Axes to draw on; by default new ones in a new figure.
     title
-        Replaces the title that names the map and counts the routes; an empty one leaves it out.
+        Title instead of the map's name and the count of routes; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -163,7 +164,7 @@ def plot_alternatives(
 def _route_line(
     canvas: Canvas, points: FloatArray, number: int, colour: str, dashes: _Dashes | None
 ) -> Line2D:
-    """A route's line: from the second on wider, and below those before it."""
+    """Return the line of a route: each later one is wider and below those before it."""
     steps = min(number, len(style.ROUTES) - 1)
     width = (_ROUTE_WIDTH + _WIDER * steps) * canvas.sizes.line
     casing = patheffects.withStroke(
@@ -188,8 +189,10 @@ def _draw_ground(
     lines: Sequence[FloatArray],
     strength: float,
 ) -> tuple[list[Entry], list[FloatArray]]:
-    """Draw rooms with names and doors, or places where there are no rooms, below lines of points;
-    entries of the legend, and the boxes of what is written."""
+    """Draw rooms with names and doors, or places if there are no rooms, below lines of points.
+
+    Return the entries of the legend, and the boxes of all texts.
+    """
     grid = topology.grid
     if topology.pyramid.rooms is None:
         places = Places(topology.level)
@@ -211,7 +214,7 @@ def _draw_ground(
 
 
 def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
-    """Doors wide enough to draw, and all that the way passes."""
+    """Return the doors wide enough to draw, and all that the path passes."""
     numbers = {door.number for door in passed}
     return [d for d in rooms.doors if not d.is_gap or d.number in numbers]
 

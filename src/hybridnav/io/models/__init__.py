@@ -1,4 +1,4 @@
-"""Models: a map with all that planners have prepared on it, in one file."""
+"""Models: a map with everything that planners have prepared on it, in one file."""
 
 from hybridnav.io.models.model import Model, is_model, load, open_model
 from hybridnav.io.models.saving import save

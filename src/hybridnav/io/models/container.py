@@ -4,11 +4,11 @@
     uint32     version of this layout
     uint32     CRC-32 of the header
     uint64     length of the header in bytes
-    header     JSON, UTF-8: the parts, and where the arrays of each are
-    arrays     each at a multiple of 64 bytes, little-endian, in C order; deflated where it says so
+    header     JSON, UTF-8: the parts, and the places of their arrays
+    arrays     each at a multiple of 64 bytes, little-endian, in C order; deflated if marked
 
-Offsets count from the first multiple of 64 behind the header. What a part holds, and what its
-arrays may look like, is a matter of `hybridnav.io.models.fields`.
+Offsets count from the first multiple of 64 behind the header. `hybridnav.io.models.fields`
+describes the contents of parts and the valid values of arrays.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ FORMAT = 1
 """Version of the layout that is written, and the only one that is read."""
 
 _MAGIC = b"\x89HNM\r\n\x1a\n"
-"""As PNG's: a transfer that takes the file for text changes it."""
+"""Like PNG's: a transfer that treats the file as text changes it."""
 _HEAD = struct.Struct("<8sIIQ")
 _ALIGN = 64
 _MAX_HEADER = 1 << 24
-"""Bytes of a header: ten thousand rooms with the longest names take a quarter of it."""
+"""Most bytes of a header: ten thousand rooms with the longest names take a quarter of it."""
 _MAX_RATIO = 1100
-"""Deflate makes nothing smaller than one part in 1,032."""
+"""Greatest ratio of compression: deflate reaches at most 1,032."""
 _LEVEL = 1
-"""The level of compression: 6 saves a tenth more, in four times the time."""
+"""Level of compression: 6 saves 10 % more, in four times the time."""
 
 Dtype = Literal["bool", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "float32",
                 "float64"]  # fmt: skip
@@ -61,7 +61,7 @@ _Count = Annotated[int, Field(ge=0, lt=1 << 62)]
 
 
 class _Stored(_Strict):
-    """Where an array is, and what."""
+    """Place, type and shape of an array in the file."""
 
     dtype: Dtype
     shape: Annotated[list[_Count], Field(max_length=3)]
@@ -98,18 +98,18 @@ class Part:
     kind: str
     version: int
     sizes: dict[str, int]
-    """Numbers that the shapes of the arrays are made of."""
+    """Numbers that the shapes of the arrays consist of."""
     values: dict[str, Any]
-    """Of JSON, without a number that is not finite."""
+    """Values of JSON, without numbers that are not finite."""
     arrays: dict[str, AnyArray]
 
 
 @dataclass(frozen=True, eq=False)
 class FiledPart:
-    """A part as the header describes it, whose arrays are in the file."""
+    """A part as described in the header, with its arrays in the file."""
 
     where: str
-    """The file, as messages begin."""
+    """The file; messages begin with it."""
     part: _StoredPart
     _data: Any = field(repr=False)
 
@@ -124,18 +124,18 @@ class FiledPart:
         return self.part.values
 
     def read(self) -> Part:
-        """Map its arrays and compare them with their checksums.
+        """Map the arrays into memory and compare them with their checksums.
 
         Returns
         -------
         Part
-            Arrays that share the memory of the file's pages, and can be written to without the
-            file noticing; those that are deflated are inflated.
+            The part; its arrays share private pages of the file, so that writes do not reach the
+            file; deflated ones are inflated.
 
         Raises
         ------
         ModelError
-            When an array is not what was written.
+            When an array has changed since it was written.
         """
         arrays = {name: self._array(name, at) for name, at in self.part.arrays.items()}
         part = self.part
@@ -158,7 +158,7 @@ class FiledPart:
         return array.astype(dtype, copy=False)
 
     def _inflated(self, name: str, stored: memoryview, size: int) -> bytearray:
-        """Inflate an array; no more memory is taken than the header says."""
+        """Inflate an array, in no more memory than the header states."""
         machine = zlib.decompressobj()
         try:
             content = bytearray(machine.decompress(stored, size + 1))
@@ -173,14 +173,14 @@ class FiledPart:
 
 
 def write_parts(path: Path, parts: Iterable[Part], *, compress: bool) -> None:
-    """Write a model whole or not at all.
+    """Write a model, whole or not at all.
 
     Parameters
     ----------
     path
-        The file; an existing one is replaced, and whoever has it mapped keeps the old one.
+        The file; an existing one is replaced, and processes that have it mapped keep the old one.
     parts
-        What it holds.
+        The parts of the model.
     compress
         Whether arrays are deflated.
 
@@ -240,17 +240,17 @@ def read_parts(path: PathLike) -> list[FiledPart]:
     Returns
     -------
     list of FiledPart
-        Every array of theirs lies inside the file, and apart from all others.
+        The parts; every array lies inside the file and overlaps no other one.
 
     Raises
     ------
     MapNotFoundError
-        When it is not there.
+        When the file does not exist.
     ModelError
-        When it is none, was made by a newer version, or is not whole.
+        When the file is no model, was made by a newer version, or is not whole.
     """
     where = f"model {printable(path)}"
-    if Path(path).exists() and not Path(path).is_file():  # to open a pipe could take for ever
+    if Path(path).exists() and not Path(path).is_file():  # opening a pipe could take forever
         raise ModelError(f"{where}: no file: expected one that hybridnav build has written")
     try:
         with Path(path).open("rb") as file:
@@ -263,7 +263,7 @@ def read_parts(path: PathLike) -> list[FiledPart]:
                 raise ModelError(f"{where}: the header is cut off: build the model anew")
             header = _read_header(content, checksum, where)
             _check_places(header, size - begin, where)
-            # Private pages: numba sees arrays like any other, and nothing is written to the file.
+            # Private pages: numba gets ordinary arrays, and the file is never written to.
             whole = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
     except FileNotFoundError:
         raise MapNotFoundError(f"{where}: no such file") from None
@@ -283,7 +283,7 @@ def _aligned(offset: int) -> int:
 
 
 def _read_head(head: bytes, where: str) -> tuple[int, int]:
-    """Length and checksum of the header."""
+    """Return the length and checksum of the header."""
     if len(head) < _HEAD.size or not head.startswith(_MAGIC):
         raise ModelError(
             f"{where}: no model of hybridnav: expected a file that hybridnav build has written"
@@ -326,7 +326,7 @@ def _finite(text: str) -> float:
 
 
 def _check_places(header: _Header, size: int, where: str) -> None:
-    """Refuse arrays that overlap or lie outside the file, and sizes that cannot be."""
+    """Refuse arrays that overlap or lie outside the file, and impossible sizes."""
     end = 0
     for name, at in sorted(_arrays_of(header), key=lambda item: item[1].offset):
         if at.offset < end or at.offset % _ALIGN:

@@ -1,7 +1,7 @@
-"""What a structure of a model is made of: fields, with the shapes and values that they may have.
+"""Descriptions of the structures of a model: fields, with their valid shapes and values.
 
-A structure is written and read through one description. What is added to a class is added to its
-description, whose version then goes up.
+A structure is written and read through one description. An attribute added to a class is added to
+its description, whose version then goes up.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _TERM = re.compile(r"(?:(\d+)\*)?([a-z_]+)([+-]\d+)?")
 _Size = int | str
 
 MOST = "1000*cells+100000000"
-"""Bytes that a structure may have: portals, the largest, take 640 a cell, and 16 MB on any map."""
+"""Most bytes of a structure: portals, the largest, take 640 a cell, and 16 MB on any map."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,13 @@ class Field:
     shape: tuple[_Size, ...]
     """Numbers, or terms of sizes such as "2*corners+1"."""
     least: float = -math.inf
-    """No value is less, nor NaN; minus infinity for no check."""
+    """Least value; NaN is refused too; minus infinity for no check."""
     below: _Size | None = None
-    """Every value is less: an index of so many things; None for no check."""
+    """Upper limit of values, exclusive, as for an index; None for no check."""
     is_offsets: bool = False
     """Whether values begin with 0, never fall, and end with `below`."""
     frozen: bool = True
-    """Whether the array is read-only in the class; to numba that is another type."""
+    """Whether the array is read-only in the class, which is another type for numba."""
 
     def check_shape(self, part: FiledPart, sizes: Mapping[str, int]) -> None:
         """Refuse another shape, or another type of numbers.
@@ -53,7 +53,7 @@ class Field:
         Raises
         ------
         ModelError
-            When the header describes the array otherwise, or not at all.
+            When the header describes the array differently, or not at all.
         """
         at = part.part.arrays.get(self.name)
         if at is None:
@@ -93,10 +93,10 @@ class Structure:
 
     kind: str
     version: int
-    """Goes up with every change of the fields."""
+    """Version, which goes up with every change of the fields."""
     fields: tuple[Field, ...]
     most: Mapping[str, _Size]
-    """The sizes, and the most that each may be: a number, or a term of those before."""
+    """The sizes, and the limit of each: a number, or a term of sizes before it."""
 
     def part(self, thing: Any, sizes: dict[str, int], values: dict[str, Any] | None = None) -> Part:
         """Describe an object of the class.
@@ -104,17 +104,18 @@ class Structure:
         Parameters
         ----------
         thing
-            Has an attribute, or an item, for each field.
+            Object with an attribute, or an item, for each field.
         sizes, values
-            Numbers that shapes are made of, and others.
+            Numbers that shapes consist of, and others.
         """
         read = thing.__getitem__ if isinstance(thing, dict) else lambda name: getattr(thing, name)
         arrays = {field.name: read(field.name) for field in self.fields}
         return Part(self.kind, self.version, sizes, values or {}, arrays)
 
     def read(self, filed: FiledPart, known: Mapping[str, int]) -> dict[str, AnyArray]:
-        """Read the arrays of an object by name, checked: shapes before anything is read, then
-        checksums, then values.
+        """Read the checked arrays of an object by name.
+
+        Shapes are checked before anything is read, then checksums, then values.
 
         Parameters
         ----------
@@ -126,13 +127,13 @@ class Structure:
         Raises
         ------
         ModelError
-            When it is of another version, or an array is not as the description states.
+            When the part is of another version, or an array does not match the description.
         """
         self.check_version(filed)
         sizes = self._checked_sizes(filed, known)
         for field in self.fields:
             field.check_shape(filed, sizes)
-        # What a file of a few kilobytes could ask for by being deflated.
+        # A deflated file of a few kilobytes could demand a lot of memory.
         size, most = sum(at.nbytes for at in filed.part.arrays.values()), evaluated(MOST, sizes)
         if size > most:
             raise refusal(filed, f"its arrays have {size} bytes, expected at most {most}")
@@ -161,7 +162,7 @@ class Structure:
             )
 
     def _checked_sizes(self, filed: FiledPart, known: Mapping[str, int]) -> dict[str, int]:
-        """All sizes that shapes are made of."""
+        """Return all sizes that shapes consist of, checked."""
         sizes = filed.part.sizes
         if sizes.keys() != self.most.keys():
             raise refusal(filed, f"its sizes are {', '.join(sizes) or 'none'}")
@@ -174,7 +175,7 @@ class Structure:
 
 
 def evaluated(size: _Size, sizes: Mapping[str, int]) -> int:
-    """Return the number that a term of sizes stands for."""
+    """Return the value of a term of sizes."""
     if isinstance(size, int):
         return size
     match = _TERM.fullmatch(size)
@@ -184,5 +185,5 @@ def evaluated(size: _Size, sizes: Mapping[str, int]) -> int:
 
 
 def refusal(part: FiledPart, what: str) -> ModelError:
-    """Return the error of a part that is not as its description states."""
+    """Return the error for a part that does not match its description."""
     return ModelError(f"{part.where}: {part.kind}: {printable(what):.200}: build the model anew")

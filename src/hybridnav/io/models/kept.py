@@ -1,4 +1,4 @@
-"""Models that are kept in a folder, and found again by what they were made of."""
+"""Models that are kept in a folder, and found again by the checksum of their sources."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from hybridnav.planner import HybridPlanner
 
 MOST_BYTES = 2_000_000_000
-"""Bytes of the models in a folder: the ones that were not used for longest make room."""
+"""Most bytes of the models in a folder: the least recently used ones are removed."""
 _ABANDONED_S = 3600.0
-"""Age of a file that a killed program has left half written."""
+"""Age at which a half-written file counts as left by a killed program."""
 
 
 def cache_folder() -> Path:
@@ -38,7 +38,7 @@ def cache_folder() -> Path:
     Raises
     ------
     ModelError
-        When the user has no home.
+        When the user has no home directory.
     """
     given = os.environ.get("XDG_CACHE_HOME", "")
     try:
@@ -53,29 +53,31 @@ def cache_folder() -> Path:
 def key_of(
     map_file: Path, preset: Preset, reading: dict[str, Any], rooms_file: Path | None = None
 ) -> str | None:
-    """Return the checksum of all that a model is made of: the bytes of the map's files and of those
-    of rooms, settings, the version of hybridnav and of the format.
+    """Return the checksum of everything that determines a model.
+
+    These are the bytes of the files of map and rooms, the settings, the version of hybridnav and of
+    the format.
 
     Parameters
     ----------
     map_file
         A ROS map or a MovingAI map.
     preset
-        With what the command line has changed in it.
+        The preset, with the changes of the command line.
     reading
-        How the map is read: thresholds and the like, as plain values.
+        Options of reading the map, such as thresholds, as plain values.
     rooms_file
         None for none.
 
     Returns
     -------
     str or None
-        None where a file is not there, or is none.
+        None if a file does not exist, or is not a file.
 
     Raises
     ------
     MapError
-        When a file does not state what else belongs to it.
+        When a file does not state which other files belong to it.
     """
     is_ros = map_file.suffix.lower() in {".yaml", ".yml"}
     files = ros.files_of(map_file) if is_ros else [map_file]
@@ -95,15 +97,16 @@ def key_of(
 
 
 def find(key: str, folder: Path) -> Model | None:
-    """Open the model with a key, None where there is none that is whole. Its checksums are compared
-    at once, so that another one can be built.
+    """Open the model with a key; return None if there is none that is whole.
+
+    All checksums are compared at once, so that the caller can build another model.
 
     Parameters
     ----------
     key
-        Of `key_of`.
+        Result of `key_of`.
     folder
-        Where models are kept.
+        Folder of the models.
     """
     path = path_of(key, folder)
     if not path.is_file():
@@ -121,12 +124,12 @@ def find(key: str, folder: Path) -> Model | None:
 
 
 def keep(planner: HybridPlanner, key: str, folder: Path) -> Path:
-    """Keep the model of a planner under a key, and remove what has not been used for longest.
+    """Keep the model of a planner under a key, and remove the least recently used models.
 
     Raises
     ------
     ModelError
-        When it cannot be written.
+        When the model cannot be written.
     """
     path = path_of(key, folder)
     try:
@@ -140,12 +143,12 @@ def keep(planner: HybridPlanner, key: str, folder: Path) -> Path:
 
 
 def path_of(key: str, folder: Path) -> Path:
-    """Return where the model with a key is kept."""
+    """Return the path of the model with a key."""
     return folder / f"{key}{MODEL_SUFFIX}"
 
 
 def _make_room(folder: Path, newest: Path) -> None:
-    """Remove the models that were not used for longest, and what killed programs have left."""
+    """Remove the least recently used models, and the remains of killed programs."""
     for path in folder.glob(".hybridnav.*"):
         if time.time() - path.stat().st_mtime > _ABANDONED_S:
             path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Models: a map with what planners have prepared on it, in one file."""
+"""Models: a map with everything that planners have prepared on it, in one file."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ if TYPE_CHECKING:
 
 
 class Model:
-    """A map, and what planners have prepared on it; made by `load`.
+    """A map, and everything that planners have prepared on it; made by `load`.
 
-    What a file holds is mapped into memory and read when it is first needed. The checksum of every
-    array is compared then.
+    The contents of a file are mapped into memory and read on first use, when the checksum of each
+    array is compared.
 
     Parameters
     ----------
     grid
-        The map; None where the parts hold it.
+        The map; None if the parts contain it.
     filed
         The parts of a file.
     max_cells
-        The most cells that the map may have.
+        Most cells of the map.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class Model:
 
     @property
     def is_filed(self) -> bool:
-        """Whether a file holds it, rather than that only a map was read."""
+        """Whether the model was read from a model file, not from a map."""
         return bool(self._filed)
 
     @property
@@ -82,24 +82,24 @@ class Model:
 
     @property
     def presets(self) -> tuple[Preset, ...]:
-        """Presets of the planners that it was saved with; none for a map that was only loaded."""
+        """Presets of the planners that the model was saved with; none for a loaded map."""
         return tuple(map(parts.preset_of, self._of_kind(PRESET.kind)))
 
     @property
     def rooms(self) -> RoomLabels | None:
-        """The rooms that its places were grown with, None without."""
+        """The rooms that its places were grown with, None without rooms."""
         rooms: RoomLabels | None = self._once("rooms", self._read_rooms)
         return rooms
 
     @property
     def topology(self) -> TopologicalMap:
-        """The topological map: as it was saved, or else grown as the first preset states, or as
-        `shortest` does."""
+        """The topological map: the saved one, else one grown by the first preset, or by
+        `shortest`."""
         topology: TopologicalMap = self._once("topology", self._read_topology)
         return topology
 
     def _once(self, name: str, read: Callable[[], Any]) -> Any:
-        """What is read once for all threads: planners must be on one grid."""
+        """Return an object that is read once for all threads: planners must share one grid."""
         if name not in self._read:
             with self._reading:
                 if name not in self._read:
@@ -125,8 +125,9 @@ class Model:
     def planner(
         self, preset: PathLike | Preset | None = None, *, topology: TopologicalMap | None = None
     ) -> HybridPlanner:
-        """Make a planner, with all that the model holds for its preset; the rest is built when it
-        is needed.
+        """Make a planner, with everything that the model holds for its preset.
+
+        The rest is built when it is needed.
 
         Parameters
         ----------
@@ -139,18 +140,18 @@ class Model:
         Returns
         -------
         HybridPlanner
-            Its answers are those of the planner that was saved, bit by bit.
+            A planner with exactly the answers of the saved planner.
 
         Raises
         ------
         ModelError
-            When what the file holds is not what was written.
+            When the contents of the file have changed since it was written.
         PresetError
             When the preset does not exist or is not valid.
         InvalidValueError
             When the map does not suit the preset.
         """
-        # Loads numba, which a grid alone can do without.
+        # Loads numba, which a grid alone does not need.
         from hybridnav.io.models.searches import made_for, search_of  # noqa: PLC0415
         from hybridnav.planner import HybridPlanner  # noqa: PLC0415
 
@@ -163,15 +164,16 @@ class Model:
         return HybridPlanner(topology, preset=preset, prepared=prepared)
 
     def grown(self, settings: PyramidSettings, rooms: RoomLabels | None) -> TopologicalMap:
-        """Return the topological map of some settings and rooms: that of the model where these are
-        its own, else one that is built.
+        """Return the topological map of some settings and rooms.
+
+        It is that of the model if these are its own, else a new one.
 
         Parameters
         ----------
         settings
             Section `pyramid` of a preset.
         rooms
-            `rooms`, others, or None for none.
+            `rooms`, other ones, or None for none.
         """
         found = self._of_kind(PYRAMID.kind)
         own = parts.pyramid_settings(found[0]) if found else {}
@@ -180,7 +182,7 @@ class Model:
         return self._grown(settings, rooms)
 
     def fitted(self, preset: Preset | None) -> Preset:
-        """Return a preset whose section `pyramid` states how the model was made, as far as it is.
+        """Return a preset whose section `pyramid` states how the model was made, if it was.
 
         Parameters
         ----------
@@ -207,13 +209,14 @@ class Model:
         occupied_threshold: float | None = None,
         least_island_m2: float | None = None,
     ) -> Model:
-        """Return the model itself where its grid was made so, else one of the same map made anew,
-        with nothing prepared.
+        """Return the model itself if its grid has these settings, else a new model of the same map.
+
+        A new model has nothing prepared.
 
         Parameters
         ----------
         robot_radius_m, free_threshold, occupied_threshold, least_island_m2
-            As of `OccupancyGrid`; None for that of the model.
+            As in `OccupancyGrid`; None for that of the model.
 
         Raises
         ------
@@ -235,12 +238,12 @@ class Model:
 
     @property
     def key(self) -> str | None:
-        """What it is found by where it is kept, None for other models."""
+        """Key of a kept model, None for other models."""
         found = self._of_kind(KEY.kind)
         return str(found[0].values.get("key")) if found else None
 
     def parts(self) -> list[Part]:
-        """Return all that it holds, as it is written to a file; every checksum is compared."""
+        """Return all parts of the model, as written to a file; every checksum is compared."""
         if self._filed:
             return [filed.read() for filed in self._filed if filed.kind != KEY.kind]
         return [parts.grid_part(self.grid)]
@@ -264,7 +267,7 @@ class Model:
 
 
 def is_model(path: PathLike) -> bool:
-    """Return whether a path names a model: whether it ends in `.hnm`."""
+    """Return whether a path names a model, that is, ends in `.hnm`."""
     return Path(path).suffix.lower() == MODEL_SUFFIX
 
 
@@ -275,7 +278,7 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
     for part in filed:
         if part.kind not in KINDS:
             raise refusal(part, "no such part is known: a newer hybridnav has made it")
-    # Meshes and graphs are there once for each kind of planner that they were made for.
+    # Meshes and graphs occur once for each kind of planner that they were made for.
     made = [(part.kind, part.values.get("made_for")) for part in filed if part.kind != PRESET.kind]
     for kind, key in [*made, (GRID.kind, None)]:
         if made.count((kind, key)) != 1:
@@ -294,27 +297,27 @@ def load(
     occupied_threshold: float | None = None,
     max_cells: int = DEFAULT_MAX_CELLS,
 ) -> Model:
-    """Load a model, or a map that has none.
+    """Load a model, or a map without one.
 
     Parameters
     ----------
     path
-        A model (.hnm), or a map as `load_map` reads it: a model without anything prepared.
+        A model (.hnm), or a map as in `load_map`, which makes a model with nothing prepared.
     robot_radius_m, free_threshold, occupied_threshold, max_cells
-        As of `load_map`. A model whose grid was made with others is a map like any other: the grid
-        is made anew and nothing of the rest is used.
+        As in `load_map`. If the grid of a model was made with other values, the grid is made again
+        and nothing else of the model is used.
 
     Returns
     -------
     Model
-        Its `planner` plans at once.
+        The model; its `planner` plans at once.
 
     Raises
     ------
     MapNotFoundError
-        When the file is not there.
+        When the file does not exist.
     ModelError
-        When a model is none, not whole, altered, or of another version; one line.
+        When a model file is no model, not whole, altered, or of another version.
     MapError
         When a map cannot be read, or has more than `max_cells`.
     InvalidValueError

@@ -80,7 +80,8 @@ def values_of(kind: type[_T], filed: FiledPart) -> _T:
 
 
 def plain(tree: Any) -> Any:
-    """Write infinities as texts, which JSON has no number for; pydantic reads them back."""
+    """Replace infinities by texts, because JSON has no number for them; pydantic reads them
+    back."""
     if isinstance(tree, dict):
         return {key: plain(value) for key, value in tree.items()}
     if isinstance(tree, list | tuple):
@@ -120,12 +121,12 @@ def grid_part(grid: OccupancyGrid) -> Part:
 
 
 def sizes_of(filed: FiledPart, *, max_cells: int) -> dict[str, int]:
-    """Return the sizes of the map that a part describes, which those of others refer to.
+    """Return the sizes of the map that a part describes, to which other sizes refer.
 
     Raises
     ------
     ModelError
-        When they are missing.
+        When the sizes are missing.
     MapError
         When the map has more than `max_cells` cells.
     """
@@ -173,12 +174,12 @@ def _probability(filed: FiledPart, palette: AnyArray, stored: AnyArray) -> AnyAr
 
 
 def grid_settings(filed: FiledPart) -> dict[str, Any]:
-    """Return what a grid is called and how it was made, without reading its cells."""
+    """Return the name and the settings of a grid, without reading its cells."""
     return values_of(_GridValues, filed).model_dump()
 
 
 def pyramid_settings(filed: FiledPart) -> dict[str, Any]:
-    """Return how a pyramid was built, without reading it."""
+    """Return the settings of a pyramid, without reading it."""
     return values_of(_PyramidValues, filed).model_dump(
         include={"merge_distance_m", "linkage", "seed"}
     )

@@ -27,25 +27,25 @@ def save(
     *,
     compress: bool = False,
 ) -> None:
-    """Write a model: a map with all that was prepared on it.
+    """Write a model: a map with everything that was prepared on it.
 
     Parameters
     ----------
     thing
-        A planner, with its grid, its topological map, and what it has prepared so far: call
-        `HybridPlanner.prepare` before, to have all of it. Or several planners on one topological
-        map, such as those of several presets. Or such a map, a grid or a `Model` alone.
+        A planner, with its grid, its topological map, and everything that it has prepared so far:
+        call `HybridPlanner.prepare` first to include all. Or several planners on one topological
+        map, such as those of several presets. Or only such a map, a grid or a `Model`.
     path
-        The file, which must end in `.hnm`. It is written whole or not at all; who has loaded the
-        one that it replaces keeps that.
+        The file, which must end in `.hnm`. It is written whole or not at all; processes that have
+        loaded the file it replaces keep the old one.
     compress
-        Whether arrays are deflated: the file is some six times as small, and loads more slowly,
-        into memory of its own.
+        Whether arrays are deflated: the file takes about a sixth of the space, and loads more
+        slowly, into separate memory.
 
     Raises
     ------
     InvalidValueError
-        When the path ends otherwise, or the planners are not on one topological map.
+        When the path has another ending, or the planners are not on one topological map.
     ModelError
         When the file cannot be written.
     """
@@ -62,7 +62,7 @@ def save(
 def parts_of(
     thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
 ) -> list[Part]:
-    """Describe what `save` writes."""
+    """Return the parts that `save` writes."""
     if isinstance(thing, Model):
         return thing.parts()
     if isinstance(thing, OccupancyGrid):

@@ -1,4 +1,4 @@
-"""What planners prepare, as parts of a model and back: meshes, graphs, portals."""
+"""Prepared meshes, graphs and portals of planners as parts of a model, and back."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class _PortalValues(_Values):
 
 
 def made_for(settings: PlannerSettings, topology: TopologicalMap) -> dict[str, Any]:
-    """Return the settings on which what a planner prepares depends, beside the grid."""
+    """Return the settings, beside the grid, that determine the preparations of a planner."""
     key: dict[str, Any] = {"allow_unexplored": settings.allow_unexplored}
     if settings.coarse == "portals":
         key |= {
@@ -69,7 +69,7 @@ def made_for(settings: PlannerSettings, topology: TopologicalMap) -> dict[str, A
 
 
 def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
-    """Describe what a planner has prepared.
+    """Return the parts for the preparations of a planner.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
 def search_of(
     filed: Sequence[FiledPart], coarse: str, key: dict[str, Any], known: dict[str, int]
 ) -> Prepared | None:
-    """Read what a planner of some settings needs, None where the model does not hold it.
+    """Read the preparations for a planner of some settings; return None if the model has none.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearc
 
 
 def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:
-    """Refuse arcs to corners, and past arcs, that do not exist."""
+    """Refuse arcs to corners, and references to arcs, that do not exist."""
     from hybridnav.search._contract_kernels import HEAD_SHIFT  # noqa: PLC0415 - loads numba
 
     heads, middles = arrays["arcs"][:, 1] >> HEAD_SHIFT, arrays["middles"]
@@ -215,7 +215,7 @@ def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:
 
 
 def _check_index(filed: FiledPart, index: LongArray) -> None:
-    """Refuse an index of cells whose counts are not those of its bits."""
+    """Refuse an index of cells whose counts differ from its bits."""
     counts = np.bitwise_count(index[:, :2].view(np.uint64)).astype(np.int64)
     before = np.zeros((len(index) + 1, 2), dtype=np.int64)
     np.cumsum(counts, axis=0, out=before[1:])
@@ -262,6 +262,6 @@ def _portals_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> BuiltPo
 
 
 def _check_same(filed: FiledPart, name: str, wanted: int) -> None:
-    """Refuse a part of another mesh or graph than it belongs to."""
+    """Refuse a part that belongs to another mesh or graph."""
     if filed.part.sizes.get(name) != wanted:
         raise refusal(filed, f"{name} is {filed.part.sizes.get(name)}, expected {wanted}")

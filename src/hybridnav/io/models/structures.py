@@ -1,7 +1,7 @@
-"""The descriptions of all structures that a model may hold.
+"""Descriptions of all structures of a model.
 
-Limits of sizes are generous bounds of what the builders make: they keep an altered header from
-asking for memory.
+Limits of sizes are generous bounds on the sizes of real structures: they keep an altered header
+from demanding memory.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ GRID = Structure(
     ),
     {"rows": MAX_CELLS, "cols": MAX_CELLS, "levels": 256},
 )
-"""Occupancy as an index into a palette where it has few values, as that of an image has."""
+"""Occupancy, as an index into a palette if it has few values, like that of an image."""
 
 ROOMS = Structure("rooms", 1, (Field("label_of", "int32", ("rows", "cols"), least=-1),), {})
 
@@ -71,7 +71,7 @@ CORNER_GRAPH = Structure(
 )
 
 CORNER_EDGES = Structure("corner edges", 1, CORNER_GRAPH.fields[:2], dict(_EDGES))
-"""The edges alone: what a hierarchy leaves of the graph that was contracted."""
+"""The edges alone: a hierarchy keeps only these of the contracted graph."""
 
 CORNER_HIERARCHY = Structure(
     "corner hierarchy",
@@ -166,7 +166,7 @@ TABLES = Structure(
 PRESET = Structure("preset", 1, (), {})
 
 KEY = Structure("key", 1, (), {})
-"""What a kept model is found by."""
+"""Key by which a kept model is found."""
 
 KINDS = frozenset(
     structure.kind

@@ -1,7 +1,7 @@
 """Refinement by OMPL's sampling-based planners, in a process of its own.
 
 I. Sucan, M. Moll, L. Kavraki: The Open Motion Planning Library, 2012. Only the worker process
-imports `ompl`; this package works, up to the first query, without it.
+imports `ompl`; this package works without it up to the first query.
 """
 
 from hybridnav.refine.ompl.clearance import Clearance

@@ -1,4 +1,4 @@
-"""Kernel of the clearance objective: length weighted by the cells that are crossed."""
+"""Kernel of the clearance objective: length weighted by the crossed cells."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ import math
 from hybridnav._jit import njit
 
 _STEP = 0.5
-"""Cells between samples at most."""
+"""Greatest distance between samples, in cells."""
 
 
 @njit(cache=True, nogil=True)
 def weighted_length(factors, origin, cosine, sine, resolution_m, x0, y0, x1, y1):
-    """Length of a straight line in metres, each step times the factor of the cell at its middle.
+    """Return the length of a line in metres, each step times the factor of the cell at its middle.
 
-    The same in both directions, and never less than the length: factors are at least 1. Outside
-    the map the factor is 1.
+    The result is the same in both directions, and never less than the length: `factors`, float32
+    (rows, cols), are at least 1. Outside the map the factor is 1. `origin` (x, y), `cosine` and
+    `sine` of the yaw and `resolution_m` are those of the frame; the line goes from `x0`, `y0` to
+    `x1`, `y1`, in metres, map frame.
     """
     length_m = math.hypot(x1 - x0, y1 - y0)
     n = max(math.ceil(length_m / (_STEP * resolution_m)), 1)

@@ -1,4 +1,4 @@
-"""One query answered: corridor after corridor, until a path is found or the time is over."""
+"""The answer to one query: corridor after corridor, until a path is found or time is up."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query
 
 _KEPT = 0.03
-"""Part of the time that is kept for the way back."""
+"""Share of the time reserved for the reply."""
 _FIRST = 0.7
-"""Part of what is left in which a corridor that is not the last must give a path."""
+"""Share of the time left in which a corridor other than the last must yield a path."""
 _CHAIN = 0.5
-"""Part of it that a chain of poses gets before the corridor is searched as one problem."""
+"""Share of that for a chain of poses, before the corridor is searched as one problem."""
 _SEARCHED = 0.9
-"""Part of what is left that improving planners get where the path is simplified after."""
+"""Share of the time left for improving planners if the path is simplified afterwards."""
 _ENOUGH = 1 + 1e-4
 """A path that is no longer than this times the lower bound needs no improvement."""
 
 
 class Answering:
-    """The state of one query: budget, best path so far, what was tried.
+    """The state of one query: budget, best path so far, attempts.
 
     Parameters
     ----------
     base
-        The map, and what the worker made of it.
+        The map, and the worker's tables of it.
     query
         The problem.
     send
@@ -72,7 +72,7 @@ class Answering:
         self._near: FloatArray = np.empty((0, 3))
 
     def run(self) -> Reply:
-        """Try the corridors in turn; the last reply."""
+        """Try the corridors in turn and return the last reply."""
         last = len(self.query.corridors) - 1
         for number, (name, fields) in enumerate(self.query.corridors):
             corridor = corridor_of(self._base, self.query, fields)
@@ -88,22 +88,24 @@ class Answering:
         return self._reply(is_last=True)
 
     def better(self, points: FloatArray, cost: float) -> None:
-        """Note a path, and send it, where it is better than the best so far, and free of contact:
-        not all planners check the states that they put between others."""
+        """Note a path and send it, if it is better than the best so far and free of contact.
+
+        Not all planners check the states that they insert between others.
+        """
         if cost < self._cost and self._whole.is_valid(points):
             self._best, self._cost = points, cost
             self._trace.append((self.budget.seconds(), cost))
             self._send(self._reply(is_last=False))
 
     def partial(self, points: FloatArray) -> None:
-        """Note a path that ends elsewhere, where it ends nearer to the goal than others, and than
-        the start."""
+        """Note a path that ends elsewhere, if it ends nearer to the goal than others and the
+        start."""
         least = min(self._miss(self._near), self._miss(self.query.start[None]))
         if self._miss(points) < least and self._whole.is_valid(points):
             self._near = points
 
     def space(self, corridor: Corridor, low: FloatArray, high: FloatArray) -> StateSpace:
-        """A state space of the query inside some bounds."""
+        """Return a state space of the query inside some bounds."""
         note = None if self.search is None else self._note
         return StateSpace(self.settings, corridor.check, low, high, note=note)
 
@@ -125,7 +127,7 @@ class Answering:
         self._at_once(corridor, whole, part=part)
 
     def _at_once(self, corridor: Corridor, whole: StateSpace, *, part: float) -> None:
-        """The whole corridor as one problem."""
+        """Solve the whole corridor as one problem."""
         if self.settings.confine == "prm":
             draw_from(corridor, whole)
         improves = self.settings.planner in IMPROVING
@@ -150,7 +152,7 @@ class Answering:
             self.partial(found.points)
 
     def finish(self, whole: StateSpace, points: FloatArray) -> FloatArray:
-        """Note a path from start to goal and simplify it; the path that came out."""
+        """Note a path from start to goal, simplify it, and return the result."""
         self.better(points, self.objective.cost(points))
         if not self.settings.simplify:
             return points

@@ -1,4 +1,4 @@
-"""Budgets: how much of the time, or of the iterations, a query has left."""
+"""Budgets: the time, or the iterations, that a query has left."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
 
 class Budget:
-    """What a query may spend, counted in seconds, or in iterations where they are given.
+    """The budget of a query, counted in seconds, or in iterations if these are given.
 
-    Only what is counted in iterations repeats from a seed.
+    Only a budget in iterations is repeatable from a seed.
 
     Parameters
     ----------
     began_s, deadline_s
-        By `time.monotonic`.
+        Times of `time.monotonic`.
     iterations
         None to count seconds.
     """
@@ -31,13 +31,13 @@ class Budget:
         self._whole_s = max(deadline_s - began_s, 1e-6)
 
     def left(self) -> float:
-        """The part that is left, 1 at the beginning, 0 at the end."""
+        """Return the share that is left, 1 at the beginning, 0 at the end."""
         if self._most is not None:
             return max(1 - self.iterations / self._most, 0.0)
         return max((self._deadline_s - time.monotonic()) / self._whole_s, 0.0)
 
     def seconds(self) -> float:
-        """Seconds since it began."""
+        """Return the seconds since the beginning."""
         return time.monotonic() - self.began_s
 
     def spend(self, iterations: int) -> None:
@@ -45,14 +45,16 @@ class Budget:
         self.iterations += iterations
 
     def stopper(self, part: float, *, most: int | None = None) -> Callable[[], bool]:
-        """What planners ask once an iteration: whether a part of what is left now is spent.
+        """Return a function for planners that states whether a share of the rest is spent.
+
+        Planners call it once an iteration.
 
         Parameters
         ----------
         part
-            Of what is left, in (0, 1].
+            Share of the budget left now, in (0, 1].
         most
-            Iterations that it may be at most; None for no limit.
+            Most iterations; None for no limit.
         """
         until = sys.maxsize if most is None else self.iterations + most
         if self._most is not None:

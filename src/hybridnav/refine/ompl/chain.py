@@ -1,7 +1,7 @@
 """A corridor as a chain of small problems, field by field along the coarse path.
 
-OMPL's bindings let no Python code draw the states of tree planners, and of the box round a winding
-corridor most states lie outside it. The box round one field holds little else.
+OMPL's bindings let no Python code draw the states of tree planners, and most states in the box
+round a winding corridor lie outside the corridor. The box round one field holds few others.
 """
 
 from __future__ import annotations
@@ -25,37 +25,37 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.spaces import StateSpace
 
 _WINDING, _SLACK_CELLS = 1.2, 4
-"""A leg is cut in two where its cells' way is longer than this times the straight line, and so
-many cells."""
+"""A leg is cut in two if its path of cells is longer than this times the straight line plus so many
+cells."""
 _SHORT_CELLS = 8
-"""Legs of so many cells that are not straight are walked from centre to centre by a disc: in a
-maze with ways one cell wide every bend is one, and planners of batches take a millisecond each."""
+"""Most cells of a bent leg that a disc walks from centre to centre: in a maze with passages one
+cell wide every bend is such a leg, and batch planners take a millisecond each."""
 _TRIES = 10
 """Iterations for each cell of a leg before it is cut in two."""
 _LONGER = 1.05
-"""A leg that is longer than this times its cells' way has taken another door."""
+"""A leg that is longer than this times its path of cells has taken another door."""
 _LEG = 0.5
 """Part of its share of the time that a leg may take before it is cut in two."""
 _WINDOW = 0.02
-"""Part of the time that is left for one window; windows are fewer where that is too short."""
+"""Share of the time left for one window; there are fewer windows if that is too short."""
 _LEAST_WINDOWS = 4
 _ROUNDS_WITHOUT_GAIN = 2
 _LEAST_GAIN = 2e-4
 
 
 def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float) -> bool:
-    """Solve leg after leg, join them, simplify, and improve windows of the path.
+    """Solve leg after leg, join and simplify them, and improve windows of the path; return success.
 
     Parameters
     ----------
     answering
         The query.
     corridor
-        Where it may search.
+        The corridor to search.
     whole
         State space of the whole corridor.
     part
-        How much of what is left the legs may take.
+        Share of the time left that the legs may take.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part
 def _legs(
     answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float
 ) -> FloatArray | None:
-    """The legs, solved and joined; None where one has no path."""
+    """Return the legs, solved and joined; None if one has no path."""
     cells = answering.query.cells
     poses = Poses(answering.query, corridor, whole)
     stops = [index for index in _stops(answering, cells) if poses.at(index) is not None]
@@ -95,14 +95,17 @@ def _legs(
         else:
             answering.partial(np.concatenate(joined))
             return None
-    # Turns to the headings at which the legs meet are left out.
+    # Turns to the headings at which legs meet are left out.
     points = whole.driven(np.concatenate(joined))
     return points if len(points) else None
 
 
 def _stops(answering: Answering, cells: LongArray) -> list[int]:
-    """Where the path of cells goes over from one field to the next, its ends, and points between
-    until no leg winds."""
+    """Return the indices of the cells at which the path of cells is cut into legs.
+
+    These are its ends, the crossings from one field to the next, and points in between until no leg
+    winds.
+    """
     last = len(cells) - 1
     field_of = answering.setup.field_of
     crossings: list[int] = []
@@ -130,8 +133,10 @@ def _leg(
     ends: tuple[FloatArray, FloatArray],
     share: float,
 ) -> FloatArray | None:
-    """A path between two states near each other, float64 (n, 3); None where there is none that is
-    not much longer than the cells' way."""
+    """Return a path between two near states, float64 (n, 3), or None.
+
+    The result is None if every path found is much longer than the path of cells.
+    """
     flat, straight = not answering.settings.has_heading, np.stack(ends)
     if flat and corridor.check.path_valid(straight[:, :2]):
         return straight
@@ -162,7 +167,7 @@ _MARGIN_CELLS = 8
 
 
 def _bounds(corridor: Corridor, cells: LongArray) -> tuple[FloatArray, FloatArray]:
-    """Bounds round some cells with a margin, inside the corridor's."""
+    """Return the bounds round some cells with a margin, inside those of the corridor."""
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
     margin = _MARGIN_CELLS + int((high - low).max()) // 4
     box: Box = (
@@ -177,7 +182,7 @@ def _bounds(corridor: Corridor, cells: LongArray) -> tuple[FloatArray, FloatArra
 def _improve(
     answering: Answering, corridor: Corridor, whole: StateSpace, points: FloatArray
 ) -> None:
-    """Give windows of the path to the planner again, each with the ellipse that can shorten it."""
+    """Plan windows of the path again, each in the ellipse that can shorten it."""
     budget = answering.budget
     cost_of = answering.objective.cost
     cost, fruitless, window = cost_of(points), 0, _LEAST_WINDOWS
@@ -201,7 +206,7 @@ def _window(
     points: FloatArray,
     along: tuple[float, float],
 ) -> FloatArray:
-    """The path with a part of it, given as parts of its length, searched anew."""
+    """Return the path with a part of it searched again; `along` are shares of its length."""
     first, last = _between(points, along)
     if last - first < 2:  # noqa: PLR2004 - one motion
         return points
@@ -220,7 +225,7 @@ def _window(
 
 
 def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:
-    """The states just before and after a part of a path's length."""
+    """Return the indices of the states just before and after a part of a path's length."""
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
     first = int(np.searchsorted(at, along[0] * at[-1], side="right")) - 1
     last = int(np.searchsorted(at, along[1] * at[-1]))
@@ -228,8 +233,10 @@ def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:
 
 
 def _ellipse(corridor: Corridor, inner: FloatArray, cost: float) -> tuple[FloatArray, FloatArray]:
-    """Bounds of the ellipse whose points lie on some path not longer than a cost, between the ends
-    of a part (J. Gammell and others: Informed RRT*, 2014), inside the corridor's bounds."""
+    """Return the bounds of the ellipse of paths up to a cost between the ends of a part.
+
+    They lie inside the bounds of the corridor (J. Gammell and others: Informed RRT*, 2014).
+    """
     offset = (inner[-1] - inner[0])[:2]
     straight = float(np.hypot(*offset))
     across = math.sqrt(max(cost**2 - straight**2, 0.0)) / 2

@@ -19,15 +19,16 @@ if TYPE_CHECKING:
 class Clearance:
     """Length weighted by nearness to obstacles, on one map.
 
-    A metre costs 1 + `clearance_weight` in a cell beside a cell that may not be entered, evenly
-    less with the distance of the centres, and 1 from `clearance_m` on. Holds four bytes a cell.
+    A metre costs 1 + `clearance_weight` in a cell beside a cell that may not be entered, linearly
+    less with the distance of the centres, and 1 from `clearance_m` on. The table takes four bytes a
+    cell.
 
     Parameters
     ----------
     grid
         The map.
     settings
-        With distance and weight.
+        Settings with distance and weight.
     allow_unexplored
         Whether unexplored cells may be entered.
     """
@@ -50,11 +51,11 @@ class Clearance:
         )
 
     def cost(self, x0: float, y0: float, x1: float, y1: float) -> float:
-        """Cost of a straight line, metres, map frame."""
+        """Return the cost of a straight line, metres, map frame."""
         cost: float = weighted_length(self._factors, *self._place, x0, y0, x1, y1)
         return cost
 
     def cost_of(self, points: FloatArray) -> float:
-        """Cost of a path, points (n, 2) or states (n, 3)."""
+        """Return the cost of a path, points (n, 2) or states (n, 3)."""
         steps = itertools.pairwise(points[:, :2].tolist())
         return math.fsum(self.cost(*first, *second) for first, second in steps)

@@ -1,4 +1,4 @@
-"""A corridor as the worker sees it: cells, bounds, and the checks of states and motions."""
+"""Corridors in the worker: cells, bounds, and the checks of states and motions."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query, Setup
 
 Box = tuple[int, int, int, int]
-"""Rows from, to and columns from, to, the ends not in it."""
+"""First and last row, first and last column of a box, the last ones exclusive."""
 
 
 def boxes_of(field_of: NDArray[np.int16 | np.int32]) -> LongArray:
-    """The smallest box of each field, int64 (n_fields, 4): rows from, to, columns from, to."""
+    """Return the smallest box of each field, int64 (n_fields, 4); see `Box`."""
     n_fields = int(field_of.max(initial=-1)) + 1
     boxes = np.zeros((n_fields, 4), dtype=np.int64)
     boxes[:, 0], boxes[:, 2] = field_of.shape
@@ -37,12 +37,12 @@ def boxes_of(field_of: NDArray[np.int16 | np.int32]) -> LongArray:
 
 
 class Base:
-    """What the worker makes of the map once.
+    """Tables of the map that the worker makes once.
 
     Parameters
     ----------
     setup
-        What the worker was told.
+        The setup of the worker.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -63,7 +63,7 @@ class Base:
 
 @dataclass(frozen=True, eq=False)
 class Corridor:
-    """Where a query may search."""
+    """The part of the map that a query may search."""
 
     grid: OccupancyGrid
     inside: BoolArray | None
@@ -79,7 +79,7 @@ class Corridor:
 
     @cached_property
     def cells(self) -> LongArray:
-        """int64 (n, 2), its cells that may be entered."""
+        """int64 (n, 2), the cells of the corridor that may be entered."""
         top, bottom, left, right = self.box
         free = self.grid.enterable(allow_unexplored=self.allow_unexplored)[top:bottom, left:right]
         if self.inside is not None:
@@ -89,7 +89,7 @@ class Corridor:
 
 
 def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest x and y of a box of cells, float64 (2,) each."""
+    """Return the lowest and highest x and y of a box of cells, float64 (2,) each."""
     top, bottom, left, right = box
     corners = np.array([[top, left], [top, right], [bottom, left], [bottom, right]])
     points = grid.frame.points_of_grid(corners)
@@ -97,7 +97,7 @@ def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
 
 
 def corridor_of(base: Base, query: Query, fields: BoolArray | None) -> Corridor:
-    """The corridor of some fields; of all cells without fields."""
+    """Return the corridor of some fields; for None, that of all cells."""
     setup, grid, inside = base.setup, base.setup.grid, None
     box: Box = (0, grid.shape[0], 0, grid.shape[1])
     if fields is not None and setup.field_of is not None:
@@ -110,7 +110,7 @@ def corridor_of(base: Base, query: Query, fields: BoolArray | None) -> Corridor:
         )
         part = setup.field_of[box[0] : box[1], box[2] : box[3]]
         inside = np.zeros(grid.shape, dtype=np.bool_)
-        # -1, no field, reads the last entry, which is False.
+        # -1, for no field, reads the last entry, which is False.
         inside[box[0] : box[1], box[2] : box[3]] = np.append(fields, False)[part]
     check = base.check.confined(inside=inside, closed=query.closed)
     return Corridor(grid, inside, box, check, setup.allow_unexplored)

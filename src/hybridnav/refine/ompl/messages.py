@@ -1,4 +1,4 @@
-"""What the planner's process and the worker tell each other."""
+"""Messages between the planner's process and the worker."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Outcome = Literal["solved", "approximate", "timeout"]
 
 
 SEARCH_S = 60.0
-"""Seconds beyond its time that a query may take where the trees of the search are wanted too."""
+"""Seconds beyond its time that a query with the trees of the search may take."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a worker is told once."""
+    """Setup of a worker, sent once."""
 
     grid: OccupancyGrid
     field_of: NDArray[np.int16 | np.int32] | None
-    """int16 or int32 (rows, cols), the field of each cell, -1 for none; None where the whole map is
+    """int16 or int32 (rows, cols), the field of each cell, -1 for none; None if the whole map is
     the corridor."""
     settings: OmplSettings
     allow_unexplored: bool
@@ -41,21 +41,21 @@ class Query:
     """float64 (3,), x and y in metres, heading in radians; map frame."""
     goal: FloatArray
     cells: LongArray
-    """int64 (n, 2), a legal path of cells from the start's to the goal's."""
+    """int64 (n, 2), a legal path of cells from the cell of the start to that of the goal."""
     deadline_s: float
-    """When the time is over, by `time.monotonic`, which all processes share."""
+    """Time of `time.monotonic`, which all processes share, at which the query ends."""
     corridors: tuple[tuple[str, BoolArray | None], ...]
     """Names of the corridors to try, one after the other, and the fields of each, bool (n_fields,);
     None for the whole map."""
     closed: LongArray | None = None
     """int64 (m,), flat cells that may not be entered."""
     tells_search: bool = False
-    """Whether states and trees of the search are wanted too."""
+    """Whether to return states and trees of the search too."""
 
 
 @dataclass(eq=False)
 class Search:
-    """What a search looked at, for pictures."""
+    """States and motions of a search, for pictures."""
 
     states: list[tuple[float, float]] = field(default_factory=list)
     """States that were found valid, map frame."""
@@ -65,20 +65,20 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Reply:
-    """What came out; a worker may send several for one query, each better than the one before."""
+    """Result of a query; a worker may send several for one query, each better than the last."""
 
     outcome: Outcome
     points: FloatArray
-    """float64 (n, 3), states of the path in order; of an approximate one it ends elsewhere than at
-    the goal. None, shape (0, 3), where there is no path."""
+    """float64 (n, 3), states of the path in order; an approximate path does not end at the goal.
+    Shape (0, 3) if there is no path."""
     cost: float
-    """Its cost by the objective, metres where that is the length."""
+    """Cost of the path by the objective, in metres if that is the length."""
     length_m: float = 0.0
-    """What the robot's base covers."""
+    """Length of the path of the robot's base."""
     bound_m: float = 0.0
     """No path is shorter: the length without obstacles."""
     steps: tuple[str, ...] = ()
-    """What was tried, and how it ended, in order."""
+    """Attempts and their outcomes, in order."""
     trace: tuple[tuple[float, float], ...] = ()
     """Seconds since the query arrived and cost, of each better path."""
     iterations: int = 0
@@ -89,17 +89,17 @@ class Reply:
 
 @dataclass(frozen=True, eq=False)
 class Failure:
-    """What ended a search that found no end of its own; what it sent before counts."""
+    """Reason for a search that broke off; its earlier replies count."""
 
     reason: str
     """One line."""
 
 
 def without_answer() -> Reply:
-    """The reply of a worker from which none came."""
+    """Return the reply for a worker that sent none."""
     return Reply("timeout", np.empty((0, 3)), np.inf)
 
 
 def ended(best: Reply, reason: str) -> Reply:
-    """The best reply of a search that something else ended."""
+    """Return the best reply of a search that was ended for a reason."""
     return replace(best, steps=(*best.steps, reason), is_last=True)

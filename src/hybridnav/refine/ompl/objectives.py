@@ -1,4 +1,4 @@
-"""What a path costs: its length, or the length weighted by nearness to obstacles."""
+"""Costs of paths: length, or length weighted by nearness to obstacles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Objective:
-    """The objective of a query, for OMPL and for us.
+    """The objective of a query, for OMPL and for this package.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Objective:
     settings
         State space and planner.
     clearance
-        What weights the length; None for the length itself.
+        Weight of the length; None for the length itself.
     """
 
     def __init__(
@@ -36,12 +36,12 @@ class Objective:
     ) -> None:
         self._whole = whole
         self._clearance = clearance
-        # PRM waits for ever for objectives in Python: it finds the least of length and turns.
+        # PRM waits forever for objectives in Python: it minimises length and turns.
         turns = settings.space in {"se2", "differential"}
         self._is_own = turns and settings.planner not in ROADMAPS
 
     def of(self, space: StateSpace) -> Any:
-        """The objective in OMPL's terms, for one state space of the query."""
+        """Return the OMPL object of the objective for one state space of the query."""
         if self._clearance is not None:
             return _Line(space, self._clearance.cost)
         if self._is_own:
@@ -49,7 +49,7 @@ class Objective:
         return base.PathLengthOptimizationObjective(space.information)
 
     def cost(self, points: FloatArray) -> float:
-        """What a path of states costs."""
+        """Return the cost of a path of states."""
         if self._clearance is None:
             return self._whole.length(points)
         return self._clearance.cost_of(points)
@@ -60,7 +60,7 @@ def _length(x0: float, y0: float, x1: float, y1: float) -> float:
 
 
 class _Line(base.OptimizationObjective):  # type: ignore[misc]  # the bindings have no types
-    """What the base's straight lines cost, whatever the turns; distances bound it from below.
+    """Cost of the base's straight lines without turns; distances bound it from below.
 
     OMPL's own path length counts half a metre for each radian of an SE2 path.
     """

@@ -1,4 +1,4 @@
-"""One problem given to one planner of OMPL."""
+"""Solution of one problem by one planner of OMPL."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.spaces import StateSpace
 
 IMPROVING = frozenset({"RRTstar", "InformedRRTstar", "BITstar", "PRMstar"})
-"""Planners that go on after the first solution."""
+"""Planners that continue after the first solution."""
 NEAR = 1e-6
-"""A path that ends nearer to the goal than this, metres and radians, ends there."""
+"""Distance from the goal, in metres and radians, below which a path ends there."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """From one state to another."""
+    """A problem from one state to another."""
 
     space: StateSpace
-    """With its checks and bounds."""
+    """State space with its checks and bounds."""
     start: FloatArray
     """float64 (3,)."""
     goal: FloatArray
     objective: Any
-    """Of OMPL."""
+    """Objective of OMPL."""
     enough: float = math.inf
     """Cost at which a planner that improves paths may stop; infinity: at the first path."""
 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a planner found."""
+    """Result of a planner."""
 
     points: FloatArray
-    """float64 (n, 3), as `StateSpace.driven` has them; without rows where it found nothing."""
+    """float64 (n, 3), as returned by `StateSpace.driven`; without rows if no path was found."""
     is_exact: bool
     """Whether the path ends at the goal."""
 
@@ -59,20 +59,20 @@ def solve(
     on_path: Callable[[FloatArray], None] | None = None,
     search: Search | None = None,
 ) -> Found:
-    """Give a problem to the planner of the settings.
+    """Solve a problem by the planner of the settings.
 
     Parameters
     ----------
     problem
-        What is to be solved.
+        The problem.
     settings
         Planner and parameters.
     is_spent
-        Asked once an iteration; ends the search.
+        Called once an iteration; True ends the search.
     on_path
-        Called with each better path that a planner which goes on has found, float64 (n, 3).
+        Called with each better path of a planner that continues, float64 (n, 3).
     search
-        Where the motions of tree or roadmap are noted.
+        Receives the motions of tree or roadmap.
     """
     space = problem.space
     problem.objective.setCostThreshold(base.Cost(min(problem.enough, 1e300)))
@@ -94,19 +94,19 @@ def solve(
 
 
 def make(settings: OmplSettings, information: Any) -> Any:
-    """A planner with its parameters.
+    """Return a planner with its parameters.
 
     Raises
     ------
     OmplError
-        When OMPL does not take one of them together with the others.
+        When OMPL refuses one of them together with the others.
     """
     planner = getattr(geometric, settings.planner)(information)
     setters = PARAMETERS[settings.planner]
     if settings.space == "differential" and "range" in setters:
-        # A state part of the way has a heading part of the way, in which a long robot rarely fits.
+        # A state part of the way has an intermediate heading, in which a long robot rarely fits.
         planner.setRange(information.getStateSpace().getMaximumExtent())
-    # Just-in-time sampling is refused while BIT* takes k nearest neighbours.
+    # BIT* refuses just-in-time sampling while it uses k nearest neighbours.
     ordered = sorted(settings.parameters.items(), key=lambda item: item[0] != "use_k_nearest")
     for name, value in ordered:
         getattr(planner, setters[name])(float(value) if name in REAL else value)
@@ -121,9 +121,10 @@ def make(settings: OmplSettings, information: Any) -> Any:
 
 
 _FIRST_SLICE, _MOST_SLICE = 64, 1 << 20
-"""Iterations after which a planner that goes on is asked for its path; twice as many each time."""
+"""Iterations after which a planner that continues is asked for its path; twice as many each
+time."""
 _WORTH = 0.01
-"""A path that is shorter by this part is asked for at once."""
+"""Share by which a path must be shorter to be fetched at once."""
 
 
 def _improve(
@@ -133,7 +134,7 @@ def _improve(
     is_spent: Callable[[], bool],
     on_path: Callable[[FloatArray], None],
 ) -> None:
-    """Let a planner go on slice by slice, so that one which must be killed has told its paths."""
+    """Run a planner slice by slice, so that its paths are known even if it must be killed."""
     best, size, over = math.inf, _FIRST_SLICE, False
     best_cost = planner.bestCost
     while not over:
@@ -150,7 +151,7 @@ def _improve(
         if found.is_exact:
             best = best_cost().value()
             on_path(found.points)
-        # One that ends without being asked has nothing left to do.
+        # A planner that ends by itself has nothing left to do.
         over = over or best <= problem.enough or left == size
         size = min(2 * size, _MOST_SLICE)
 
@@ -170,8 +171,9 @@ def _grow(
     """Grow a roadmap and ask it for paths, in turn.
 
     `solve` of PRM looks for paths in a thread of its own, which asks the termination condition: a
-    condition in Python would wait there for ever, because the bindings never release the
-    interpreter. So roadmaps grow under conditions in Python and are asked under ones by the clock.
+    condition in Python would wait there forever, because the bindings never release the
+    interpreter. So roadmaps grow under conditions in Python and are queried under conditions by the
+    clock.
     """
     best, growth, over = math.inf, _FIRST_GROWTH, False
     while not over:

@@ -14,21 +14,23 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.spaces import StateSpace
 
 _AHEAD_M = 1.0
-"""How far before and behind a cell the path is looked at for its direction."""
+"""Distance before and behind a cell over which the direction of the path is taken."""
 _TURNS = tuple(math.radians(degrees) for degrees in (0, 15, -15, 30, -30, 60, -60, 90, -90))
 _ASIDE_CELLS = (0, 2, -2, 4, -4, 8, -8)
 
 
 class Poses:
-    """Valid states at cells of a path: the ends are the query's, the others head along the path,
-    turned or put aside where that is not valid.
+    """Valid states at cells of a path.
+
+    The ends are those of the query. The others head along the path, turned or moved aside if that
+    is not valid.
 
     Parameters
     ----------
     query
-        With the path of cells.
+        Query with the path of cells.
     corridor
-        Where states may be.
+        Corridor that states must lie in.
     whole
         State space of the corridor.
     """
@@ -43,13 +45,14 @@ class Poses:
         self._known[0] = query.start
 
     def at(self, index: int) -> FloatArray | None:
-        """The state at a cell of the path, float64 (3,); None where none is valid near it."""
+        """Return the state at a cell of the path, float64 (3,); None if no state near it is
+        valid."""
         if index not in self._known:
             self._known[index] = self._found(index)
         return self._known[index]
 
     def pair(self, first: int, last: int) -> tuple[FloatArray, FloatArray]:
-        """The states at two cells that have one."""
+        """Return the states at two cells that have valid ones."""
         one, other = self.at(first), self.at(last)
         assert one is not None  # noqa: S101 - the caller has looked
         assert other is not None  # noqa: S101

@@ -1,4 +1,4 @@
-"""States drawn from the cells of a corridor, for the planners that take a valid-state sampler."""
+"""States drawn from the cells of a corridor, for planners with a valid-state sampler."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _CellSampler(base.ValidStateSampler):  # type: ignore[misc]  # the binding
         self._random = util.RNG()
 
     def sample(self, state: Any) -> bool:
-        """Fill a state; whether it is valid."""
+        """Fill a state and return whether it is valid."""
         uniform = self._random.uniformReal
         row, col = self._cells[self._random.uniformInt(0, len(self._cells) - 1)].tolist()
         x, y = self._frame.points_of_grid((row + uniform(0, 1), col + uniform(0, 1))).tolist()

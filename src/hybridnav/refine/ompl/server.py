@@ -1,8 +1,8 @@
 """The worker process: `python -m hybridnav.refine.ompl.server DESCRIPTOR`.
 
 It reads the map once and then forks for each query. The fork may hang, crash or leak, as OMPL's
-bindings do now and then: it is killed when the time is over, and its memory goes with it. Random
-numbers start from the seed in each fork.
+bindings sometimes do: it is killed when the time is up, which frees its memory. Random numbers
+start from the seed in each fork.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query, Reply, Setup
 
 GRACE = 0.03
-"""Part of the budget after its end at which a fork is killed."""
+"""Share of the budget after its end at which a fork is killed."""
 _ALONE_S = 0.5
-"""Seconds after that at which a fork that nobody killed ends by itself."""
+"""Seconds after that at which a fork that was not killed ends by itself."""
 
 
 def serve(connection: Connection) -> None:
@@ -58,7 +58,7 @@ def serve(connection: Connection) -> None:
 
 
 def _warm_up(base: Base) -> None:
-    """Load modules and kernels, so that forks need not; OMPL's word on the parameters."""
+    """Load modules and kernels before the first fork, and let OMPL check the parameters."""
     import hybridnav.refine.ompl.answer  # noqa: F401, PLC0415
     from hybridnav.refine.ompl.planners import make  # noqa: PLC0415
     from hybridnav.refine.ompl.spaces import StateSpace  # noqa: PLC0415
@@ -89,7 +89,7 @@ def _warm_up(base: Base) -> None:
 def _answer(
     base: Base, query: Query, connection: Connection, tell: Callable[[Reply], None]
 ) -> Reply:
-    """Fork, hand on what it finds, kill it where it takes too long; the last reply."""
+    """Fork, pass on its replies, kill it if it takes too long, and return the last reply."""
     left_s = query.deadline_s - time.monotonic()
     kill_s = query.deadline_s + GRACE * max(left_s, 0.0)
     if query.tells_search:
@@ -97,7 +97,7 @@ def _answer(
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
-        # Ends it even where this process is gone and OMPL never comes back to Python.
+        # Ends the fork even if this process is gone and OMPL never returns to Python.
         signal.setitimer(signal.ITIMER_REAL, max(kill_s - time.monotonic(), 0.0) + _ALONE_S)
         connection.close()
         os.close(reading)
@@ -133,7 +133,7 @@ def _last_reply(
 
 
 def _replied(replies: Connection, connection: Connection, until_s: float) -> bool:
-    """Wait until the fork replies or dies, or the time is over; return whether it did.
+    """Wait until the fork replies or dies, or the time is up; return whether it did.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _replied(replies: Connection, connection: Connection, until_s: float) -> boo
     """
     waiting = select.poll()
     waiting.register(replies, select.POLLIN)
-    waiting.register(connection, 0)  # its end alone: the next query may wait there
+    waiting.register(connection, 0)  # only its end: the next query may wait there
     ready = [which for which, _ in waiting.poll(max(until_s - time.monotonic(), 0.0) * 1000)]
     if connection.fileno() in ready:
         raise EOFError
@@ -150,7 +150,7 @@ def _replied(replies: Connection, connection: Connection, until_s: float) -> boo
 
 
 def _run(base: Base, query: Query, replies: Connection) -> None:
-    """What a fork does; it never returns."""
+    """Run a query in a fork; never return."""
     try:
         from ompl import util  # noqa: PLC0415
 
@@ -167,10 +167,10 @@ def _run(base: Base, query: Query, replies: Connection) -> None:
 
 
 if __name__ == "__main__":
-    # Whoever ignores the ends of children hands that on, and no child could be waited for.
+    # A parent that ignores the ends of children passes that on, and no child could be waited for.
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     # The planner's process closes the connection when it is done, or is gone.
     with contextlib.suppress(EOFError, OSError):
         serve(Connection(int(sys.argv[1])))
-    # The bindings complain at an orderly exit about instances that are left.
+    # At an orderly exit the bindings complain about remaining instances.
     os._exit(0)

@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.spaces import StateSpace
 
 _PIECE = 16
-"""States of the pieces that are simplified each for itself: PathSimplifier tries pairs of states
-anywhere on the path, of which on a long one nearly all are out of sight of each other, and some of
-its steps take time with the square of the states."""
+"""States of the pieces that are simplified one by one: PathSimplifier tries pairs of states
+anywhere on the path, nearly all of which are out of sight of each other on a long path, and some of
+its steps take quadratic time."""
 _STEPS = 8
 """Steps for each state of a piece."""
 _SNAP = 1e-3
 _LEAST_GAIN = 5e-4
-"""Rounds that gain less than this part are fruitless."""
+"""Share that a round must gain to count as fruitful."""
 _FRUITLESS = 3
 _SPLINES, _LEAST_MOVE = 3, 1e-4
-"""Rounds of subdivision, each of which doubles the states, and the least part of the length by
+"""Rounds of subdivision, each of which doubles the states, and the least share of the length by
 which a state must move."""
 
 
@@ -38,7 +38,7 @@ def simplify(
     objective: Objective,
     on_better: Callable[[FloatArray, float], None],
 ) -> FloatArray:
-    """Shorten a path by rounds of PathSimplifier, until they gain nothing or the time is over.
+    """Shorten a path by rounds of PathSimplifier, until they gain nothing or the time is up.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def simplify(
     points
         float64 (n, 3), a valid path.
     budget
-        What is left.
+        The budget of the query.
     objective
-        What a path costs.
+        Cost of a path.
     on_better
         Called with each better path and its cost.
     """
@@ -66,7 +66,7 @@ def simplify(
 
 
 def _round(simplifier: Simplifier, points: FloatArray, budget: Budget, shift: int) -> FloatArray:
-    """Simplify piece by piece; the pieces begin at other states in every other round."""
+    """Simplify piece by piece; pieces begin at other states in every other round."""
     cuts = [0, *range(shift or _PIECE, len(points) - 1, _PIECE), len(points) - 1]
     done = [points[:1]]
     for first, last in itertools.pairwise(cuts):
@@ -79,17 +79,17 @@ def _round(simplifier: Simplifier, points: FloatArray, budget: Budget, shift: in
 
 
 class Simplifier:
-    """PathSimplifier, with its results checked.
+    """OMPL's PathSimplifier, with checked results.
 
-    OMPL takes parts of valid motions for valid, but a point between two others can be rounded to
-    the wrong side of a corner that their line grazes.
+    OMPL assumes that parts of valid motions are valid, but a point between two others can be
+    rounded to the wrong side of a corner that their line grazes.
 
     Parameters
     ----------
     space
-        With the checks.
+        State space with the checks.
     objective
-        What a path costs.
+        Cost of a path.
     """
 
     def __init__(self, space: StateSpace, objective: Objective) -> None:
@@ -99,7 +99,7 @@ class Simplifier:
         self._simplifier = geometric.PathSimplifier(space.information, None, self._own)
 
     def shorter(self, points: FloatArray) -> FloatArray:
-        """Drop states, and join points anywhere between them; the path itself if in vain."""
+        """Drop states, and join points between them; return the path itself if that is in vain."""
         path = self._path_of(points)
         steps = _STEPS * len(points)
         self._simplifier.reduceVertices(path, steps, steps, 1.0)
@@ -107,8 +107,10 @@ class Simplifier:
         return self._checked(path, points)
 
     def smoother(self, points: FloatArray) -> FloatArray:
-        """Round the bends of a path of straight motions by B-splines, where there is room; the
-        path itself if that is in vain. States at the corner of an obstacle stay where they are."""
+        """Round the bends of a path of straight motions by B-splines, where there is room.
+
+        Return the path itself if that is in vain. States at the corner of an obstacle stay.
+        """
         path = self._path_of(points)
         least_m = _LEAST_MOVE * self._space.length(points)
         self._simplifier.smoothBSpline(path, _SPLINES, least_m)

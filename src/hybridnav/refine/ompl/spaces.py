@@ -1,4 +1,4 @@
-"""State spaces, and how OMPL asks for the validity of states and motions in them."""
+"""State spaces, and OMPL's checks of states and motions in them."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ if TYPE_CHECKING:
 
 _STATES = {"r2": 2, "se2": 3, "differential": 3, "dubins": 3, "reeds-shepp": 3}
 FINE = 1e-4
-"""Part of the extent that OMPL takes as its validity resolution; its own motion check is never
-asked, so it only has to be small."""
+"""Share of the extent that OMPL takes as its validity resolution; its own motion check is never
+used, so the share only has to be small."""
 
 
 class StateSpace:
     """One state space inside some bounds, with the checks of a map.
 
-    Keeps what it hands to OMPL alive: the bindings hold no references to Python objects.
-    `state_valid` decides on a state of OMPL.
+    It keeps all objects that it passes to OMPL alive: the bindings hold no references to Python
+    objects. `state_valid` checks a state of OMPL.
 
     Parameters
     ----------
     settings
         Space and turning radius.
     check
-        Decides on states and motions.
+        Check of states and motions.
     low, high
         float64 (2,), bounds of x and y in metres, map frame.
     note
-        Called with x and y of each state that was found valid; None for nobody.
+        Called with x and y of each valid state; None for no call.
     """
 
     def __init__(
@@ -74,17 +74,17 @@ class StateSpace:
         self._kept: list[Any] = []
 
     def keep(self, thing: Any) -> None:
-        """Keep something alive as long as the space: OMPL holds no references to Python objects."""
+        """Keep an object alive as long as the space: OMPL holds no references to Python objects."""
         self._kept.append(thing)
 
     def state(self, values: FloatArray) -> Any:
-        """A state of OMPL from x, y and, where there is one, a heading."""
+        """Return a state of OMPL from x, y and, if there is one, a heading."""
         state = self.information.allocState()
         self.fill(state, values)
         return state
 
     def fill(self, state: Any, values: Sequence[float] | FloatArray) -> None:
-        """Give a state of OMPL its values."""
+        """Set the values of a state of OMPL."""
         if self.dimension == 2:  # noqa: PLR2004
             state[0], state[1] = float(values[0]), float(values[1])
         else:
@@ -94,7 +94,8 @@ class StateSpace:
             state.setYaw(-math.pi if yaw >= math.pi else yaw)  # pi itself is out of OMPL's bounds
 
     def points(self, states: Iterable[Any]) -> FloatArray:
-        """Values of states, float64 (n, 3); copied, for OMPL frees states with their path."""
+        """Return the values of states, float64 (n, 3), copied because OMPL frees states with their
+        path."""
         if self.dimension == 2:  # noqa: PLR2004
             rows = [(state[0], state[1], 0.0) for state in states]
         else:
@@ -102,15 +103,18 @@ class StateSpace:
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
     def driven(self, points: FloatArray) -> FloatArray:
-        """The states of a path; for `differential` those between which the robot only turns or
-        only drives, float64 (n, 3), none where it cannot. Parts of motions between such states are
-        valid where the motions are, as PathSimplifier takes for granted."""
+        """Return the states of a path, float64 (n, 3), without rows if it cannot be driven.
+
+        For `differential` the robot only turns or only drives between them. Parts of such motions
+        are valid if the motions are, as PathSimplifier assumes.
+        """
         if not self._spells or not len(points):
             return points
         return driven(self._check, points, reverses=self._reverses)
 
     def is_valid(self, points: FloatArray) -> bool:
-        """Whether every state and motion of a path is valid, joints between motions included."""
+        """Return whether every state and motion of a path is valid, joints between motions
+        included."""
         if not len(points):
             return False
         if self.dimension == 2:  # noqa: PLR2004
@@ -122,7 +126,7 @@ class StateSpace:
         return all(map(valid, states)) and all(runs(*pair) for pair in itertools.pairwise(states))
 
     def length(self, points: FloatArray) -> float:
-        """Metres along a path of states: what the robot's base covers."""
+        """Return the metres that the robot's base moves along a path of states."""
         if not self.is_straight:
             states = [self.state(point) for point in points]
             return math.fsum(self.space.distance(*pair) for pair in itertools.pairwise(states))
@@ -180,7 +184,7 @@ class _Straight(base.MotionValidator):  # type: ignore[misc]  # the bindings hav
 
 
 class _Turning(base.MotionValidator):  # type: ignore[misc]
-    """Motions between poses, whatever lies between them."""
+    """Motions between poses, by a given check."""
 
     def __init__(self, information: Any, valid: Callable[..., bool]) -> None:
         super().__init__(information)

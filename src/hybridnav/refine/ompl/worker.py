@@ -23,24 +23,24 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.messages import Query, Reply, Setup
 
 _GRACE = 0.08
-"""Part of a query's time after its end at which the worker is no longer waited for. It has killed
-its fork before that, unless the machine is busy."""
+"""Share of a query's time after its end at which the wait for the worker ends. By then it has
+killed its fork, unless the machine is busy."""
 _PATIENCE_S = 5.0
-"""How long the worker may owe an answer before it is given up."""
+"""Seconds that the worker may owe an answer before it is given up."""
 _LATE = 0.3
-"""Part of a query's time before its end at which its reply is late."""
+"""Share of a query's time before its end from which its reply is late."""
 _START_S = 120.0
 _END_S = 1.0
 _PACKAGES = Path(__file__).parents[3]
 
 
 def require_ompl() -> None:
-    """Refuse to go on without OMPL.
+    """Refuse to continue without OMPL.
 
     Raises
     ------
     OmplError
-        When it is not installed; says what to install.
+        When OMPL is not installed; the message states what to install.
     """
     if importlib.util.find_spec("ompl") is None:
         raise OmplError(
@@ -52,8 +52,8 @@ def require_ompl() -> None:
 class Worker:
     """A process that answers queries on one map, one after the other.
 
-    It is started anew where it died, owed an answer for long or was closed, in a process that was
-    forked from the one it belongs to, and for a copy.
+    It is restarted after it died, owed an answer for long or was closed, in a fork of the process
+    that it belongs to, and for a copy.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Worker:
             raise OmplError(self._problem)
 
     def __getstate__(self) -> Setup:
-        """What a process is started with: a copy has none yet."""
+        """Return the setup, without the process: a copy starts its own."""
         return self._setup
 
     def __setstate__(self, setup: Setup) -> None:
@@ -87,10 +87,10 @@ class Worker:
         self._problem = ""
 
     def ensure(self) -> None:
-        """Have a process, before the time of a query runs.
+        """Start a process if needed, before the time of a query runs.
 
-        Where it was closed, or belongs to the process that this one was forked from, a new one is
-        waited for. Where it died it is started beside the next query, which has its own time.
+        If the process was closed, or belongs to the process that this one was forked from, wait for
+        a new one. If it died, a new one starts beside the next query, which has its own time.
         """
         running = self._running
         if running is not None and running.owner != os.getpid():
@@ -109,7 +109,7 @@ class Worker:
                 self._start_and_wait()
 
     def send(self, query: Query) -> None:
-        """Give the process a query; `reply` waits for what comes of it."""
+        """Send the process a query; `reply` waits for the result."""
         left_s = query.deadline_s - time.monotonic()
         self._until = query.deadline_s + _GRACE * max(left_s, 0.0)
         if query.tells_search:
@@ -125,25 +125,28 @@ class Worker:
             try:
                 self._running.connection.send((self._number, query))
             except OSError:
-                pass  # it died: `reply` says so
+                pass  # it died: `reply` reports that
             except BaseException:
-                # Half a message was written, as when the user interrupts: the rest never comes.
+                # Half a message was written, as when the user interrupts: the rest never follows.
                 self.close()
                 raise
 
     def is_late(self) -> bool:
-        """Wait for the reply until most of the time is over; whether it still has not come."""
+        """Wait for the reply until most of the time is up; return whether it is still missing."""
         return not self._has_ended(self._late)
 
     def reply(self) -> Reply:
-        """The last reply to the query that was sent, or at most a tenth of its time too late the
-        best so far, which says that no other came."""
+        """Return the last reply to the query that was sent, or the best so far.
+
+        The best so far is returned at most a tenth of the query's time too late, and reports that
+        no other reply arrived.
+        """
         if self._has_ended(self._until):
             return self._best
         return ended(self._best, self._problem or "the worker did not answer in time")
 
     def close(self) -> None:
-        """End the process and what it forked."""
+        """End the process and its forks."""
         if self._starting is not None:
             self._starting.give_up()
         if self._running is not None:
@@ -152,7 +155,7 @@ class Worker:
         self._answered, self._problem = self._number, ""
 
     def _has_ended(self, until_s: float) -> bool:
-        """Wait for the last reply to the last query; what comes of earlier ones is dropped."""
+        """Wait for the last reply to the last query; replies to earlier ones are dropped."""
         running = self._running
         if running is None:
             return self._answered == self._number
@@ -169,7 +172,7 @@ class Worker:
             running.end()
             return False
         except BaseException:
-            # Half a message was read, as when the user interrupts: the rest means nothing.
+            # Half a message was read, as when the user interrupts: the rest is meaningless.
             self.close()
             raise
         return True
@@ -199,7 +202,7 @@ _NO_START = (
 
 
 class _Start(threading.Thread):
-    """A start of the process, which takes seconds; `problem` says afterwards why it failed."""
+    """A start of the process, which takes seconds; `problem` is the reason for a failure."""
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(daemon=True)
@@ -224,14 +227,14 @@ class _Start(threading.Thread):
             _end(self.process, self.connection, os.getpid())
 
     def give_up(self) -> None:
-        """End what was started, now or when it is there."""
+        """End the started process, now or when it is ready."""
         self._is_given_up = True
         if not self.is_alive() and self.process is not None:
             _end(self.process, self.connection, os.getpid())
 
 
 class _Running:
-    """A process that answers; it ends with the worker, and with the process that started it."""
+    """A running process; it ends with the worker, and with the process that started it."""
 
     def __init__(
         self, worker: Worker, process: subprocess.Popen[bytes], connection: Connection
@@ -242,12 +245,12 @@ class _Running:
         self.end = weakref.finalize(worker, _end, process, connection, self.owner)
 
     def has_ended(self) -> bool:
-        """Whether it was ended, or died."""
+        """Return whether it was ended, or died."""
         return not self.end.alive or self.process.poll() is not None
 
 
 def _launch(descriptor: int) -> subprocess.Popen[bytes]:
-    # By its own command: a spawned process of multiprocessing would run the caller's main module.
+    # With its own command: a spawned process of multiprocessing would run the caller's main module.
     # Without the working directory, whose files may have the names of modules.
     quiet = ("-W", f"ignore:{CacheWarning.opening}")  # this process has warned
     paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
@@ -256,7 +259,7 @@ def _launch(descriptor: int) -> subprocess.Popen[bytes]:
         pass_fds=[descriptor],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
-        start_new_session=True,  # an interrupt from the keyboard is the planner's alone
+        start_new_session=True,  # only the planner receives an interrupt from the keyboard
         env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
     )
 
@@ -265,8 +268,8 @@ def _end(process: subprocess.Popen[bytes], connection: Connection, owner: int) -
     with contextlib.suppress(OSError):
         connection.close()
     if os.getpid() != owner:
-        return  # forked, as by multiprocessing: the process is the parent's
+        return  # forked, as by multiprocessing: the process belongs to the parent
     with contextlib.suppress(OSError):
-        os.killpg(process.pid, signal.SIGKILL)  # its session, so what it forked too
+        os.killpg(process.pid, signal.SIGKILL)  # its session, so its forks too
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(_END_S)
