@@ -6,8 +6,8 @@ import hashlib
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
+from hybridnav import portals
 from hybridnav._progress import no_progress
-from hybridnav.planner import cell_plans
 from hybridnav.portals import BuiltPortals, PortalOptions, prepare_portals
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def remember_portals(replace: Callable[[object, str, object], None]) -> None:
 
     `replace` is `setattr`, or that of a patch.
     """
-    replace(cell_plans, "prepare_portals", shared_portals)
+    replace(portals, "prepare_portals", shared_portals)
 
 
 def shared_portals(topology: TopologicalMap, **choices: Any) -> BuiltPortals:

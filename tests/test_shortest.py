@@ -213,13 +213,13 @@ def test_a_query_whose_time_is_up_has_a_path_and_a_bound() -> None:
 
 @pytest.mark.parametrize(
     ("preset", "built"),
-    [("shortest", "mesh_plans.build_mesh"), ("portals", "cell_plans.PortalSearch")],
+    [("shortest", "planner.mesh_plans.build_mesh"), ("portals", "portals.PortalSearch")],
 )
 def test_a_planner_builds_at_its_first_query_and_once_for_all_threads(
     preset: str, built: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = importlib.import_module(f"hybridnav.planner.{built.partition('.')[0]}")
-    name, calls = built.partition(".")[2], []
+    home, _, name = built.rpartition(".")
+    module, calls = importlib.import_module(f"hybridnav.{home}"), []
     build = getattr(module, name)
 
     def slowly(*args: Any, **kwargs: Any) -> Any:
