@@ -25,6 +25,9 @@ def _free_cell_at(free, row, col):
     """
     above, right = math.floor(row), math.floor(col)
     below, left = math.ceil(row) - 1, math.ceil(col) - 1
+    # Most positions lie inside one cell; a look at it would fetch another row of the map.
+    if above == below and right == left:
+        return above, right
     if _is_free(free, above, right):
         return above, right
     if _is_free(free, above, left):
