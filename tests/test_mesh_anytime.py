@@ -51,7 +51,7 @@ def interrupted(
 ) -> Iterator[MeshPath]:
     """The answers of a search that is stopped after one step, after two, and so on, until it is
     done before it is stopped."""
-    monkeypatch.setattr("hybridnav.mesh.search._SLICE", 1)
+    monkeypatch.setattr("hybridnav.mesh.search.SLICE", 1)
     for steps in itertools.count(1):
         clock = itertools.count()
         monkeypatch.setattr("hybridnav.mesh.search.perf_counter", lambda now=clock: next(now))

@@ -137,7 +137,7 @@ def steps(
     round_it: DetourSearch, query: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[MeshPath]:
     """The answers of a search that is stopped after one step, after two, and so on."""
-    monkeypatch.setattr(detours, "_SLICE", 1)
+    monkeypatch.setattr(detours, "SLICE", 1)
     for count in itertools.count(1):
         clock = itertools.count()
         monkeypatch.setattr(detours, "perf_counter", lambda now=clock: next(now))

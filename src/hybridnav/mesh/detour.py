@@ -13,13 +13,13 @@ from hybridnav.mesh._detour_search_kernels import UNSURE, query_round
 from hybridnav.mesh._polyanya_kernels import DONE, EXPANDED, NO_ROOM
 from hybridnav.mesh.cut import cut_mesh
 from hybridnav.mesh.search import (
-    _SLICE,
     MOST_MADE,
     NO_LIMIT,
+    SLICE,
     SURE,
     MeshPath,
     MeshSearch,
-    _inside,
+    round_into,
 )
 
 if TYPE_CHECKING:
@@ -123,8 +123,8 @@ class DetourSearch:
             self._detour = _detour_of(search, graph, self._closure)
         if len(self._detour[1][0]) > MOST_MADE:
             return None
-        limit = NO_LIMIT if math.isinf(until) else _SLICE
-        ends = tuple(_inside(*end) for end in zip(cells, positions, strict=True))
+        limit = NO_LIMIT if math.isinf(until) else SLICE
+        ends = tuple(round_into(*end) for end in zip(cells, positions, strict=True))
         points = ends[0][1], ends[0][0], ends[1][1], ends[1][0]
         mesh, edges = search.mesh, graph.arrays
         where = mesh.component, mesh.polygon_at, (*cells[0], *cells[1])
@@ -139,7 +139,7 @@ class DetourSearch:
                 if status == NO_ROOM:
                     work.make_room()
                 else:
-                    limit = -1 if perf_counter() >= until else limit + _SLICE
+                    limit = -1 if perf_counter() >= until else limit + SLICE
             length, bound = work.bounds.tolist()
             expanded = int(work.counts[EXPANDED])
         if status == UNSURE:

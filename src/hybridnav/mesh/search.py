@@ -34,7 +34,7 @@ _ROOM = 4096
 """Initial room for nodes of a query."""
 _FRACTION = float(1 << 24)
 """Positions are rounded to this part of a cell, so that every side test is exact."""
-_SLICE = 256
+SLICE = 256
 """Nodes that a query with a budget expands between looks at the clock, some 0.2 ms."""
 NO_LIMIT = 1 << 62
 """More nodes than any query expands."""
@@ -276,7 +276,7 @@ class MeshSearch:
         until = math.inf if budget_s is None else perf_counter() + budget_s
         if budget_s is None and self.expanded >= max(_WORTH, len(self.mesh.corners)):
             self.prepare()
-        ends = tuple(_inside(*end) for end in zip(cells, positions, strict=True))
+        ends = tuple(round_into(*end) for end in zip(cells, positions, strict=True))
         upper = math.inf
         if known is not None:
             known = np.concatenate([ends[:1], known[1:-1], ends[1:]])
@@ -302,7 +302,7 @@ class MeshSearch:
     ) -> FloatArray:
         """Run a kernel in slices until it is done, or out of time."""
         upper, epsilon, until = effort
-        limit = NO_LIMIT if math.isinf(until) else _SLICE
+        limit = NO_LIMIT if math.isinf(until) else SLICE
         at = self.mesh.polygon_at
         while True:
             left = upper, 1.0 + epsilon, limit
@@ -321,7 +321,7 @@ class MeshSearch:
             elif perf_counter() >= until:
                 limit = -1
             else:
-                limit += _SLICE
+                limit += SLICE
 
 
 def _doubled(arrays: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -329,7 +329,7 @@ def _doubled(arrays: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(np.concatenate([array, array]) for array in arrays)
 
 
-def _inside(cell: Cell, position: Position) -> Position:
+def round_into(cell: Cell, position: Position) -> Position:
     """Round a position, and move it into the closed square of its cell."""
     row, col = (
         round(position[0] * _FRACTION) / _FRACTION,
@@ -342,5 +342,5 @@ def _inside(cell: Cell, position: Position) -> Position:
 def rounded_into(cells: LongArray, positions: FloatArray) -> FloatArray:
     """Round positions, and move each into the closed square of its cell; float64 (n, 2)."""
     rounded = np.round(positions * _FRACTION) / _FRACTION
-    inside: FloatArray = np.clip(rounded, cells, cells + 1.0)
-    return inside
+    clipped: FloatArray = np.clip(rounded, cells, cells + 1.0)
+    return clipped

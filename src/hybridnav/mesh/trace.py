@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav.mesh._interval_kernels import G
 from hybridnav.mesh._polyanya_kernels import N
-from hybridnav.mesh.search import Cell, MeshPath, MeshSearch, Position, _inside
+from hybridnav.mesh.search import Cell, MeshPath, MeshSearch, Position, round_into
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray
@@ -71,7 +71,7 @@ def trace_search(
     SearchTrace
         Without intervals if start and goal lie in one polygon or are not connected.
     """
-    ends = np.array([_inside(*end) for end in zip(cells, positions, strict=True)])
+    ends = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
     path, whole, real = _nodes(mesh, cells, positions)
     slots, roots, parents, marks = whole.T
     # Nodes for the goal itself have no side.

@@ -226,23 +226,23 @@ def _check_index(filed: FiledPart, index: LongArray) -> None:
 
 
 def _portal_parts(built: BuiltPortals, key: dict[str, Any]) -> list[Part]:
-    portals, tables = built.portals, built.tables
+    layout, tables = built.portals, built.tables
     sizes = {
-        "fields": portals.n_fields,
-        "positions": len(portals.position),
-        "entered": int(portals.field_start[-1]),
-        "gates": portals.n_gates,
-        "moves": len(portals.first_move),
-        "costs": len(portals.clique),
-        "exits": len(portals.exit_gate),
-        "sides": portals.n_sides,
-        "members": len(portals.side_gates),
-        "side_costs": len(portals.side_cost),
-        "sources": len(portals.source_gate),
-        "portals": len(portals.portal_sides),
+        "fields": layout.n_fields,
+        "positions": len(layout.position),
+        "entered": int(layout.field_start[-1]),
+        "gates": layout.n_gates,
+        "moves": len(layout.first_move),
+        "costs": len(layout.clique),
+        "exits": len(layout.exit_gate),
+        "sides": layout.n_sides,
+        "members": len(layout.side_gates),
+        "side_costs": len(layout.side_cost),
+        "sources": len(layout.source_gate),
+        "portals": len(layout.portal_sides),
     }
     values = key | {"has_all_gates": built.has_all_gates, "shift": int(tables.shift)}
-    arrays = {"field_of": built.field_of, **portals._asdict()}
+    arrays = {"field_of": built.field_of, **layout._asdict()}
     of_tables = {name: sizes[name] for name in TABLES.most}
     return [PORTALS.part(arrays, sizes, values), TABLES.part(tables, of_tables, key)]
 
