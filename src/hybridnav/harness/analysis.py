@@ -46,7 +46,7 @@ class Outcome:
     """The method's name, with its hash where a run holds it with several settings."""
     preparation: Record
     records: list[Record]
-    """Of the pairs, all kinds."""
+    """One record for each pair, of every kind."""
     optimum: dict[QueryKey, Record] = field(repr=False)
     """The reference's records on this map."""
     yardstick: Yardstick = "both"
@@ -168,17 +168,17 @@ class Outcome:
 
     @cached_property
     def first_seconds(self) -> FloatArray:
-        """Of these, seconds until there was a first path, of planners that improve theirs."""
+        """Seconds until the first path of these queries, for planners that improve their path."""
         return np.where(np.isfinite(self.lengths_m), self._stage("first path"), math.nan)
 
     @cached_property
     def reference_seconds(self) -> FloatArray:
-        """Those of the reference on the same pairs."""
+        """Wall-clock seconds of the reference on the same pairs."""
         return np.array([record["seconds"] for record in self.references], dtype=float)
 
     @cached_property
     def refine_seconds(self) -> FloatArray:
-        """Of these, seconds in the metric layer."""
+        """Seconds of these queries in the metric layer."""
         return self._stage("refine")
 
     def _stage(self, name: str) -> FloatArray:

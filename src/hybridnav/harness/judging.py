@@ -129,7 +129,10 @@ class Judge:
 
 
 def _false_claims(line: Line, length_m: float) -> list[str]:
-    """What a method says of a path and is not so; asked so that what is no number fails too."""
+    """Return the false statements of a method about a path.
+
+    The comparisons are negated so that they fail for NaN too.
+    """
     wrong = []
     if not abs(line.length_m - length_m) <= SLACK * length_m:
         wrong.append(f"the length is {length_m:.6f} m, not {line.length_m:.6f} m as reported")

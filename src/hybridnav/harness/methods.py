@@ -67,7 +67,7 @@ class MethodSpec:
 
     @property
     def metric(self) -> Metric:
-        """Of its paths. A baseline whose answers have a `line` is not known as any-angle here."""
+        """Metric of its paths; octile for baselines, even for those whose answers have a `line`."""
         planner = (self.preset or {}).get("planner", {})
         settings = ("refine", "ompl"), ("smooth", LINE_OF_SIGHT), ("coarse", "mesh")
         is_line = any(planner.get(key) == value for key, value in settings)

@@ -41,7 +41,7 @@ class Pair:
     stated_optimum_cells: float | None = None
     """Optimum that a scenario file states, in cells."""
     seed: int | None = None
-    """Of the sampler that drew the pair."""
+    """Seed of the sampler that drew the pair."""
 
     @property
     def key(self) -> str:

@@ -60,7 +60,7 @@ class RunSettings:
     scenarios: str | None = None
     """Instead of sampled pairs: a MovingAI scenario file; there must be one map."""
     seed: int = 0
-    """Of the sampler."""
+    """Seed of the sampler."""
     robot_radius_m: float | None = None
     """None: 0.25 m for ROS maps, 0 for MovingAI's."""
     merge_distance_m: float | None = None

@@ -151,7 +151,7 @@ def _plain(settings: Record) -> Record:
 
 
 def _reason(error: Exception) -> str:
-    """One line that says what went wrong."""
+    """Return one line that describes an error."""
     known = isinstance(error, HybridNavError)
     text = str(error) if known else f"{type(error).__name__}: {error}"
     return " ".join(text.split())[:200]

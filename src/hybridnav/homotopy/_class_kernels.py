@@ -65,8 +65,8 @@ class States(NamedTuple):
     word: np.ndarray
     cost: np.ndarray
     before: np.ndarray
-    # Of states that have been taken: steps from the start, an earlier state to jump back to, and
-    # the first state of those with the same word at the end of the path.
+    # For states taken from the heap: steps from the start, an earlier state to jump back to, and
+    # the first of the states with the same word at the end of the path.
     depth: np.ndarray
     jump: np.ndarray
     run: np.ndarray
@@ -263,7 +263,7 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, state
         heap[0] = _STATE_MASK
         n_states = n_heap = 1
     while n_heap > 0:
-        # Of equal costs the newest state comes first.
+        # The newest state comes first among those of equal cost.
         state = _STATE_MASK - (_pop(heap, n_heap) & _STATE_MASK)
         n_heap -= 1
         if states.status[state] != _OPEN:

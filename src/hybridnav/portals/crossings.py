@@ -93,7 +93,7 @@ def _moves_between(
 
 
 def _middles(group: LongArray, position: LongArray, diagonal: BoolArray) -> LongArray:
-    """Of the moves of each group the one nearest their middle; a diagonal counts as a cell off."""
+    """Return the move nearest the middle of each group; a diagonal counts as a cell away."""
     if not len(group):
         return np.empty(0, dtype=np.int64)
     count = np.bincount(group)

@@ -160,7 +160,7 @@ def wall_line_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -
     free = grid.measured == CellClass.FREE
     occupied = grid.measured == CellClass.OCCUPIED
     tilt_rad = main_direction(occupied)
-    # Of a solid mass only the rim is a wall: else a space in it would be a gap all over.
+    # Only the rim of a solid mass is a wall: otherwise a space in it would be a gap throughout.
     rim = ndimage.distance_transform_edt(~free) * grid.resolution_m <= _RIM_M
     occupied = occupied & rim
     if abs(tilt_rad) < _LEAST_TILT_RAD:
