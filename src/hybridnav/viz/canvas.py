@@ -28,6 +28,26 @@ MAX_HEIGHT = 1.1
 PAD_IN = 0.04
 
 
+def new_figure(width_in: float, height: float) -> Figure:
+    """Return a new figure.
+
+    Parameters
+    ----------
+    width_in
+        Width in inches.
+    height
+        Height in widths.
+
+    Raises
+    ------
+    InvalidValueError
+        When the width is not a positive number.
+    """
+    if not (math.isfinite(width_in) and width_in > 0):
+        raise InvalidValueError(f"width must be a positive number of inches, got {width_in}")
+    return Figure(figsize=(width_in, height * width_in))
+
+
 @dataclass(frozen=True)
 class View:
     """The rectangle of the map frame that a picture shows, in metres."""
@@ -87,12 +107,7 @@ class Canvas:
         """Return the given axes, or new ones in a new figure of some width, set to a view."""
         is_new = ax is None
         if ax is None:
-            if not (math.isfinite(width_in) and width_in > 0):
-                raise InvalidValueError(
-                    f"width must be a positive number of inches, got {width_in}"
-                )
-            figure = Figure(figsize=(width_in, MAX_HEIGHT * width_in))
-            ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+            ax = new_figure(width_in, MAX_HEIGHT).add_axes((0.0, 0.0, 1.0, 1.0))
         _show(ax, view)
         room = _room_in(ax)
         sizes = Sizes.fitting(float(room[0]), float((72 * room / view.size).min()))

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.metrics.statistics import TOLERANCE
 from hybridnav.viz import style
+from hybridnav.viz.canvas import new_figure
 from hybridnav.viz.style import Sizes
 
 if TYPE_CHECKING:
@@ -254,9 +254,7 @@ def _opened(
     if not methods:
         raise InvalidValueError("a chart needs one method at least, got none")
     if ax is None:
-        if not (math.isfinite(width_in) and width_in > 0):
-            raise InvalidValueError(f"width must be a positive number of inches, got {width_in}")
-        ax = Figure(figsize=(width_in, _HEIGHT * width_in)).add_axes(_BOX)
+        ax = new_figure(width_in, _HEIGHT).add_axes(_BOX)
     sizes = Sizes.fitting(float(ax.figure.figure.get_size_inches()[0]), 1.0)
     if title:
         ax.set_title(title, fontsize=sizes.font, color=style.INK, parse_math=False)
