@@ -18,7 +18,7 @@ from hybridnav.config import load_preset
 from hybridnav.grid.worlds import figure1_world, office_world
 from hybridnav.harness.analysis import loss_of
 from hybridnav.harness.methods import _nbytes
-from hybridnav.harness.pairs import sample_pairs, scenario_pairs
+from hybridnav.harness.pairs import evenly_spread, sample_pairs, scenario_pairs
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.io.movingai import read_scenarios
 from hybridnav.metrics import judge_line, judge_path
@@ -150,8 +150,7 @@ def _pairs(path: Path, grid: hn.OccupancyGrid, asked: Mapping[str, int]) -> list
     if not asked["scenarios"]:
         return sample_pairs(grid, asked["asked"], seed=asked["seed"])
     stated = scenario_pairs(grid, read_scenarios(path.with_name(path.name + ".scen")))
-    count = min(asked["asked"], len(stated))
-    return [stated[at * len(stated) // count] for at in range(count)]
+    return evenly_spread(stated, asked["asked"])
 
 
 def _ends(grid: hn.OccupancyGrid, pair: Pair) -> FloatArray:

@@ -204,6 +204,12 @@ def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[P
     return list(dict.fromkeys(pairs))
 
 
+def evenly_spread(pairs: list[Pair], count: int) -> list[Pair]:
+    """Return so many pairs, spread evenly over a list; all where it has no more."""
+    count = min(count, len(pairs))
+    return [pairs[at * len(pairs) // count] for at in range(count)]
+
+
 def _pair(start: LongArray, goal: LongArray, kind: Kind) -> Pair:
     (row, col), (goal_row, goal_col) = start.tolist(), goal.tolist()
     return Pair((row, col), (goal_row, goal_col), kind)

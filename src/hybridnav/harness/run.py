@@ -17,6 +17,7 @@ from hybridnav.harness.methods import REFERENCE, MethodSpec, baseline_spec, pres
 from hybridnav.harness.pairs import (
     SAMPLER_VERSION,
     Pair,
+    evenly_spread,
     lattice_pairs,
     sample_pairs,
     scenario_pairs,
@@ -195,9 +196,8 @@ def _pairs_of(settings: RunSettings, grid: OccupancyGrid) -> list[Pair]:
             raise InvalidValueError(
                 f"a scenario file goes with one map, got {len(settings.maps)} maps"
             )
-        pairs = list(dict.fromkeys(scenario_pairs(grid, read_scenarios(settings.scenarios))))
-        count = min(settings.pairs or len(pairs), len(pairs))
-        return [pairs[at * len(pairs) // count] for at in range(count)]
+        pairs = scenario_pairs(grid, read_scenarios(settings.scenarios))
+        return evenly_spread(pairs, settings.pairs or len(pairs))
     if settings.lattice_step_m is not None:
         return lattice_pairs(grid, settings.lattice_step_m)
     return sample_pairs(
