@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env
-NOJIT_TESTS := tests/test_blocks.py tests/test_pyramid_invariants.py tests/test_search.py
+NOJIT_TESTS := tests/pyramid/test_blocks.py tests/pyramid/test_invariants.py tests/search/test_search.py
 
 .PHONY: route test test-full lint docs site unit nojit full setup maps lock clean
 

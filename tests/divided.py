@@ -16,8 +16,8 @@ from hybridnav.grid import CellClass
 from hybridnav.portals import build_portals
 from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from tests.oracle.grid import move_graph
+from tests.search.test_search import block_labels
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid, scenes
-from tests.test_search import block_labels
 
 if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid

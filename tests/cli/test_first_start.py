@@ -1,0 +1,174 @@
+"""The first start: who compiles what, what the user is told, and what an interrupt leaves."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numba.core.registry import CPUDispatcher
+
+import hybridnav as hn
+from hybridnav.cli import compiling
+from hybridnav.cli.compiling import told_of_compiling
+from hybridnav.cli.warm import small_grid
+from hybridnav.config import load_preset
+from hybridnav.pyramid import _base_kernels
+
+OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
+PLAN = ("plan", str(OFFICE), "--start", "1.0,13.2", "--goal", "40.6,19.4")
+KERNELS = logging.getLogger("hybridnav.kernels")
+
+pytestmark = pytest.mark.skipif(
+    os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="nothing is compiled"
+)
+
+# Whoever runs the tests in the background has Ctrl-C ignored, and that is handed on.
+_COMMAND = (
+    "import signal, sys\n"
+    "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    "from hybridnav.cli import main\n"
+    "main()\n"
+)
+
+
+def started(cache: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", _COMMAND, *PLAN],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
+    )
+
+
+def compilers(cache: Path) -> list[int]:
+    """Processes that compile into a folder."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            command = (process / "cmdline").read_bytes()
+            environment = (process / "environ").read_bytes()
+        except OSError:
+            continue
+        if b"hybridnav.cli.warm" in command and os.fsencode(cache) in environment:
+            found.append(int(process.name))
+    return found
+
+
+def wait_until(is_so, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not is_so() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert is_so()
+
+
+def test_the_user_is_told_once_and_only_of_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+    with told_of_compiling():
+        KERNELS.info("compiled", extra={"seconds": 1.5, "is_kept": True})
+        assert capsys.readouterr().err == ""
+        for _ in range(3):
+            KERNELS.info("compiled", extra={"seconds": 1.5, "is_kept": True})
+    told = capsys.readouterr().err
+    assert told.startswith("hybridnav: compiling kernels, ")
+    assert told.count("\n") == 1
+    KERNELS.warning("compiled", extra={"seconds": 9.0, "is_kept": True})
+    assert capsys.readouterr().err == ""
+
+
+def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with told_of_compiling():
+        KERNELS.info("compiled", extra={"seconds": 9.0, "is_kept": False})
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("preset", "processors", "start", "jobs"),
+    [
+        ("shortest", 2, "cold", ["mesh"]),
+        ("ompl-rrtconnect", 2, "cold", ["mesh"]),
+        ("octile", 2, "cold", ["jumps"]),
+        ("portals", 2, "cold", []),
+        ("shortest", 1, "cold", []),
+        ("shortest", 2, "warm", []),
+    ],
+)
+def test_a_second_process_compiles_what_a_first_plan_searches_with(
+    monkeypatch: pytest.MonkeyPatch, preset: str, processors: int, start: str, jobs: list[str]
+) -> None:
+    begun: list[str] = []
+    monkeypatch.setattr(compiling, "processors", lambda: processors)
+    monkeypatch.setattr(compiling, "_is_kept", lambda _: start == "warm")
+    monkeypatch.setattr(compiling, "start", begun.append)
+    with compiling.compiling_beside(load_preset(preset)) as compiled:
+        compiled()
+    assert begun == jobs
+
+
+def test_a_pyramid_with_rooms_is_built_by_the_same_kernels() -> None:
+    grid = small_grid()
+    label_of = np.where(np.arange(64) < 32, 0, 1) + np.zeros((64, 1), np.int32)
+    hn.DualGraphPyramid.build(grid)
+    kernels = [
+        kernel for kernel in vars(_base_kernels).values() if isinstance(kernel, CPUDispatcher)
+    ]
+    before = [kernel.signatures for kernel in kernels]
+    hn.DualGraphPyramid.build(grid, rooms=hn.RoomLabels(("west", "east"), label_of))
+    assert [kernel.signatures for kernel in kernels] == before
+
+
+@pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")
+@pytest.mark.skipif(compiling.processors() == 1, reason="one processor compiles alone")
+def test_ctrl_c_ends_the_process_that_compiles(tmp_path: Path) -> None:
+    with started(tmp_path) as process:
+        wait_until(lambda: compilers(tmp_path))
+        process.send_signal(signal.SIGINT)
+        answer, told = process.communicate()
+    assert (process.returncode, answer) == (130, "")
+    assert told.count("\n") <= 1
+    wait_until(lambda: not compilers(tmp_path), 10.0)
+
+
+@pytest.mark.full  # compiles all kernels of a first plan
+def test_a_first_plan_leaves_nothing_to_compile(tmp_path: Path) -> None:
+    for is_first in (True, False):
+        kept = len(list(tmp_path.rglob("*.nbi")))
+        with started(tmp_path) as process:
+            answer, told = process.communicate()
+        assert process.returncode == 0
+        assert "42.51 m (any-angle)" in answer
+        assert told.count("compiling kernels") == is_first
+        assert told.count("\n") == is_first
+        assert (len(list(tmp_path.rglob("*.nbi"))) > kept) == is_first
+    assert not compilers(tmp_path)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("preset", ["shortest", "grid-astar"])
+def test_a_plan_on_the_small_map_compiles_what_one_in_a_building_needs(
+    tmp_path: Path, preset: str
+) -> None:
+    code = (
+        "import logging\n"
+        "from hybridnav.cli.warm import compile_plan\n"
+        "from hybridnav.cli.app import run\n"
+        f"compile_plan({preset!r})\n"
+        "logging.basicConfig(level=logging.INFO)\n"
+        f"assert run({[*PLAN, '--preset', preset]!r}) == 0\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        check=True,
+        encoding="utf-8",
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
+    )
+    assert "compiled" not in done.stderr

@@ -1,0 +1,173 @@
+"""Methods with a planted fault are caught by a run of the harness; sound ones are not."""
+
+import csv
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from hybridnav.harness.analysis import load_study
+from hybridnav.harness.output import write_outputs
+from hybridnav.harness.records import read_records
+from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.task import run_task
+from tests.harness import faulty_methods as faulty
+
+ROOT = Path(__file__).parents[2]
+ROOMS = [
+    "####################",
+    "#........#.........#",
+    "#........#.........#",
+    "#..................#",
+    "#........#.........#",
+    "#........#.........#",
+    "######.#######.#####",
+    "#........#.........#",
+    "#........#......####",
+    "#........#......#..#",
+    "####################",
+]
+"""Four rooms in a row of doors, and a closet without one."""
+
+FAULTS = {
+    faulty.ThroughWall: "is not free",
+    faulty.CutsCorners: "cuts a corner",
+    faulty.TooLong: "breaks its bound, 1.000000 x optimum",
+    faulty.Jumps: "is below the optimum",
+    faulty.StopsShort: "the last cell is",
+    faulty.LeavesTheMap: "is outside the map",
+    faulty.WalksThroughAll: "solvability: solved, the whole grid says no path",
+    faulty.NoCells: "no answer to judge",
+    faulty.MissingDoor: "solvability: no path, the whole grid says solved",
+    faulty.SkipsRegions: "no metric path inside regions",
+    faulty.Backwards: "the plan does not start and end in the regions of start and goal",
+    faulty.UnknownRegions: "the plan names region 1000000, which there is not",
+    faulty.TornRegion: "is not connected",
+    faulty.HomelessCells: "free cells are in no region",
+}
+SOUND = (faulty.Sound, faulty.SoundPlaces, faulty.HonestlyLong)
+FAILING = (faulty.Raises, faulty.CannotBeMade, faulty.FailsAtOnce)
+N_PAIRS = 40
+
+
+def name_of(method):
+    return f"{method.__module__}:{method.__name__}"
+
+
+def write_map(folder, lines, name="rooms"):
+    body = "".join(f"{line}\n" for line in lines).replace("#", "@")
+    path = folder / f"{name}.map"
+    path.write_text(f"type octile\nheight {len(lines)}\nwidth {len(lines[0])}\nmap\n{body}")
+    return path
+
+
+def run_here(tasks, **_settings):
+    """Instead of `run_local`: no process is started, where none is what a test is about."""
+    return (list(run_task(task)) for task in tasks)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("faults")
+    methods = map(name_of, (*FAULTS, *SOUND, *FAILING))
+    settings = RunSettings(
+        maps=(str(write_map(folder, ROOMS)),),
+        presets=("paper",),
+        baselines=("simple-graph", *methods),
+        pairs=N_PAIRS,
+        merge_distance_m=4.0,
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(ROOT))
+        evaluate(settings, folder / "run")
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def study(folder):
+    return write_outputs(folder)
+
+
+def outcome_of(study, method):
+    name = method if isinstance(method, str) else name_of(method)
+    return next(outcome for outcome in study.outcomes if outcome.label == name)
+
+
+@pytest.mark.parametrize("method", FAULTS)
+def test_a_planted_fault_is_caught(study, method):
+    found = [fault for _, fault in outcome_of(study, method).faults]
+    assert any(FAULTS[method] in fault for fault in found), found[:3]
+
+
+@pytest.mark.parametrize("method", ["grid-astar", "simple-graph", "paper", *SOUND])
+def test_a_sound_method_has_no_fault(study, method):
+    outcome = outcome_of(study, method)
+    assert outcome.faults == []
+    assert outcome.checks == N_PAIRS + 2
+    assert outcome.failures == 0
+
+
+def test_nothing_is_found_that_was_not_planted(study):
+    for method in (faulty.ThroughWall, faulty.HomelessCells, faulty.TooLong, faulty.Backwards):
+        found = [fault for _, fault in outcome_of(study, method).faults]
+        wrong = [fault for fault in found if FAULTS[method] not in fault]
+        if method is faulty.ThroughWall:  # a cell inside an obstacle is several things at once
+            wrong = [one for one in wrong if "blocked cell" not in one and "corner" not in one]
+        if method is faulty.HomelessCells:  # nor can paths and plans be there
+            wrong = [one for one in wrong if "leaves the regions" not in one]
+        assert not wrong
+
+
+def test_all_that_is_lost_by_a_lie_is_counted(study):
+    outcome = outcome_of(study, faulty.TooLong)
+    assert len(outcome.faults) == N_PAIRS
+    assert (outcome.losses >= 0.05 - 1e-9).all()
+
+
+def test_a_failing_method_leaves_records_and_the_run_goes_on(study):
+    outcome = outcome_of(study, faulty.Raises)
+    status = Counter(record["status"] for record in outcome.records)
+    assert status.keys() == {"solved", "no path", "error"} or status.keys() == {"solved", "error"}
+    assert {record.get("error") for record in outcome.records if record["status"] == "error"} == {
+        "RuntimeError: odd rows are beyond me"
+    }
+    assert outcome.failures == status["error"]
+    assert outcome.faults == []
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        (faulty.CannotBeMade, "RuntimeError: too small a map"),
+        (faulty.FailsAtOnce, "KeyError"),
+    ],
+)
+def test_a_preparation_that_fails_fails_all_its_pairs(study, method, words):
+    outcome = outcome_of(study, method)
+    assert outcome.preparation["status"] == "error"
+    assert {record["status"] for record in outcome.records} == {"error"}
+    assert len(outcome.records) == N_PAIRS + 2
+    assert all(words in record["error"] for record in (outcome.preparation, *outcome.records))
+    assert outcome.faults == []
+
+
+def test_every_query_has_one_record(folder):
+    records = read_records(folder)
+    ids = [record["id"] for record in records]
+    assert len(set(ids)) == len(ids)
+    methods = 3 + len(FAULTS) + len(SOUND) + len(FAILING)
+    assert len(ids) == methods * (1 + N_PAIRS + 2)
+
+
+def test_counter_examples_are_in_all_that_is_written(folder, study):
+    with (folder / "summary.csv").open() as stream:
+        rows = {row["method"]: row for row in csv.DictReader(stream)}
+    for method in FAULTS:
+        assert int(rows[name_of(method)]["faults"]) > 0
+    for method in ("grid-astar", "simple-graph", "paper", *map(name_of, SOUND)):
+        assert int(rows[method]["faults"]) == 0
+    report = (folder / "report.html").read_text()
+    assert report.count("data:image/png") > 3
+    assert "is not free" in report
+    assert f"{len(study.faults)} counter-examples" in (folder / "summary.md").read_text()
+    assert load_study(folder).labels == study.labels

@@ -1,0 +1,190 @@
+"""Interrupts at any moment leave no object half changed: what follows is as if there were none."""
+
+from __future__ import annotations
+
+import ast
+import time
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from hybridnav.baselines.grid import WeightedAstar
+from hybridnav.baselines.hpa import HpaStar
+from tests.interrupts import Struck, lines_of, timer
+from tests.product.test_threads import OVER_CELLS, grid_with_rooms, told
+from tests.strategies import examples, occupancy_grid
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+GRID = grid_with_rooms(seed=8, side=45)
+START, GOAL = GRID.frame.points_of(np.argwhere(GRID.enterable())[[0, -1]])
+
+
+def struck(call: Callable[[], object], at: int) -> bool:
+    """Whether an interrupt before the `at`-th line ended a call."""
+    try:
+        lines_of(call, strike_at=at)
+    except Struck:
+        return True
+    return False
+
+
+def spread(n_lines: int, count: int) -> Iterable[int]:
+    """Numbers of so many lines, first and last among them; all where there are fewer."""
+    return sorted({*np.linspace(1, n_lines, min(count, n_lines)).round().astype(int).tolist()})
+
+
+def grown() -> hn.TopologicalMap:
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(GRID, merge_distance_m=3.0))
+
+
+def record(topology: hn.TopologicalMap) -> list[Any]:
+    """All that a pyramid is rebuilt from, and what its apex says."""
+    level = topology.level
+    arrays = (level.field_of, level.arcs, level.sigma, level.max_distance_m, level.through_m)
+    return [array.tolist() for array in arrays] + [level.boundary(0).tolist()]
+
+
+@pytest.mark.parametrize("preset", OVER_CELLS)
+def test_a_query_that_is_interrupted_before_any_line_changes_no_other(preset: str) -> None:
+    planner = hn.HybridPlanner(grown(), preset=preset)
+    cells = np.argwhere(GRID.enterable())
+    around = hn.Blocked(cells=cells[np.abs(cells - 15).max(axis=1) < 5])
+
+    def plain() -> Any:
+        return told(planner.plan(START, GOAL))
+
+    def closed() -> Any:
+        return told(planner.plan(START, GOAL, blocked=around, smooth="line-of-sight"))
+
+    expected = plain(), closed()
+    assert expected[0] != expected[1]
+    for call in (plain, closed):
+        for at in spread(lines_of(call), examples(60)):
+            assert struck(call, at)
+            assert (plain(), closed()) == expected
+
+
+@pytest.mark.parametrize("method", [HpaStar, WeightedAstar])
+def test_a_baseline_that_is_interrupted_answers_as_before(method: Any) -> None:
+    planner = method(GRID)
+    ends = [tuple(cell) for cell in np.argwhere(GRID.enterable())[[0, -1]].tolist()]
+    expected = planner.solve(*ends)
+    for at in range(1, lines_of(lambda: planner.solve(*ends)) + 1):
+        assert struck(lambda: planner.solve(*ends), at)
+        answer = planner.solve(*ends)
+        assert (answer.cells == expected.cells).all()
+        assert (answer.bound, answer.expanded) == (expected.bound, expected.expanded)
+
+
+def test_a_map_whose_making_is_interrupted_is_made_again_alike() -> None:
+    expected = record(grown())
+    for at in spread(lines_of(grown), 60):
+        assert struck(grown, at)
+    assert record(grown()) == expected
+
+
+def test_what_is_computed_on_demand_is_whole_or_absent() -> None:
+    expected = record(grown())
+    for at in spread(lines_of(lambda: record(grown())), 60):
+        topology = grown()
+        with suppress(Struck):
+            lines_of(partial(record, topology), strike_at=at)
+        assert record(topology) == expected
+
+
+@pytest.mark.parametrize("preset", ["shortest", "portals", "paper"])
+def test_a_planner_whose_making_is_interrupted_leaves_its_map_whole(preset: str) -> None:
+    # Its file is read before: one that is left half read stays open for a while.
+    topology, loaded = grown(), hn.load_preset(preset)
+
+    def prepare() -> Any:
+        return told(hn.HybridPlanner(topology, preset=loaded).plan(START, GOAL, smooth="none"))
+
+    expected = prepare()
+    for at in spread(lines_of(prepare), 40):
+        assert struck(prepare, at)
+    assert prepare() == expected
+
+
+def test_a_signal_inside_a_query_with_blocked_cells_changes_no_other() -> None:
+    side = 300
+    topology = hn.TopologicalMap(
+        hn.DualGraphPyramid.build(occupancy_grid(np.ones((side, side), np.uint8)))
+    )
+    planner = hn.HybridPlanner(topology, preset="grid-astar")
+    band = np.zeros((side, side), np.bool_)
+    band[20:-20] = True
+    closed = hn.Blocked(cells=np.argwhere(band))
+    across = (10.5, 5.5), (200.5, 295.5)
+    expected = told(planner.plan(*across))
+    began = time.perf_counter()
+    planner.plan(*across, blocked=closed)
+    duration_s = time.perf_counter() - began
+    n_struck = 0
+    for part in np.linspace(0.02, 1.0, 60):
+        try:
+            with timer(part * duration_s):
+                planner.plan(*across, blocked=closed)
+        except Struck:
+            n_struck += 1
+        assert told(planner.plan(*across)) == expected
+    assert n_struck > 0
+
+
+def strike_builds(count: int) -> int:
+    """Interrupt builds by timers spread over one; how many were struck."""
+    grid = occupancy_grid(np.ones((500, 500), np.uint8))
+
+    def build() -> hn.DualGraphPyramid:
+        return hn.DualGraphPyramid.build(grid, merge_distance_m=40.0)
+
+    expected = build()[-1].field_of
+    began = time.perf_counter()
+    assert (build()[-1].field_of == expected).all()
+    duration_s, n_struck = time.perf_counter() - began, 0
+    for part in np.linspace(0.0, 1.0, count + 1)[1:]:
+        try:
+            with timer(part * duration_s):
+                build()
+        except Struck:
+            n_struck += 1
+    assert (build()[-1].field_of == expected).all()
+    return n_struck
+
+
+def test_signals_inside_the_kernels_of_a_build_raise_what_their_handler_raises() -> None:
+    assert strike_builds(40) > 0
+
+
+def test_kernels_that_return_several_values_to_python_are_guarded() -> None:
+    package = Path(hn.__file__).parent
+    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in package.rglob("*.py")}
+    called = set()
+    for path, tree in trees.items():
+        for node in ast.walk(tree) if not path.stem.endswith("kernels") else ():
+            if isinstance(node, ast.ImportFrom) and str(node.module).endswith("kernels"):
+                called |= {alias.name for alias in node.names}
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value).endswith("kernels"):
+                called.add(node.attr)
+    found = {}
+    for path, tree in trees.items():
+        for node in tree.body if path.stem.endswith("_kernels") else ():
+            if not isinstance(node, ast.FunctionDef) or node.name not in called:
+                continue
+            returns = [part for part in ast.walk(node) if isinstance(part, ast.Return)]
+            if any(isinstance(part.value, ast.Tuple) for part in returns):
+                found[path.stem, node.name] = [ast.unparse(one) for one in node.decorator_list]
+    assert len(found) > 20
+    assert [name for name, decorators in found.items() if decorators[0] != "guarded"] == []
+
+
+@pytest.mark.full
+def test_hundreds_of_signals_inside_the_kernels_of_a_build() -> None:
+    assert strike_builds(400) > 0

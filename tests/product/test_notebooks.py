@@ -1,0 +1,135 @@
+"""Every notebook runs from a clean kernel, far from the checkout and on other maps."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import numpy as np
+import pytest
+from nbclient import NotebookClient
+
+from hybridnav.grid import Frame
+from hybridnav.grid.worlds import World, office_world, write_world
+
+ROOT = Path(__file__).parents[2]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+NEEDS_OMPL = ROOT / "notebooks" / "05_ompl_in_the_corridor.ipynb"
+TIMEOUT_S = 300
+ELSEWHERE: dict[str, dict[str, Any]] = {
+    "01_map_to_route": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "ROBOT_RADIUS_M": 0.2},
+    "02_inside_the_pyramid": {"MERGE_DISTANCE_M": 6.0, "LARGE_M": 20.0},
+    "03_rooms_and_alternatives": {"NAMES": {}, "FROM": (12.0, 2.0), "TO": (24.0, 23.0)}
+    | {"STOPS": [(24.0, 23.0), (12.0, 2.0)], "ACROSS": ((12.0, 2.0), (24.0, 23.0))},
+    "04_thruns_criteria": {"PAIRS": 20, "MERGE_DISTANCES_M": (3.0, 6.0), "ROBOT_RADIUS_M": 0.2},
+    "05_ompl_in_the_corridor": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "LENGTH_M": 1.2},
+    "06_certificates": {"NEAR": ((12.0, 2.0), (12.0, 7.5)), "FAR": ((12.0, 2.0), (24.0, 23.0))}
+    | {"DOORS": ((15.5, 6.2), (9.9, 6.2))},
+}
+"""Settings with which each notebook runs on another map."""
+SHARED_PORTALS = f"""
+import sys
+sys.path.append({str(ROOT)!r})
+from tests.portal_memory import remember_portals
+remember_portals(setattr)
+sys.path.remove({str(ROOT)!r})
+"""
+WITHOUT_OMPL = """
+import importlib.util
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *args: None if name == "ompl" else found(name, *args)
+"""
+
+
+@pytest.fixture(autouse=True)
+def clean_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No start-up files of whoever runs the tests; one that prepares the office's portals once."""
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
+    startup = tmp_path / "profile_default" / "startup"
+    startup.mkdir(parents=True)
+    (startup / "shared_portals.py").write_text(SHARED_PORTALS)
+
+
+def executed(notebook: Any, start: Path = ROOT / "notebooks") -> list[Any]:
+    """Run a notebook in a folder and return its outputs."""
+    client = NotebookClient(
+        notebook,
+        timeout=TIMEOUT_S,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(start)}},
+    )
+    client.execute()
+    return [output for cell in notebook.cells for output in cell.get("outputs", [])]
+
+
+def written(outputs: list[Any]) -> str:
+    return "".join(output.text for output in outputs if output.output_type == "stream")
+
+
+def pictures(outputs: list[Any]) -> int:
+    return sum("image/png" in output.get("data", {}) for output in outputs)
+
+
+def settings(notebook: Any) -> Any:
+    """The cell that holds all that a notebook depends on."""
+    (cell,) = (cell for cell in notebook.cells if cell.source.startswith("MAP = None"))
+    return cell
+
+
+def with_settings(notebook: Any, **values: Any) -> Any:
+    """The notebook with other settings in its cell for them."""
+    cell = settings(notebook)
+    cell.source += "".join(f"\n{name} = {value!r}" for name, value in values.items())
+    return notebook
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_copy_of_a_notebook_runs_far_from_the_checkout(path: Path, tmp_path: Path) -> None:
+    copy = shutil.copy(path, tmp_path)
+    outputs = executed(nbformat.read(copy, as_version=4), start=tmp_path)
+    assert pictures(outputs) > 3
+    assert "Warning" not in written(outputs)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_has_its_map_in_one_place(path: Path) -> None:
+    notebook = nbformat.read(path, as_version=4)
+    cells = [cell.source for cell in notebook.cells]
+    place = cells.index(settings(notebook).source)
+    assert "## Your map here" in cells[place - 1]
+    assert sum("hn.load_map(" in cell for cell in cells) == 1
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_holds_on_another_map(path: Path, tmp_path: Path) -> None:
+    """Other noise, another place in the map frame, cells of another size."""
+    office = office_world(seed=7)
+    halved = np.min([office.pixels[row::2, col::2] for row in (0, 1) for col in (0, 1)], axis=0)
+    frame = Frame(2 * office.frame.resolution_m, office.frame.origin_m)
+    write_world(World(halved, frame, "other"), tmp_path, "other")
+    outputs = executed(
+        with_settings(nbformat.read(path, as_version=4), MAP="other.yaml", **ELSEWHERE[path.stem]),
+        start=tmp_path,
+    )
+    assert pictures(outputs) > 3
+
+
+def test_without_ompl_one_sentence_says_so_and_the_rest_runs(tmp_path: Path) -> None:
+    (tmp_path / "profile_default" / "startup" / "without_ompl.py").write_text(WITHOUT_OMPL)
+    outputs = executed(nbformat.read(NEEDS_OMPL, as_version=4))
+    assert written(outputs).count("not installed") == 1
+    assert "Error" not in written(outputs)
+    assert pictures(outputs) == 1  # the coarse route, which needs no OMPL
+
+
+def test_there_are_notebooks() -> None:
+    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_", "06_"]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook_is_kept_without_outputs(path: Path) -> None:
+    cells = nbformat.read(path, as_version=4).cells
+    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in cells)

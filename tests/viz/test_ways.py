@@ -1,0 +1,209 @@
+"""Pictures of rooms and ways: names that do not hide each other, doors by number, all routes."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+
+import hybridnav as hn
+from hybridnav.grid import RoomLabels
+from hybridnav.planner.alternatives import Alternatives
+from hybridnav.viz import plot_alternatives, plot_rooms, plot_tour
+from tests.cli.test_commands import cli  # noqa: F401 - the fixture
+from tests.strategies import drawn, occupancy_grid
+
+# A ring of corridor round a block, and a closet that nothing leads to.
+RING = drawn(
+    "#############",
+    "#.......#...#",
+    "#.#####.#...#",
+    "#.#####.#...#",
+    "#.#####.#...#",
+    "#.......#...#",
+    "#############",
+)
+
+
+@pytest.fixture(scope="module")
+def ring():
+    """West, east and closet; two doors between west and east."""
+    label_of = np.full(RING.shape, -1, dtype=np.int32)
+    label_of[1:6, 1:4], label_of[1:6, 4:8], label_of[1:6, 9:12] = 0, 1, 2
+    rooms = RoomLabels(("west", "east", "closet"), label_of)
+    grid = occupancy_grid(RING, resolution_m=0.5)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=rooms)
+    return hn.HybridPlanner(hn.TopologicalMap(pyramid))
+
+
+def texts(ax, pattern):
+    """Texts by gid, drawn inside the axes."""
+    return {
+        t.get_gid(): t for t in ax.texts + ax.artists if re.fullmatch(pattern, t.get_gid() or "")
+    }
+
+
+def legend(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def many_rooms(side):
+    """A map of 8 x 8 rooms, a few cells each, with names far too long for them."""
+    cells = np.zeros((8 * side + 1, 8 * side + 1), dtype=np.uint8)
+    rows, cols = np.indices(cells.shape)
+    wall = (rows % side == 0) | (cols % side == 0)
+    label_of = np.where(wall, -1, rows // side * 8 + cols // side).astype(np.int32)
+    grid = hn.OccupancyGrid(wall.astype(np.float32), hn.Frame(0.1), robot_radius_m=0)
+    return RoomLabels(tuple(f"laboratory {n}" for n in range(64)), label_of), grid
+
+
+@pytest.mark.parametrize(
+    ("side", "width_in"), [pytest.param(9, 2.5, marks=pytest.mark.full), (9, 3.0), (9, 15.0)]
+)
+def test_names_hide_neither_each_other_nor_the_room_beside(side, width_in):
+    labels, grid = many_rooms(side)
+    ax = plot_rooms(labels, grid, width_in=width_in)
+    ax.figure.figure.set_dpi(600)  # a text is measured in whole dots
+    renderer = FigureCanvasAgg(ax.figure.figure).get_renderer()
+    names = texts(ax, r"room-\d+")
+    boxes = {gid: text.get_window_extent(renderer) for gid, text in names.items()}
+    for one, other in itertools.combinations(boxes.values(), 2):
+        wide = min(one.x1, other.x1) - max(one.x0, other.x0)
+        high = min(one.y1, other.y1) - max(one.y0, other.y0)
+        assert wide <= 4 or high <= 0.2 * one.height  # a font's box is higher than its letters
+    for gid, box in boxes.items():
+        middle = ax.transData.inverted().transform([((box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2)])
+        ends = ax.transData.inverted().transform([(box.x0 + 4, box.y0), (box.x1 - 4, box.y0)])
+        ends[:, 1] = middle[0, 1]
+        cells = grid.frame.cells_of(np.concatenate([middle, ends]))
+        assert set(labels.label_of[tuple(cells.T)].tolist()) <= {-1, int(gid.split("-")[1])}
+    told = [re.fullmatch(r"rooms \((\d+) without their name\)", entry) for entry in legend(ax)]
+    left_out = sum(int(found[1]) for found in told if found)
+    assert left_out == 64 - len(names)
+    assert (left_out == 0) is (width_in == 15.0)
+
+
+def test_a_tour_numbers_the_doors_that_its_words_tell_of(ring):
+    tour = hn.plan_tour(ring, ["west", (3.75, 1.75)], at="point")
+    passed = [leg.door.number for leg in tour.legs if leg.door is not None]
+    assert len(passed) == 1
+    ax = plot_tour(ring.topology, tour)
+    numbers = texts(ax, r"door-\d+")
+    assert [text.get_text() for text in numbers.values()] == [str(n) for n in passed]
+    assert f"door {passed[0]} " in " ".join(tour.in_words())
+    (door,) = (d for d in ring.topology.rooms.doors if d.number == passed[0])
+    assert np.hypot(*np.subtract(numbers[f"door-{passed[0]}"].get_position(), door.position)) < 0.5
+
+
+@pytest.mark.parametrize(("width_in", "size_m"), [(4.0, 0.2), (6.0, 0.5), (9.0, 0.5)])
+def test_names_lie_beside_the_way_where_there_is_room(width_in, size_m):
+    cells = np.zeros((21, 41), dtype=np.uint8)
+    cells[[0, -1]], cells[:, [0, 20, -1]], cells[9:12, 20] = 1, 1, 0
+    label_of = np.where(cells, -1, 0).astype(np.int32)
+    label_of[1:-1, 21:-1] = 1
+    rooms = RoomLabels(("west", "east"), label_of)
+    grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(size_m))
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=4 * size_m, rooms=rooms)
+    planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="grid-astar")
+    ends = np.array([[3.5, 10.5], [37.5, 10.5]]) * size_m  # along the middle of both rooms
+    ax = plot_tour(planner.topology, hn.plan_tour(planner, ends), width_in=width_in)
+    (line,) = (line for line in ax.lines if line.get_gid() == "path")
+    way = ax.transData.transform(line.get_xydata())
+    renderer = FigureCanvasAgg(ax.figure.figure).get_renderer()
+    names = texts(ax, r"room-\d+")
+    assert len(names) == 2
+    for text in names.values():
+        box = text.get_window_extent(renderer)
+        inside = (way >= [box.x0, box.y0]) & (way <= [box.x1, box.y1])
+        assert not inside.all(axis=1).any(), text.get_text()
+
+
+def test_rooms_number_all_their_doors_where_there_is_room(ring):
+    numbers = texts(plot_rooms(ring.topology), r"door-\d+")
+    assert sorted(numbers) == [f"door-{door.number}" for door in ring.topology.rooms.doors]
+
+
+def routes_of(ax):
+    lines = {
+        line.get_gid(): line for line in ax.lines if (line.get_gid() or "").startswith("route-")
+    }
+    return [lines[f"route-{n + 1}"] for n in range(len(lines))]
+
+
+def test_all_alternatives_are_drawn_each_in_its_colour(ring):
+    found = hn.plan_alternatives(ring, "west", (3.75, 1.75), 3)
+    assert len(found) == 2
+    ax = plot_alternatives(ring.topology, found)
+    lines = routes_of(ax)
+    for line, alternative in zip(lines, found, strict=True):
+        assert np.array_equal(np.column_stack(line.get_data()), alternative.path.points)
+    assert len({to_rgb(line.get_color()) for line in lines}) == 2
+    # Where they share their way, the shorter lies on the longer, which shows on both its sides.
+    assert lines[0].get_zorder() > lines[1].get_zorder()
+    assert lines[0].get_linewidth() < lines[1].get_linewidth()
+    told = [f"route {n}, {a.path.length_m:.2f} m" for n, a in enumerate(found, start=1)]
+    assert legend(ax)[:2] == told
+    doors = {door.number for door in ring.topology.rooms.doors}
+    assert set(texts(ax, r"door-\d+")) == {f"door-{number}" for number in doors}
+
+
+def test_twenty_routes_are_all_told_apart(ring):
+    (first, *_) = found = hn.plan_alternatives(ring, "west", "east", 2)
+    many = hn.Alternatives((first,) * 20, complete=found.complete)
+    lines = routes_of(plot_alternatives(ring.topology, many))
+    looks = {(line.get_color(), str(line._unscaled_dash_pattern)) for line in lines}
+    assert len(looks) == 20
+
+
+def test_routes_that_share_all_their_way_show_each(ring):
+    (way, _) = hn.plan_alternatives(ring, "west", "east", 2, least_hole_m2=0.5)
+    same = Alternatives((way,) * 5, complete=True)
+    ax = plot_alternatives(ring.topology, same, width_in=4.0)
+    picture = FigureCanvasAgg(ax.figure.figure)
+    picture.draw()
+    pixels = np.asarray(picture.buffer_rgba())[..., :3].astype(int)
+    lines = {line.get_gid(): line for line in ax.lines}
+    along = ax.transData.transform(lines["route-1"].get_xydata())
+    low, high = along.min(axis=0) - 8, along.max(axis=0) + 8
+    height = len(pixels)  # the legend, which has all colours, lies outside
+    part = pixels[int(height - high[1]) : int(height - low[1]), int(low[0]) : int(high[0])]
+    for number in range(1, 6):
+        colour = np.array(to_rgb(lines[f"route-{number}"].get_color())) * 255
+        alike = (np.abs(part - colour) < 40).all(axis=-1).sum()
+        assert alike > np.hypot(*np.diff(along, axis=0).T).sum() / 4, number
+
+
+def test_alternatives_on_a_map_without_rooms_and_without_a_path():
+    grid = occupancy_grid(RING, resolution_m=0.5)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
+    planner = hn.HybridPlanner(topology)
+    found = hn.plan_alternatives(planner, (0.75, 1.75), (3.75, 1.75), 2)
+    ax = plot_alternatives(topology, found, title="")
+    assert (len(routes_of(ax)), ax.get_title()) == (2, "")
+    assert "places" in legend(ax)
+    none = hn.plan_alternatives(planner, (0.75, 1.75), (5.25, 1.75), 2)
+    ax = plot_alternatives(topology, none)
+    assert not routes_of(ax)
+    assert "no path" in ax.get_title()
+
+
+@pytest.mark.parametrize("ends", [("0.75,1.75", "3.75,1.75"), ("west", "3.75,1.75")])
+def test_the_command_draws_all_routes(cli, tmp_path, ring, ends):  # noqa: F811 - the fixture
+    grid = occupancy_grid(RING, resolution_m=0.5)
+    image = np.where(np.flipud(grid.measured) == hn.CellClass.OCCUPIED, 0, 254).astype(np.uint8)
+    (tmp_path / "m.pgm").write_bytes(b"P5\n13 7\n255\n" + image.tobytes())
+    (tmp_path / "m.yaml").write_text(
+        "image: m.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    rooms = ring.topology.rooms
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms.labels, rooms.grid)
+    picture = tmp_path / "m.svg"
+    query = ("--from", ends[0], "--to", ends[1], "--alternatives", 2, "--robot-radius", 0)
+    done = cli("plan", tmp_path / "m.yaml", *query, "--plot", picture)
+    assert done.code == 0
+    drawn_routes = set(re.findall(r'id="(route-\d)"', picture.read_text()))
+    assert drawn_routes == {f"route-{n}" for n in (1, 2)}
+    assert done.out.count("\nroute ") == 2
