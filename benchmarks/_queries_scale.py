@@ -27,7 +27,7 @@ from hybridnav.harness.methods import _nbytes
 from hybridnav.harness.tables import to_markdown
 from hybridnav.mesh import MeshSearch, build_mesh
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from collections.abc import Callable

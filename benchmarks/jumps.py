@@ -23,7 +23,7 @@ from benchmarks.queries import maps_of
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.jumps import JumpPath, JumpSearch, build_jump_graph, contract_graph
 from hybridnav.search.grid_search import CellPath, GridSearch
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from collections.abc import Callable

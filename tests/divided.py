@@ -14,7 +14,7 @@ from scipy.sparse import csgraph
 
 from hybridnav.grid import CellClass
 from hybridnav.portals import build_portals
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search.moves import DIAGONAL, STRAIGHT
 from tests.oracle.grid import move_graph
 from tests.search.test_search import block_labels
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid, scenes

@@ -11,8 +11,8 @@ from scipy import sparse
 
 from hybridnav.portals import BuiltPortals, PortalOptions, PortalSearch, build_tables
 from hybridnav.portals.fields import compact_labels
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
 from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.moves import DIAGONAL, STRAIGHT
 from tests.divided import Divided, costs_from
 from tests.oracle.grid import assert_legal, centre, moves, recounted
 from tests.portal_memory import shared_portals

@@ -12,7 +12,7 @@ from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.metrics import judge_path
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 from tests.strategies import examples, scenes
 
 EPSILONS = (None, 0.01, 0.05)

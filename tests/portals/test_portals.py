@@ -19,7 +19,7 @@ from hybridnav.portals.build import (
     build_portals,
 )
 from hybridnav.portals.fields import compact_labels
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search.moves import DIAGONAL, STRAIGHT
 from tests.divided import GATES, Divided, costs_from, fields_of, halves, partitions
 from tests.strategies import drawn, examples, occupancy_grid
 

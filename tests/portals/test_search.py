@@ -16,8 +16,8 @@ from hybridnav.portals import PortalSearch, prepare_portals
 from hybridnav.portals._path_kernels import FAR
 from hybridnav.portals._side_kernels import side_costs, ways_by_sides
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.search._costs import STRAIGHT
 from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.moves import STRAIGHT
 from hybridnav.topology import TopologicalMap
 from tests.divided import GATES, Divided, costs_from, partitions, pieces_of
 from tests.portal_judge import EPSILONS, Judge, length_of

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hybridnav.portals import PortalOptions, build_tables
 from hybridnav.portals._descent_kernels import descend
 from hybridnav.portals._path_kernels import FAR, UNREACHED
-from hybridnav.search._costs import STRAIGHT
+from hybridnav.search.moves import STRAIGHT
 from tests.divided import (
     GATES,
     Divided,

@@ -16,7 +16,7 @@ import hybridnav as hn
 from hybridnav.grid import CellClass
 from hybridnav.io.movingai import read_scenarios
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 from tests.oracle.grid import assert_legal, moves, recounted
 
 if TYPE_CHECKING:

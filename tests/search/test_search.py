@@ -14,10 +14,14 @@ from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
 from hybridnav.search import _kernels
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search.fields import field_distances
 from hybridnav.search.grid_search import GridSearch, move_tables
-from hybridnav.search.octile import (
+from hybridnav.search.moves import (
+    DIAGONAL,
+    STRAIGHT,
+    legal_moves,
     length_in_cells,
+    octile_cost,
     octile_distance_in_cells,
     path_length_in_cells,
 )
@@ -315,7 +319,7 @@ def test_successors_are_left_out_for_a_path_as_good_and_diagonal_first(
         enterable = np.ones((3, 3), dtype=np.bool_)
         for k, cell in enumerate(around):
             enterable[cell] = drawing >> k & 1
-        mask = int(_kernels.legal_moves(enterable, corner_cutting)[1, 1])
+        mask = int(legal_moves(enterable, corner_cutting)[1, 1])
         if not mask >> (d + 4) % 8 & 1:
             continue
         sides = np.ones_like(enterable) if corner_cutting else enterable
@@ -407,7 +411,7 @@ def test_without_obstacles_the_shortest_path_has_the_octile_distance(
     assert found.cells is not None
     expected = octile_distance_in_cells(start, goal)
     assert path_length_in_cells(found.cells) == expected
-    cost = _kernels.octile_cost(goal[0] - start[0], goal[1] - start[1])
+    cost = octile_cost(goal[0] - start[0], goal[1] - start[1])
     assert float(length_in_cells(cost)) == expected
 
 
@@ -424,7 +428,7 @@ def test_distances_inside_fields_are_those_that_dijkstra_finds(classes: Any, see
     field_of[vertices] = dense
     sources = [random_cell(field_of == v, rng) for v in range(len(names))]
     flat = np.array([row * classes.shape[1] + col for row, col in sources], dtype=np.int64)
-    found = _kernels.field_distances(classes, field_of.ravel(), flat).reshape(classes.shape)
+    found = field_distances(classes, field_of.ravel(), flat).reshape(classes.shape)
     expected = np.full(classes.shape, np.inf)
     for v, source in enumerate(sources):
         free = classes[source] == CellClass.FREE

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 from hybridnav.search.stops import cheapest_stops
 from tests.strategies import class_grids
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.baselines._weighted_kernels import COL_STEP, ROW_STEP, drop_least, push
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import grow, octile_cost
+from hybridnav.baselines._weighted_kernels import drop_least, push
+from hybridnav.search.arrays import grow
+from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray

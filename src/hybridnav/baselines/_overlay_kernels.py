@@ -1,6 +1,6 @@
 """Kernels of the exact overlay: cells on boundaries, distances inside fields, the overlay search.
 
-Costs are the integers of `hybridnav.search._kernels`.
+Costs are the integers of `hybridnav.search.moves`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import heapq
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import _COL_STEP, _ROW_STEP, grow, octile_cost
+from hybridnav.search.arrays import grow
+from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 _NONE = np.int64(1) << 62
 
@@ -41,7 +41,7 @@ def boundary_cells(labels, moves, cols):
     for cell in range(labels.size):
         mask = moves[cell]
         for k in range(8):
-            if mask >> k & 1 and labels[cell + _ROW_STEP[k] * cols + _COL_STEP[k]] != labels[cell]:
+            if mask >> k & 1 and labels[cell + ROW_STEP[k] * cols + COL_STEP[k]] != labels[cell]:
                 if count == found.size:
                     found = grow(found)
                 found[count] = cell
@@ -67,7 +67,7 @@ def cross_edges(labels, moves, cols, node_cell):
         for k in range(8):
             if not mask >> k & 1:
                 continue
-            to = cell + _ROW_STEP[k] * cols + _COL_STEP[k]
+            to = cell + ROW_STEP[k] * cols + COL_STEP[k]
             if labels[to] == labels[cell]:
                 continue
             if count == heads.size:
@@ -92,7 +92,7 @@ def inner_moves(labels, moves, cols, field, box):
                 mask = moves[cell]
                 for k in range(8):
                     if mask >> k & 1:
-                        if labels[cell + _ROW_STEP[k] * cols + _COL_STEP[k]] != field:
+                        if labels[cell + ROW_STEP[k] * cols + COL_STEP[k]] != field:
                             mask &= ~np.uint8(1 << k)
                 inner[local] = mask
             local += 1
@@ -108,8 +108,8 @@ def keep_table():
     keep = np.zeros(8, np.uint8)
     for k in range(8):
         for further in range(8):
-            rows = _ROW_STEP[k] + _ROW_STEP[further]
-            cols = _COL_STEP[k] + _COL_STEP[further]
+            rows = ROW_STEP[k] + ROW_STEP[further]
+            cols = COL_STEP[k] + COL_STEP[further]
             if max(abs(rows), abs(cols)) == 2:
                 keep[k] |= 1 << further
     return keep
@@ -127,7 +127,7 @@ def distances_from(inner, width, source, keep, distance, closed, came, open_cell
     """
     distance[:] = _NONE
     closed[:] = False
-    step = _ROW_STEP * width + _COL_STEP
+    step = ROW_STEP * width + COL_STEP
     count = np.zeros(3, np.int64)
     distance[source] = 0
     came[source] = -1

@@ -9,12 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import grow, octile_cost
-
-# Directions counter-clockwise from east, as in the masks of `legal_moves`; odd ones are diagonal.
-ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
-COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
+from hybridnav.search.arrays import grow
+from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 
 @njit(cache=True, nogil=True)

@@ -14,9 +14,8 @@ from hybridnav.baselines.protocol import Answer, Cell
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.search import _kernels
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.octile import length_in_cells, path_length_in_cells
+from hybridnav.search.moves import legal_moves, length_in_cells, path_length_in_cells, trace
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ class GridAstar:
         self.region_of: IntArray | None = None
         enterable = grid.classes == CellClass.FREE
         self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
-        moves = _kernels.legal_moves(enterable, grid.corner_cutting)
+        moves = legal_moves(enterable, grid.corner_cutting)
         self.n_nodes, self.n_edges = _graph_size(enterable, moves)
         self.memory_bytes = self._search.memory_bytes
 
@@ -176,7 +175,7 @@ class _Workspace:
 
     def path(self, start: Cell, goal: Cell) -> LongArray:
         """Return the cells of the path of the last search."""
-        flat = _kernels.trace(self._came, self._cols, self._flat(start), self._flat(goal))
+        flat = trace(self._came, self._cols, self._flat(start), self._flat(goal))
         return np.stack(divmod(flat, self._cols), axis=1)
 
     def _flat(self, cell: Cell) -> int:
@@ -186,7 +185,7 @@ class _Workspace:
 def _workspaces(grid: OccupancyGrid) -> tuple[Pool[_Workspace], tuple[int, int]]:
     """Return work space for searches of the free cells, and the numbers of cells and moves."""
     enterable = grid.classes == CellClass.FREE
-    moves: ByteArray = _kernels.legal_moves(enterable, grid.corner_cutting)
+    moves: ByteArray = legal_moves(enterable, grid.corner_cutting)
     works = Pool(partial(_Workspace, moves.ravel(), grid.shape[1]))
     return works, _graph_size(enterable, moves)
 

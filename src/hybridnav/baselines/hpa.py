@@ -15,8 +15,7 @@ from hybridnav.baselines.protocol import CUT_CORNERS, Answer, Cell
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.search._costs import STRAIGHT
-from hybridnav.search._kernels import legal_moves
+from hybridnav.search.moves import STRAIGHT, legal_moves
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:

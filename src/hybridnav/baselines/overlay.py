@@ -15,8 +15,8 @@ from hybridnav.baselines.protocol import Answer
 from hybridnav.baselines.regions import array_bytes, free_fields, region_at
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
-from hybridnav.search._kernels import legal_moves
 from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.moves import legal_moves
 
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, BoolArray, IntArray, LongArray

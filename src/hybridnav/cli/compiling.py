@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,15 +105,12 @@ def processors() -> int:
 
 def _is_cold(job: str) -> bool:
     """Whether neither the pyramid nor a search was compiled yet and what is compiled is kept."""
-    from hybridnav.pyramid._kernels import select_stars  # noqa: PLC0415 - loads numba
+    from hybridnav.pyramid import decimation  # noqa: PLC0415 - loads numba
 
-    if _is_kept(select_stars):
+    if _is_kept(decimation.KERNEL):
         return False
-    from hybridnav.jumps._query_kernels import paths  # noqa: PLC0415
-    from hybridnav.mesh._query_kernels import query  # noqa: PLC0415
-    from hybridnav.search._kernels import astar  # noqa: PLC0415
-
-    return not _is_kept({"mesh": query, "jumps": paths}.get(job, astar))
+    home = {"mesh": "mesh.search", "jumps": "jumps.search"}.get(job, "search.grid_search")
+    return not _is_kept(import_module(f"hybridnav.{home}").KERNEL)
 
 
 def _is_kept(kernel: Any) -> bool:

@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from hybridnav.grid import CellClass
+from hybridnav.search.moves import legal_moves, moves_along
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
-
-_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
 class Consistency:
@@ -78,19 +77,9 @@ class Consistency:
 
     def _legal_moves(self, *, corner_cutting: bool) -> LongArray:
         """All moves between free cells, each in one direction, as flat cells (n, 2)."""
-        free = self._free
-        rows, cols = free.shape
-        flat = np.arange(free.size).reshape(free.shape)
-        found = []
-        for down, right in _STEPS:
-            high, low = slice(down, rows), slice(0, rows - down)
-            left = slice(max(0, -right), cols - max(0, right))
-            ahead = slice(max(0, right), cols + min(0, right))
-            legal = free[low, left] & free[high, ahead]
-            if down and right and not corner_cutting:
-                legal &= free[low, ahead] & free[high, left]
-            found.append(np.stack([flat[low, left][legal], flat[high, ahead][legal]], axis=1))
-        return np.concatenate(found)
+        masks = legal_moves(self._free, corner_cutting).ravel()
+        along = [moves_along(masks, self._cols, direction) for direction in (0, 2, 1, 3)]
+        return np.concatenate([np.stack(ends, axis=1) for ends in along])
 
     def _keys(self, regions: IntArray) -> LongArray:
         """One number for each unordered pair of regions."""

@@ -16,7 +16,7 @@ from hybridnav.harness.methods import HybridMethod, Prepared
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.metrics import ScipyOptimum, VisibilityGraph, judge_line, judge_path, line_cells
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray

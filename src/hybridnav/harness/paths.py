@@ -9,16 +9,16 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.limits import MAX_CELLS
+from hybridnav.search.moves import STEPS
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
 
 Cell = tuple[int, int]
 
-# East, north-east, north, ... counter-clockwise: a to h; anything else is written as cells.
-_STEPS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
+# One for each direction, counter-clockwise from east; anything else is written as cells.
 _LETTERS = "abcdefgh"
-_LETTER_OF = {tuple(step): letter for step, letter in zip(_STEPS.tolist(), _LETTERS, strict=True)}
+_LETTER_OF = {tuple(step): letter for step, letter in zip(STEPS.tolist(), _LETTERS, strict=True)}
 _RUN = re.compile(r"([a-h])(\d{1,9})|\((-?\d{1,18}),(-?\d{1,18})\)")
 
 
@@ -64,7 +64,7 @@ def decode_path(start: Cell, text: str) -> LongArray:
         if run.start() != end or total > MAX_CELLS:
             break
         end = run.end()
-        step = _STEPS[[_LETTERS.index(letter)]] if letter else np.array([[int(rows), int(cols)]])
+        step = STEPS[[_LETTERS.index(letter)]] if letter else np.array([[int(rows), int(cols)]])
         runs.append((step, int(count or 1)))
     if end != len(text):
         raise InvalidValueError(f"no path: {text[end : end + 20]!r} at character {end}")

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
+from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 
 _STATE_BITS = 26
 _STATE_MASK = (1 << _STATE_BITS) - 1
@@ -145,10 +144,10 @@ def _after(tree, letters, of_edge, word, cell, direction, cols):
     """The word after a step; a diagonal goes by the cell in its own row."""
     if direction & 1 == 0:
         return _times(tree, letters, word, _along(of_edge, cell, direction, cols))
-    sideways = 0 if _COL_STEP[direction] > 0 else 4
-    upwards = 2 if _ROW_STEP[direction] > 0 else 6
+    sideways = 0 if COL_STEP[direction] > 0 else 4
+    upwards = 2 if ROW_STEP[direction] > 0 else 6
     word = _times(tree, letters, word, _along(of_edge, cell, sideways, cols))
-    beside = cell + _COL_STEP[direction]
+    beside = cell + COL_STEP[direction]
     return _times(tree, letters, word, _along(of_edge, beside, upwards, cols))
 
 
@@ -191,7 +190,7 @@ def _winds(states, tree, letters, of_edge, moves, head, state, apart, cols):
             there = _times(tree, letters, there, _along(of_edge, at, direction, cols))
             if there < 0:
                 return -1
-            at += _ROW_STEP[direction] * cols + _COL_STEP[direction]
+            at += ROW_STEP[direction] * cols + COL_STEP[direction]
             other = np.int64(head[at])
             while other >= 0:
                 if (
@@ -315,7 +314,7 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, state
             if there < 0:
                 reason = LIMITED
                 break
-            to = cell + _ROW_STEP[k] * cols + _COL_STEP[k]
+            to = cell + ROW_STEP[k] * cols + COL_STEP[k]
             cost = states.cost[state] + (DIAGONAL if k & 1 else STRAIGHT)
             known = np.int64(head[to])
             while known >= 0 and states.word[known] != there:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.search._kernels import grow
+from hybridnav.search.arrays import grow
 
 
 @njit(cache=True, nogil=True)

@@ -13,8 +13,8 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.homotopy import _class_kernels
 from hybridnav.homotopy.classes import HomotopyClasses
 from hybridnav.homotopy.dead_ends import DeadEnds
-from hybridnav.search._kernels import field_distances, legal_moves
-from hybridnav.search.octile import length_in_cells
+from hybridnav.search.fields import field_distances
+from hybridnav.search.moves import legal_moves, length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, LongArray

@@ -7,8 +7,9 @@ import numpy as np
 from hybridnav._jit import guarded, njit
 from hybridnav.jumps._leg_kernels import class_of, reverse, row_col_kind
 from hybridnav.jumps._table_kernels import corner_at, is_corner, number_of
-from hybridnav.search._contract_kernels import pack
-from hybridnav.search._kernels import grow, octile_cost
+from hybridnav.search.arrays import grow
+from hybridnav.search.contraction import pack
+from hybridnav.search.moves import octile_cost
 
 
 @njit(cache=True, nogil=True)

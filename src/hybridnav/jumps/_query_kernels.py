@@ -7,7 +7,7 @@ import numpy as np
 from hybridnav._jit import guarded, njit
 from hybridnav.jumps._leg_kernels import FAR, row_col_kind
 from hybridnav.jumps._search_kernels import FROM_START, shortest
-from hybridnav.search._unpack_kernels import corners_between
+from hybridnav.search.contraction import corners_between
 
 
 @njit(cache=True, nogil=True)

@@ -8,9 +8,9 @@ from hybridnav._jit import njit
 from hybridnav.jumps._join_kernels import is_direct, join
 from hybridnav.jumps._leg_kernels import FAR, class_of, row_col_kind
 from hybridnav.jumps._table_kernels import corner_at, is_corner
-from hybridnav.search._heap_kernels import pop, push
-from hybridnav.search._kernels import octile_cost
-from hybridnav.search._unpack_kernels import NO_ARC
+from hybridnav.search.arrays import pop, push
+from hybridnav.search.contraction import NO_ARC
+from hybridnav.search.moves import octile_cost
 
 FROM_START, FROM_GOAL = -2, -3
 """Returned by `shortest` as the corner cell when the path is one leg: free with the diagonal first

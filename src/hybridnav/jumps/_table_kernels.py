@@ -1,6 +1,6 @@
 """Kernels of the tables of a jump-point graph: corner cells, and the distances to them.
 
-Directions are those of `search._kernels`: 0 east (column + 1), 1 north-east, counter-clockwise, row
+Directions are those of `search.moves`: 0 east (column + 1), 1 north-east, counter-clockwise, row
 + 1 being north. Cells lie in a frame of blocked ones, so that no neighbour is off the map; a flat
 cell is its place in the framed grid.
 """

@@ -11,7 +11,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.jumps._join_kernels import arcs_of, components
 from hybridnav.jumps._leg_kernels import COLUMN_BITS, KIND_BITS, legs_that_follow
 from hybridnav.jumps._table_kernels import look_ahead, number_cells
-from hybridnav.search._contract_kernels import contract, renumbered
+from hybridnav.search.contraction import contract, renumbered
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.jumps.build import JumpGraph
 
+KERNEL = kernels.paths
+"""The kernel whose compiled form shows that a search was run before."""
+
 Cell = tuple[int, int]
 
 _LEAST = 64

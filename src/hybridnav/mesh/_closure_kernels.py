@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 _MARGIN = 1e-6
 """Rounding of the point where a segment meets a row of cells, in cells."""

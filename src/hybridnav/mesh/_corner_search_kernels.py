@@ -26,7 +26,7 @@ from hybridnav.mesh._polyanya_kernels import (
     put_corner,
 )
 from hybridnav.mesh._view_kernels import distance, lobe_of
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 _SLACK = 1e-9
 """Rounding of distances in the graph, in cells."""

@@ -11,7 +11,7 @@ from hybridnav._jit import guarded, njit
 from hybridnav.mesh._closure_kernels import crosses, is_at_closed, is_clear
 from hybridnav.mesh._end_kernels import polygons_with
 from hybridnav.mesh._view_kernels import distance, lobe_of, see_from_point, touches
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 
 @njit(cache=True, nogil=True)

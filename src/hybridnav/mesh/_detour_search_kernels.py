@@ -33,7 +33,7 @@ from hybridnav.mesh._polyanya_kernels import (
     put_corner,
 )
 from hybridnav.mesh._view_kernels import distance, lobe_of, see_from_point, touches
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 UNSURE = 3
 """Status of a query whose start or goal lies at a corner of a cell that is not free."""

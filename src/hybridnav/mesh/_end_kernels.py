@@ -9,7 +9,7 @@ import numpy as np
 from hybridnav._jit import njit
 from hybridnav.mesh._polyanya_kernels import DONE, NO_ROOM, PAUSED
 from hybridnav.mesh._view_kernels import see_from_point
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 APART, MET, SPLIT = -1, 1, 0
 """Positions of the ends of a query: not connected, in one polygon, in several."""

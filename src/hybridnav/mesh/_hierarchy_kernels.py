@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.mesh._view_kernels import distance, lobe_of
-from hybridnav.search._contract_kernels import pack
+from hybridnav.search.contraction import pack
 
 UNITS = float(1 << 34)
 """Units of cost per cell: a path of 100,000 segments is exact to 1e-5 cells, and one of 5e8 cells

@@ -27,8 +27,8 @@ from hybridnav.mesh._polyanya_kernels import (
     put_corner,
 )
 from hybridnav.mesh._view_kernels import distance
-from hybridnav.search._heap_kernels import pop, push
-from hybridnav.search._unpack_kernels import NO_ARC, corners_between
+from hybridnav.search.arrays import pop, push
+from hybridnav.search.contraction import NO_ARC, corners_between
 
 FAR = np.int64(1) << 62
 """Cost above that of any path."""

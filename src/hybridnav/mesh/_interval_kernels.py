@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from hybridnav._jit import njit
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 # Columns of a node's whole numbers.
 SLOT, ROOT, PARENT, ENDS = 0, 1, 2, 3

@@ -25,7 +25,7 @@ from hybridnav.mesh._interval_kernels import (
     successors,
     turns,
 )
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 DONE, PAUSED, NO_ROOM = 0, 1, 2
 """Status of a run of the search: the answer is good enough; the limit of expansions is reached;

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from hybridnav._jit import njit
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 # Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
 _LEFT, _RIGHT = 1, 2

@@ -10,7 +10,7 @@ import pythoncdt
 
 from hybridnav._copies import copies_alike
 from hybridnav.mesh._block_kernels import blocks_of
-from hybridnav.mesh._corner_kernels import NO_CORNER, kinds_of, walls_of
+from hybridnav.mesh._corner_kernels import MANY, NO_CORNER, kinds_of, walls_of
 from hybridnav.mesh._merge_kernels import are_free, polygons_of_cells
 from hybridnav.mesh.merge import merge_triangles, select_triangles
 
@@ -64,6 +64,11 @@ class ConvexMesh:
         stops: IntArray = np.roll(self.begins, -1)
         stops[self.first[1:] - 1] = self.begins[self.first[:-1]]
         return stops
+
+    @property
+    def is_convex(self) -> BoolArray:
+        """bool (n,), whether paths bend round each corner."""
+        return self.kinds < MANY
 
     @property
     def n_polygons(self) -> int:

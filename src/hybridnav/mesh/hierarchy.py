@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.mesh._hierarchy_kernels import arcs_of, ways_that_follow
-from hybridnav.search._contract_kernels import contract
+from hybridnav.search.contraction import contract
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from hybridnav.mesh.build import ConvexMesh
     from hybridnav.mesh.corner_graph import CornerGraph
 
+KERNEL = query
+"""The kernel whose compiled form shows that a search was run before."""
+
 Cell = tuple[int, int]
 Position = tuple[float, float]
 

@@ -12,7 +12,7 @@ from hybridnav.homotopy.search import MOST_STATES, alternative_search
 from hybridnav.planner.named import At, check_names, stop_points
 from hybridnav.result import Path
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

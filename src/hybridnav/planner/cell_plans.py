@@ -15,7 +15,7 @@ from hybridnav import route as routes
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.result import Route
-from hybridnav.search.octile import octile_distance_in_cells, path_length_in_cells
+from hybridnav.search.moves import octile_distance_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:
     from collections.abc import Callable

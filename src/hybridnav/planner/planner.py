@@ -21,7 +21,7 @@ from hybridnav.planner.radius import check_radius
 from hybridnav.refine import GridRefiner, LineOfSight
 from hybridnav.result import Path, PlanResult, PlanStats, PlanStatus, Route
 from hybridnav.route import Walks
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

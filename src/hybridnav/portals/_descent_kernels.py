@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._jit import njit
 from hybridnav.portals._distance_kernels import next_gate
 from hybridnav.portals._path_kernels import FAR, stored_costs
-from hybridnav.search._kernels import grow
+from hybridnav.search.arrays import grow
 
 
 @njit(cache=True, nogil=True)

@@ -1,6 +1,6 @@
 """Kernels that prepare portals: shortest paths inside fields, from many gates at once.
 
-Directions are those of `search._kernels`: 0 to 7, east and on counter-clockwise. Cells of a field
+Directions are those of `search.moves`: 0 to 7, east and on counter-clockwise. Cells of a field
 are numbered from 0, `n` stands for "no such neighbour".
 """
 
@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
+from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 
 LANES = 16
 """Gates that are searched from together: one cache line of costs a cell."""
@@ -34,7 +33,7 @@ def neighbours_in_field(moves, cols, index, cells, first, out):
         for k in range(8):
             out[i, k] = n
             if mask >> k & 1:
-                j = index[cell + _ROW_STEP[k] * cols + _COL_STEP[k]] - first
+                j = index[cell + ROW_STEP[k] * cols + COL_STEP[k]] - first
                 if 0 <= j < n:
                     out[i, k] = j
 

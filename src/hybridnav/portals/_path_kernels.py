@@ -1,6 +1,6 @@
 """Kernels that portal routes are made of: stored paths, and the cells of a way.
 
-Directions are those of `search._kernels`: 0 to 7, east and on counter-clockwise, with `LEAP` set
+Directions are those of `search.moves`: 0 to 7, east and on counter-clockwise, with `LEAP` set
 where as many moves lead that way.
 """
 
@@ -11,8 +11,7 @@ import numpy as np
 from hybridnav._jit import njit
 from hybridnav.grid.centres import centres
 from hybridnav.portals._gate_kernels import LEAP
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
+from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 
 _INVERSE = DIAGONAL % STRAIGHT
 FAR = 1 << 60
@@ -76,8 +75,8 @@ def stored_costs(portals, field, cols, gates, count, cell, costs):
             code = first_move[np.uint64(begin[i] + (at >> 1))] >> ((at & 1) << 2)
             k, n = code & 7, 1 + (LEAP - 1) * (code >> 3 & 1)
             costs[place[i]] += n * (STRAIGHT + (k & 1) * (DIAGONAL - STRAIGHT))
-            row[i] += n * _ROW_STEP[k]
-            col[i] += n * _COL_STEP[k]
+            row[i] += n * ROW_STEP[k]
+            col[i] += n * COL_STEP[k]
             i += 1
 
 
@@ -143,12 +142,12 @@ def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
             code = first_move[np.uint64(begin[i] + (position >> 1))] >> ((position & 1) << 2)
             k = code & 7
             for _ in range(LEAP - 1 if code & LEAP else 0):
-                row[i] += _ROW_STEP[k]
-                col[i] += _COL_STEP[k]
+                row[i] += ROW_STEP[k]
+                col[i] += COL_STEP[k]
                 here += onward[i]
                 cells[here, 0], cells[here, 1] = row[i], col[i]
-            row[i] += _ROW_STEP[k]
-            col[i] += _COL_STEP[k]
+            row[i] += ROW_STEP[k]
+            col[i] += COL_STEP[k]
             at[i] = here + onward[i]
             i += 1
     return cells, centres(cells, frame)

@@ -1,6 +1,6 @@
 """Kernels of the ends of a way: by which side it leaves its first field, and enters its last one.
 
-Costs are the integers of `search._costs`. Array fields of named tuples are read once, at the head
+Costs are the integers of `search.moves`. Array fields of named tuples are read once, at the head
 of each kernel: reading them in a loop costs more than the loop.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._jit import guarded, njit
 from hybridnav.portals._distance_kernels import distances
 from hybridnav.portals._path_kernels import FAR, UNREACHED, position_of, stored_costs
-from hybridnav.search._kernels import octile_cost
+from hybridnav.search.moves import octile_cost
 
 
 @njit(cache=True, nogil=True)

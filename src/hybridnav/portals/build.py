@@ -18,7 +18,7 @@ from hybridnav.portals import _gate_kernels as kernels
 from hybridnav.portals.crossings import find_crossings
 from hybridnav.portals.fields import compact_labels
 from hybridnav.portals.layout import Layout, offsets_of, starts_of
-from hybridnav.search._kernels import legal_moves
+from hybridnav.search.moves import legal_moves
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,7 +40,7 @@ class PathTooLongError(InvalidValueError):
 class Portals(NamedTuple):
     """Portals of a partition of the cells that may be entered, and the paths inside its fields.
 
-    F fields, G gates, R sides, S sources. Costs are the integers of `search._costs`. A portal has
+    F fields, G gates, R sides, S sources. Costs are the integers of `search.moves`. A portal has
     two sides, one in each of its fields. Flat cells are `row * cols + col`; gates are sorted by
     field, sides too: those of field f are `side_start[f]` to `side_start[f + 1]`, and likewise for
     gates.

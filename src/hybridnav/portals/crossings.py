@@ -6,12 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search.moves import DIAGONAL, STRAIGHT, moves_along
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
-
-_STEPS = ((0, 1), (1, 1), (1, 0), (1, -1))
 
 
 class Crossings(NamedTuple):
@@ -81,9 +79,8 @@ def _moves_between(
 ) -> tuple[LongArray, LongArray, BoolArray]:
     """All legal moves between two fields: cell in the lower one, in the higher, if diagonal."""
     found = []
-    for direction, (down, right) in enumerate(_STEPS):
-        tail = np.flatnonzero(moves >> direction & 1)
-        head = tail + down * cols + right
+    for direction in range(4):
+        tail, head = moves_along(moves, cols, direction)
         apart = label[tail] != label[head]
         diagonal = np.full(int(apart.sum()), direction & 1 == 1)
         found.append((tail[apart], head[apart], diagonal))

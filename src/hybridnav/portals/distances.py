@@ -10,7 +10,7 @@ from hybridnav.portals import _table_kernels as kernels
 from hybridnav.portals._path_kernels import UNREACHED
 from hybridnav.portals._side_kernels import entries_of
 from hybridnav.portals.options import DEFAULT_OPTIONS
-from hybridnav.search._costs import DIAGONAL
+from hybridnav.search.moves import DIAGONAL
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

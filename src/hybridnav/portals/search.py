@@ -13,9 +13,14 @@ from hybridnav.grid.centres import centres
 from hybridnav.portals import _answer_kernels as kernels
 from hybridnav.portals._path_kernels import FAR
 from hybridnav.portals.any_angle_bound import AnyAngleBound
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import octile_cost
-from hybridnav.search.octile import cost_of, length_in_cells, length_of_cost
+from hybridnav.search.moves import (
+    DIAGONAL,
+    STRAIGHT,
+    cost_of,
+    length_in_cells,
+    length_of_cost,
+    octile_cost,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

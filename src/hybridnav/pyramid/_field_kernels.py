@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
+from hybridnav.search.arrays import find
 
 
 @guarded
@@ -55,15 +56,6 @@ def field_extents(field_of, cols, n_vertices):
         boxes[v, 2] = row
         boxes[v, 3] = max(boxes[v, 3], col)
     return areas, boxes
-
-
-@njit(cache=True, nogil=True)
-def find(root, i):
-    """Return the representative of i in a union-find forest, halving the path."""
-    while root[i] != i:
-        root[i] = root[root[i]]
-        i = root[i]
-    return i
 
 
 @njit(cache=True, nogil=True)

@@ -6,8 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.pyramid._field_kernels import find_cracks
+
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
+
+
+__all__ = ["cell_pairs", "ends_of", "find_cracks", "middles_of", "sides_of"]
 
 
 def ends_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:

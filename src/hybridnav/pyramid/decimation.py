@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.combinatorial import _kernels as dart_kernels
+from hybridnav.combinatorial import darts as dart_kernels
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _kernels
 from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from hybridnav.pyramid.resistance import Resistance
 
     KindArray = NDArray[np.uint8] | NDArray[np.uint16]
+
+KERNEL = _kernels.select_stars
+"""The kernel whose compiled form shows that a pyramid was built before."""
 
 _LINKAGES: dict[Linkage, int] = {
     "survivor": _kernels.SURVIVOR,

@@ -15,9 +15,8 @@ from hybridnav.pyramid import _field_kernels, _hull_kernels
 from hybridnav.pyramid.cracks import cell_pairs, ends_of, middles_of, sides_of
 from hybridnav.pyramid.dual import DualGraph
 from hybridnav.pyramid.record import SURVIVES
-from hybridnav.search import _kernels as search_kernels
-from hybridnav.search._costs import STRAIGHT
-from hybridnav.search.octile import length_in_cells
+from hybridnav.search.fields import field_distances
+from hybridnav.search.moves import STRAIGHT, length_in_cells
 
 _SOUTH = 3
 
@@ -283,9 +282,7 @@ class Level:
         unexplored field. For a self-loop it is the shortest closed walk from its surviving cell
         across one of the cell pairs of its boundary.
         """
-        distance = search_kernels.field_distances(
-            self._grid.classes, self._labels[0], self._labels[1]
-        )
+        distance = field_distances(self._grid.classes, self._labels[0], self._labels[1])
         edges, arc = self.boundary_table
         first, second = ends_of(edges, self._grid.shape[1])
         across = distance[first] + distance[second] + STRAIGHT

@@ -13,7 +13,7 @@ from hybridnav.pyramid import _field_kernels, _resistance_kernels
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, IntArray, KeyArray
-    from hybridnav.combinatorial._kernels import Darts
+    from hybridnav.combinatorial.darts import Darts
     from hybridnav.pyramid._kernels import Vertices
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from hybridnav._jit import njit
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 
 @njit(cache=True, nogil=True)

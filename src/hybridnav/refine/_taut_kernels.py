@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search.exact import turn_of
 
 FREE = 128
 """Bit of a mark: the cell may be entered."""

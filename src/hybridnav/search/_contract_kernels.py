@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._heap_kernels import pop, push
+from hybridnav.search._array_kernels import pop, push
 
 SLACK = 6000
 """Delay with which a corner may still be contracted, in thousandths of a level. With 0 there are 3

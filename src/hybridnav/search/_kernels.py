@@ -1,10 +1,4 @@
-"""Kernels of the searches: legal moves, A* on cells, distances inside fields, arcs of a graph.
-
-Costs on the octile grid are integers: STRAIGHT for a step along a side, DIAGONAL for one along a
-diagonal. DIAGONAL / STRAIGHT = 114243 / 80782 is a convergent of sqrt 2: no fraction with a smaller
-denominator lies between the two, so integer costs order any two paths exactly as a + b sqrt 2 does,
-as long as their numbers of diagonal steps differ by less than 80782.
-"""
+"""Kernels of the searches: A* on cells, distances inside fields, arcs of a graph."""
 
 from __future__ import annotations
 
@@ -13,7 +7,7 @@ import heapq
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._move_kernels import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 # A record of A*: generation, cost modulo 2^19, direction of arrival (see `astar`).
 _DIRECTION_BITS = 3
@@ -27,63 +21,10 @@ GENERATIONS = (1 << (32 - _GENERATION_SHIFT)) - 1
 NO_ROOM = -2
 """Returned by `astar` when a bucket of its open list is full."""
 
-# Directions in the order east, north-east, north, ... counter-clockwise, row step and column step.
-_ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)
-_COL_STEP = np.array([1, 1, 0, -1, -1, -1, 0, 1], np.int64)
-
 # Width of a bucket of the open list, 0.41 of a straight step; a quarter and an eighth of that are
 # equal within noise. A move raises f by less than 2 * DIAGONAL, 7 buckets: 8 take turns.
 _BUCKET_SHIFT = 15
 BUCKETS = 8
-
-
-@njit(cache=True, nogil=True)
-def octile_cost(rows, cols):
-    """Return the cost of the shortest path between cells without obstacles, from their offsets."""
-    rows, cols = abs(rows), abs(cols)
-    if rows < cols:
-        rows, cols = cols, rows
-    return STRAIGHT * (rows - cols) + DIAGONAL * cols
-
-
-@njit(cache=True, nogil=True)
-def legal_moves(enterable, corner_cutting):
-    """Return the byte mask of the legal moves of each cell, bit k for direction k.
-
-    A diagonal needs both side cells enterable, unless corners may be cut. Moves are judged once, on
-    the whole grid.
-    """
-    rows, cols = enterable.shape
-    moves = np.zeros((rows, cols), np.uint8)
-    for row in range(rows):
-        for col in range(cols):
-            if not enterable[row, col]:
-                continue
-            to_east, to_west = col + 1 < cols, col > 0
-            to_north, to_south = row + 1 < rows, row > 0
-            east = to_east and enterable[row, col + 1]
-            west = to_west and enterable[row, col - 1]
-            north = to_north and enterable[row + 1, col]
-            south = to_south and enterable[row - 1, col]
-            mask = east | north << 2 | west << 4 | south << 6
-            if to_north and to_east and (corner_cutting or (north and east)):
-                mask |= enterable[row + 1, col + 1] << 1
-            if to_north and to_west and (corner_cutting or (north and west)):
-                mask |= enterable[row + 1, col - 1] << 3
-            if to_south and to_west and (corner_cutting or (south and west)):
-                mask |= enterable[row - 1, col - 1] << 5
-            if to_south and to_east and (corner_cutting or (south and east)):
-                mask |= enterable[row - 1, col + 1] << 7
-            moves[row, col] = mask
-    return moves
-
-
-@njit(cache=True, nogil=True)
-def grow(array):
-    """Return a copy of an array with twice the room."""
-    larger = np.empty(2 * array.size, array.dtype)
-    larger[: array.size] = array
-    return larger
 
 
 @guarded
@@ -108,7 +49,7 @@ def forbid(moves, cols, blocked, corner_cutting):
         moves[cell] = 0
         row, col = cell // cols, cell % cols
         for k in range(8):
-            to_row, to_col = row + _ROW_STEP[k], col + _COL_STEP[k]
+            to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
             if to_row < 0 or to_row >= rows or to_col < 0 or to_col >= cols:
                 continue
             gone = 1 << (k + 4 & 7)
@@ -190,14 +131,14 @@ def astar(
                 pruned = spared & 7
                 spared >>= 4
                 via = pruned + (1 if pruned - k & 7 < 4 else -1) & 7
-                if not in_corridor[field_of[cell + _ROW_STEP[via] * cols + _COL_STEP[via]]]:
+                if not in_corridor[field_of[cell + ROW_STEP[via] * cols + COL_STEP[via]]]:
                     todo = todo << 4 | 8 | pruned
         following = np.int64(-1)
         following_row = following_col = following_cost = following_k = np.int64(0)
         while todo != 0:
             k = todo & 7
             todo >>= 4
-            row_step, col_step = _ROW_STEP[np.uint64(k)], _COL_STEP[np.uint64(k)]
+            row_step, col_step = ROW_STEP[np.uint64(k)], COL_STEP[np.uint64(k)]
             to = cell + row_step * cols + col_step
             if field_of is not None and not in_corridor[field_of[to]]:
                 continue
@@ -262,39 +203,6 @@ def astar(
 
 
 @njit(cache=True, nogil=True)
-def trace(came, cols, start, goal):
-    """Return the flat cells of the path that a search recorded, from start to goal.
-
-    The lowest three bits of `came` are the direction from which each cell was reached.
-    """
-    count = 1
-    cell = goal
-    while cell != start:
-        k = came[cell] & 7
-        cell -= _ROW_STEP[k] * cols + _COL_STEP[k]
-        count += 1
-    path = np.empty(count, np.int64)
-    cell = goal
-    for i in range(count - 1, 0, -1):
-        path[i] = cell
-        k = came[cell] & 7
-        cell -= _ROW_STEP[k] * cols + _COL_STEP[k]
-    path[0] = start
-    return path
-
-
-@njit(cache=True, nogil=True)
-def trace_cells(came, cols, start, goal):
-    """Return the path of `trace` as (row, col), shape (n, 2)."""
-    flat = trace(came, cols, start, goal)
-    cells = np.empty((flat.size, 2), np.int64)
-    for i in range(flat.size):
-        row = flat[i] // cols
-        cells[i, 0], cells[i, 1] = row, flat[i] - row * cols
-    return cells
-
-
-@njit(cache=True, nogil=True)
 def field_distances(classes, field_of, sources):
     """Return the cost of the shortest path inside each field from its source to each cell.
 
@@ -325,7 +233,7 @@ def field_distances(classes, field_of, sources):
                     continue
                 row, col = cell // cols, cell % cols
                 for k in range(8):
-                    to_row, to_col = row + _ROW_STEP[k], col + _COL_STEP[k]
+                    to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
                     if to_row < 0 or to_row >= rows or to_col < 0 or to_col >= cols:
                         continue
                     to = to_row * cols + to_col

@@ -7,8 +7,7 @@ import heapq
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
-from hybridnav.search._kernels import _COL_STEP, _ROW_STEP
+from hybridnav.search._move_kernels import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 
 
 @guarded
@@ -45,7 +44,7 @@ def spread(moves, cols, sources, costs, is_target, all_targets):
         for k in range(8):
             if moves[cell] >> k & 1 == 0:
                 continue
-            to = cell + _ROW_STEP[k] * cols + _COL_STEP[k]
+            to = cell + ROW_STEP[k] * cols + COL_STEP[k]
             further = at + (DIAGONAL if k & 1 else STRAIGHT)
             if cost[to] < 0 and further < best[to]:
                 best[to] = further

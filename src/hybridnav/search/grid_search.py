@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.search import _kernels
+from hybridnav.search._move_kernels import legal_moves, trace_cells
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 
+KERNEL = _kernels.astar
+"""The kernel whose compiled form shows that a search was run before."""
 _UNLIMITED = 1 << 62
 _ROOM = 1024
 
@@ -67,7 +70,7 @@ class GridSearch:
     def __init__(self, enterable: BoolArray, *, corner_cutting: bool = False) -> None:
         self._cols = enterable.shape[1]
         self._corner_cutting = corner_cutting
-        moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting)
+        moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
         self._moves = moves.ravel()
         self._works = Pool(partial(_Work, enterable.size))
         self._moves_to_edit: Pool[ByteArray] = Pool(partial(np.copy, self._moves))
@@ -149,7 +152,7 @@ class GridSearch:
                     work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
             if cost < 0:
                 return CellPath(None, int(expanded))
-            cells: LongArray = _kernels.trace_cells(work.records, self._cols, *ends)
+            cells: LongArray = trace_cells(work.records, self._cols, *ends)
         return CellPath(cells, int(expanded))
 
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.search import _kernels, _stops_kernels
+from hybridnav.search import _stops_kernels
+from hybridnav.search.moves import legal_moves
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,7 +38,7 @@ def cheapest_stops(
     list of int | None
         A flat cell of each set; None if one of them cannot be reached.
     """
-    moves = _kernels.legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+    moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
     sources, costs = sets[0], np.zeros(len(sets[0]), dtype=np.int64)
     origins: list[LongArray] = []
     for number, goals in enumerate(sets[1:], start=2):

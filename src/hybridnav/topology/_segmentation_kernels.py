@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.pyramid._field_kernels import find
+from hybridnav.search.arrays import find
 
 
 @njit(cache=True, nogil=True)

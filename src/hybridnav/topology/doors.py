@@ -10,8 +10,7 @@ import numpy as np
 
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.grid.clearance import clearance_cells
-from hybridnav.pyramid import _field_kernels
-from hybridnav.pyramid.cracks import ends_of, middles_of, sides_of
+from hybridnav.pyramid.cracks import ends_of, find_cracks, middles_of, sides_of
 from hybridnav.pyramid.decimation import kinds_of
 
 if TYPE_CHECKING:
@@ -77,7 +76,7 @@ class RoomBoundaries:
         rows, cols = grid.shape
         kinds = kinds_of(grid.measured, rooms.label_of).astype(np.int32).ravel() - np.int32(1)
         kinds.flags.writeable = False  # as the kernel is compiled for
-        edges, classes = _field_kernels.find_cracks(kinds, rows, cols)
+        edges, classes = find_cracks(kinds, rows, cols)
         first, second = ends_of(edges, cols)
         free = grid.measured.ravel() == CellClass.FREE
         between = free[first] & free[second]  # then their rooms differ

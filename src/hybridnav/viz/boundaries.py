@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 
 from hybridnav.grid import CellClass
 from hybridnav.pyramid.dual import FaceKind
+from hybridnav.search.moves import STEPS
 from hybridnav.viz.fields import Field, Walks, distance_to_rim, rounded, smoothed
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ Corner = tuple[int, int]
 """A corner of cells: (row, col) in grid units, the lower left corner of cell (row, col)."""
 
 _ALL_ROUND = np.ones((3, 3), dtype=np.bool_)
-_STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
 _SAMPLED_ENDS = 8
 _SHORT = 100
 """Most cells of a line that is smoothed; a longer one follows walls and has few bends anyway."""
@@ -289,7 +289,7 @@ def _links(number: LongArray) -> Any:
     """Return the moves between 8-neighbours of one hole, and their lengths."""
     padded = np.pad(number, 1, constant_values=-1)
     tails, heads, lengths = [], [], []
-    for up, right in _STEPS:
+    for up, right in STEPS[[2, 0, 1, 3]].tolist():
         beyond = np.roll(padded, (-up, -right), axis=(0, 1))
         linked = (padded >= 0) & (beyond >= 0)
         tails.append(padded[linked])

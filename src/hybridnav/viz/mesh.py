@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.mesh import build_mesh
-from hybridnav.mesh._corner_kernels import MANY
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
@@ -81,7 +80,7 @@ def plot_mesh(
     fill.set_gid("polygons")
     canvas.ax.add_collection(fill, autolim=False)
     draw_sides(canvas, grid, mesh)
-    convex = mesh.kinds < MANY
+    convex = mesh.is_convex
     x, y = corners[convex].T
     dots = canvas.ax.scatter(x, y, s=(1.5 * line) ** 2, c=style.HOLE, linewidths=0, zorder=4)
     dots.set_gid("corners")

@@ -203,7 +203,7 @@ def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearc
 
 def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:
     """Refuse arcs to corners, and references to arcs, that do not exist."""
-    from hybridnav.search._contract_kernels import HEAD_SHIFT  # noqa: PLC0415 - loads numba
+    from hybridnav.search.contraction import HEAD_SHIFT  # noqa: PLC0415 - loads numba
 
     heads, middles = arrays["arcs"][:, 1] >> HEAD_SHIFT, arrays["middles"]
     past = middles[middles >= 0]

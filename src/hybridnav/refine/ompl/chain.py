@@ -16,7 +16,7 @@ from hybridnav.refine.ompl.corridor import bounds_of
 from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
 from hybridnav.refine.ompl.poses import Poses
 from hybridnav.refine.ompl.simplify import Simplifier
-from hybridnav.search.octile import path_length_in_cells
+from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray

@@ -1,4 +1,9 @@
-"""Lengths on the octile grid, exact in a + b sqrt 2."""
+"""Moves between neighbouring cells: directions, costs, legal moves, lengths of paths.
+
+A cell has 8 neighbours. Direction k leads `ROW_STEP[k]` rows and `COL_STEP[k]` columns on, counted
+counter-clockwise from east; odd directions are diagonal. Searches count in integers, `STRAIGHT` for
+a step along a side and `DIAGONAL` for one along a diagonal; lengths are exact in a + b sqrt 2.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +12,62 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.search._costs import DIAGONAL, STRAIGHT
+from hybridnav.search._move_kernels import (
+    COL_STEP,
+    DIAGONAL,
+    ROW_STEP,
+    STRAIGHT,
+    legal_moves,
+    octile_cost,
+    trace,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import ByteArray, FloatArray, LongArray
+
+__all__ = [
+    "COL_STEP",
+    "DIAGONAL",
+    "ROW_STEP",
+    "STEPS",
+    "STRAIGHT",
+    "cost_of",
+    "legal_moves",
+    "length_in_cells",
+    "length_of_cost",
+    "moves_along",
+    "octile_cost",
+    "octile_distance_in_cells",
+    "path_length_in_cells",
+    "trace",
+]
+
+STEPS = np.stack([ROW_STEP, COL_STEP], axis=1)
+"""int64 (8, 2), `(rows, columns)` of each direction; the first four are half of the moves, each
+the opposite of one of the others."""
+STEPS.flags.writeable = False
 
 # DIAGONAL^2 = 2 * STRAIGHT^2 + 1, so DIAGONAL is its own inverse modulo STRAIGHT.
 _INVERSE = DIAGONAL % STRAIGHT
+
+
+def moves_along(moves: ByteArray, cols: int, direction: int) -> tuple[LongArray, LongArray]:
+    """Return the flat cells that the legal moves in one direction lead from, and to.
+
+    Parameters
+    ----------
+    moves
+        uint8 (rows * cols,), masks of the legal moves, as `legal_moves` returns them.
+    cols
+        Columns of the map.
+    direction
+        From 0 to 7.
+    """
+    tail = np.flatnonzero(moves >> direction & 1)
+    row_step, col_step = STEPS[direction].tolist()
+    return tail, tail + row_step * cols + col_step
 
 
 def length_in_cells(cost: ArrayLike) -> FloatArray:
@@ -57,7 +109,7 @@ def path_length_in_cells(cells: LongArray) -> float:
 
 
 def cost_of(cells: LongArray) -> int:
-    """Return the integer cost of a path of 8-neighbour moves; see `_kernels` for its unit.
+    """Return the integer cost of a path of 8-neighbour moves; see `STRAIGHT`.
 
     Parameters
     ----------

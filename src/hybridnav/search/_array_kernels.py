@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hybridnav._jit import njit
 
 
@@ -39,3 +41,20 @@ def pop(heap, size):
         at = least
     heap[at, 0], heap[at, 1] = key, value
     return found
+
+
+@njit(cache=True, nogil=True)
+def find(root, i):
+    """Return the representative of i in a union-find forest, halving the path."""
+    while root[i] != i:
+        root[i] = root[root[i]]
+        i = root[i]
+    return i
+
+
+@njit(cache=True, nogil=True)
+def grow(array):
+    """Return a copy of an array with twice the room."""
+    larger = np.empty(2 * array.size, array.dtype)
+    larger[: array.size] = array
+    return larger

@@ -1,0 +1,8 @@
+"""Contraction of a graph of corners into a hierarchy, and paths in it, for kernels."""
+
+from __future__ import annotations
+
+from hybridnav.search._contract_kernels import HEAD_SHIFT, contract, pack, renumbered
+from hybridnav.search._unpack_kernels import NO_ARC, corners_between
+
+__all__ = ["HEAD_SHIFT", "NO_ARC", "contract", "corners_between", "pack", "renumbered"]

@@ -1,0 +1,7 @@
+"""Predicates that rounding cannot change, for kernels."""
+
+from __future__ import annotations
+
+from hybridnav.search._exact_kernels import turn_of
+
+__all__ = ["turn_of"]
