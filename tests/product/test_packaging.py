@@ -283,11 +283,15 @@ def wheel(tmp_path_factory):
 def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
-    modules = {path.relative_to(ROOT / "src").as_posix() for path in (ROOT / "src").rglob("*.py")}
+    source = ROOT / "src"
+    modules = {path.relative_to(source).as_posix() for path in source.rglob("*.py")}
+    # What type checkers read, and what the names of packages are loaded by.
+    stubs = {path.relative_to(source).as_posix() for path in source.rglob("*.pyi")}
     presets = {f"hybridnav/presets/{name}" for name in PLANNERS}
     content = {name for name in names if ".dist-info/" not in name}
     others = {"hybridnav/py.typed", "hybridnav/harness/report.html.j2"}
-    assert content == modules | presets | others
+    assert "hybridnav/__init__.pyi" in stubs
+    assert content == modules | stubs | presets | others
     assert len(names) == len(set(names))
     assert any(name.endswith("licenses/LICENSE") for name in names)
 

@@ -1,0 +1,60 @@
+from .config import Preset as Preset, load_preset as load_preset, preset_names as preset_names
+from .errors import (
+    CacheWarning as CacheWarning,
+    HybridNavError as HybridNavError,
+    InvalidValueError as InvalidValueError,
+    MapError as MapError,
+    MapNotFoundError as MapNotFoundError,
+    MapWarning as MapWarning,
+    ModelError as ModelError,
+    OmplError as OmplError,
+    PlanError as PlanError,
+    PresetError as PresetError,
+    PresetNotFoundError as PresetNotFoundError,
+    RoomsError as RoomsError,
+    RoomsNotFoundError as RoomsNotFoundError,
+)
+from .grid import (
+    CellClass as CellClass,
+    DroppedIslands as DroppedIslands,
+    Frame as Frame,
+    OccupancyGrid as OccupancyGrid,
+    RoomLabels as RoomLabels,
+    drop_islands as drop_islands,
+)
+from .io import (
+    Model as Model,
+    example_map as example_map,
+    load as load,
+    load_blocked as load_blocked,
+    load_map as load_map,
+    load_rooms as load_rooms,
+    save as save,
+    save_rooms as save_rooms,
+)
+from .planner import (
+    Alternative as Alternative,
+    Alternatives as Alternatives,
+    Blocked as Blocked,
+    HybridPlanner as HybridPlanner,
+    Tour as Tour,
+    plan_alternatives as plan_alternatives,
+    plan_tour as plan_tour,
+)
+from .pyramid import DualGraphPyramid as DualGraphPyramid, Level as Level, LevelArc as LevelArc
+from .result import (
+    Path as Path,
+    PlanBatch as PlanBatch,
+    PlanResult as PlanResult,
+    PlanStatus as PlanStatus,
+    Route as Route,
+)
+from .topology import (
+    Door as Door,
+    Rooms as Rooms,
+    TopologicalMap as TopologicalMap,
+    find_rooms as find_rooms,
+)
+
+__version__: str
+__all__: list[str]
