@@ -3,34 +3,6 @@
 Names load on first use: few maps have rooms, and to find them takes scipy.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from typing import TYPE_CHECKING
-
-from hybridnav._lazy import on_first_use
-
-if TYPE_CHECKING:
-    from hybridnav.topology.map import Component, Obstacle, TopologicalMap
-    from hybridnav.topology.rooms import Door, Rooms
-    from hybridnav.topology.segmentation import find_rooms
-
-__all__ = [
-    "Component",
-    "Door",
-    "Obstacle",
-    "Rooms",
-    "TopologicalMap",
-    "find_rooms",
-]
-
-__getattr__ = on_first_use(
-    __name__,
-    {
-        "Component": "map",
-        "Door": "rooms",
-        "Obstacle": "map",
-        "Rooms": "rooms",
-        "TopologicalMap": "map",
-        "find_rooms": "segmentation",
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

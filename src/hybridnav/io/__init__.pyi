@@ -1,0 +1,14 @@
+from .blocked import load_blocked as load_blocked
+from .examples import example_map as example_map
+from .maps import load_map as load_map
+from .models import Model as Model, load as load, save as save
+from .movingai import (
+    Scenario as Scenario,
+    load_movingai_map as load_movingai_map,
+    read_scenarios as read_scenarios,
+)
+from .rooms import load_rooms as load_rooms
+from .rooms_out import save_rooms as save_rooms
+from .ros import load_ros_map as load_ros_map
+
+__all__: list[str]

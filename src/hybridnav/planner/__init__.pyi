@@ -1,0 +1,10 @@
+from .alternatives import (
+    Alternative as Alternative,
+    Alternatives as Alternatives,
+    plan_alternatives as plan_alternatives,
+)
+from .blocked import Blocked as Blocked
+from .planner import HybridPlanner as HybridPlanner
+from .tour import Tour as Tour, plan_tour as plan_tour
+
+__all__: list[str]

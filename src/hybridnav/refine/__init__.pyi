@@ -1,0 +1,5 @@
+from .grid import GridRefiner as GridRefiner, Refiner as Refiner
+from .line_of_sight import LineOfSight as LineOfSight
+from .motions import MotionCheck as MotionCheck
+
+__all__: list[str]
