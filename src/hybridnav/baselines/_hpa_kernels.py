@@ -214,12 +214,23 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
     """Return the flat cells of the cheapest abstract path, and the nodes and cells expanded.
 
     The path includes start and goal, and is empty if there is none; cells are expanded to join
-    start and goal to the graph.
+    start and goal to the graph: to the nodes of their clusters, and to each other if a path inside
+    one cluster does so.
 
-    Start and goal are joined to the nodes of their clusters, and to each other if a path inside one
-    cluster does so. `moves`, uint8 (rows, cols), are the legal moves; `start` and `goal` flat
-    cells; `cost_of`, `previous` and `mark`, one entry for each node, are work arrays; `mark` and
-    `generation` are as in `_weighted_kernels`.
+    Parameters
+    ----------
+    moves
+        uint8 (rows, cols), the legal moves of each cell.
+    side
+        Side of a cluster, in cells.
+    graph
+        `AbstractGraph`.
+    start, goal
+        Flat cells.
+    cost_of, previous
+        Work arrays, one entry a node: integer cost and previous node.
+    mark, generation
+        As in `_weighted_kernels.dijkstra`, by node.
     """
     cols = moves.shape[1]
     is_open, is_closed = 2 * generation, 2 * generation + 1

@@ -122,8 +122,18 @@ def distances_from(inner, width, source, keep, distance, closed, came, open_cell
     Buckets as wide as a straight step make the search label-setting (Dinic 1978); three take turns.
     A cell is improved at most once by each neighbour, which bounds the buckets.
 
-    `inner`, uint8, the moves of the cells in the field's bounding box, `width` cells wide; `source`
-    an index in the box; `keep` that of `keep_table`; the others are those of `room_for`.
+    Parameters
+    ----------
+    inner
+        uint8 (n,), the moves of the cells in the field's bounding box.
+    width
+        Columns of the box.
+    source
+        Index of a cell in the box.
+    keep
+        Result of `keep_table`.
+    distance, closed, came, open_cells
+        Work arrays from `room_for`: integer costs (filled in), cells done, directions, buckets.
     """
     distance[:] = _NONE
     closed[:] = False
@@ -187,10 +197,21 @@ def local_of(cells, cols, box):
 def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first, clique):
     """Fill `clique` with the distances between boundary cells inside fields; return if all fit.
 
-    `labels`, int32 (n_cells,), is the field of each cell; `moves`, uint8 (n_cells,); `boxes`,
-    (n_fields, 4); `node_cell`, the flat boundary cells by field, those of field f from
-    `node_first[f]` on; `clique`, flat square matrices, that of field f from `clique_first[f]` on. A
-    distance must fit the type of `clique`.
+    Parameters
+    ----------
+    labels
+        int32 (n_cells,), the field of each flat cell.
+    moves
+        uint8 (n_cells,), its legal moves.
+    cols
+        Columns of the grid.
+    boxes
+        int64 (n_fields, 4), from `field_boxes`.
+    node_cell, node_first
+        Flat boundary cells by field; those of field f begin at `node_first[f]`.
+    clique_first, clique
+        Flat square matrices of integer costs, that of field f from `clique_first[f]` on. A distance
+        must fit the type of `clique`.
     """
     keep = keep_table()
     largest = np.iinfo(clique.dtype).max
@@ -219,8 +240,14 @@ def fill_cliques(labels, moves, cols, boxes, node_cell, node_first, clique_first
 def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, other):
     """Return the distances inside its field from a cell to the boundary cells and to another cell.
 
-    The latter is `_NONE` in another field. The third result is the number of cells reached. `cell`
-    and `other` are flat cells; for the other arguments see `fill_cliques`.
+    The latter is `_NONE` in another field. The third result is the number of cells reached.
+
+    Parameters
+    ----------
+    labels, moves, cols, boxes, node_cell, node_first
+        See `fill_cliques`.
+    cell, other
+        Flat cells.
     """
     field = labels[cell]
     box = boxes[field]
@@ -238,9 +265,26 @@ def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, 
 def relax(heap, best, came, by_cross, node_cell, cols, goal, bound, node, new_cost, via, across):
     """Note a cheaper path to a node, unless no path through it can cost less than `bound`.
 
-    `best` and `came`, int64 by node, are cost and predecessor, `by_cross` whether it is reached
-    across a boundary; `goal` is a flat cell; `new_cost` the cost through `via`, `across` a boundary
-    or not. Costs are integers.
+    Parameters
+    ----------
+    heap
+        Pairs of an estimate and a node; grows.
+    best, came
+        int64 and int32 (n_nodes,), cost and predecessor; changed.
+    by_cross
+        bool (n_nodes,), whether a node is reached across a boundary; changed.
+    node_cell
+        Flat cell of each node.
+    cols
+        Columns of the grid.
+    goal
+        Flat cell.
+    bound
+        Integer cost of the best path so far.
+    node, new_cost
+        The node, and the integer cost of the path to it.
+    via, across
+        The node before, and whether a boundary lies between.
     """
     if new_cost >= best[node]:
         return
@@ -276,13 +320,33 @@ def overlay_search(
     """Search the overlay by A*, from the boundary cells of the start's field to those of the
     goal's.
 
-    `node_field` and `node_cell` are the field and flat cell of each node; `cross_first`,
-    `cross_head` and `cross_cost` the moves of `cross_edges`; `start_distance` and `goal_distance`
-    the results of `distances_to_nodes`; for the other arrays see `fill_cliques`. `direct` is the
-    cost of the best path that never leaves the start's field. A node reached inside its field is
-    left only across the boundary: two paths in a row inside one field are never shorter than one.
-    Return the cost, `_NONE` for no path, the nodes of the path, whether each was reached across a
-    boundary, and the expansions; no nodes if the direct path wins.
+    A node reached inside its field is left only across the boundary: two paths in a row inside one
+    field are never shorter than one.
+
+    Parameters
+    ----------
+    node_field, node_cell
+        Field and flat cell of each node.
+    cols
+        Columns of the grid.
+    node_first, clique_first, clique
+        See `fill_cliques`.
+    cross_first, cross_head, cross_cost
+        The moves of `cross_edges`.
+    start_field, goal_field
+        Fields of the two ends.
+    start_distance, goal_distance
+        Results of `distances_to_nodes`.
+    goal
+        Flat cell.
+    direct
+        Integer cost of the best path that never leaves the start's field.
+
+    Returns
+    -------
+    tuple
+        The cost, `_NONE` for no path; the nodes of the path, none if the direct path wins; whether
+        each was reached across a boundary; the expansions.
     """
     best = np.full(node_cell.size, _NONE)
     came = np.full(node_cell.size, -1, np.int32)

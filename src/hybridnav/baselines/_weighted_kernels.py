@@ -49,11 +49,23 @@ def drop_least(keys, items, size):
 def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
     """Return whether there is a path between two flat cells, and the expansions up to the goal's.
 
-    `moves`, uint8 (n_cells,), are the legal moves on a grid of `cols` columns, `start` and `goal`
-    flat cells; `cost_of`, `came` and `mark`, one entry a cell, are work arrays; `generation` is the
-    number of this search. `came` receives the direction by which a shortest path reaches each
-    closed cell. Buckets as wide as a straight step make the search label-setting (Dinic 1978): no
-    cell can be improved from its own bucket, and three buckets that take turns hold all open cells.
+    Buckets as wide as a straight step make the search label-setting (Dinic 1978): no cell can be
+    improved from its own bucket, and three buckets that take turns hold all open cells.
+
+    Parameters
+    ----------
+    moves
+        uint8 (n_cells,), the legal moves of each flat cell.
+    cols
+        Columns of the grid.
+    start, goal
+        Flat cells.
+    cost_of
+        int64 (n_cells,), work array of integer costs.
+    came
+        uint8 (n_cells,), receives the direction by which a shortest path reaches each closed cell.
+    mark, generation
+        One entry a cell: 2 * `generation` if open in this search, one more if closed.
     """
     is_open, is_closed = 2 * generation, 2 * generation + 1
     waiting = np.empty((3, 1024), np.int32)
@@ -101,11 +113,17 @@ def dijkstra(moves, cols, start, goal, cost_of, came, mark, generation):
 def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, generation):
     """Return a lower bound on the cost of a shortest path, -1 for none, and the expansions.
 
-    The other arguments are those of `dijkstra`. Cells are expanded in order of g + weight * h, once
-    each. A closed cell that is reached at less cost keeps the better path, which its successors
-    learn only through `came`, and is put aside. The first cell of a shortest path that was not
-    expanded at its least cost was reached at its least cost, and is open, put aside, or the goal:
-    the least g + h of these bounds the optimum.
+    Cells are expanded in order of g + weight * h, once each. A closed cell that is reached at less
+    cost keeps the better path, which its successors learn only through `came`, and is put aside.
+    The first cell of a shortest path that was not expanded at its least cost was reached at its
+    least cost, and is open, put aside, or the goal: the least g + h of these bounds the optimum.
+
+    Parameters
+    ----------
+    moves, cols, start, goal, cost_of, came, mark, generation
+        See `dijkstra`.
+    weight
+        Factor of the estimate, >= 1.
     """
     is_open, is_closed = 2 * generation, 2 * generation + 1
     goal_row, goal_col = goal // cols, goal % cols
