@@ -63,12 +63,28 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
 
     The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the dart
     after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
-    `kernel_dart[v]` starts at the parent of v and ends at v; origins become the vertices of the
-    next level, `new_vertex[parent[v]]`. `touched` lists one dart of every ordinary face that lost a
-    dart: apart from faces with a self-loop, no other face can have become redundant. `parent` and
-    `new_vertex` are int32 by vertex; `state`, uint8 by edge, receives `ALIVE` or `CONTRACTED`,
-    `inverse`, int32 by dart, the inverse of sigma; `shift`, int32 by vertex, is scratch; `cols` are
-    the columns of the grid.
+
+    Parameters
+    ----------
+    darts
+        `Darts` of the level; changed.
+    parent
+        int32 (n_vertices,), the vertex that each vertex goes into; itself if it survives.
+    new_vertex
+        int32 (n_vertices,), the number of a survivor on the next level.
+    kernel_dart
+        int32 (n_vertices,), the dart that starts at the parent of v and ends at v.
+    state
+        uint8 (n_edges,), receives `ALIVE` or `CONTRACTED`.
+    inverse
+        int32 (n_darts,), receives the inverse of sigma.
+    shift
+        int32 (n_vertices,), scratch.
+    touched
+        int32, receives one dart of every ordinary face that lost a dart: apart from faces with a
+        self-loop, no other face can have become redundant.
+    cols
+        Columns of the grid.
     """
     sigma, origin, sweep, protected, base_edge = darts
     one = np.uint32(1)
@@ -178,13 +194,23 @@ def start_together(dart, partner, darts, whole_at, level, cols):
 def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, all_whole):
     """Remove redundant edges through ordinary faces until none is left, in place.
 
-    `touched`, `any_loop`, `state`, `inverse` and `cols` are those of `contract`; removed edges
-    become `REMOVED`. An edge that ends at a block in pieces (`whole_at`, uint8 by vertex, above
-    `level`, unless `all_whole`) waits for the pieces to merge, so all of those are looked at again.
-
     Rules one and two: a face of degree one, a face of degree two. Rules three and four need a
     self-loop, and the lower levels have none. A removal can make only the merged face redundant, so
     every face is followed until it is not.
+
+    Parameters
+    ----------
+    darts, state, inverse, cols
+        See `contract`; removed edges become `REMOVED`.
+    touched, any_loop
+        Results of `contract`.
+    whole_at
+        uint8 (n_vertices,), the level from which a vertex is whole. An edge that ends at a block in
+        pieces waits for the pieces to merge, so all of those are looked at again.
+    level
+        The level to make.
+    all_whole
+        Whether no block is in pieces at this level.
     """
     sigma, origin, sweep, protected, base_edge = darts
     n_darts = 2 * base_edge.size if any_loop or not all_whole else 0
