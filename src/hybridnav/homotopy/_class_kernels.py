@@ -25,25 +25,32 @@ FOUND, EXHAUSTED, LIMITED = 0, 1, 2
 
 
 class Letters(NamedTuple):
-    """The numbered words, letter by letter: word n is letters[start[n]:start[n + 1]]."""
+    """The numbered words, letter by letter: word n is letters[start[n]:start[n + 1]].
+
+    Both fields are int32.
+    """
 
     start: np.ndarray
     letters: np.ndarray
 
 
 class Tree(NamedTuple):
-    """The reduced words that were met: vertex 0 is the identity."""
+    """The reduced words that were met, int32 (room,) each: vertex 0 is the identity.
+
+    `above` is the word without its last `letter`; `child` the first word with one letter more, and
+    `sibling` the next such word of the same `above`. `known` begins a list at each word of products
+    met before: `known_next` entry, `known_number` of the other factor, `known_product`. `used`,
+    int64 (2,), counts words and products. -1 stands for none.
+    """
 
     above: np.ndarray
     letter: np.ndarray
     child: np.ndarray
     sibling: np.ndarray
-    # Products met before: a list at each word of pairs of a numbered word and the product.
     known: np.ndarray
     known_next: np.ndarray
     known_number: np.ndarray
     known_product: np.ndarray
-    # Words, and products met before.
     used: np.ndarray
 
     @classmethod
@@ -58,19 +65,22 @@ class Tree(NamedTuple):
 
 
 class States(NamedTuple):
-    """Pairs of a cell and a word, in the order in which they were met."""
+    """Pairs of a flat `cell` and a `word` of the tree, in the order in which they were met.
+
+    All fields are int32 (room,), but the integer `cost`, int64, and `status`, uint8. `before` is
+    the state before, -1 at the start, `other` the next state of the same cell, -1 for none. States
+    taken from the heap have a `depth`, the steps from the start, an earlier state to `jump` back
+    to, and as `run` the first of the states with the same word at the end of the path.
+    """
 
     cell: np.ndarray
     word: np.ndarray
     cost: np.ndarray
     before: np.ndarray
-    # For states taken from the heap: steps from the start, an earlier state to jump back to, and
-    # the first of the states with the same word at the end of the path.
     depth: np.ndarray
     jump: np.ndarray
     run: np.ndarray
     status: np.ndarray
-    # The next state of the same cell.
     other: np.ndarray
 
     @classmethod
@@ -82,6 +92,7 @@ class States(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def _times_letter(tree, word, letter):
+    """Return the product of a word and a letter; -1 when there is no room."""
     if tree.letter[word] == -letter:
         return tree.above[word]
     child = tree.child[word]
@@ -141,7 +152,21 @@ def _along(of_edge, cell, direction, cols):
 
 @njit(cache=True, nogil=True)
 def _after(tree, letters, of_edge, word, cell, direction, cols):
-    """The word after a step; a diagonal goes by the cell in its own row."""
+    """Return the word after a step; a diagonal goes by the cell in its own row.
+
+    Parameters
+    ----------
+    tree, letters
+        `Tree` and `Letters`.
+    of_edge
+        See `find_classes`.
+    word
+        Vertex of the tree.
+    cell, direction
+        Flat cell before the step, and its direction, 0 to 7.
+    cols
+        Columns of the grid.
+    """
     if direction & 1 == 0:
         return _times(tree, letters, word, _along(of_edge, cell, direction, cols))
     sideways = 0 if COL_STEP[direction] > 0 else 4
@@ -170,8 +195,22 @@ def _leads_to(states, earlier, later):
 
 @njit(cache=True, nogil=True)
 def _winds(states, tree, letters, of_edge, moves, head, state, apart, cols):
-    """Whether a path has come back: stands on, or sees along a row or a column, at most `apart`
-    cells off, a cell that it passed before it circled a hole. 1 or 0, -1 when there is no room."""
+    """Return whether a path has come back: 1 or 0, -1 when there is no room.
+
+    It has when it stands on a cell that it passed before it circled a hole, or sees one along a row
+    or a column, at most `apart` cells off.
+
+    Parameters
+    ----------
+    states, tree, letters, of_edge, moves, cols
+        See `find_classes`.
+    head
+        int32 (n_cells,), the last state at each cell, -1 for none.
+    state
+        The state at the end of the path.
+    apart
+        Cells to look at in each of four directions.
+    """
     cell, word = np.int64(states.cell[state]), np.int64(states.word[state])
     other = np.int64(head[cell])
     while other >= 0:
@@ -205,6 +244,7 @@ def _winds(states, tree, letters, of_edge, moves, head, state, apart, cols):
 
 @njit(cache=True, nogil=True)
 def _push(heap, n, key):
+    """Put a key into a heap of n keys."""
     at = n
     while at > 0:
         above = (at - 1) >> 2
@@ -240,12 +280,36 @@ def _pop(heap, n):
 @guarded
 @njit(cache=True, nogil=True)
 def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, states, tree):
-    """Shortest paths of the first classes that do not wind, and why there are no more.
+    """Find shortest paths of the first classes that do not wind, and why there are no more.
 
-    `left` is the exact cost of the way from each flat cell to the goal, -1 where there is none: a
-    consistent estimate, so that each state is taken at its least cost among paths that do not wind.
-    Fills the states and the tree; returns the states at the goal in the order of cost, and the
-    reason.
+    Parameters
+    ----------
+    moves
+        uint8 (n_cells,), the legal moves of each flat cell.
+    cols
+        Columns of the grid.
+    ends
+        Flat cells of start and goal.
+    left
+        The exact integer cost from each flat cell to the goal, -1 for no path: a
+        consistent estimate, so that each state is taken at its least cost among paths that do not
+        wind.
+    of_edge
+        int32 (2 n_cells,), the signed number of the word of each base edge: 2 c for the step from
+        cell c to the east, 2 c + 1 to the north.
+    letters
+        `Letters`, the numbered words.
+    wanted
+        Number of classes.
+    apart
+        Cells within which a path that comes back to itself winds.
+    states, tree
+        `States` and `Tree` with room; filled in.
+
+    Returns
+    -------
+    tuple
+        The states at the goal in the order of cost; `FOUND`, `EXHAUSTED` or `LIMITED`.
     """
     start, goal = ends
     head = np.full(moves.size, np.int32(-1), np.int32)

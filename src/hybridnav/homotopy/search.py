@@ -56,10 +56,19 @@ class ClassPaths:
 def alternative_search(
     topology: TopologicalMap, *, allow_unexplored: bool = False, least_hole_m2: float = 1.0
 ) -> AlternativeSearch:
-    """The search on a map, made for the first query: it takes up to a second.
+    """Return the search on a map, made for the first query in up to a second.
 
-    Kept as long as the map is, for the last few areas asked for. Parameters and errors are those of
-    `AlternativeSearch`.
+    It is kept as long as the map, for the last few areas used.
+
+    Parameters
+    ----------
+    topology, allow_unexplored, least_hole_m2
+        As in `AlternativeSearch`.
+
+    Returns
+    -------
+    AlternativeSearch
+        The same object for the same arguments.
     """
     kept = _KEPT.setdefault(topology, {})
     asked = bool(allow_unexplored), float(least_hole_m2)
