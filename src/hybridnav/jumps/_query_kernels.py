@@ -45,9 +45,22 @@ def _walk(cells, n_cells, rows, cols, is_side_first):
 def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
     """Append the cells of a path to `cells`.
 
-    Return the cells (a new array if there was no room), their number, and the moves of the path
-    along sides and along diagonals. `graph`, `ends` and `meeting` are those of `shortest`, `nodes`
-    the corner cells on the path, `origin` as in `paths`.
+    Parameters
+    ----------
+    graph, ends, meeting
+        See `shortest`.
+    nodes
+        int32 (m,), the corner cells on the path.
+    origin
+        As in `paths`.
+    cells, n_cells
+        int64 (room, 2) as (row, col), and how many of them are filled.
+
+    Returns
+    -------
+    tuple
+        The cells, in a new array if there was no room; their number; the moves of the path along
+        sides and along diagonals.
     """
     (_, _, _, width), places = graph[:2]
     row, col = ends[0] // width, ends[0] % width
