@@ -100,11 +100,18 @@ def blocks_of(first, twins, polygon_of):
 
 @njit(cache=True, nogil=True)
 def open_blocks(block_head, block_up, depth, start, goal, is_open, marked, n):
-    """Open the blocks between two polygons of one component.
+    """Open the blocks between two polygons of one component; return the index behind the last one.
 
-    `block_head`, int32 (b,), `block_up` and `depth`, int32 (p,), are those of `blocks_of`; `start`
-    and `goal` are polygons; `is_open`, bool (b,), is changed. Newly opened blocks are written to
-    `marked`, int32, from index n on; return the index behind the last one.
+    Parameters
+    ----------
+    block_head, block_up, depth
+        int32 (b,), (p,) and (p,), from `blocks_of`.
+    start, goal
+        Polygons.
+    is_open
+        bool (b,), changed.
+    marked, n
+        int32, receives newly opened blocks from index n on.
     """
     while start != goal:
         if depth[start] < depth[goal]:

@@ -155,9 +155,21 @@ def _advance(mesh, graph, ends, work, factor, limit):
 def _relax(mesh, table, ends, work, before, way, cost_before, heads):
     """Reach corners from a corner, or from the start, if that is cheaper than before.
 
-    `way` is the point before, that corner, and the side to which a path bends there: 1 for the
-    left, 0 for either. `table`, float64 (n, landmarks), is that of `landmarks_of`; `before` is the
-    number of the corner, `cost_before` its cost in cells, `heads` are the corners to reach.
+    Parameters
+    ----------
+    mesh, ends
+        See `successors`.
+    table
+        float64 (n, landmarks), from `landmarks_of`.
+    work
+        Arrays of the query; see `query_corners`.
+    before, cost_before
+        Number of the corner, and its cost in cells.
+    way
+        x and y of the point before, x and y of the corner, and the side to which a path bends
+        there: 1 for the left, 0 for either.
+    heads
+        int32, the corners to reach.
     """
     cx, cy = mesh[0], mesh[1]
     px, py, x, y, side = way

@@ -156,8 +156,14 @@ def _begin(mesh, graph, detour, where, ends, work):
 def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
     """Search until the answer is good enough or enough corners are expanded; see `advance`.
 
-    All is in one function, because a call with all arrays takes as long as an expansion. Arguments
-    are those of `query_round`, with `polygon_at`, int32 (rows, cols), from `where`.
+    All is in one function, because a call with all arrays takes as long as an expansion.
+
+    Parameters
+    ----------
+    mesh, graph, detour, ends, work, effort
+        See `query_round`.
+    polygon_at
+        int32 (rows, cols), from `where`.
     """
     cx, cy, kinds, n = mesh[0], mesh[1], mesh[2], len(mesh[0])
     first, heads, table = graph

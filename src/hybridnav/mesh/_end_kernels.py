@@ -178,7 +178,15 @@ def polygons_with(mesh, inner, row, col, x, y, found):
 
 @njit(cache=True, nogil=True)
 def _touch(ax, ay, bx, by, px, py, qx, qy):
-    """Return whether two segments have a point in common."""
+    """Return whether two segments have a point in common.
+
+    Parameters
+    ----------
+    ax, ay, bx, by
+        Ends of one segment, in cells.
+    px, py, qx, qy
+        Ends of the other.
+    """
     if max(ax, bx) < min(px, qx) or max(px, qx) < min(ax, bx):
         return False
     if max(ay, by) < min(py, qy) or max(py, qy) < min(ay, by):

@@ -44,7 +44,12 @@ def _cut(px, py, qx, qy, ax, ay, bx, by):
     """Return where the line from p through q meets the line from a to b, rounded: for estimates
     only.
 
-    All arguments are x and y in cells.
+    Parameters
+    ----------
+    px, py, qx, qy
+        Two points of the first line, in cells.
+    ax, ay, bx, by
+        Ends of the second.
     """
     ux, uy = qx - px, qy - py
     vx, vy = bx - ax, by - ay
@@ -60,7 +65,14 @@ def _cut(px, py, qx, qy, ax, ay, bx, by):
 def estimate(x, y, lx, ly, rx, ry, tx, ty):
     """Return the length of the shortest path from a root through an interval to the goal.
 
-    `x`, `y` are the root, `lx` to `ry` the ends of the interval, `tx`, `ty` the goal, in cells.
+    Parameters
+    ----------
+    x, y
+        The root, in cells.
+    lx, ly, rx, ry
+        Left and right end of the interval.
+    tx, ty
+        The goal.
     """
     # The goal on the near side is seen in the mirror of the side.
     vx, vy = lx - rx, ly - ry
@@ -98,8 +110,18 @@ def estimate_of(mesh, ends, whole, real, node):
 def put(nodes, n, slot, root, parent, marks, g, lx, ly, rx, ry):
     """Write node n and return the number of nodes.
 
-    `nodes` holds the arrays int32 (m, 4) and float64 (m, 5); the other arguments are its columns:
-    slot, root, parent, ENDS, cost of the root, points on the left and right ray.
+    Parameters
+    ----------
+    nodes
+        int32 (m, 4) and float64 (m, 5); the other arguments are their columns.
+    n
+        Number of nodes before.
+    slot, root, parent, marks
+        Slot of the node's side, corner number of its root, node before, and `ENDS`.
+    g
+        Cost of the root, in cells.
+    lx, ly, rx, ry
+        Points on the left and right ray, in cells.
     """
     whole, real = nodes
     whole[n, SLOT], whole[n, ROOT], whole[n, PARENT], whole[n, ENDS] = slot, root, parent, marks
@@ -143,6 +165,8 @@ def successors(mesh, blocks, ends, is_goal, nodes, node, n):
         Whether the goal is in the polygon behind the node's side.
     nodes
         int32 (m, 4) and float64 (m, 5), with room for three more nodes a side, and the goal.
+    node, n
+        Number of the node, and of all nodes.
     """
     cx, cy, kinds, first, begins, stops, twins, polygon_of = mesh
     block_of, is_open = blocks
@@ -240,7 +264,10 @@ def _all_seen(mesh, blocks, ends, is_goal, nodes, node, n):
     """Write the successors of a node whose root is an end of its side, so that it sees all of the
     polygon.
 
-    See `successors` for the arguments.
+    Parameters
+    ----------
+    mesh, blocks, ends, is_goal, nodes, node, n
+        See `successors`.
     """
     cx, cy, kinds, first, begins, stops, twins, polygon_of = mesh
     block_of, is_open = blocks

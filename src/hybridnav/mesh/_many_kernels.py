@@ -59,7 +59,15 @@ def many_by_intervals(mesh, blocks, place, asked, work, bounds, effort, answers,
 @guarded
 @njit(cache=True, nogil=True)
 def many_by_corners(mesh, graph, place, asked, work, bounds, effort, answers, begin, n):
-    """Answer queries from `begin` on by `query_corners`; see `many_by_intervals`."""
+    """Answer queries from `begin` on by `query_corners`; return as `many_by_intervals` does.
+
+    Parameters
+    ----------
+    mesh, place, asked, work, bounds, effort, answers, begin, n
+        See `many_by_intervals`.
+    graph
+        See `query_corners`.
+    """
     cells, ends = asked
     for k in range(begin, len(cells)):
         where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
@@ -77,7 +85,15 @@ def many_by_corners(mesh, graph, place, asked, work, bounds, effort, answers, be
 @guarded
 @njit(cache=True, nogil=True)
 def many_by_hierarchy(mesh, hierarchy, place, asked, work, bounds, effort, answers, begin, n):
-    """Answer queries from `begin` on by `query_hierarchy`; see `many_by_intervals`."""
+    """Answer queries from `begin` on by `query_hierarchy`; return as `many_by_intervals` does.
+
+    Parameters
+    ----------
+    mesh, place, asked, work, bounds, effort, answers, begin, n
+        See `many_by_intervals`.
+    hierarchy
+        See `query_hierarchy`.
+    """
     cells, ends = asked
     for k in range(begin, len(cells)):
         where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]

@@ -62,8 +62,16 @@ def _axes(kind, lobe):
 def _pend(room, n, slot, marks, lx, ly, rx, ry):
     """Append an interval to those pending, and return their number.
 
-    `room` holds int32 (m, 2) slots and marks and float64 (m, 4) points on the left and right ray;
-    `n` is the number before.
+    Parameters
+    ----------
+    room
+        int32 (m, 2) slots and marks, float64 (m, 4) points on the left and right ray.
+    n
+        Number of intervals before.
+    slot, marks
+        Slot of the interval's side, and marks of its ends.
+    lx, ly, rx, ry
+        Points on the left and right ray, in cells.
     """
     whole, real = room[0], room[1]
     whole[n, 0], whole[n, 1] = slot, marks
@@ -157,8 +165,18 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
     """Note the view in a quadrant of a polygon, from one of its corners.
 
     The view holds the corners of the polygon, except those behind others, and pending intervals on
-    the sides opposite to the point. `quadrant` and `sides` are the limits and the slots round the
-    corner; the other arguments are those of `see_from_point`, with `n` pending intervals.
+    the sides opposite to the point.
+
+    Parameters
+    ----------
+    mesh, x, y, room, found
+        See `see_from_point`.
+    quadrant
+        rx, ry, lx, ly, points on the right and left limit.
+    sides
+        Slots of the sides beside the corner, and whether the polygon is the last one round it.
+    n
+        Number of pending intervals.
     """
     cx, cy, kinds, first, _, stops, twins, polygon_of = mesh
     rx, ry, lx, ly = quadrant
@@ -210,7 +228,12 @@ def _is_behind(mesh, x, y, corner, other):
 def _spread(mesh, x, y, target, room, n, found):
     """Follow the pending intervals; return the result of `see_from_point`.
 
-    The arguments are those of `see_from_point`, with `n` pending intervals.
+    Parameters
+    ----------
+    mesh, x, y, target, room, found
+        See `see_from_point`.
+    n
+        Number of pending intervals.
     """
     cx, cy, kinds, first, _, stops, twins, polygon_of = mesh
     whole, real, seen = room

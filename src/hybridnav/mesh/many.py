@@ -66,6 +66,11 @@ def shortest_paths(
         cells.
     epsilon
         As for `MeshSearch.path`.
+
+    Returns
+    -------
+    MeshPaths
+        The paths in the order of the pairs.
     """
     where = np.concatenate(cells, axis=1)
     ends = np.concatenate([rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1)
