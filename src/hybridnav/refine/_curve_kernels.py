@@ -40,7 +40,18 @@ def _wrapped(angle):
 def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
     """Keep a word if it is shorter than the best one; return the lesser length.
 
-    The word may be mirrored, flipped in direction, and driven from its end (`back`).
+    Parameters
+    ----------
+    kinds, lengths
+        See `shortest_word`.
+    best
+        Length of the best word so far.
+    mirror, flip
+        -1 for a word that is mirrored, or driven in the other direction; else 1.
+    back
+        Whether it is driven from its end.
+    word, pieces
+        Kinds and signed lengths of its pieces.
     """
     total = 0.0
     for piece in pieces:
@@ -99,7 +110,17 @@ def _tau_omega(u, v, xi, eta, phi):
 
 @njit(cache=True, nogil=True)
 def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
-    """Try the words of an arc, a straight line and an arc; return the least length."""
+    """Try the words of an arc, a straight line and an arc; return the least length.
+
+    Parameters
+    ----------
+    x, y, phi
+        The goal's position, in radii, and heading, in radians, as seen from the start.
+    sine, cosine
+        Those of `phi`.
+    kinds, lengths, best, mirror, flip
+        See `_take`.
+    """
     xi, eta = x - sine, y - 1 + cosine
     u, t = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
     v = _wrapped(phi - t)
@@ -118,7 +139,13 @@ def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
 
 @njit(cache=True, nogil=True)
 def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
-    """Try the words of four arcs, the middle two equally long; return the least length."""
+    """Try the words of four arcs, the middle two equally long; return the least length.
+
+    Parameters
+    ----------
+    x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip
+        See `_three_pieces`.
+    """
     xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
     rho = (2 + math.sqrt(squared)) / 4
@@ -140,7 +167,13 @@ def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
 
 @njit(cache=True, nogil=True)
 def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
-    """Try the words with a straight line between two quarter turns; return the least length."""
+    """Try the words with a straight line between two quarter turns; return the least length.
+
+    Parameters
+    ----------
+    x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip
+        See `_three_pieces`.
+    """
     quarter = math.pi / 2
     xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
@@ -159,7 +192,14 @@ def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
 def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     """Try the words that may be driven from their end: three arcs, or one quarter turn.
 
-    Return the least length; `back` states whether the word is driven from its end.
+    Return the least length.
+
+    Parameters
+    ----------
+    x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip
+        See `_three_pieces`.
+    back
+        Whether the word is driven from its end.
     """
     quarter = math.pi / 2
     xi, eta = x - sine, y - 1 + cosine
@@ -214,11 +254,22 @@ def _reeds_shepp(x, y, phi, kinds, lengths):
 
 @njit(cache=True, nogil=True)
 def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
-    """Return the shortest curve between two poses, with lengths in the unit of the radius.
+    """Find the shortest curve between two poses; return the number of its pieces.
 
-    Fill `kinds` and `lengths`, five each, and return the number of pieces: 0 for poses that are not
-    finite or have headings beyond `LARGEST_HEADING`. `yaw0` and `yaw1` are in radians; `reverses`
-    allows backward pieces.
+    It is 0 for poses that are not finite or have headings beyond `LARGEST_HEADING`.
+
+    Parameters
+    ----------
+    x0, y0, yaw0, x1, y1, yaw1
+        The poses; headings in radians.
+    radius
+        Turning radius, in the unit of the positions.
+    reverses
+        Whether backward pieces are allowed.
+    kinds
+        int64 (5,), receives 1 for an arc to the left, 0 for straight on, -1 for one to the right.
+    lengths
+        float64 (5,), receives lengths in the unit of the radius, negative backwards.
     """
     if not 0.0 < radius < np.inf:
         return 0

@@ -50,10 +50,26 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     """Walk cells straight from u to w, and round obstacles always on one hand.
 
     After V. Lumelsky, A. Stepanov: Path-planning strategies for a point mobile automaton, 1987
-    (Bug2). The walk ends outside the ellipse in which a path shorter than `limit` stays. Write the
-    points of the walk to `string`; return their number, 0 for none, and the number of steps. The
-    points where the walk leaves and meets the straight line are rounded, so the result must be
-    tested. `u` and `w` are positions, `limit` is a length in cells, `hand` is 1 or -1.
+    (Bug2). The walk ends outside the ellipse in which a path shorter than `limit` stays. The points
+    where the walk leaves and meets the straight line are rounded, so the result must be tested.
+
+    Parameters
+    ----------
+    marks
+        uint8 (rows, cols), marks of corners and free cells.
+    string
+        float64 (n, 3), receives the positions of the walk, and 1 for each.
+    u_row, u_col, w_row, w_col
+        Positions u and w.
+    limit
+        Length in cells.
+    hand
+        1 or -1.
+
+    Returns
+    -------
+    tuple
+        Number of points, 0 for no walk, and of steps.
     """
     rows, cols = marks.shape
     row, col = _cell_at(marks, u_row, u_col, w_row, w_col)

@@ -123,7 +123,15 @@ def _short_turn(yaw0, yaw1):
 @njit(cache=True, nogil=True)
 def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
     """Return whether a body may go straight from one place to another while it turns the short
-    way."""
+    way.
+
+    Parameters
+    ----------
+    marks, place, body
+        See the module.
+    x0, y0, yaw0, x1, y1, yaw1
+        The two poses: metres and radians, map frame.
+    """
     row, col = _position(place, x0, y0)
     b_row, b_col = _position(place, x1, y1)
     if not runs(marks, row, col, b_row, b_col):
@@ -148,7 +156,17 @@ def body_turns(marks, place, body, x0, y0, yaw0, x1, y1, yaw1):
 @njit(cache=True, nogil=True)
 def turn_on_the_spot(marks, place, body, x, y, yaw0, yaw1):
     """Return the radians by which a body may turn on the spot from heading to heading; nan for
-    none."""
+    none.
+
+    Parameters
+    ----------
+    marks, place, body
+        See the module.
+    x, y
+        Point in metres, map frame.
+    yaw0, yaw1
+        Headings in radians.
+    """
     row, col = _position(place, x, y)
     if not in_map(marks, row, col) or not stands(marks, row, col):
         return np.nan
@@ -162,6 +180,13 @@ def body_drives_straight(marks, place, body, x0, y0, yaw0, x1, y1, yaw1, backwar
     """Return whether a body may turn to the direction of travel, drive straight, and turn again.
 
     Between equal points it only turns. Turns go either way round.
+
+    Parameters
+    ----------
+    marks, place, body, x0, y0, yaw0, x1, y1, yaw1
+        See `body_turns`.
+    backwards
+        Whether the body travels backwards.
     """
     row, col = _position(place, x0, y0)
     b_row, b_col = _position(place, x1, y1)
@@ -196,9 +221,19 @@ def body_drives(
 ):
     """Return whether a body may drive a curve of tangent arcs and straight lines.
 
-    The curve starts at `x0`, `y0`, `yaw0`. `kinds`, int64 (n,), are 1 for an arc to the left, 0 for
-    straight on, -1 to the right; `lengths`, float64 (n,), in metres like `radius`, are negative
-    backwards. No arc may be longer than a full turn.
+    Parameters
+    ----------
+    marks, place, body
+        See the module.
+    x0, y0, yaw0
+        Pose at the start: metres and radians, map frame.
+    kinds
+        int64 (n,), 1 for an arc to the left, 0 for straight on, -1 to the right. No arc may be
+        longer than a full turn.
+    lengths
+        float64 (n,), metres, negative backwards.
+    radius
+        Turning radius in metres.
     """
     row, col = _position(place, x0, y0)
     heading = yaw0 - place[6]
@@ -258,7 +293,14 @@ def body_steers(
 ):
     """Return whether a body may drive the shortest curve of a turning radius between two poses.
 
-    `radius` is in metres; `reverses` allows backward pieces.
+    Parameters
+    ----------
+    marks, place, body, x0, y0, yaw0, x1, y1, yaw1
+        See `body_turns`.
+    radius
+        Turning radius in metres.
+    reverses
+        Whether backward pieces are allowed.
     """
     kinds, lengths = np.empty(5, np.int64), np.empty(5)
     n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths)

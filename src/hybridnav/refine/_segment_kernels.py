@@ -15,11 +15,21 @@ from hybridnav.search.exact import turn_of
 def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
     """Return whether a segment stays in the closed cells that it may stand on; exact.
 
-    The ends a and b, positions in the map, differ. `marks` is uint8 (rows, cols): a cell may be
-    stood on from the mark `stand` upwards, and lines may pass its corners from the mark `pass_by`
-    <= `stand` upwards: no line runs between two cells below it. The walk visits the cells that the
-    segment enters (J. Amanatides, A. Woo: A fast voxel traversal algorithm for ray tracing, 1987);
-    a segment along a line between cells needs one of the two at each step.
+    The walk visits the cells that the segment enters (J. Amanatides, A. Woo: A fast voxel traversal
+    algorithm for ray tracing, 1987); a segment along a line between cells needs one of the two at
+    each step.
+
+    Parameters
+    ----------
+    marks
+        uint8 (rows, cols), mark of each cell.
+    a_row, a_col, b_row, b_col
+        Different positions in the map, the ends of the segment.
+    stand
+        The least mark of a cell that may be stood on.
+    pass_by
+        The least mark of a cell whose corners lines may pass, <= `stand`: no line runs between two
+        cells below it.
     """
     rows, cols = marks.shape
     if a_row == b_row or a_col == b_col:

@@ -87,9 +87,16 @@ def look_ahead(occupied):
 def moved(row, col, heading, d_row, d_col, turn, radius, share):
     """Return the base (row, col) and heading after a share of a motion.
 
-    The motion starts at `row`, `col`, `heading` and moves by `d_row`, `d_col` (cells) while the
-    heading turns by `turn` (radians), or along an arc of `radius` (cells, 0 for none); `share` is
-    in [0, 1].
+    Parameters
+    ----------
+    row, col, heading
+        Where the motion starts: position and radians.
+    d_row, d_col, turn
+        The way along a straight line, in cells, and the radians by which the heading turns.
+    radius
+        Signed radius of the arc in cells, 0 for a straight line.
+    share
+        In [0, 1].
     """
     now = heading + share * turn
     if radius == 0.0:
@@ -126,8 +133,14 @@ def place(corners, row, col, heading, placed):
 def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
     """Widen the columns that each row sees by those of an edge.
 
-    The edge goes from a to b, positions (row, col); `columns` holds the lowest and highest column
-    of each row from `first` to `end`; `margin` is in cells.
+    Parameters
+    ----------
+    columns
+        float64 (n, 2), lowest and highest column of each row; changed.
+    first, end
+        The rows of the map that `columns` holds.
+    a_row, a_col, b_row, b_col, margin
+        Positions of the edge's ends, and cells added all round.
     """
     if b_row < a_row:
         a_row, a_col, b_row, b_col = b_row, b_col, a_row, a_col
@@ -195,12 +208,20 @@ def _hull(before, after, first, last):
 def rows_seen(rows, before, after, first, last, margin, moves, columns):
     """Fill in the columns of the hull of a convex polygon in two places; return its rows.
 
-    Corners `first` to `last` of `before` and `after`, float64 (n, 2) positions, are the polygon in
-    the two places; `rows` is the number of rows of the map, `margin` is in cells, `moves` one of
-    `STAYS`, `SHIFTS` and `TURNS`, `columns` the room of `room`. Each row of cells sees one run of
-    columns of the hull. If the polygon does not turn, the ends of a run are those of its edges and
-    of the lines that its corners move on; if it turns, an edge of the hull may join two different
-    corners.
+    Each row of cells sees one run of columns of the hull. If the polygon does not turn, the ends of
+    a run are those of its edges and of the lines that its corners move on; if it turns, an edge of
+    the hull may join two different corners.
+
+    Parameters
+    ----------
+    rows, margin
+        Number of rows of the map, and cells added all round.
+    before, after, first, last
+        float64 (n, 2), positions in the two places; the polygon's corners are first to last - 1.
+    moves
+        `STAYS`, `SHIFTS` or `TURNS`.
+    columns
+        float64 (n, 2), from `room`; filled in.
     """
     low, high = np.inf, -np.inf
     for i in range(first, last):
@@ -233,7 +254,12 @@ def rows_seen(rows, before, after, first, last, margin, moves, columns):
 def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
     """Return whether the hull of a convex polygon in two places meets no occupied cell.
 
-    `ahead` is that of a body; the other arguments are those of `rows_seen`.
+    Parameters
+    ----------
+    ahead
+        uint8 (rows, cols), columns to the next occupied cell, as in a body.
+    before, after, first, last, margin, moves, columns
+        See `rows_seen`.
     """
     rows, cols = ahead.shape
     low_row, end_row = rows_seen(rows, before, after, first, last, margin, moves, columns)
@@ -253,7 +279,12 @@ def _part_is_free(ahead, before, after, first, last, margin, moves, columns):
 def is_free(ahead, offsets, before, after, margin, moves, columns):
     """Return whether the hulls of all convex parts of a body meet no occupied cell.
 
-    `ahead` and `offsets` are those of a body; the other arguments are those of `rows_seen`.
+    Parameters
+    ----------
+    ahead, offsets
+        Those of a body; see the module.
+    before, after, margin, moves, columns
+        See `rows_seen`.
     """
     for k in range(offsets.size - 1):
         first, last = offsets[k], offsets[k + 1]
@@ -299,7 +330,12 @@ def body_fits(body, row, col, heading):
 def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
     """Return whether a body meets no occupied cell on a motion whose base stays in the map.
 
-    See `moved` for the arguments of the motion.
+    Parameters
+    ----------
+    body
+        See the module.
+    row, col, heading, d_row, d_col, turn, radius
+        See `moved`.
     """
     ahead, clearance, corners, offsets, radii = body
     if offsets.size == 1:

@@ -70,8 +70,23 @@ def grown(array, size):
 def _insert(chain, size, side, v_row, v_col, row, col):
     """Put a corner into the chain that holds a string from chain[0] to chain[size - 1].
 
-    The chain, float64 (m, 2) positions, is convex towards v and ordered by angle as seen from
-    there. `side` is 1 or -1, `row` and `col` the corner. Return the new size.
+    Parameters
+    ----------
+    chain
+        float64 (m, 2) positions, convex towards v and ordered by angle as seen from there; changed.
+    size
+        Number of its points.
+    side
+        1 or -1.
+    v_row, v_col
+        Position v.
+    row, col
+        The corner.
+
+    Returns
+    -------
+    int
+        The new size.
     """
     low, high, above = 0, size - 1, False
     while high - low > 1:
@@ -117,9 +132,22 @@ def _insert(chain, size, side, v_row, v_col, row, col):
 def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
     """Release the bend v between u and w; fill in the chain of points that then holds the string.
 
-    The corners in the triangle are found row by row; u, v and w are positions. Return the number of
-    points of the chain, including u and w; 0 if v itself is a corner that holds the string, -1 if
-    the chain has too little room.
+    The corners in the triangle are found row by row.
+
+    Parameters
+    ----------
+    marks
+        uint8 (rows, cols), marks of corners and free cells.
+    chain
+        float64 (m, 2), receives positions.
+    u_row, u_col, v_row, v_col, w_row, w_col
+        Positions u, v and w.
+
+    Returns
+    -------
+    int
+        Number of points of the chain, including u and w; 0 if v itself is a corner that holds the
+        string, -1 if the chain has too little room.
     """
     chain[0, 0], chain[0, 1] = u_row, u_col
     chain[1, 0], chain[1, 1] = w_row, w_col

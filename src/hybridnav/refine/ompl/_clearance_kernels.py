@@ -14,10 +14,16 @@ _STEP = 0.5
 def weighted_length(factors, origin, cosine, sine, resolution_m, x0, y0, x1, y1):
     """Return the length of a line in metres, each step times the factor of the cell at its middle.
 
-    The result is the same in both directions, and never less than the length: `factors`, float32
-    (rows, cols), are at least 1. Outside the map the factor is 1. `origin` (x, y), `cosine` and
-    `sine` of the yaw and `resolution_m` are those of the frame; the line goes from `x0`, `y0` to
-    `x1`, `y1`, in metres, map frame.
+    The result is the same in both directions, and never less than the length.
+
+    Parameters
+    ----------
+    factors
+        float32 (rows, cols), >= 1; outside the map the factor is 1.
+    origin, cosine, sine, resolution_m
+        The frame: its origin (x, y), cosine and sine of its yaw, and metres of a cell's side.
+    x0, y0, x1, y1
+        Ends of the line in metres, map frame.
     """
     length_m = math.hypot(x1 - x0, y1 - y0)
     n = max(math.ceil(length_m / (_STEP * resolution_m)), 1)
