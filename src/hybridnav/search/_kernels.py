@@ -78,13 +78,6 @@ def astar(
 
     The cost is -1 if there is no path below `limit`, `NO_ROOM` if a bucket is full.
 
-    `moves`, uint8 (n_cells,), are the legal moves; `ends` the flat cells of start and goal; `limit`
-    an integer cost; `successors` and `detours` those of `grid_search.move_tables`; `field_of`,
-    int16 or int32 (n_cells,), a label for each cell and `in_corridor`, bool by label, whether it
-    may be stood on; `records`, uint32 (n_cells,); `generation` the number of this search, below
-    `GENERATIONS`; `waiting` the open list. `field_of` None makes the whole map the corridor (the
-    kernel is compiled for both).
-
     The open list is a ring of buckets of f, each a stack of cells: the newest comes first, which
     breaks ties in favour of the deeper cell. A successor in the current bucket is expanded next
     without a stay in its bucket, as the newest one would be. A cell can be expanded again within a
@@ -104,6 +97,30 @@ def astar(
 
     No array grows here: with arrays that may be replaced in the loop, numba's code took 50 %
     longer. Indices are unsigned because a test for negative ones took 15 % of the time.
+
+    Parameters
+    ----------
+    moves
+        uint8 (n_cells,), the legal moves of each flat cell.
+    cols
+        Columns of the grid.
+    ends
+        Flat cells of start and goal.
+    limit
+        Integer cost that a path must stay below.
+    successors, detours
+        Those of `grid_search.move_tables`.
+    field_of
+        int16 or int32 (n_cells,), a label for each cell; None makes the whole map the corridor (the
+        kernel is compiled for both).
+    in_corridor
+        bool by label, whether such a cell may be stood on.
+    records
+        uint32 (n_cells,).
+    generation
+        Number of this search, below `GENERATIONS`.
+    waiting
+        The open list.
     """
     start, goal = ends
     stamp = np.int64(generation) << _GENERATION_SHIFT
@@ -265,9 +282,22 @@ def field_distances(classes, field_of, sources):
 def cheapest_arcs(first, neighbour, arc, costs, ties, allowed, start, goal):
     """Find the cheapest walk over the arcs of a multigraph (Dijkstra), ties by a second cost.
 
-    The arcs out of vertex v are positions first[v] .. first[v + 1] of `neighbour` and `arc`, int32
-    or int64; `costs` and `ties`, float64 (n_arcs,), >= 0; `allowed`, bool (n_vertices,). Return the
-    arcs from start to goal, whether there is such a walk, and the expansions.
+    Parameters
+    ----------
+    first, neighbour, arc
+        int32 or int64: the arcs out of vertex v are positions first[v] .. first[v + 1] of the other
+        two.
+    costs, ties
+        float64 (n_arcs,), >= 0.
+    allowed
+        bool (n_vertices,).
+    start, goal
+        Vertices.
+
+    Returns
+    -------
+    tuple
+        The arcs from start to goal, whether there is such a walk, and the expansions.
     """
     n_vertices = first.size - 1
     cost = np.full(n_vertices, np.inf)
