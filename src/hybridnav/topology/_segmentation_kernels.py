@@ -48,11 +48,29 @@ def flood_basins(clearance, order, cols, ratio, broad):
 
 @njit(cache=True, nogil=True)
 def gaps_in_rows(wall, free, longest, short, window, side, both, share):
-    """Cells of the gaps between walls that continue each other along a row.
+    """Return the cells of the gaps between walls that continue each other along a row.
 
-    A gap of at most `longest` cells counts when `share` of its cells are free and `window` cells on
-    either side hold at least `side` wall cells each and `both` together; at most `short` cells wide
-    it needs only `both`.
+    A gap counts when enough of its cells are free and there is enough wall on both sides.
+
+    Parameters
+    ----------
+    wall, free
+        bool (rows, cols).
+    longest
+        Cells of the longest gap.
+    short
+        Cells of a gap that needs only `both`, not `side`.
+    window
+        Cells looked at on either side of the gap.
+    side, both
+        Wall cells needed on each side, and on both together.
+    share
+        Least share of free cells in the gap.
+
+    Returns
+    -------
+    ndarray
+        bool (rows, cols).
     """
     rows, cols = wall.shape
     found = np.zeros((rows, cols), np.bool_)
