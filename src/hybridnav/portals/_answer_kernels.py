@@ -13,14 +13,32 @@ from hybridnav.portals._side_kernels import best_gates, side_costs, ways_by_side
 @guarded
 @njit(cache=True, nogil=True)
 def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
-    """Path over gates between two cells that may be entered, if it costs less than `inside`, the
-    cost of the shortest path inside one field where start and goal share it, else FAR.
+    """Find the cheapest path over gates between two cells that may be entered.
 
     Pairs of sides, one of the start's field and one of the goal's, are looked at in the order of
     what bounds their ways from below, until no other one can be better by more than `epsilon`.
-    Gives the lower cost of the two, a lower bound on the ways over gates and `inside`, how many
-    stored paths were walked to find the ends, and the path's cells and points, which are empty if
-    it costs no less.
+
+    Parameters
+    ----------
+    portals, tables
+        `Portals` and `Tables`.
+    cols
+        Columns of the grid.
+    start, goal
+        Flat cells.
+    inside
+        Integer cost of the shortest path inside the field that both share, else `FAR`.
+    epsilon
+        Share by which the answer may exceed the optimum, >= 0.
+    frame
+        See `cells_of_way`.
+
+    Returns
+    -------
+    tuple
+        The lower cost of the way over gates and `inside`; a lower bound on both; how many stored
+        paths were walked to find the ends; the path's cells and points, which are empty if it does
+        not cost less than `inside`.
     """
     cells, points = np.empty((0, 2), np.int64), np.empty((0, 2), np.float64)
     side_start = portals.side_start
@@ -69,10 +87,20 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
 @guarded
 @njit(cache=True, nogil=True)
 def answers(portals, tables, cols, starts, goals, epsilon, frame):
-    """`answer` for many pairs of flat cells, int64 (n,) each, as if no two shared a field.
+    """Answer many pairs of cells, as if no two shared a field.
 
-    Gives their costs and lower bounds, where the points of each path begin (n + 1), and the points
-    of all, float64 (m, 2).
+    Parameters
+    ----------
+    portals, tables, cols, epsilon, frame
+        See `answer`.
+    starts, goals
+        int64 (n,), flat cells.
+
+    Returns
+    -------
+    tuple
+        Costs and lower bounds, int64 (n,); where the points of each path begin, int64 (n + 1,); the
+        points of all paths, float64 (m, 2).
     """
     n = starts.size
     costs = np.empty(n, np.int64)

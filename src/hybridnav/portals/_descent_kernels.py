@@ -72,8 +72,17 @@ def _cost_of_exit(portals, gate, head):
 
 @njit(cache=True, nogil=True)
 def with_ends(portals, gate_field, cols, start, goal, out, into, legs, over):
-    """Cost of the whole way from start to goal, which lie in the fields of its ends; sets the first
-    and the last leg."""
+    """Return the cost of the whole way from start to goal; set the first and the last leg.
+
+    Parameters
+    ----------
+    portals, gate_field, cols, start, goal, out, into
+        See `cells_of_way`; start and goal lie in the fields of the way's ends.
+    legs
+        int64, receives the costs of the two legs.
+    over
+        Integer cost of the way between its first and last gate, `FAR` for none.
+    """
     n = out.size
     if n == 0 or over >= FAR:
         return np.int64(FAR)

@@ -98,10 +98,17 @@ def wave(near, n, source, cost, ring, order):
 
 @njit(cache=True, nogil=True)
 def _sweep(near, order, begin, end, step, cost, row, stale, lanes):
-    """Relax the stale cells of order[begin:end:step], all lanes at once; says if any changed.
+    """Relax the stale cells of order[begin:end:step] in all lanes; return whether any changed.
 
     The inner loops run over contiguous lanes and compile to vector instructions; unsigned offsets
     keep out the test for negative indices.
+
+    Parameters
+    ----------
+    near, order, cost, row, stale, lanes
+        See `relax`.
+    begin, end, step
+        A slice of the order.
     """
     any_changed = False
     width = np.uint64(lanes)
@@ -133,11 +140,28 @@ def _sweep(near, order, begin, end, step, cost, row, stale, lanes):
 
 @njit(cache=True, nogil=True)
 def relax(near, n, order, prefix, cost, row, stale, lanes):
-    """Costs from all lanes' sources, which lie among the first `prefix` cells of the order.
+    """Compute the costs from all lanes' sources, which lie among the first cells of the order.
 
     The order is one source's: round the sources it is swept to and fro until nothing changes, from
     there on once or twice is nearly always enough. It ends when no cell can be improved, so the
     costs are exact whatever the order is.
+
+    Parameters
+    ----------
+    near
+        (n, 8), the neighbour of each local cell in each direction, n for none.
+    n
+        Number of cells of the field.
+    order
+        (n,), the cells in the order of `wave`.
+    prefix
+        How many cells of the order hold all sources.
+    cost
+        int32 ((n + 1) * lanes,), integer cost of each cell and lane; changed.
+    row, stale
+        Scratch by lane and by cell.
+    lanes
+        Number of sources.
     """
     stale[: n + 1] = 0
     for q in range(prefix):
@@ -154,11 +178,20 @@ def relax(near, n, order, prefix, cost, row, stale, lanes):
 
 @njit(cache=True, nogil=True)
 def directions(near, far, n, cost, row, lanes, out):
-    """First direction of the path from each cell to each lane's source, `out` (LANES, n).
+    """Write the first direction of the path from each cell to each lane's source.
 
-    With `LEAP` added where the path goes on so for as many moves; such a path is taken before
-    others of the same cost. A straight line of legal moves between two cells is the only shortest
-    path, so it is part of one to the source if the costs at its ends differ by its length.
+    `LEAP` is added where the path goes on so for as many moves; such a path is taken before others
+    of the same cost. A straight line of legal moves between two cells is the only shortest path, so
+    it is part of one to the source if the costs at its ends differ by its length.
+
+    Parameters
+    ----------
+    near, n, cost, row, lanes
+        See `relax`.
+    far
+        (n, 8), the cell `LEAP` moves away in each direction, n for none.
+    out
+        (`LANES`, n), receives the directions.
     """
     width = np.uint64(lanes)
     for i in range(n):
@@ -199,6 +232,7 @@ def directions(near, far, n, cost, row, lanes, out):
 
 @njit(cache=True, nogil=True)
 def _pack(directions_of_lane, n, row):
+    """Write directions, four bits each, into the bytes of a row, even ones into the low half."""
     for i in range(n // 2):
         row[i] = directions_of_lane[2 * i] | directions_of_lane[2 * i + 1] << 4
     if n & 1:
@@ -217,7 +251,21 @@ def shift_of(cost):
 
 @njit(cache=True, nogil=True)
 def _lower_side_cost(cost, n, lanes, sides, count, shift, side_cost):
-    """Set side_cost[i, side] to the least of itself and the shifted costs of some lanes."""
+    """Set side_cost[i, side] to the least of itself and the shifted costs of some lanes.
+
+    Parameters
+    ----------
+    cost, n
+        See `relax`.
+    lanes, sides
+        (count,), lanes and the side of each.
+    count
+        How many there are.
+    shift
+        Bits that `side_cost` lacks.
+    side_cost
+        uint16 (n, R), changed.
+    """
     for i in range(n):
         for q in range(count):
             there = cost[i * LANES + lanes[q]] >> shift
@@ -227,12 +275,29 @@ def _lower_side_cost(cost, n, lanes, sides, count, shift, side_cost):
 
 @njit(cache=True, nogil=True)
 def fill_field(near, far, n, gates, first_move, clique, begin, side, side_cost, scratch):
-    """Paths from all gates of a field.
+    """Store the paths from all gates of a field.
 
-    `first_move` gets their directions, a row a gate, two cells a byte; `clique` the costs from gate
-    to gate; `side_cost` (n, R) those from each cell to the nearest gate of each side: gate c is one
-    of the sides `side[begin[c]:begin[c + 1]]`. Gates are local cells. Returns the bits that
-    `side_cost` lacks, -1 where a path is too long.
+    Parameters
+    ----------
+    near, far, n
+        See `directions`.
+    gates
+        Local cells of the gates.
+    first_move
+        Receives the directions of the paths, a row a gate, two cells a byte.
+    clique
+        Receives the integer costs from gate to gate.
+    begin, side
+        Gate c is one of the sides `side[begin[c]:begin[c + 1]]`.
+    side_cost
+        uint16 (n, R), receives the costs from each cell to the nearest gate of each side.
+    scratch
+        Arrays of the sweeps, by cell, gate and lane.
+
+    Returns
+    -------
+    int
+        The bits that `side_cost` lacks, -1 where a path is too long.
     """
     cost, first_cost, ring, order, row, stale, heading, member, gate_at = scratch
     if wave(near, n, gates[0], first_cost, ring, order) < n:

@@ -39,11 +39,25 @@ def field_at(portals, cols, cell):
 
 @njit(cache=True, nogil=True)
 def stored_costs(portals, field, cols, gates, count, cell, costs):
-    """Fill `costs` with those of the stored paths from a cell to the first `count` of some gates of
-    its field.
+    """Fill in the costs of the stored paths from a cell to some gates of its field.
 
     The paths are walked side by side, a step of each in turn: a step waits for memory, and steps of
     different paths wait together.
+
+    Parameters
+    ----------
+    portals
+        `Portals`.
+    field
+        The field of the cell.
+    cols
+        Columns of the grid.
+    gates, count
+        Gates of the field, and how many of them to walk to.
+    cell
+        Flat cell.
+    costs
+        int64 (count,), filled in.
     """
     index = portals.position
     first_move = portals.first_move
@@ -89,11 +103,33 @@ def moves_of(cost):
 
 @njit(cache=True, nogil=True)
 def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame):
-    """Cells of a way, int64 (n, 2), and their centres, float64 (n, 2).
+    """Return the cells of a way and their centres.
 
-    The way leaves its fields by the gates `out` and enters the next ones by `into`; `legs` are the
-    costs of its parts, one more. The parts are walked side by side, as in `stored_costs`: from
-    where each begins to the gate it ends at, the last one back from the goal.
+    The way leaves its fields by the gates `out` and enters the next ones by `into`. Its parts are
+    walked side by side, as in `stored_costs`: from where each begins to the gate it ends at, the
+    last one back from the goal.
+
+    Parameters
+    ----------
+    portals
+        `Portals`.
+    gate_field
+        int32 (G,), the field of each gate.
+    cols
+        Columns of the grid.
+    start, goal
+        Flat cells.
+    out, into
+        (n,), gates.
+    legs
+        int64 (n + 1,), integer costs of the parts.
+    frame
+        `Frame.for_kernels` of the grid.
+
+    Returns
+    -------
+    tuple
+        int64 (m, 2), cells (row, col), and float64 (m, 2), their centres in the map frame.
     """
     index = portals.position
     first_move = portals.first_move

@@ -52,7 +52,17 @@ def ways_by_sides(between, shift, first, last, low_start, low_goal):
 
 @njit(cache=True, nogil=True)
 def _weigh_gates(portals, cols, cell, begin, end, low, known, costs):
-    """Lower bounds on the costs from a cell to a side's gates, the costs where they are known."""
+    """Fill in lower bounds on the costs from a cell to a side's gates, or costs that are known.
+
+    Parameters
+    ----------
+    portals, cols, cell, begin, end, known
+        See `_walk`.
+    low
+        Lower bound on all costs.
+    costs
+        int64 (end - begin,), filled in.
+    """
     side_gates = portals.side_gates
     gate_cell = portals.gate_cell
     row, col = cell // cols, cell % cols
@@ -66,7 +76,19 @@ def _weigh_gates(portals, cols, cell, begin, end, low, known, costs):
 
 @njit(cache=True, nogil=True)
 def _walk(portals, cols, cell, field, begin, end, is_wanted, known):
-    """Make the costs known from a cell to those gates of a side that are wanted."""
+    """Find the costs from a cell to those gates of a side that are needed; return their number.
+
+    Parameters
+    ----------
+    portals, cols, field, cell
+        See `stored_costs`.
+    begin, end
+        Where the gates of the side begin and end in `portals.side_gates`.
+    is_wanted
+        bool (end - begin,), the gates whose costs are needed.
+    known
+        int64 (end - begin,), integer costs, -1 for unknown ones; changed.
+    """
     side_gates = portals.side_gates
     gates = np.empty(end - begin, np.int64)
     costs = np.empty(end - begin, np.int64)
@@ -116,14 +138,28 @@ def entries_of(portals, source_at, begin, end):
 
 @njit(cache=True, nogil=True)
 def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, known_goal, limit):
-    """The gates of two sides by which the shortest way leads, among those cheaper than `limit`.
+    """Find the gates of two sides on the shortest way, if it costs less than `limit`.
 
-    `ends`, `fields`, `sides` and `lows` are those of the start and of the goal: cells, their
-    fields, sides of these, lower bounds on the costs to their gates. `known_start` and
-    `known_goal` are costs to the gates of these sides, -1 where they are not known yet. Returns
-    the cost, `limit` or more where there is none, the gate left by, the source, the gate entered
-    across from the source (-1 where the source is in the goal's field), and how many stored paths
-    were walked.
+    Parameters
+    ----------
+    portals, tables
+        `Portals` and `Tables`.
+    cols
+        Columns of the grid.
+    ends, fields, sides, lows
+        For start and goal each: flat cell, field, side of the field, lower bound on the costs to
+        the side's gates.
+    known_start, known_goal
+        int64, integer costs to the gates of these sides, -1 for unknown ones; changed.
+    limit
+        Integer cost.
+
+    Returns
+    -------
+    tuple
+        The cost, `limit` or more for no way; the gate by which it leaves the start's field; the
+        source; the gate across from the source, -1 if the source is in the goal's field; how many
+        stored paths were walked.
     """
     side_gates = portals.side_gates
     side_gates_start = portals.side_gates_start

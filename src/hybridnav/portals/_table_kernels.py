@@ -16,12 +16,24 @@ def costs_to_gates(
     sources, field_of, gate_start, clique_start, clique, exit_start, exit_gate, exit_cost, shift,
     table,
 ):  # fmt: skip
-    """Costs of shortest paths from some gates to all gates, `table` (sources, G) uint32, without
-    their last `shift` bits; UNREACHED where there is no path. Gives the greatest cost.
+    """Fill in the costs of shortest paths from some gates to all gates; return the greatest cost.
 
     Label correction, field by field: what has come to a field's gates across its borders goes on to
     all its other gates at once, as the costs between them are those of whole paths; the field whose
     news are cheapest comes first. It ends when there is no news.
+
+    Parameters
+    ----------
+    sources
+        Gates.
+    field_of
+        int32 (G,), the field of each gate.
+    gate_start, clique_start, clique, exit_start, exit_gate, exit_cost
+        See `Portals`.
+    shift
+        Bits that the table lacks.
+    table
+        uint32 (sources, G), receives the costs, `UNREACHED` for no path.
     """
     n_gates = field_of.size
     n_fields = gate_start.size - 1

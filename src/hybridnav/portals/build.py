@@ -52,6 +52,7 @@ class Portals(NamedTuple):
     field_start: LongArray
     """int64 (F + 1,), first position of each field."""
     gate_start: LongArray
+    """int64 (F + 1,), first gate of each field."""
     gate_cell: IntArray
     """int32 (G,), flat cell of each gate."""
     first_move_start: LongArray
@@ -66,7 +67,9 @@ class Portals(NamedTuple):
     exit_start: LongArray
     """int64 (G + 1,), the moves out of each gate's field are positions of the next two."""
     exit_gate: IntArray
+    """int32, the gate that each of these moves leads to."""
     exit_cost: IntArray
+    """int32, its cost."""
     side_start: LongArray
     """int64 (F + 1,)."""
     side_gates_start: LongArray

@@ -13,12 +13,16 @@ if TYPE_CHECKING:
 
 
 class Crossings(NamedTuple):
-    """Legal moves between fields: cell in the lower field and in the higher one."""
+    """Legal moves between fields; every field has n entries."""
 
     low: LongArray
+    """Flat cell in the lower field."""
     high: LongArray
+    """Flat cell in the higher field."""
     diagonal: BoolArray
+    """Whether the move is diagonal."""
     portal: LongArray
+    """Number of its portal."""
     is_gate: BoolArray
     """Whether its ends were chosen as gates."""
 

@@ -63,6 +63,11 @@ def prepare_portals(
     progress
         Called after each step with the number of steps done and of all.
 
+    Returns
+    -------
+    BuiltPortals
+        Fields, portals and tables, ready for `PortalSearch`.
+
     Raises
     ------
     InvalidValueError
