@@ -59,10 +59,20 @@ def raise_powers(power, squares, halves, p):
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record for the blocks alone; return the counts of their vertices and edges.
 
-    `classes`, (rows, cols), are the kinds of cells, `power` the powers of blocks (see
-    `block_powers`), `templates` the arrays of `Templates`. Filled in: the record's `vertex_end`,
-    `vertex_parent`, by flat cell, and `edge_end`, by base edge; `new_edge`, int32 by base edge, the
-    new numbers of the edges that stay.
+    Parameters
+    ----------
+    classes
+        (rows, cols), the kinds of cells, 0 for none.
+    power
+        The powers of blocks; see `block_powers`.
+    templates
+        The arrays of `Templates`.
+    vertex_end, vertex_parent
+        By flat cell, the record of vertices; filled in.
+    edge_end
+        By base edge, the record of edges; filled in.
+    new_edge
+        int32 by base edge, receives the new numbers of the edges that stay.
     """
     ends, offset, inside_east, inside_north, across_east, across_north = templates
     rows, cols = classes.shape

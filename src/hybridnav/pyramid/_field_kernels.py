@@ -215,9 +215,18 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
     from a contracted dart to the one after its other half. The base corners on the way make up one
     corner of the level: a face is protected when one of them is.
 
-    `edges`, int32 (n,), are the base edges of the level, ascending; `edge_end`, uint8 (2 n_cells,),
-    and `vertex_end`, uint8 (n_cells,), are the record; `field_of`, int32 (n_cells,), is the vertex
-    of each flat cell.
+    Parameters
+    ----------
+    edges
+        int32 (n,), the base edges of the level, ascending.
+    edge_end, vertex_end
+        uint8 (2 n_cells,) and (n_cells,), the record.
+    field_of
+        int32 (n_cells,), the vertex of each flat cell.
+    level
+        Number of the level.
+    rows, cols
+        Shape of the grid.
     """
     n_edges = edges.size
     sigma = np.empty(2 * n_edges, np.int32)
@@ -256,9 +265,18 @@ def way_to_rim(start, inside, field_of, edge_end, level, cols, came):
     """Return the base edges from a face in a field to the nearest rim, int64, the last one first.
 
     The rim is a face that is not ordinary or a block that holds a crack. The search follows removed
-    edges inside the field. A face is named by its lower left cell. `start` is a face, `inside` the
-    vertex of the field, `field_of`, int32 (n_cells,), the vertex of each flat cell, `edge_end`,
-    uint8 (2 n_cells,), the record; `came`, uint8 (n_cells + cols,) and zero, is scratch.
+    edges inside the field. A face is named by its lower left cell.
+
+    Parameters
+    ----------
+    start
+        A face.
+    inside
+        The vertex of the field.
+    field_of, edge_end, level, cols
+        See `level_darts`.
+    came
+        uint8 (n_cells + cols,), scratch, zero.
     """
     n_cells = field_of.size
     queue = np.empty(64, np.int64)

@@ -42,7 +42,10 @@ class Vertices(NamedTuple):
 
 
 class Hulls(NamedTuple):
-    """Convex hulls of fields as cells: those of vertex v are points[start[v]:start[v + 1]]."""
+    """Convex hulls of fields as cells: those of vertex v are points[start[v]:start[v + 1]].
+
+    `start` is (n + 1,), `points` (m, 2), rows and columns.
+    """
 
     start: np.ndarray
     points: np.ndarray
@@ -97,10 +100,20 @@ def near_enough(u, v, hull_start, hull_points, limit):
 def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
     """Return which of two vertices may survive their merging, or UNDECIDED.
 
-    The caller has found that the common box of the fields, int32 `boxes` (n, 4), is too large to
-    decide. `cells`, int32 (n, 2), are surviving cells; the hull of v is
-    `hull_points[hull_start[v]:hull_start[v + 1]]`, both empty before hulls are built; `limit` is in
-    squared cells.
+    The caller has found that the common box of the fields is too large to decide.
+
+    Parameters
+    ----------
+    u, v
+        The vertices.
+    cells, boxes
+        See `Vertices`.
+    hull_start, hull_points
+        Fields of `Hulls`; both empty before hulls are built.
+    linkage
+        `SURVIVOR`, `RADIUS` or `DIAMETER`.
+    limit
+        The merge distance squared, in squared cells.
     """
     rows = np.int64(cells[u, 0] - cells[v, 0])
     cols = np.int64(cells[u, 1] - cells[v, 1])
@@ -137,10 +150,24 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
     merged fields first keeps fields compact (measured 2 to 5 % fewer places on real maps than the
     distance between the surviving cells or the merged radius).
 
-    `origin`, int32 (2 n_edges,), and `base_edge`, int32 (n_edges,), are those of the darts;
-    `vertices` and `hulls` belong to the `level`; `linkage` is one of the constants; `limit` is in
-    squared cells; `seed` orders equal attributes. Out: `keys`, uint64 (n_edges,); `ways`, uint8 by
-    edge, which end may survive; `best`, uint64 by vertex, its least key.
+    Parameters
+    ----------
+    origin, base_edge
+        int32 (2 n_edges,) and (n_edges,), as in `Darts`.
+    vertices, hulls
+        `Vertices` and `Hulls` of the level.
+    level
+        Number of the level.
+    linkage, limit
+        See `ways_of`.
+    seed
+        uint64, orders equal attributes.
+    keys
+        uint64 (n_edges,), filled in.
+    ways
+        uint8 (n_edges,), receives which end of an edge may survive.
+    best
+        uint64 (n_vertices,), receives the least key of each vertex.
     """
     cells, boxes, classes, whole_at = vertices
     hull_start, hull_points = hulls
@@ -230,8 +257,16 @@ def match(origin, keys, best, matched, rest):
 def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
     """Let every vertex without a partner join the best matched neighbour that may survive it.
 
-    `origin`, `keys`, `ways` and `matched` are those of `contractible` and `match`; `best` is
-    scratch by vertex; `parent` and `kernel_dart`, int32 by vertex, are changed.
+    Parameters
+    ----------
+    origin, keys, ways
+        See `contractible`.
+    matched
+        int32 (n_vertices,), from `match`.
+    best
+        uint64 (n_vertices,), scratch.
+    parent, kernel_dart
+        int32 (n_vertices,), changed.
     """
     for v in range(matched.size):
         best[v] = _NO_KEY
@@ -282,15 +317,20 @@ def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
 
 @njit(cache=True, nogil=True)
 def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, seed, stars):
-    """Return the stars of a maximal matching (MIES): the parent of each vertex and the dart to it.
+    """Fill in the stars of a maximal matching (MIES): the parent of each vertex and the dart to it.
 
     A matched edge whose ends both gained leaves is dropped, so that no tree has diameter three. In
     a pair without leaves, the vertex with the smaller merged radius survives; the hash breaks ties.
-    `kernel_dart[v]` starts at the parent of v and ends at v.
 
-    `keys`, `ways` and `matched` are those of `contractible` and `match`; `darts_origin` and
-    `base_edge` belong to the darts; `seed` is that of the keys; `best` is scratch by vertex;
-    `stars` holds `parent`, `kernel_dart` and `has_leaf`, by vertex.
+    Parameters
+    ----------
+    darts_origin, base_edge, keys, ways, vertices, seed
+        See `contractible`.
+    matched, best
+        See `join_leaves`.
+    stars
+        `parent`, `kernel_dart` and `has_leaf` by vertex, filled in; `kernel_dart[v]` starts at the
+        parent of v and ends at v.
     """
     cells, boxes, _, _ = vertices
     parent, kernel_dart, has_leaf = stars
@@ -336,8 +376,18 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
 def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vertex_parent):
     """Merge boxes into survivors and close the gaps, in place; return the number of survivors.
 
-    By flat cell, `vertex_end` receives the level at which a surviving cell goes, `vertex_parent`
-    the cell that it goes into. `parent` and `new_vertex` are int32 by vertex.
+    Parameters
+    ----------
+    vertices
+        `Vertices` of the level; changed.
+    parent, new_vertex
+        int32 (n_vertices,); `new_vertex` is filled in.
+    cols
+        Columns of the grid.
+    level
+        Number of the level.
+    vertex_end, vertex_parent
+        By flat cell: receive the level at which a surviving cell goes, and the cell it goes into.
     """
     cells, boxes, classes, whole_at = vertices
     count = 0

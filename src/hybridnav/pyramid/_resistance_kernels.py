@@ -14,9 +14,20 @@ _LEAST_ATTRIBUTE = 8191
 def yielding(origin, base_edge, classes, widths, peaks, share, seed, keys):
     """Fill `keys` with the arcs that may be contracted, widest first, and return their number.
 
-    `origin`, int32 (2 n_arcs,), the vertices of the darts; `base_edge`, int32 (n_arcs,); `classes`
-    and `peaks`, by vertex; `widths`, float64 (n_arcs,), in the unit of `peaks`; `share` in (0, 1];
-    `keys`, uint64 (n_arcs,).
+    Parameters
+    ----------
+    origin, base_edge
+        int32 (2 n_arcs,) and (n_arcs,), as in `Darts`.
+    classes, peaks
+        By vertex: its kind, and the greatest clearance of its field.
+    widths
+        float64 (n_arcs,), in the unit of `peaks`.
+    share
+        In (0, 1]: an arc narrower than this share of the lower peak is kept.
+    seed
+        uint64, orders equal widths.
+    keys
+        uint64 (n_arcs,), filled in.
     """
     widest = 0.0
     for e in range(base_edge.size):

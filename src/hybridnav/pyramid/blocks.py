@@ -28,10 +28,10 @@ _PERIOD = 2 << MAX_POWER  # a block's survivor depends on whether its block numb
 class Templates(NamedTuple):
     """Ends of cells and edges by the power p of their block (side 2^p) and their place in it.
 
-    `vertex_end` and the steps to the parent are indexed by (p, row mod 16, col mod 16). The other
-    arrays hold ends of edges as `Record.edge_end` does: `inside_*` by (p, row mod 8, col mod 8), 0
-    for an edge that leaves the block; `across_*`, for edges that leave it, by (lesser power, row or
-    column mod 8).
+    `vertex_end`, and `parent_rows` and `parent_cols`, the steps to the parent, are indexed by
+    (p, row mod 16, col mod 16). The other arrays hold ends of edges as `Record.edge_end` does:
+    `inside_*` by (p, row mod 8, col mod 8), 0 for an edge that leaves the block; `across_*`, for
+    edges that leave it, by (lesser power, row or column mod 8).
     """
 
     vertex_end: ByteArray
