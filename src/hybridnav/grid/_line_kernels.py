@@ -14,6 +14,7 @@ _SLIVER_CELLS = 1e-9
 
 @njit(cache=True, nogil=True)
 def _is_free(free, row, col):
+    """Return whether a cell is on the grid and free."""
     return 0 <= row < free.shape[0] and 0 <= col < free.shape[1] and free[row, col]
 
 

@@ -308,12 +308,17 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     Parameters
     ----------
     folder
-        The run's.
+        The run's folder.
     root
-        Folder by whose paths maps below it are called; else by their names.
+        Maps below this folder are named by their paths from it; None names them by their files.
     metric
-        What losses refer to: "any-angle", for all paths the any-angle optimum; "octile", the
-        octile optimum, any-angle paths having no loss then; "both", each path's own metric.
+        Reference of losses: "any-angle", for all paths the any-angle optimum; "octile", the octile
+        optimum, without losses for any-angle paths; "both", the optimum in each path's own metric.
+
+    Returns
+    -------
+    Study
+        Its outcomes in the order of the records.
 
     Raises
     ------

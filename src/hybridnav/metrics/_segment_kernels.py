@@ -72,6 +72,7 @@ def crossing_at(classes, free_of, row, col):
 
 @njit(cache=True, nogil=True)
 def _point_code(classes, free_of, row, col):
+    """Return `CLEAR` if a point touches the closed square of a free cell, else `BLOCKED`."""
     for r in range(math.ceil(row) - 1, math.floor(row) + 1):
         for c in range(math.ceil(col) - 1, math.floor(col) + 1):
             if _is_free(classes, free_of, r, c):

@@ -47,6 +47,11 @@ def compare_rooms(true: AnyArray, found: AnyArray) -> RoomAgreement:
     true, found
         Integer labels of the same cells, shape (n,), n >= 1; -1 in `found` for no room.
 
+    Returns
+    -------
+    RoomAgreement
+        Precision and recall of each true room, and the coefficient.
+
     Raises
     ------
     InvalidValueError

@@ -189,6 +189,11 @@ def plan_tour(
     smooth, blocked
         As in `HybridPlanner.plan`.
 
+    Returns
+    -------
+    Tour
+        It ends with the first part that is not solved.
+
     Raises
     ------
     InvalidValueError

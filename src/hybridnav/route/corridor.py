@@ -32,17 +32,22 @@ class Corridor:
 def corridor_of(
     topology: TopologicalMap, places: LongArray, *, neighbours: BoolArray | None = None
 ) -> Corridor:
-    """Receptive fields of the places of a route.
+    """Return the receptive fields of the places of a route.
 
     Parameters
     ----------
     topology
-        The map the route is on.
+        The map of the route.
     places
         Dense indices of the route's places.
     neighbours
-        bool (n_places,), places to take in too where an arc joins them to the route; None for
+        bool (n_places,), places to include too where an arc joins them to the route; None for
         the route alone.
+
+    Returns
+    -------
+    Corridor
+        The places, and the number of their cells.
     """
     inside = np.zeros(topology.n_places, dtype=np.bool_)
     inside[places] = True
