@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,11 +20,12 @@ from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_t
 from hybridnav.pyramid.hulls import merge_hulls
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Linkage, Record
 from hybridnav.pyramid.resistance import Steering
+from hybridnav.pyramid.scratch import Scratch
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, KeyArray
+    from hybridnav._typing import ByteArray, IntArray
     from hybridnav.pyramid.resistance import Resistance
 
     KindArray = NDArray[np.uint8] | NDArray[np.uint16]
@@ -112,68 +112,6 @@ def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
     return kinds
 
 
-@dataclass
-class _Scratch:
-    """Work space of all levels: 17 bytes an edge and 21 a vertex, shared by consecutive passes."""
-
-    keys: KeyArray
-    rest: KeyArray
-    state: ByteArray
-    best: KeyArray
-    matched: IntArray
-    parent: IntArray
-    kernel_dart: IntArray
-    has_leaf: BoolArray
-
-    @classmethod
-    def of_size(cls, n_vertices: int, n_edges: int) -> _Scratch:
-        return cls(
-            np.empty(n_edges, np.uint64),
-            np.empty(n_edges, np.uint64),
-            np.empty(n_edges, np.uint8),
-            np.empty(n_vertices, np.uint64),
-            np.empty(n_vertices, np.int32),
-            np.empty(n_vertices, np.int32),
-            np.empty(n_vertices, np.int32),
-            np.empty(n_vertices, np.bool_),
-        )
-
-    def for_level(self, n_vertices: int, n_edges: int) -> _Scratch:
-        """Return views of the length of a level."""
-        return _Scratch(
-            self.keys[:n_edges],
-            self.rest[:n_edges],
-            self.state[:n_edges],
-            self.best[:n_vertices],
-            self.matched[:n_vertices],
-            self.parent[:n_vertices],
-            self.kernel_dart[:n_vertices],
-            self.has_leaf[:n_vertices],
-        )
-
-    # Keys and matching are free once the stars are chosen.
-
-    @property
-    def inverse(self) -> IntArray:
-        return self.rest.view(np.int32)
-
-    @property
-    def touched(self) -> IntArray:
-        return self.keys.view(np.int32)
-
-    @property
-    def new_edge(self) -> IntArray:
-        return self.keys.view(np.int32)
-
-    @property
-    def new_vertex(self) -> IntArray:
-        return self.matched
-
-    @property
-    def shift(self) -> IntArray:
-        return self.best.view(np.int32)
-
-
 class _Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
@@ -195,7 +133,7 @@ class _Decimation:
         self._loops = [0]
         self._darts, self._vertices = self._base(kinds)
         self._whole_at = int(self._vertices.whole_at.max(initial=0))
-        self._scratch = _Scratch.of_size(len(self._vertices.cells), len(self._darts.base_edge))
+        self._scratch = Scratch.of_size(len(self._vertices.cells), len(self._darts.base_edge))
         self._lap("base")
 
     def _base(self, kinds: KindArray) -> tuple[dart_kernels.Darts, _kernels.Vertices]:
@@ -279,7 +217,7 @@ class _Decimation:
         self._lap("compaction")
         return True
 
-    def _select(self, scratch: _Scratch, count: int) -> None:
+    def _select(self, scratch: Scratch, count: int) -> None:
         """Choose the stars of this level from its first `count` candidates."""
         darts, keys = self._darts, scratch.keys[:count]
         _kernels.match(darts.origin, keys, scratch.best, scratch.matched, scratch.rest)
@@ -355,7 +293,7 @@ class _Decimation:
         )[0]
         return labels
 
-    def _merge_vertices(self, scratch: _Scratch) -> None:
+    def _merge_vertices(self, scratch: Scratch) -> None:
         record = self.record
         n_vertices = _kernels.compact_vertices(
             self._vertices,
@@ -371,7 +309,7 @@ class _Decimation:
             self._hulls = merge_hulls(self._hulls, merged_into, n_vertices)
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))
 
-    def _close_gaps(self, scratch: _Scratch) -> None:
+    def _close_gaps(self, scratch: Scratch) -> None:
         n_edges = dart_kernels.compact_darts(
             self._darts, scratch.state, scratch.new_edge, self._level, self.record.edge_end
         )
