@@ -7,7 +7,6 @@ from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
 from hybridnav import portals
-from hybridnav._progress import no_progress
 from hybridnav.portals import BuiltPortals, PortalOptions, prepare_portals
 
 if TYPE_CHECKING:
@@ -35,15 +34,16 @@ def shared_portals(topology: TopologicalMap, **choices: Any) -> BuiltPortals:
     """Return what `prepare_portals` returns, of large maps the same object each time."""
     if topology.grid.classes.size < LEAST_CELLS:
         return prepare_portals(topology, **choices)
-    progress = choices.pop("progress", no_progress)
+    progress = choices.pop("progress", None)
     key = _key_of(topology, **choices)
     if key not in _KEPT:
         _KEPT[key] = prepare_portals(topology, **choices)
     _KEPT.move_to_end(key)
     while len(_KEPT) > MOST:
         _KEPT.popitem(last=False)
-    progress(1, 2)
-    progress(2, 2)
+    if progress is not None:
+        progress(1, 2)
+        progress(2, 2)
     return _KEPT[key]
 
 

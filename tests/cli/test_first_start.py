@@ -10,16 +10,11 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numba.core.registry import CPUDispatcher
 
-import hybridnav as hn
 from hybridnav.cli import compiling
 from hybridnav.cli.compiling import told_of_compiling
-from hybridnav.cli.warm import small_grid
 from hybridnav.config import load_preset
-from hybridnav.pyramid import _base_kernels
 
 OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
 PLAN = ("plan", str(OFFICE), "--start", "1.0,13.2", "--goal", "40.6,19.4")
@@ -111,18 +106,6 @@ def test_a_second_process_compiles_what_a_first_plan_searches_with(
     with compiling.compiling_beside(load_preset(preset)) as compiled:
         compiled()
     assert begun == jobs
-
-
-def test_a_pyramid_with_rooms_is_built_by_the_same_kernels() -> None:
-    grid = small_grid()
-    label_of = np.where(np.arange(64) < 32, 0, 1) + np.zeros((64, 1), np.int32)
-    hn.DualGraphPyramid.build(grid)
-    kernels = [
-        kernel for kernel in vars(_base_kernels).values() if isinstance(kernel, CPUDispatcher)
-    ]
-    before = [kernel.signatures for kernel in kernels]
-    hn.DualGraphPyramid.build(grid, rooms=hn.RoomLabels(("west", "east"), label_of))
-    assert [kernel.signatures for kernel in kernels] == before
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="looks for processes in /proc")

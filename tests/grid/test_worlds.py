@@ -20,7 +20,7 @@ from hybridnav.grid.worlds import (
     tiled,
     write_world,
 )
-from hybridnav.grid.worlds_office import _DOORS, _ROOMS
+from hybridnav.grid.worlds_office import DOORS, ROOMS
 from hybridnav.grid.worlds_scan import window
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -174,7 +174,7 @@ def test_seed_changes_the_noise_and_nothing_else_does():
 def test_every_ordinary_room_can_be_reached(seed):
     grid = office_grid(seed)
     reached = reach(grid, START)
-    for name, rect in _ROOMS.items():
+    for name, rect in ROOMS.items():
         room = mask_of(grid, rect)
         free = room & (grid.classes == CellClass.FREE)
         share = (reached & free).sum() / free.sum()
@@ -185,7 +185,7 @@ def test_every_ordinary_room_can_be_reached(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_every_doorway_stays_wide_enough(seed):
     grid = office_grid(seed, radius_m=0.0)
-    for door in _DOORS:
+    for door in DOORS:
         half = door.width_m / 2 - 0.05
         x, y = (half, 0.4) if door.along_x else (0.4, half)
         rows, cols = window(grid.frame, (door.x - x, door.y - y, door.x + x, door.y + y))
@@ -197,7 +197,7 @@ def test_every_doorway_stays_wide_enough(seed):
 def test_sealed_room_is_a_component_of_its_own(radius_m):
     grid = office_grid(radius_m=radius_m)
     vertices, _ = ndimage.label(grid.classes != CellClass.OCCUPIED)
-    inside = mask_of(grid, _ROOMS[SEALED])
+    inside = mask_of(grid, ROOMS[SEALED])
     row, col = grid.frame.cells_of((15.8, 13.6))
     sealed = vertices == vertices[row, col]
     assert vertices[row, col] > 0
@@ -214,7 +214,7 @@ def test_corridor_is_a_loop():
 
 def test_seminar_room_has_two_doors_onto_one_corridor():
     grid = office_grid()
-    doors = [(door.x - 0.6, door.y - 0.4, door.x + 0.6, door.y + 0.4) for door in _DOORS[1:3]]
+    doors = [(door.x - 0.6, door.y - 0.4, door.x + 0.6, door.y + 0.4) for door in DOORS[1:3]]
     seminar, corridor = (12.6, 4.8), (12.6, 7.4)
     assert reaches(grid, seminar, corridor, closed=doors[:1])
     assert reaches(grid, seminar, corridor, closed=doors[1:])

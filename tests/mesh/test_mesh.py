@@ -28,7 +28,7 @@ from hybridnav.mesh import (
     shortest_paths,
 )
 from hybridnav.metrics import VisibilityGraph, segment_faults
-from tests.oracle.any_angle import by_visibility, some_positions
+from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
     KINDS,
     assert_sides_agree,
@@ -98,7 +98,7 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
         searches(mesh), itertools.pairwise(ends)
     ):
         found = search.path((first, last), (start, goal))
-        assert found.length_cells == pytest.approx(by_visibility(grid, graph, start, goal))
+        assert found.length_cells == pytest.approx(graph.between(start, goal).length_m)
         if found.positions is not None:
             points = grid.frame.points_of_grid(found.positions)
             assert found.positions[0].tolist() == list(start)

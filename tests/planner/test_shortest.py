@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from hybridnav.planner.mesh_plans import OverMesh
-from tests.oracle.any_angle import by_visibility, some_positions
+from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 seeds = st.integers(0, 2**32 - 1)
@@ -65,8 +65,7 @@ def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn
         if (frame.cells_of(ends) != [first, last]).any():
             continue  # a point on a side belongs to the cell behind it
         result = planner.plan(*ends)
-        optimum = by_visibility(topology.grid, graph, start, goal)
-        assert_optimal(topology.grid, result, optimum * frame.resolution_m)
+        assert_optimal(topology.grid, result, graph.between(start, goal).length_m)
         if result.path is not None:
             np.testing.assert_array_equal(result.path.points[[0, -1]], ends)
             assert result.path.cells[[0, -1]].tolist() == [list(first), list(last)]
@@ -99,8 +98,8 @@ def test_paths_round_closed_cells_are_optimal(
                 held = grid.frame.cells_of([start, goal])
                 assert (held[:, None] == shut).all(axis=2).any()
                 continue
-            optimum = by_visibility(grid, graph, tuple(start[::-1]), tuple(goal[::-1]))
-            assert_optimal(grid, result, optimum)
+            optimum = graph.between(tuple(start[::-1]), tuple(goal[::-1]))
+            assert_optimal(grid, result, optimum.length_m)
 
 
 def test_searches_round_what_was_closed_are_kept_for_the_next_query() -> None:

@@ -7,7 +7,6 @@ import importlib.util
 import pickle
 import subprocess
 import sys
-import threading
 import weakref
 from functools import cache
 from pathlib import Path
@@ -250,19 +249,6 @@ def test_a_copied_search_does_not_hold_the_original() -> None:
     found = other.search((0, 0), (3, 3), blocked=blocked)
     assert found.cells is not None
     assert [1, 1] not in found.cells.tolist()
-
-
-def test_a_lock_is_not_shared_with_a_copy() -> None:
-    from hybridnav._copies import copies_alike
-
-    @copies_alike
-    class Locked:
-        def __init__(self) -> None:
-            self.lock = threading.Lock()
-
-    locked = Locked()
-    with locked.lock:
-        assert copy.deepcopy(locked).lock.acquire(blocking=False)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ompl") is None, reason="OMPL is not installed")

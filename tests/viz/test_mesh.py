@@ -13,7 +13,6 @@ import hybridnav as hn
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.mesh import build_mesh, trace_search
 from hybridnav.viz import plot_mesh, plot_search
-from hybridnav.viz.mesh import _views
 from tests.mesh.test_trace import seeds, traced
 from tests.strategies import class_grids, examples, occupancy_grid
 
@@ -83,7 +82,9 @@ def test_what_is_drawn_as_seen_lies_in_free_space(classes: Any, seed: int) -> No
     trace = traced(classes, seed)
     free = np.argwhere(classes == CellClass.FREE).astype(float)
     space = shapely.union_all(shapely.box(*free.T, *(free + 1).T)).buffer(1e-6)
-    for view, root in zip(_views(trace), trace.roots, strict=True):
+    views = drawn_as(plot_search(occupancy_grid(classes), trace), "views").get_paths()
+    for path, root in zip(views, trace.roots, strict=True):
+        view = np.asarray(path.vertices)[:, ::-1]
         ring = shapely.convex_hull(shapely.MultiPoint(view))
         assert space.contains(ring)
         whole = shapely.convex_hull(shapely.MultiPoint([root, *view]))

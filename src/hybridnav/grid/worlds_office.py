@@ -45,7 +45,7 @@ _CORRIDOR: tuple[Rect, ...] = (
     (5.6, 6.2, 8.0, 18.8),
     (26.8, 6.2, 29.2, 18.8),
 )
-_ROOMS: dict[str, Rect] = {
+ROOMS: dict[str, Rect] = {
     "south-west office": (0.0, 0.0, 8.6, 6.2),
     "seminar room": (8.6, 0.0, 16.8, 6.2),
     "office 1": (16.8, 0.0, 20.8, 6.2),
@@ -65,11 +65,12 @@ _ROOMS: dict[str, Rect] = {
     "hall": (29.2, 3.4, 42.0, 21.6),
     "reception": (37.2, 17.4, 42.0, 21.6),
 }
+"""`(x0, y0, x1, y1)` of each room in metres."""
 _UNEXPLORED: dict[str, Rect] = {
     "lift shafts": (18.6, 8.6, 21.4, 16.4),
     "store": (17.4, 18.8, 21.4, 25.0),
 }
-_DOORS: tuple[_Door, ...] = (
+DOORS: tuple[_Door, ...] = (
     _Door(7.2, 6.2, along_x=True),  # south-west office
     _Door(9.9, 6.2, along_x=True),  # seminar room, twice onto one corridor
     _Door(15.5, 6.2, along_x=True),
@@ -184,7 +185,7 @@ def office_world(*, seed: int = 0) -> World:
     cells = _painted()
     _scan(cells, rng)
     cells = speckle(hide_depths(wobble(cells, rng), rng), rng)
-    for door in _DOORS:
+    for door in DOORS:
         _fill(cells, _opening(door, width_m=door.width_m - _JAMB_M, depth_m=_STEP_M), FREE)
     return World(cells[::-1], _FRAME, "office")
 
@@ -193,11 +194,11 @@ def _painted() -> ByteArray:
     """Paint the floor plan as it is, row 0 at the lowest y."""
     cells = np.full(_SHAPE, UNEXPLORED)
     _build(cells, _CORRIDOR, inside=FREE)
-    for room in _ROOMS.values():
+    for room in ROOMS.values():
         _build(cells, (room,), inside=FREE)
     for room in _UNEXPLORED.values():
         _build(cells, (room,), inside=UNEXPLORED)
-    for door in _DOORS:
+    for door in DOORS:
         _fill(cells, _opening(door, width_m=door.width_m, depth_m=_WALL_M), FREE)
     for rect in _CUPBOARDS:
         _fill(cells, rect, OCCUPIED)

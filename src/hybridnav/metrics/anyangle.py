@@ -107,10 +107,23 @@ class VisibilityGraph:
         InvalidValueError
             When a cell lies outside the map.
         """
-        classes = self._grid.classes
         start, goal = (_centre(self._grid, cell) for cell in (start_cell, goal_cell))
-        if not all(self._free_of[classes[tuple(cell)]] for cell in (start_cell, goal_cell)):
+        if not all(
+            self._free_of[self._grid.classes[tuple(cell)]] for cell in (start_cell, goal_cell)
+        ):
             return AnyAnglePath(None, math.inf)
+        return self.between(start, goal)
+
+    def between(self, start: tuple[float, float], goal: tuple[float, float]) -> AnyAnglePath:
+        """Find a shortest path between two positions in free space.
+
+        Parameters
+        ----------
+        start, goal
+            (row, col) in grid units, where the centre of cell (0, 0) is (0.5, 0.5); neither may be
+            a corner at which two free cells meet alone.
+        """
+        classes = self._grid.classes
         ends = np.array([start, goal])
         if start == goal:
             return self._path(ends[:1])
