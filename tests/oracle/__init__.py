@@ -1,1 +1,1 @@
-"""What design.md defines, computed a second time, slowly and plainly, for tests to compare with."""
+"""The definitions of the pages, computed a second time, slowly and plainly, to compare with."""

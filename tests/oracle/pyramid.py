@@ -198,8 +198,8 @@ def n_field_pieces(field_of: AnyArray) -> int:
 def holes(field_of: AnyArray) -> AnyArray:
     """Holes of each field: 8-connected sets of other cells that it keeps from the outside.
 
-    A place has one self-loop per hole. This is no definition of design.md but follows from its
-    rules: the loops of a vertex cut the sphere into one region more than there are loops, and a
+    A place has one self-loop per hole. This is no definition of docs/pyramid.md but follows from
+    its rules: the loops of a vertex cut the sphere into one region more than there are loops, and a
     region that held no part of the outside of the field would be a face of rule 1 or 4.
     """
     found = np.zeros(int(field_of.max(initial=-1)) + 1, dtype=int)

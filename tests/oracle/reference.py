@@ -1,8 +1,8 @@
 """A plane map of dictionaries, contracted and simplified one edge at a time.
 
-The explicit dual graph contraction of design.md section 3, as plainly as it can be written: a
-dart is named by the base edge it comes from, as `(cell, cell)`, at every level. It validates the
-oracle and, given the same kernels, must end with the same darts as any other implementation.
+The explicit dual graph contraction of docs/pyramid.md, as plainly as it can be written: a dart is
+named by the base edge it comes from, as `(cell, cell)`, at every level. It validates the oracle
+and, given the same kernels, must end with the same darts as any other implementation.
 """
 
 from __future__ import annotations
