@@ -20,7 +20,7 @@ from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.refine.ompl.answer import Answering
+    from hybridnav.refine.ompl.attempts import Attempts
     from hybridnav.refine.ompl.corridor import Box, Corridor
     from hybridnav.refine.ompl.spaces import StateSpace
 
@@ -43,12 +43,12 @@ _ROUNDS_WITHOUT_GAIN = 2
 _LEAST_GAIN = 2e-4
 
 
-def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float) -> bool:
+def attempt(attempts: Attempts, corridor: Corridor, whole: StateSpace, *, part: float) -> bool:
     """Solve leg after leg, join and simplify them, and improve windows of the path; return success.
 
     Parameters
     ----------
-    answering
+    attempts
         The query.
     corridor
         The corridor to search.
@@ -62,52 +62,50 @@ def attempt(answering: Answering, corridor: Corridor, whole: StateSpace, *, part
     bool
         Whether there is a path.
     """
-    points = _legs(answering, corridor, whole, part=part)
+    points = _legs(attempts, corridor, whole, part=part)
     if points is None:
         return False
-    points = answering.finish(whole, points)
-    if answering.settings.planner in IMPROVING:
-        _improve(answering, corridor, whole, points)
+    points = attempts.finish(whole, points)
+    if attempts.settings.planner in IMPROVING:
+        _improve(attempts, corridor, whole, points)
     return True
 
 
 def _legs(
-    answering: Answering, corridor: Corridor, whole: StateSpace, *, part: float
+    attempts: Attempts, corridor: Corridor, whole: StateSpace, *, part: float
 ) -> FloatArray | None:
     """Return the legs, solved and joined; None if one has no path."""
-    cells = answering.query.cells
-    poses = Poses(answering.query, corridor, whole)
-    stops = [index for index in _stops(answering, cells) if poses.at(index) is not None]
+    cells = attempts.query.cells
+    poses = Poses(attempts.query, corridor, whole)
+    stops = [index for index in _stops(attempts, cells) if poses.at(index) is not None]
     waiting = list(itertools.pairwise(stops))[::-1]
-    joined = [answering.query.start[None]]
-    stop_at = (1 - part) * answering.budget.left()
+    joined = [attempts.query.start[None]]
+    stop_at = (1 - part) * attempts.budget.left()
     while waiting:
         first, last = waiting.pop()
         share = _LEG / (len(waiting) + 1)
-        found = _leg(answering, corridor, cells[first : last + 1], poses.pair(first, last), share)
+        found = _leg(attempts, corridor, cells[first : last + 1], poses.pair(first, last), share)
         middle = (first + last) // 2
         if found is not None:
             joined.append(found[1:])
-        elif (
-            last - first > 1 and poses.at(middle) is not None and answering.budget.left() > stop_at
-        ):
+        elif last - first > 1 and poses.at(middle) is not None and attempts.budget.left() > stop_at:
             waiting += [(middle, last), (first, middle)]
         else:
-            answering.partial(np.concatenate(joined))
+            attempts.partial(np.concatenate(joined))
             return None
     # Turns to the headings at which legs meet are left out.
     points = whole.driven(np.concatenate(joined))
     return points if len(points) else None
 
 
-def _stops(answering: Answering, cells: LongArray) -> list[int]:
+def _stops(attempts: Attempts, cells: LongArray) -> list[int]:
     """Return the indices of the cells at which the path of cells is cut into legs.
 
     These are its ends, the crossings from one field to the next, and points in between until no leg
     winds.
     """
     last = len(cells) - 1
-    field_of = answering.setup.field_of
+    field_of = attempts.setup.field_of
     crossings: list[int] = []
     if field_of is not None:
         fields = field_of[cells[:, 0], cells[:, 1]]
@@ -127,7 +125,7 @@ def _stops(answering: Answering, cells: LongArray) -> list[int]:
 
 
 def _leg(
-    answering: Answering,
+    attempts: Attempts,
     corridor: Corridor,
     cells: LongArray,
     ends: tuple[FloatArray, FloatArray],
@@ -137,27 +135,27 @@ def _leg(
 
     The result is None if every path found is much longer than the path of cells.
     """
-    flat, straight = not answering.settings.has_heading, np.stack(ends)
+    flat, straight = not attempts.settings.has_heading, np.stack(ends)
     if flat and corridor.check.path_valid(straight[:, :2]):
         return straight
     if flat and len(cells) <= _SHORT_CELLS:
         return None
-    space = answering.space(corridor, *_bounds(corridor, cells))
-    turns_and_drives = answering.settings.space == "differential"
+    space = attempts.space(corridor, *_bounds(corridor, cells))
+    turns_and_drives = attempts.settings.space == "differential"
     if turns_and_drives and len(direct := space.driven(straight)):
         return direct
-    objective = answering.objective.of(space)
+    objective = attempts.objective.of(space)
     most = _TRIES * len(cells) if flat or turns_and_drives else None
     found = solve(
         Problem(space, *ends, objective),
-        answering.settings,
-        answering.budget.stopper(share, most=most),
-        search=answering.search,
+        attempts.settings,
+        attempts.budget.stopper(share, most=most),
+        search=attempts.search,
     )
     if not found.is_exact or not flat:
         return found.points if found.is_exact else None
-    points = Simplifier(space, answering.objective).shorter(found.points)
-    if answering.settings.objective != "length":
+    points = Simplifier(space, attempts.objective).shorter(found.points)
+    if attempts.settings.objective != "length":
         return points
     limit_m = _LONGER * path_length_in_cells(cells) * corridor.grid.resolution_m
     return points if space.length(points) <= limit_m else None
@@ -179,28 +177,26 @@ def _bounds(corridor: Corridor, cells: LongArray) -> tuple[FloatArray, FloatArra
     return bounds_of(corridor.grid, box)
 
 
-def _improve(
-    answering: Answering, corridor: Corridor, whole: StateSpace, points: FloatArray
-) -> None:
+def _improve(attempts: Attempts, corridor: Corridor, whole: StateSpace, points: FloatArray) -> None:
     """Plan windows of the path again, each in the ellipse that can shorten it."""
-    budget = answering.budget
-    cost_of = answering.objective.cost
+    budget = attempts.budget
+    cost_of = attempts.objective.cost
     cost, fruitless, window = cost_of(points), 0, _LEAST_WINDOWS
     while fruitless < _ROUNDS_WITHOUT_GAIN and budget.left() > 0 and len(points) > 2:  # noqa: PLR2004
         before = cost
         for number in range(2 * window - 1):
             along = number / (2 * window), (number + 2) / (2 * window)
-            points = _window(answering, corridor, whole, points, along)
+            points = _window(attempts, corridor, whole, points, along)
             if budget.left() <= 0:
                 break
         cost = cost_of(points)
-        answering.better(points, cost)
+        attempts.better(points, cost)
         fruitless = 0 if cost < before * (1 - _LEAST_GAIN) else fruitless + 1
         window = max(window // 2, 1) if fruitless else window
 
 
 def _window(
-    answering: Answering,
+    attempts: Attempts,
     corridor: Corridor,
     whole: StateSpace,
     points: FloatArray,
@@ -210,14 +206,14 @@ def _window(
     first, last = _between(points, along)
     if last - first < 2:  # noqa: PLR2004 - one motion
         return points
-    cost_of, inner = answering.objective.cost, points[first : last + 1]
+    cost_of, inner = attempts.objective.cost, points[first : last + 1]
     cost, least = cost_of(inner), whole.length(inner[[0, -1]])
     if cost <= least * (1 + _LEAST_GAIN):
         return points
-    space = answering.space(corridor, *_ellipse(corridor, inner, cost))
-    objective = answering.objective.of(space)
+    space = attempts.space(corridor, *_ellipse(corridor, inner, cost))
+    objective = attempts.objective.of(space)
     problem = Problem(space, inner[0], inner[-1], objective, least * (1 + _LEAST_GAIN))
-    found = solve(problem, answering.settings, answering.budget.stopper(_WINDOW))
+    found = solve(problem, attempts.settings, attempts.budget.stopper(_WINDOW))
     if not found.is_exact or cost_of(found.points) >= cost:
         return points
     joined = whole.driven(np.concatenate([points[:first], found.points, points[last + 1 :]]))

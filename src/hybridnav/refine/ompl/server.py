@@ -154,10 +154,10 @@ def _run(base: Base, query: Query, replies: Connection) -> None:
     try:
         from ompl import util  # noqa: PLC0415
 
-        from hybridnav.refine.ompl.answer import Answering  # noqa: PLC0415
+        from hybridnav.refine.ompl.answer import answer  # noqa: PLC0415
 
         util.RNG.setSeed(base.setup.settings.seed)
-        replies.send(Answering(base, query, replies.send).run())
+        replies.send(answer(base, query, replies.send))
     except BaseException as error:  # noqa: BLE001 - whatever it is, it ends here
         text = " ".join(f"{type(error).__name__}: {error}".split())
         with contextlib.suppress(OSError):
