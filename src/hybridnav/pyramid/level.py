@@ -13,8 +13,10 @@ from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels, _hull_kernels
 from hybridnav.pyramid.cracks import cell_pairs, ends_of, middles_of, sides_of
-from hybridnav.pyramid.dual import DualGraph
+from hybridnav.pyramid.dual import DualGraph, FaceKind
+from hybridnav.pyramid.export import multigraph, vertices_with_attributes
 from hybridnav.pyramid.record import SURVIVES
+from hybridnav.pyramid.simple import SimpleGraph, simple_graph
 from hybridnav.search.fields import field_distances
 from hybridnav.search.moves import STRAIGHT, length_in_cells
 
@@ -23,7 +25,7 @@ _SOUTH = 3
 _Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     import networkx as nx
 
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import Record
-    from hybridnav.pyramid.simple import SimpleGraph
 
 
 @dataclass(frozen=True, order=True)
@@ -242,25 +243,71 @@ class Level:
         return DualGraph.of_map(self.darts, outer[outer >= 0])
 
     def to_networkx(self) -> nx.MultiGraph[int]:
-        """Return the level as a multigraph: see `hybridnav.pyramid.export.to_networkx`."""
-        from hybridnav.pyramid.export import to_networkx  # noqa: PLC0415 - loads networkx
+        """Return the level as a multigraph, with its parallel arcs and self-loops.
 
-        return to_networkx(self)
+        Returns
+        -------
+        networkx.MultiGraph
+            Nodes are the vertices, by index: `cell` [row, col] (the surviving cell), `position`
+            [x, y] (its centre in metres, map frame), `class` ("free" or "unexplored"), `area_m2`.
+            Edges are the arcs, their key the index of the arc: `max_distance_m`, `through_m`,
+            `n_cracks` (cell sides of the boundary) and `base_pair` [[row, col], [row, col]], the
+            two cells of the base edge that stands for the arc. The graph has the `name` of the map,
+            the index of the `level` and `resolution_m`; all attributes survive JSON.
+        """
+        return multigraph(
+            self._about(),
+            self._nodes(),
+            self.arcs,
+            max_distance_m=self.max_distance_m.tolist(),
+            through_m=self.through_m.tolist(),
+            n_cracks=np.bincount(self.boundary_table[1], minlength=self.n_arcs).tolist(),
+            base_pair=self.base_pairs.tolist(),
+        )
 
     def dual_to_networkx(self) -> nx.MultiGraph[int]:
-        """Return the dual as a multigraph: see `hybridnav.pyramid.export.dual_to_networkx`."""
-        from hybridnav.pyramid.export import dual_to_networkx  # noqa: PLC0415 - loads networkx
+        """Return the dual as a multigraph: meeting points and holes, joined by boundaries.
 
-        return dual_to_networkx(self)
+        A vertex without an arc has no face here, although the plane round it is one; `n_isolated`
+        of the graph counts these vertices, so that vertices - edges + faces = 2 components -
+        `n_isolated`.
+
+        Returns
+        -------
+        networkx.MultiGraph
+            Nodes are the faces, by index in `dual`: `kind` ("ordinary", "protected" or "outside").
+            Edges are the dual edges, one for each arc and with its index as key: `length_m` and
+            `n_cracks` of the boundary (for a self-loop, of the line of its dual edge through its
+            own field), and `vertices` [u, v] on its two sides. The graph has the attributes of
+            `to_networkx` and `n_isolated`.
+        """
+        n_cracks = np.bincount(self.boundary_table[1], minlength=self.n_arcs)
+        isolated = self.n_vertices - len(np.unique(self.arcs))
+        kinds = [FaceKind(kind).name.lower() for kind in self.dual.kinds.tolist()]
+        return multigraph(
+            {**self._about(), "n_isolated": isolated},
+            ((face, {"kind": kind}) for face, kind in enumerate(kinds)),
+            self.dual.edges,
+            length_m=(n_cracks * np.float64(self._grid.resolution_m)).tolist(),
+            n_cracks=n_cracks.tolist(),
+            vertices=self.arcs.tolist(),
+        )
 
     def to_simple_graph(self) -> SimpleGraph:
-        """Return the level as a simple graph, with a report of the arcs that it drops.
+        """Return the level as a simple graph: at most one edge between two vertices, no self-loop.
 
-        See `hybridnav.pyramid.simple.to_simple_graph`.
+        The result has a report of the arcs that this drops.
         """
-        from hybridnav.pyramid.simple import to_simple_graph  # noqa: PLC0415 - loads networkx
+        about, nodes = self._about(), self._nodes()
+        return simple_graph(about, nodes, self.arcs, self.max_distance_m, self.through_m)
 
-        return to_simple_graph(self)
+    def _about(self) -> dict[str, Any]:
+        grid = self._grid
+        return {"name": grid.name, "level": self.index, "resolution_m": grid.resolution_m}
+
+    def _nodes(self) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Yield the vertices with their attributes in graphs."""
+        return vertices_with_attributes(self._grid, self.cells, self.classes, self.areas)
 
     @cached_property
     def max_distance_m(self) -> FloatArray:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import networkx as nx
 import numpy as np
 
-from hybridnav.pyramid.export import vertices_with_attributes
-
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
-    from hybridnav._typing import BoolArray, IntArray, LongArray
-    from hybridnav.pyramid.level import Level
+    import networkx as nx
+
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.pyramid.export import Node
 
 _LISTED = 8
 
@@ -87,37 +86,48 @@ class SimpleGraph:
     dropped: SimpleGraphReport
 
 
-def to_simple_graph(level: Level) -> SimpleGraph:
-    """Return a level as a simple graph: at most one edge between two vertices, no self-loop.
+def simple_graph(
+    about: dict[str, Any],
+    nodes: Iterable[Node],
+    arcs: IntArray,
+    max_distance_m: FloatArray,
+    through_m: FloatArray,
+) -> SimpleGraph:
+    """Return a graph with at most one edge between two vertices and no self-loop.
 
     Parameters
     ----------
-    level
-        Any level of a pyramid.
+    about
+        Attributes of the graph.
+    nodes
+        Vertices with their attributes.
+    arcs
+        int (n_arcs, 2), the vertices that each arc joins.
+    max_distance_m, through_m
+        float64 (n_arcs,), as in `Level`.
 
     Returns
     -------
     SimpleGraph
         The graph, and a report of the arcs that it drops.
     """
-    graph: nx.Graph[int] = nx.Graph(
-        name=level.grid.name, level=level.index, resolution_m=level.grid.resolution_m
-    )
-    graph.add_nodes_from(vertices_with_attributes(level))
-    loops = level.is_self_loop
-    plain = np.flatnonzero(~loops)
+    from networkx import Graph  # noqa: PLC0415 - only who looks at graphs pays
+
+    graph: nx.Graph[int] = Graph(**about)
+    graph.add_nodes_from(nodes)
+    plain = np.flatnonzero(arcs[:, 0] != arcs[:, 1])
     # Stable: among arcs with an equal through_m, the lowest index is kept.
-    by_length = plain[np.argsort(level.through_m[plain], kind="stable")]
-    pairs, first = np.unique(np.sort(level.arcs[by_length], axis=1), axis=0, return_index=True)
+    by_length = plain[np.argsort(through_m[plain], kind="stable")]
+    pairs, first = np.unique(np.sort(arcs[by_length], axis=1), axis=0, return_index=True)
     for (low, high), arc in zip(pairs.tolist(), by_length[first].tolist(), strict=True):
         graph.add_edge(
             low,
             high,
             arc=arc,
-            max_distance_m=float(level.max_distance_m[arc]),
-            through_m=float(level.through_m[arc]),
+            max_distance_m=float(max_distance_m[arc]),
+            through_m=float(through_m[arc]),
         )
-    return SimpleGraph(graph, report_of(level.arcs, level.n_vertices))
+    return SimpleGraph(graph, report_of(arcs, len(graph)))
 
 
 def report_of(arcs: IntArray, n_vertices: int) -> SimpleGraphReport:
