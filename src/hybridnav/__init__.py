@@ -7,7 +7,8 @@ import logging
 
 import lazy_loader
 
-__version__ = "0.1.0"
+from hybridnav._version import __version__ as __version__
+
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid.occupancy import CellClass, OccupancyGrid
+from hybridnav.grid.classes import CellClass
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
@@ -36,37 +36,6 @@ class DroppedIslands:
     unexplored: int = 0
     unexplored_cells: int = 0
     closed_cells: int = 0
-
-
-def drop_islands(grid: OccupancyGrid, least_area_m2: float) -> OccupancyGrid:
-    """Leave out the islands of a grid that are smaller than an area.
-
-    An island is a 4-connected set of cells of one class. A free island below the area becomes
-    unexplored. After that, an unexplored island below the area is closed: it counts as occupied in
-    `classes`, belongs to no place, and is not inflated. It stays where it joins two free areas, so
-    that connections stay for a robot that may enter unexplored cells. No cell becomes free,
-    occupied cells stay occupied, and free sets of that area or more keep every cell and so their
-    paths.
-
-    Parameters
-    ----------
-    grid
-        The map; unchanged.
-    least_area_m2
-        Square metres that an island must have to be kept, finite; 0 keeps all of them. Cells within
-        the robot's radius of an obstacle do not count.
-
-    Returns
-    -------
-    OccupancyGrid
-        The same map with `least_island_m2` set; `dropped` counts the islands that were left out.
-
-    Raises
-    ------
-    InvalidValueError
-        When the area is negative or not finite.
-    """
-    return replace(grid, least_island_m2=least_area_m2)
 
 
 def without_islands(

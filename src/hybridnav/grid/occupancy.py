@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from enum import IntEnum
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -12,23 +11,16 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.classes import CellClass
 from hybridnav.grid.clearance import within_radius
 from hybridnav.grid.frame import Frame
+from hybridnav.grid.islands import DroppedIslands, without_islands
 from hybridnav.grid.limits import MAX_CELLS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._typing import BoolArray, ByteArray
-    from hybridnav.grid.islands import DroppedIslands
-
-
-class CellClass(IntEnum):
-    """Class of a cell for planners; occupied cells are not vertices of any graph."""
-
-    OCCUPIED = 0
-    FREE = 1
-    UNEXPLORED = 2
 
 
 class _RobotRadius:
@@ -146,8 +138,6 @@ class OccupancyGrid:
             blocked = within_radius(measured == CellClass.OCCUPIED, radius_cells=radius_cells)
             classes = np.where(blocked, np.uint8(CellClass.OCCUPIED), measured)
         if self.least_island_m2 > 0:
-            from hybridnav.grid.islands import without_islands  # noqa: PLC0415 - it needs this module
-
             classes, dropped = without_islands(
                 classes,
                 least_area_m2=self.least_island_m2,
@@ -240,3 +230,34 @@ def _check_probability(probability: NDArray[np.float32]) -> None:
         )
     if (probability < 0).any() or (probability > 1).any():
         raise InvalidValueError("occupancy probabilities must lie in [0, 1] or be NaN")
+
+
+def drop_islands(grid: OccupancyGrid, least_area_m2: float) -> OccupancyGrid:
+    """Leave out the islands of a grid that are smaller than an area.
+
+    An island is a 4-connected set of cells of one class. A free island below the area becomes
+    unexplored. After that, an unexplored island below the area is closed: it counts as occupied in
+    `classes`, belongs to no place, and is not inflated. It stays where it joins two free areas, so
+    that connections stay for a robot that may enter unexplored cells. No cell becomes free,
+    occupied cells stay occupied, and free sets of that area or more keep every cell and so their
+    paths.
+
+    Parameters
+    ----------
+    grid
+        The map; unchanged.
+    least_area_m2
+        Square metres that an island must have to be kept, finite; 0 keeps all of them. Cells within
+        the robot's radius of an obstacle do not count.
+
+    Returns
+    -------
+    OccupancyGrid
+        The same map with `least_island_m2` set; `dropped` counts the islands that were left out.
+
+    Raises
+    ------
+    InvalidValueError
+        When the area is negative or not finite.
+    """
+    return replace(grid, least_island_m2=least_area_m2)

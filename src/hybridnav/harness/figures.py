@@ -18,13 +18,12 @@ from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed
 from hybridnav.viz.save import picture_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from matplotlib.axes import Axes
 
     from hybridnav._typing import FloatArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.harness.report import MapSection, ReportData
 
 _CASE_WIDTH_IN = 4.0
 _CASE_DPI = 144.0
@@ -57,27 +56,28 @@ class Charts:
 
     Parameters
     ----------
-    report
-        The report.
+    names
+        Methods of the report, in its order; they may repeat.
+    metric_of
+        The metric of the paths of a method, octile where it has none.
     """
 
-    def __init__(self, report: ReportData) -> None:
-        names = [*report.overall_losses, *report.overall_times_ms]
-        for section in report.maps:
-            names += [*section.losses, *section.times_ms]
+    def __init__(self, names: Iterable[str], metric_of: Mapping[str, str]) -> None:
         self._styles = method_styles(names)
-        self._report = report
+        self._metric_of = metric_of
 
-    def overall(self) -> list[Chart]:
+    def overall(
+        self, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
+    ) -> list[Chart]:
         """Return those of all maps together, one for each metric."""
-        losses, times_ms = self._report.overall_losses, self._report.overall_times_ms
         title = "Speed against loss, all maps"
         groups = self._groups([*losses, *times_ms])
         return [self._speed(losses, times_ms, names, f"{title}{of}") for of, names in groups]
 
-    def of_map(self, section: MapSection) -> list[Chart]:
+    def of_map(
+        self, name: str, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
+    ) -> list[Chart]:
         """Return those of one map, two for each metric."""
-        losses, times_ms, name = section.losses, section.times_ms, section.name
         charts = []
         for of, names in self._groups([*losses, *times_ms]):
             charts.append(self._losses(losses, names, f"Loss, {name}{of}"))
@@ -92,7 +92,7 @@ class Charts:
         """
         groups: dict[str, list[str]] = {}
         for name in dict.fromkeys(names):
-            groups.setdefault(self._report.metric_of.get(name, "octile"), []).append(name)
+            groups.setdefault(self._metric_of.get(name, "octile"), []).append(name)
         if groups.keys() <= {"octile"}:
             return [("", groups.get("octile", []))]
         return [(f", {metric} paths", of_metric) for metric, of_metric in groups.items()]

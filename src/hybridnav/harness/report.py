@@ -100,7 +100,11 @@ def render_report(report: ReportData) -> str:
     """
     from hybridnav.harness.figures import Charts  # noqa: PLC0415 - loads matplotlib
 
-    return _template().render(report=report, charts=Charts(report))
+    names = [*report.overall_losses, *report.overall_times_ms]
+    for section in report.maps:
+        names += [*section.losses, *section.times_ms]
+    charts = Charts(names, report.metric_of)
+    return _template().render(report=report, charts=charts)
 
 
 @cache

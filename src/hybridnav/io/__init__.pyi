@@ -1,7 +1,7 @@
 from .blocked import load_blocked as load_blocked
 from .examples import example_map as example_map
-from .maps import load_map as load_map
-from .models import Model as Model, load as load, save as save
+from .maps import load as load, load_map as load_map
+from .models import Model as Model, save as save
 from .movingai import (
     Scenario as Scenario,
     load_movingai_map as load_movingai_map,

@@ -1,4 +1,4 @@
-"""One function for every kind of map file."""
+"""One function for every kind of map file, and one for models."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hybridnav.io.ros import load_ros_map
 if TYPE_CHECKING:
     from hybridnav._typing import PathLike
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.io.models import Model
 
 _LOADERS = {".yaml": load_ros_map, ".yml": load_ros_map, ".map": load_movingai_map}
 _IMAGES = {".pgm", ".png", ".pnm", ".ppm", ".pbm", ".bmp", ".tif", ".tiff", ".gif", ".jpg", ".jpeg"}
@@ -67,8 +68,6 @@ def load_map(
     """
     suffix = Path(path).suffix.lower()
     if suffix == MODEL_SUFFIX:
-        from hybridnav.io.models import load  # noqa: PLC0415 - loads numba
-
         return load(
             path,
             robot_radius_m=robot_radius_m,
@@ -91,3 +90,55 @@ def load_map(
         occupied_threshold=occupied_threshold,
         max_cells=max_cells,
     )
+
+
+def load(
+    path: PathLike,
+    *,
+    robot_radius_m: float | None = None,
+    free_threshold: float | None = None,
+    occupied_threshold: float | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> Model:
+    """Load a model, or a map without one.
+
+    Parameters
+    ----------
+    path
+        A model (.hnm), or a map as in `load_map`, which makes a model with nothing prepared.
+    robot_radius_m, free_threshold, occupied_threshold, max_cells
+        As in `load_map`. If the grid of a model was made with other values, the grid is made again
+        and nothing else of the model is used.
+
+    Returns
+    -------
+    Model
+        The model; its `planner` plans at once.
+
+    Raises
+    ------
+    MapNotFoundError
+        When the file does not exist.
+    ModelError
+        When a model file is no model, not whole, altered, or of another version.
+    MapError
+        When a map cannot be read, or has more than `max_cells`.
+    InvalidValueError
+        When the radius, a threshold or the limit is out of range.
+    """
+    from hybridnav.io.models import Model, is_model, open_model  # noqa: PLC0415 - loads numba
+
+    if is_model(path):
+        return open_model(path, max_cells=max_cells).remade(
+            robot_radius_m=robot_radius_m,
+            free_threshold=free_threshold,
+            occupied_threshold=occupied_threshold,
+        )
+    grid = load_map(
+        path,
+        robot_radius_m=robot_radius_m,
+        free_threshold=free_threshold,
+        occupied_threshold=occupied_threshold,
+        max_cells=max_cells,
+    )
+    return Model(grid)

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from hybridnav import __version__
 from hybridnav._files import printable, replace_file
+from hybridnav._version import __version__
 from hybridnav.errors import MapNotFoundError, ModelError
 
 if TYPE_CHECKING:

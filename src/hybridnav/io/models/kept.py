@@ -10,8 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridnav import __version__
 from hybridnav._files import MODEL_SUFFIX
+from hybridnav._version import __version__
 from hybridnav.errors import MapError, ModelError
 from hybridnav.grid import MAX_CELLS
 from hybridnav.io import rooms, ros

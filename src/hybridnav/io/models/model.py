@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridnav import io
 from hybridnav._files import MODEL_SUFFIX, printable
 from hybridnav.config import Preset, PyramidSettings, load_preset
 from hybridnav.errors import ModelError
@@ -272,7 +271,7 @@ def is_model(path: PathLike) -> bool:
 
 
 def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
-    """Open a model; see `load`."""
+    """Open a model; see `hybridnav.io.load`."""
     check_max_cells(max_cells)
     filed = read_parts(path)
     for part in filed:
@@ -287,53 +286,3 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
                 "build the model anew"
             )
     return Model(None, filed, max_cells)
-
-
-def load(
-    path: PathLike,
-    *,
-    robot_radius_m: float | None = None,
-    free_threshold: float | None = None,
-    occupied_threshold: float | None = None,
-    max_cells: int = DEFAULT_MAX_CELLS,
-) -> Model:
-    """Load a model, or a map without one.
-
-    Parameters
-    ----------
-    path
-        A model (.hnm), or a map as in `load_map`, which makes a model with nothing prepared.
-    robot_radius_m, free_threshold, occupied_threshold, max_cells
-        As in `load_map`. If the grid of a model was made with other values, the grid is made again
-        and nothing else of the model is used.
-
-    Returns
-    -------
-    Model
-        The model; its `planner` plans at once.
-
-    Raises
-    ------
-    MapNotFoundError
-        When the file does not exist.
-    ModelError
-        When a model file is no model, not whole, altered, or of another version.
-    MapError
-        When a map cannot be read, or has more than `max_cells`.
-    InvalidValueError
-        When the radius, a threshold or the limit is out of range.
-    """
-    if is_model(path):
-        return open_model(path, max_cells=max_cells).remade(
-            robot_radius_m=robot_radius_m,
-            free_threshold=free_threshold,
-            occupied_threshold=occupied_threshold,
-        )
-    grid = io.load_map(
-        path,
-        robot_radius_m=robot_radius_m,
-        free_threshold=free_threshold,
-        occupied_threshold=occupied_threshold,
-        max_cells=max_cells,
-    )
-    return Model(grid)

@@ -1,0 +1,13 @@
+"""Classes of cells."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class CellClass(IntEnum):
+    """Class of a cell for planners; occupied cells are not vertices of any graph."""
+
+    OCCUPIED = 0
+    FREE = 1
+    UNEXPLORED = 2
