@@ -1,4 +1,4 @@
-"""Kernel of the centres of cells."""
+"""Kernels that convert as `Frame` does."""
 
 from __future__ import annotations
 
@@ -20,3 +20,15 @@ def centres(cells, frame):
         points[i, 0] = origin_x + cosine * x - sine * y
         points[i, 1] = origin_y + sine * x + cosine * y
     return points
+
+
+@njit(cache=True, nogil=True)
+def position_of(x, y, frame):
+    """Return a point as (row, col) in grid units, that of `Frame.position_of` for near points.
+
+    `x` and `y` are in metres, map frame, and `frame` is `Frame.for_kernels`.
+    """
+    resolution, origin_x, origin_y, cosine, sine = frame
+    along, across = x - origin_x, y - origin_y
+    row = (cosine * across - sine * along) / resolution
+    return row, (cosine * along + sine * across) / resolution

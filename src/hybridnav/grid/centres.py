@@ -1,7 +1,7 @@
-"""Centres of cells, compiled: for kernels, and for paths of few cells, where numpy is slower."""
+"""Conversions of `Frame`, compiled: for kernels, and for few cells, where numpy is slower."""
 
 from __future__ import annotations
 
-from hybridnav.grid._centre_kernels import centres
+from hybridnav.grid._centre_kernels import centres, position_of
 
-__all__ = ["centres"]
+__all__ = ["centres", "position_of"]

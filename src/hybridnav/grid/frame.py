@@ -50,8 +50,8 @@ class Frame:
     resolution_m: float = 1.0
     origin_m: tuple[float, float] = (0.0, 0.0)
     yaw_rad: float = 0.0
-    _turned: tuple[float, float, float, float] = field(init=False, repr=False, compare=False)
-    """Cosine and sine of the yaw, and the origin inside the range of numbers."""
+    _turn: tuple[float, float] = field(init=False, repr=False, compare=False)
+    """Cosine and sine of the yaw."""
 
     def __post_init__(self) -> None:
         # numpy numbers may be float32, which would spoil all lengths computed from them.
@@ -73,15 +73,23 @@ class Frame:
                 f"origin must lie within {FARTHEST_M:g} m, and yaw within as many radians, "
                 f"got {self.origin_m} and {self.yaw_rad:g}"
             )
-        x, y = (min(max(along, -_FAR), _FAR) for along in self.origin_m)
-        turned = math.cos(self.yaw_rad), math.sin(self.yaw_rad), x, y
-        object.__setattr__(self, "_turned", turned)
+        object.__setattr__(self, "_turn", (math.cos(self.yaw_rad), math.sin(self.yaw_rad)))
 
     @property
     def for_kernels(self) -> tuple[float, float, float, float, float]:
         """Side of a cell, `(x, y)` of the origin in metres, cosine and sine of the yaw."""
-        turned = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return (self.resolution_m, *self.origin_m, *turned)
+        return (self.resolution_m, *self.origin_m, *self._turn)
+
+    @property
+    def axes_m(self) -> FloatArray:
+        """Vectors `(x, y)` of one row and of one column in metres, float64 (2, 2)."""
+        # A frame at the origin yields them without the rounding of a far origin.
+        return Frame(self.resolution_m, yaw_rad=self.yaw_rad).points_of_grid(np.eye(2))
+
+    @property
+    def per_metre(self) -> FloatArray:
+        """Rows, then columns, in a metre along x and along y, float64 (2, 2)."""
+        return self.axes_m / self.resolution_m**2
 
     def points_of(self, cells: ArrayLike) -> FloatArray:
         """Return the centres of cells in the map frame.
@@ -114,7 +122,7 @@ class Frame:
         """
         rowcol = np.asarray(positions, dtype=np.float64) * self.resolution_m
         along_x, along_y = rowcol[..., 1], rowcol[..., 0]
-        cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        cosine, sine = self._turn
         points = np.empty_like(rowcol)
         points[..., 0] = self.origin_m[0] + cosine * along_x - sine * along_y
         points[..., 1] = self.origin_m[1] + sine * along_x + cosine * along_y
@@ -143,15 +151,8 @@ class Frame:
         xy = np.asarray(points, dtype=np.float64)
         if not np.isfinite(xy).all():
             raise InvalidValueError(f"points need finite coordinates in metres, got {points!r:.80}")
-        # Numbers at the end of their range must become "outside" without an overflow.
-        offset = np.clip(xy, -_FAR, _FAR) - np.clip(self.origin_m, -_FAR, _FAR)
-        cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        along_x = cosine * offset[..., 0] + sine * offset[..., 1]
-        along_y = cosine * offset[..., 1] - sine * offset[..., 0]
-        with np.errstate(over="ignore"):
-            position = np.stack([along_y, along_x], axis=-1) / self.resolution_m
         # A centre from points_of must map back to its cell: 1e-9 of a cell absorbs rounding.
-        cells = np.floor(np.clip(position + 1e-9, -_MANY, _MANY))
+        cells = np.floor(np.clip(self.positions_of(xy) + 1e-9, -_MANY, _MANY))
         return cells.astype(np.int64)
 
     def cell_of(self, x: float, y: float) -> tuple[int, int]:
@@ -176,7 +177,8 @@ class Frame:
         x, y
             Finite, in metres, map frame.
         """
-        cosine, sine, x0, y0 = self._turned
+        (cosine, sine), (x0, y0) = self._turn, self.origin_m
+        # Numbers at the end of their range must become "outside" without an overflow.
         along = min(max(x, -_FAR), _FAR) - x0
         across = min(max(y, -_FAR), _FAR) - y0
         row = (cosine * across - sine * along) / self.resolution_m
@@ -188,15 +190,15 @@ class Frame:
         Parameters
         ----------
         points
-            float64 (n, 2), finite, in metres, map frame.
+            `(x, y)` in metres along the last axis, finite, map frame.
 
         Returns
         -------
         FloatArray
-            float64 (n, 2).
+            `(row, col)` along the last axis.
         """
-        cosine, sine, x0, y0 = self._turned
-        along = np.clip(points[:, 0], -_FAR, _FAR) - x0
-        across = np.clip(points[:, 1], -_FAR, _FAR) - y0
+        (cosine, sine), (x0, y0) = self._turn, self.origin_m
+        along = np.clip(points[..., 0], -_FAR, _FAR) - x0
+        across = np.clip(points[..., 1], -_FAR, _FAR) - y0
         row = (cosine * across - sine * along) / self.resolution_m
-        return np.stack([row, (cosine * along + sine * across) / self.resolution_m], axis=1)
+        return np.stack([row, (cosine * along + sine * across) / self.resolution_m], axis=-1)

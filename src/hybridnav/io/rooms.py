@@ -301,11 +301,7 @@ def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -
 
 def in_cells(points: FloatArray, grid: OccupancyGrid) -> FloatArray:
     """Convert points in metres to cells, x along columns and y along rows."""
-    frame = grid.frame
-    offset = (points - np.array(frame.origin_m)) / frame.resolution_m
-    cosine, sine = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
-    x = cosine * offset[:, 0] + sine * offset[:, 1]
-    return np.stack([x, cosine * offset[:, 1] - sine * offset[:, 0]], axis=1)
+    return grid.frame.positions_of(points)[:, ::-1]
 
 
 def _check_keys(values: dict[Any, Any], known: tuple[str, ...], at: str) -> None:

@@ -209,10 +209,8 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
 
 def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
     """Return the positions (row, col) of points, rounded to 2^-24 of a cell, held near the map."""
-    # A frame at the origin yields the two axes without the rounding of a far origin.
-    axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
-    positions = (xy - frame.origin_m) @ axes.T / frame.resolution_m**2
-    rounded: FloatArray = np.rint(np.clip(positions, -_FAR, _FAR) / _QUANTUM) * _QUANTUM
+    positions = np.clip(frame.positions_of(xy), -_FAR, _FAR)
+    rounded: FloatArray = np.rint(positions / _QUANTUM) * _QUANTUM
     return rounded
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -108,15 +107,10 @@ def _beside(area: BaseGeometry, grid: OccupancyGrid) -> InvalidValueError:
 
 
 def _in_cells(area: BaseGeometry, frame: Frame) -> list[BaseGeometry]:
-    cosine, sine = math.cos(frame.yaw_rad), math.sin(frame.yaw_rad)
-
     def turned(points: FloatArray) -> FloatArray:
-        x, y = ((points - np.array(frame.origin_m)) / frame.resolution_m).T
-        return np.stack([cosine * x + sine * y, cosine * y - sine * x], axis=1)
+        return frame.positions_of(points)[:, ::-1]
 
-    with np.errstate(over="ignore", invalid="ignore"):
-        position = turned(shapely.get_coordinates(area))
-    if not (np.abs(position) <= _FARTHEST_CELLS).all():
+    if not (np.abs(turned(shapely.get_coordinates(area))) <= _FARTHEST_CELLS).all():
         raise InvalidValueError(
             f"an area must lie within {_FARTHEST_CELLS:g} cells of the map, got {shown(area)}"
         )

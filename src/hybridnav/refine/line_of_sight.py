@@ -11,7 +11,6 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import Frame
 from hybridnav.refine import _line_of_sight_kernels as kernels
 from hybridnav.refine._taut_kernels import marks_of
 
@@ -60,10 +59,7 @@ class LineOfSight:
         if closed is not None:
             free.flat[closed] = False
         self._marks = marks_of(free)
-        # A frame at the origin yields the two axes without the rounding of a far origin.
-        resolution_m = grid.resolution_m
-        axes = Frame(resolution_m, yaw_rad=grid.frame.yaw_rad).points_of_grid(np.eye(2))
-        self._per_metre = axes / resolution_m**2
+        self._per_metre = grid.frame.per_metre
         self._origin_m = np.array(grid.frame.origin_m)
 
     def shorten(self, cells: LongArray, start: FloatArray, goal: FloatArray) -> FloatArray:

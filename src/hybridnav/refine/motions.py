@@ -302,10 +302,8 @@ class MotionCheck:
 
 def _place_of(frame: Frame) -> FloatArray:
     """Return the pose of a grid in the map frame, float64 (8,); see the kernels."""
-    # A frame at the origin yields the two axes without the rounding of a far origin.
-    axes = Frame(frame.resolution_m, yaw_rad=frame.yaw_rad).points_of_grid(np.eye(2))
-    per_metre = (axes / frame.resolution_m**2).ravel()
-    return np.array([*frame.origin_m, *per_metre, frame.yaw_rad, 1 / frame.resolution_m])
+    rates = *frame.per_metre.ravel(), frame.yaw_rad, 1 / frame.resolution_m
+    return np.array([*frame.origin_m, *rates])
 
 
 def _no_body() -> tuple[Any, ...]:

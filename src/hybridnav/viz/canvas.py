@@ -152,8 +152,8 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
     block = -(-int((high - low).max()) // MAX_IMAGE_SIDE)
     image = _image(grid.measured[window], grid.classes[window], field_of[window], colours, block)
     end = low + block * np.array(image.shape[:2])
-    (x, y), side = grid.frame.origin_m, grid.resolution_m
-    to_map = Affine2D().scale(side).rotate(grid.frame.yaw_rad).translate(x, y)
+    (up_x, up_y), (along_x, along_y) = grid.frame.axes_m.tolist()
+    to_map = Affine2D.from_values(along_x, along_y, up_x, up_y, *grid.frame.origin_m)
     drawn = ax.imshow(
         image,
         origin="lower",

@@ -42,17 +42,11 @@ class Clearance:
         away_m = ndimage.distance_transform_edt(free) * grid.resolution_m
         nearness = np.clip(1 - away_m / settings.clearance_m, 0, 1)
         self._factors = (1 + settings.clearance_weight * nearness).astype(np.float32)
-        frame = grid.frame
-        self._place = (
-            np.array(frame.origin_m),
-            math.cos(frame.yaw_rad),
-            math.sin(frame.yaw_rad),
-            frame.resolution_m,
-        )
+        self._frame = grid.frame.for_kernels
 
     def cost(self, x0: float, y0: float, x1: float, y1: float) -> float:
         """Return the cost of a straight line, metres, map frame."""
-        cost: float = weighted_length(self._factors, *self._place, x0, y0, x1, y1)
+        cost: float = weighted_length(self._factors, self._frame, x0, y0, x1, y1)
         return cost
 
     def cost_of(self, points: FloatArray) -> float:
