@@ -13,7 +13,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.cli import main
-from hybridnav.cli.plan import summary
+from hybridnav.cli.rendering import summary
 
 MAPS = Path(__file__).parents[2] / "maps"
 FIGURE = MAPS / "figure1" / "figure1.yaml"
@@ -169,9 +169,12 @@ def test_a_path_equal_to_its_bound_is_called_optimal(cli, rooms):
 def test_a_path_that_ends_short_of_the_goal_says_by_how_much():
     points = np.array([[1.0, 1.0], [1.5, 1.0]])
     path = hn.Path(np.zeros((2, 2), dtype=np.int64), points, 0.5)
-    result = hn.PlanResult(hn.PlanStatus.APPROXIMATE, "any-angle", path)
+    ends = (1.0, 1.0), (1.5, 3.25, 0.5)
+    result = hn.PlanResult(
+        hn.PlanStatus.APPROXIMATE, "any-angle", path, start=ends[0], goal=ends[1]
+    )
     grid = hn.OccupancyGrid(np.zeros((4, 4), np.float32), hn.Frame(1.0))
-    text = summary(grid, ((1.0, 1.0), (1.5, 3.25, 0.5)), result.to_dict())
+    text = summary(grid, ends, result.to_dict())
     assert "status     approximate\n" in text
     assert "path       ends 2.25 m short of the goal after 0.50 m\n" in text
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 import sys
 import time
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from hybridnav.config import Preset
 
 _SMOOTH = ("none", "line-of-sight")
-_OPTIMAL = 1e-9
-"""Gap of a path that equals its bound, lengths being sums of rounded numbers."""
 _PICTURES = (".pdf", ".png", ".svg")
 
 
@@ -332,14 +329,6 @@ def refused_result(
         "pyramid": settings.pyramid.model_dump(),
     }
     return hn.PlanResult(status, settings=record, start=start, goal=goal)
-
-
-def told_bound(bound: float, gap: float) -> tuple[str, str]:
-    """Return a bound and how far from the optimum a path is at most, rounded to the safe side."""
-    if gap <= _OPTIMAL:
-        return f"{bound:.2f}", "optimal"
-    low = math.floor(bound * 100) / 100
-    return f"{low:.2f}", f"at most {math.ceil(gap * 1000) / 10:.1f} % too long"
 
 
 def timings(seconds: dict[str, float]) -> str:

@@ -1,0 +1,167 @@
+"""The answer of `hybridnav plan`: as text, as JSON, as a picture."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import hybridnav as hn
+from hybridnav._files import printable
+from hybridnav.cli.blocked import told_closing
+from hybridnav.cli.common import answer, extent_line, islands_line, timings
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+Stop = str | tuple[float, ...]
+"""A name, or `(x, y)` or `(x, y, yaw)` in metres and radians, map frame."""
+_OPTIMAL = 1e-9
+"""Gap of a path that equals its bound, lengths being sums of rounded numbers."""
+
+
+def respond(
+    grid: hn.OccupancyGrid, stops: Sequence[Stop], figures: dict[str, Any], *, as_json: bool
+) -> None:
+    """Print the figures of an answer on stdout, as one JSON object or as lines for a person."""
+    whole = json.dumps(figures, allow_nan=False) + "\n" if as_json else None
+    answer(whole or summary(grid, stops, figures))
+
+
+def draw(
+    path: Path,
+    topology: hn.TopologicalMap,
+    outcome: hn.PlanResult | hn.Tour | hn.Alternatives,
+    stops: Sequence[Stop],
+    optimum_m: float | None,
+) -> None:
+    """Save the picture of a plan between two points, of a tour, or of alternatives."""
+    from hybridnav import viz  # noqa: PLC0415 - loads matplotlib
+
+    if isinstance(outcome, hn.PlanResult):
+        start, goal = (stop[:2] for stop in stops)
+        ax = viz.plot_plan(topology, outcome, start=start, goal=goal, optimum_m=optimum_m)
+    elif isinstance(outcome, hn.Tour):
+        ax = viz.plot_tour(topology, outcome)
+    else:
+        ax = viz.plot_alternatives(topology, outcome)
+    viz.save_figure(ax, path)
+
+
+def query_of(stops: Sequence[Stop]) -> str:
+    """Describe a query: its start, what lies between, its goal."""
+    *before, last = (
+        stop if isinstance(stop, str) else f"({', '.join(f'{n:.10g}' for n in stop)})"
+        for stop in stops
+    )
+    return f"{' via '.join(before)} to {last}"
+
+
+def summary(grid: hn.OccupancyGrid, stops: Sequence[Stop], figures: dict[str, Any]) -> str:
+    """Return the lines that describe an answer to a person.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    stops
+        What was asked for.
+    figures
+        Those of a plan or, with `words`, of a tour, and of what was asked for beside it.
+    """
+    radius = f"robot radius {grid.robot_radius_m:g} m"
+    lines = [
+        f"query      {printable(grid.name)}, {query_of(stops)}, {radius}",
+        *told_closing(figures),
+        f"status     {figures['status']}",
+        *islands_line(grid),
+    ]
+    if "outside" in figures["status"]:
+        lines.append(extent_line(grid))
+    lines += _tour_lines(figures) if "words" in figures else _plan_lines(figures)
+    lines.append(f"seconds    {timings(figures['seconds'])}")
+    return "\n".join(lines) + "\n"
+
+
+def _plan_lines(figures: dict[str, Any]) -> list[str]:
+    """Describe one plan: its length and bound, places and arcs, what was expanded."""
+    lines = []
+    if figures["length_m"] is not None and figures["lower_bound"] is None:
+        short_m = math.dist(figures["points"][-1], figures["goal"][:2])
+        told = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"
+        lines.append(f"path       {told}")
+    elif figures["length_m"] is not None:
+        lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
+        bound, told = _rounded_bound(figures["lower_bound"], figures["gap"])
+        lines.append(f"bound      {bound} m, the path is {told}")
+    if figures["steps"] is not None:
+        lines.append(f"steps      {'; '.join(figures['steps'])}")
+    if figures["places"] is not None:
+        for key in ("places", "arcs"):
+            ids = figures[key]
+            lines.append(f"{key:<10} {len(ids)}: {' '.join(map(str, ids))}".rstrip(": "))
+    expanded = [
+        f"{n:,} {what}"
+        for what in ("cells", "places", "gates", "intervals")
+        if (n := figures["expanded" if what == "cells" else f"expanded_{what}"])
+    ]
+    if expanded:
+        lines.append(f"expanded   {', '.join(expanded)}")
+    return lines + _whole_grid_lines(figures)
+
+
+def _whole_grid_lines(figures: dict[str, Any]) -> list[str]:
+    """Describe the plan on the whole grid, if it was asked for.
+
+    Its length is the optimum of a path in the same metric, octile, and for any other path a length
+    alone: a loss over another metric's optimum would mean nothing.
+    """
+    if "grid_expanded" not in figures:
+        return []
+    if figures["grid_length_m"] is None:
+        return ["optimum    none, the whole grid has no path either"]
+    cells, seconds = figures["grid_expanded"], figures["grid_seconds"]
+    took = f"{cells:,} cells expanded on the whole map, {seconds:.3f} s"
+    if figures["optimum_m"] is None:
+        return [f"grid       {figures['grid_length_m']:.2f} m (octile), {took}"]
+    loss = f", loss {figures['loss'] * 100:.2f} %" if figures["loss"] is not None else ""
+    return [f"optimum    {figures['optimum_m']:.2f} m{loss}", f"grid       {took}"]
+
+
+def _tour_lines(figures: dict[str, Any]) -> list[str]:
+    """Describe a tour: its length and bound, the rooms and doors, the alternatives."""
+    lines = _measured(figures) if figures["length_m"] is not None else []
+    for number, line in enumerate(figures["words"]):
+        lines.append(f"{'' if number else 'way':<10} {line}")
+    for number, other in enumerate(figures.get("alternatives", ()), start=1):
+        word = " ".join(f"{letter:+d}" for letter in other["word"]) or "-"
+        rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
+        length = f"{other['length_m']:.2f} m ({other['metric']})"
+        lines.append(f"route {number:<4} {length}, class {word}{rooms}")
+    if not figures.get("alternatives_complete", True):
+        lines.append("routes     the search gave up: there may be more")
+    return lines
+
+
+def _measured(figures: dict[str, Any]) -> list[str]:
+    """Describe the length, the cost if the metric weighs the length, and the bound."""
+    length_m, metric = figures["length_m"], figures["metric"]
+    if figures["cost"] == length_m:
+        lines = [f"length     {length_m:.2f} m ({metric})"]
+    else:
+        lines = [f"length     {length_m:.2f} m", f"cost       {figures['cost']:.2f} ({metric})"]
+    bound, gap = figures["lower_bound"], 0.0
+    if bound > 0:
+        gap = figures["cost"] / bound - 1
+    least, told = _rounded_bound(bound, gap)
+    unit = "m " if figures["cost"] == length_m else ""
+    return [*lines, f"bound      {least} {unit}({metric}), this way is {told} between its stops"]
+
+
+def _rounded_bound(bound: float, gap: float) -> tuple[str, str]:
+    """Return a bound and how far from the optimum a path is at most, rounded to the safe side."""
+    if gap <= _OPTIMAL:
+        return f"{bound:.2f}", "optimal"
+    low = math.floor(bound * 100) / 100
+    return f"{low:.2f}", f"at most {math.ceil(gap * 1000) / 10:.1f} % too long"

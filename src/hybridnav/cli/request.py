@@ -1,0 +1,222 @@
+"""What `hybridnav plan` was asked for, and how it is answered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import hybridnav as hn
+from hybridnav.cli.common import (
+    check_room_to_be,
+    complain,
+    grow_topology,
+    islands_figures,
+    outside,
+    refused_result,
+    stage,
+)
+from hybridnav.cli.compiling import compiling_beside
+from hybridnav.cli.rendering import draw, query_of, respond
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from hybridnav.cli.blocked import Closing
+    from hybridnav.cli.keep import Source
+    from hybridnav.cli.rendering import Stop
+    from hybridnav.planner.named import At
+
+_GRID_SEARCH = {
+    "coarse": "none",
+    "smooth": "none",
+    "refine": "grid-astar",
+    "ompl": None,
+    "epsilon": None,
+}
+"""Settings of a plan on the whole grid."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a command line asks for: a plan between two points, or a tour described in rooms."""
+
+    source: Source
+    stops: list[Stop]
+    """The start, what lies between, the goal."""
+    closing: Closing
+    rooms_file: Path | None
+    at: At
+    alternatives: int
+    least_hole_m2: float
+    compare: bool
+    plot: Path | None
+    as_json: bool
+
+    @property
+    def is_tour(self) -> bool:
+        """Whether rooms are needed, for the plan itself or to describe it."""
+        names_rooms = any(isinstance(stop, str) for stop in self.stops) or self.closing.needs_rooms
+        has_more = len(self.stops) > 2 or self.alternatives > 1  # noqa: PLR2004 - start and goal
+        return names_rooms or has_more or self.rooms_file is not None
+
+    def run(self) -> bool:
+        """Plan, print the answer, draw it, and return whether it is solved."""
+        seconds: dict[str, float] = {}
+        settings, rooms_file = self.source.settings, self._rooms_file()
+        model, key = self.source.load(seconds, rooms_file=rooms_file, needs_rooms=self.is_tour)
+        grid = model.grid
+        check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
+        closed = self.closing.read(grid)
+        status = outside(grid, self.stops) if self.plot is None else None
+        if status is not None:
+            refused = refused_result(status, settings, self.stops)
+            outcome = hn.Tour((refused,), ()) if self.is_tour else refused
+            self._respond(grid, outcome, self._beside_refusal(refused), seconds)
+            return False
+        topology = self._grown(model, rooms_file, seconds)
+        with stage("preparing the planner", seconds, "prepare"):
+            planner = model.planner(settings, topology=topology)
+        outcome = self._planned(planner, closed, seconds)
+        self.source.keep(planner, key)
+        found = self._alternatives(planner, closed, seconds)
+        beside: dict[str, Any] = {}
+        if found is not None:
+            beside = _alternatives_figures(topology, found)
+        elif self.compare and isinstance(outcome, hn.PlanResult):
+            beside = _compared(self._on_whole_grid(topology, closed), outcome)
+        self._respond(grid, outcome, beside, seconds)
+        if self.plot is not None:
+            optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
+            draw(self.plot, topology, found or outcome, self.stops, optimum_m)
+        return outcome.solved
+
+    def _rooms_file(self) -> Path | None:
+        """Return the file of a tour's rooms, by default one in the map's folder."""
+        beside = self.source.map_file.parent / "rooms.yaml"
+        default = beside if self.is_tour and beside.is_file() else None
+        return self.rooms_file or default
+
+    def _grown(
+        self, model: hn.Model, rooms_file: Path | None, seconds: dict[str, float]
+    ) -> hn.TopologicalMap:
+        """Build the pyramid, with rooms for a tour, while the search is compiled."""
+        if model.rooms is not None and (self.rooms_file is None or model.key is not None):
+            rooms_file = None  # the model has them
+        elif self.is_tour and rooms_file is None:
+            complain(
+                "no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help"
+            )
+        settings = self.source.settings
+        with compiling_beside(settings) as compiled:
+            topology = grow_topology(
+                model,
+                settings,
+                seconds,
+                rooms_file=rooms_file,
+                find_rooms=self.is_tour,
+                stops=self.stops,
+                closing=self.closing,
+            )
+            compiled()
+        return topology
+
+    def _planned(
+        self, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: dict[str, float]
+    ) -> hn.PlanResult | hn.Tour:
+        spent: dict[str, float] = {}
+        with stage("planning", spent, "plan"):
+            if not self.is_tour:  # the result has the seconds of its stages
+                return planner.plan(*self.stops, blocked=closed)
+            tour = hn.plan_tour(planner, self.stops, at=self.at, blocked=closed)
+        counted = sum(sum(result.stats.seconds.values()) for result in tour.results)
+        seconds["plan"] = round(max(spent["plan"] - counted, 0.0), 6)  # what no stage counts
+        return tour
+
+    def _alternatives(
+        self, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: dict[str, float]
+    ) -> hn.Alternatives | None:
+        """Find routes of different classes between the two stops, if asked for."""
+        if self.alternatives == 1:
+            return None
+        with stage("finding alternatives", seconds, "alternatives"):
+            return hn.plan_alternatives(
+                planner,
+                self.stops[0],
+                self.stops[-1],
+                self.alternatives,
+                least_hole_m2=self.least_hole_m2,
+                at=self.at,
+                blocked=closed,
+            )
+
+    def _on_whole_grid(
+        self, topology: hn.TopologicalMap, closed: hn.Blocked | None
+    ) -> hn.PlanResult:
+        settings = self.source.settings
+        whole = settings.planner.model_copy(update=_GRID_SEARCH)
+        preset = settings.model_copy(update={"name": "grid-astar", "planner": whole})
+        start, goal = (stop[:2] for stop in self.stops)
+        return hn.HybridPlanner(topology, preset=preset).plan(start, goal, blocked=closed)
+
+    def _beside_refusal(self, refused: hn.PlanResult) -> dict[str, Any]:
+        """Return the figures of what was asked for beside a plan that was refused."""
+        if self.alternatives > 1:
+            return {"alternatives": [], "alternatives_complete": True}
+        return _compared(refused, None) if self.compare else {}
+
+    def _respond(
+        self,
+        grid: hn.OccupancyGrid,
+        outcome: hn.PlanResult | hn.Tour,
+        beside: dict[str, Any],
+        seconds: dict[str, float],
+    ) -> None:
+        figures = outcome.to_dict() | {"map": str(self.source.map_file)}
+        islands, closed = islands_figures(grid), self.closing.to_dict()
+        if self.is_tour:
+            stops = [stop if isinstance(stop, str) else list(stop) for stop in self.stops]
+            figures |= {"stops": stops, "query": query_of(self.stops)} | closed | beside | islands
+        else:
+            figures |= islands | closed | beside
+        figures["seconds"] = seconds | figures["seconds"]
+        respond(grid, self.stops, figures, as_json=self.as_json)
+
+
+def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[str, Any]:
+    """Return the figures of a plan on the whole grid, and the loss of a result against it."""
+    length_m, loss = grid_result.cost if grid_result.solved else None, None
+    alike = result is None or result.metric == grid_result.metric
+    if length_m is not None and result is not None and result.solved and alike:
+        loss = result.cost / length_m - 1 if length_m > 0 else 0.0
+    return {
+        "optimum_m": length_m if alike else None,
+        "loss": loss,
+        "grid_length_m": length_m,
+        "grid_expanded": grid_result.stats.expanded,
+        "grid_seconds": round(sum(grid_result.stats.seconds.values()), 6),
+    }
+
+
+def _alternatives_figures(topology: hn.TopologicalMap, found: hn.Alternatives) -> dict[str, Any]:
+    """Return routes with the rooms and doors that they pass, and whether there may be more."""
+    # Loads numba, which help and wrong usage can do without.
+    from hybridnav.planner.itinerary import NOWHERE, Guide  # noqa: PLC0415
+
+    guide = Guide(topology.rooms)
+    routes = []
+    for alternative in found:
+        legs = guide.legs(alternative.path)
+        passed = [
+            f"{leg.room or NOWHERE}" + (f" (door {leg.door.number})" if leg.door else "")
+            for leg in legs
+        ]
+        routes.append(
+            {
+                "metric": "octile",
+                "length_m": alternative.path.length_m,
+                "word": list(alternative.word),
+                "rooms": passed,
+                "points": alternative.path.points.round(6).tolist(),
+            }
+        )
+    return {"alternatives": routes, "alternatives_complete": found.complete}
