@@ -16,7 +16,6 @@ from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.metrics import (
     ScipyOptimum,
     VisibilityGraph,
-    anyangle_optimum,
     segment_faults,
 )
 from tests.oracle.grid import length_of_points
@@ -101,7 +100,9 @@ def test_no_path_over_any_lattice_corners_is_shorter(classes: Any, seed: int) ->
     start, goal = two_cells(classes, seed)
     grid = occupancy_grid(classes)
     expected = brute_force(grid, start, goal)
-    assert anyangle_optimum(grid, start, goal).length_m == pytest.approx(expected, rel=1e-12)
+    assert VisibilityGraph(grid).shortest(start, goal).length_m == pytest.approx(
+        expected, rel=1e-12
+    )
 
 
 ONE_SQUARE = np.ones((12, 12), np.uint8)
@@ -122,25 +123,25 @@ ONE_SQUARE[3:9, 3:9] = CellClass.OCCUPIED
 def test_one_square_obstacle_has_the_known_shortest_paths(
     start: Cell, goal: Cell, length: float
 ) -> None:
-    found = anyangle_optimum(framed(ONE_SQUARE), start, goal)
+    found = VisibilityGraph(framed(ONE_SQUARE)).shortest(start, goal)
     assert found.length_m == pytest.approx(length * 0.05, rel=1e-12)
 
 
 def test_no_path_squeezes_between_two_cells_that_meet_at_a_corner() -> None:
     grid = occupancy_grid(drawn("....", ".#..", "..#.", "...."))
-    found = anyangle_optimum(grid, (1, 1), (2, 2))
+    found = VisibilityGraph(grid).shortest((1, 1), (2, 2))
     # By the outer corners (1, 2), (1, 3) and (2, 3) of the lower of the two blocked cells.
     assert found.length_m == pytest.approx(2 * math.hypot(0.5, 0.5) + 2, rel=1e-12)
     assert found.points is not None
     assert not segment_faults(grid, found.points)
     closed = occupancy_grid(drawn("#.", ".#"))
-    assert anyangle_optimum(closed, (0, 0), (1, 1)).points is None
+    assert VisibilityGraph(closed).shortest((0, 0), (1, 1)).points is None
 
 
 def test_unexplored_cells_are_crossed_only_when_allowed() -> None:
     grid = occupancy_grid(drawn("..?.."))
-    assert anyangle_optimum(grid, (0, 0), (0, 4)).points is None
-    assert anyangle_optimum(grid, (0, 0), (0, 4), allow_unexplored=True).length_m == 4
+    assert VisibilityGraph(grid).shortest((0, 0), (0, 4)).points is None
+    assert VisibilityGraph(grid, allow_unexplored=True).shortest((0, 0), (0, 4)).length_m == 4
 
 
 def test_a_map_with_too_many_corners_is_refused_in_one_line() -> None:
@@ -152,4 +153,4 @@ def test_a_map_with_too_many_corners_is_refused_in_one_line() -> None:
 
 def test_cells_outside_the_map_are_refused() -> None:
     with pytest.raises(InvalidValueError, match=r"\(12, 0\) lies outside"):
-        anyangle_optimum(occupancy_grid(ONE_SQUARE), (12, 0), (0, 0))
+        VisibilityGraph(occupancy_grid(ONE_SQUARE)).shortest((12, 0), (0, 0))

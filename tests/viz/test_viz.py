@@ -139,7 +139,7 @@ def test_an_arc_runs_from_place_to_place_through_its_own_boundary(rooms):
     assert len(drawn) == len(plain) > 0
     for arc in plain:
         first, last = rooms.positions[rooms.arcs[arc]]
-        assert (*first, *rooms.boundary_middle(arc), *last) in drawn
+        assert (*first, *rooms.level.boundary_middles[arc], *last) in drawn
 
 
 def test_self_loops_are_drawn_on_request_through_their_boundary(figure1):
@@ -150,7 +150,7 @@ def test_self_loops_are_drawn_on_request_through_their_boundary(figure1):
     for line, arc in zip(loops, indices, strict=True):
         at = figure1.positions[figure1.arcs[arc, 0]]
         np.testing.assert_allclose(line[[0, -1]], [at, at])
-        np.testing.assert_allclose(line[len(line) // 2], figure1.boundary_middle(arc))
+        np.testing.assert_allclose(line[len(line) // 2], figure1.level.boundary_middles[arc])
 
 
 def test_arcs_can_be_left_out(rooms):
@@ -242,7 +242,7 @@ def test_a_plan_shows_its_path_route_and_ends(rooms, plan):
     middles = [line[1] for line in _lines(ax, "route")]
     np.testing.assert_allclose(
         sorted(map(tuple, middles)),
-        sorted(tuple(rooms.boundary_middle(a)) for a in plan.route.arcs),
+        sorted(tuple(rooms.level.boundary_middles[a]) for a in plan.route.arcs),
     )
     assert len(_find(ax, "route-places").get_offsets()) == len(plan.route.places)
     start, goal = _find(ax, "start"), _find(ax, "goal")

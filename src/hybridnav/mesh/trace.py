@@ -12,7 +12,7 @@ from hybridnav.mesh._polyanya_kernels import N
 from hybridnav.mesh.search import Cell, MeshPath, MeshSearch, Position, round_into
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray, IntArray
+    from hybridnav._typing import FloatArray, IntArray
     from hybridnav.mesh.build import ConvexMesh
 
 _LEFT, _RIGHT = 1, 2
@@ -42,14 +42,6 @@ class SearchTrace:
     """float64 (n,), length of the path from the start to each root."""
     parents: IntArray
     """int32 (n,), the interval behind which each was found, -1 for the first ones."""
-
-    @property
-    def is_followed(self) -> BoolArray:
-        """bool (n,), whether an interval was found behind each: not behind those that stayed in the
-        open list, lost to a shorter path to their root, or lead nowhere."""
-        followed = np.zeros(len(self.parents), dtype=np.bool_)
-        followed[self.parents[self.parents >= 0]] = True
-        return followed
 
 
 def trace_search(

@@ -1,14 +1,9 @@
 """The judges of paths, optima and losses, whose code shares nothing with the planners."""
 
-from hybridnav.metrics.anyangle import (
-    MAX_CORNERS,
-    AnyAnglePath,
-    VisibilityGraph,
-    anyangle_optimum,
-)
+from hybridnav.metrics.anyangle import MAX_CORNERS, AnyAnglePath, VisibilityGraph
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
 from hybridnav.metrics.judge_line import judge_line, line_cells
-from hybridnav.metrics.optimum import ScipyOptimum, scipy_optimum
+from hybridnav.metrics.optimum import ScipyOptimum
 from hybridnav.metrics.segmentation import RoomAgreement, compare_rooms
 from hybridnav.metrics.statistics import (
     Buckets,
@@ -30,14 +25,12 @@ __all__ = [
     "Summary",
     "Verdict",
     "VisibilityGraph",
-    "anyangle_optimum",
     "compare_rooms",
     "distance_buckets",
     "judge_line",
     "judge_path",
     "line_cells",
     "paired_difference",
-    "scipy_optimum",
     "segment_faults",
     "summarise",
     "thrun_count",

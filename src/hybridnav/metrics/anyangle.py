@@ -153,35 +153,6 @@ class VisibilityGraph:
         return AnyAnglePath(frame.points_of_grid(positions), length * frame.resolution_m)
 
 
-def anyangle_optimum(
-    grid: OccupancyGrid, start_cell: Cell, goal_cell: Cell, *, allow_unexplored: bool = False
-) -> AnyAnglePath:
-    """Find the exact Euclidean shortest path between the centres of two cells.
-
-    Parameters
-    ----------
-    grid
-        A map with at most `MAX_CORNERS` convex corners; for several queries on one map, build a
-        `VisibilityGraph`.
-    start_cell, goal_cell
-        (row, col), inside the map.
-    allow_unexplored
-        Whether unexplored cells may be entered.
-
-    Returns
-    -------
-    AnyAnglePath
-        Without points if there is no path.
-
-    Raises
-    ------
-    InvalidValueError
-        When a cell lies outside the map or the map has too many corners.
-    """
-    graph = VisibilityGraph(grid, allow_unexplored=allow_unexplored)
-    return graph.shortest(start_cell, goal_cell)
-
-
 def _convex_corners(free: BoolArray) -> tuple[FloatArray, LongArray]:
     """Return the lattice corners with one blocked cell of four, and the sign of its diagonal."""
     blocked = ~free

@@ -13,9 +13,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.metrics.judge import Cell, free_classes
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.grid import OccupancyGrid
 
 # In the order of the flat indices that they lead to, so that the matrix has sorted rows.
@@ -65,54 +63,18 @@ class ScipyOptimum:
         -----
         E. W. Dijkstra: A note on two problems in connexion with graphs, 1959.
         """
-        _check_inside(np.asarray([start]), self._free.shape)
+        row, col = start
+        rows, cols = self._free.shape
+        if not (0 <= row < rows and 0 <= col < cols):
+            raise InvalidValueError(
+                f"cell ({row}, {col}) lies outside the map of {rows} x {cols} cells"
+            )
         lengths: FloatArray = np.full(self._free.shape, np.inf)
         node = int(self._node_of[tuple(start)])
         if node >= 0:
             reached = csgraph.dijkstra(self._graph, directed=True, indices=[node])[0]
             lengths[self._free] = reached * self._resolution_m
         return lengths
-
-
-def scipy_optimum(
-    grid: OccupancyGrid, start: Cell, goals: ArrayLike, *, allow_unexplored: bool = False
-) -> FloatArray:
-    """Return the lengths of the shortest octile paths from one cell to others.
-
-    Parameters
-    ----------
-    grid
-        The map; for several starts on one map, build a `ScipyOptimum`.
-    start
-        (row, col).
-    goals
-        (row, col) along the last axis, shape (n, 2).
-    allow_unexplored
-        Whether unexplored cells may be entered.
-
-    Returns
-    -------
-    FloatArray
-        float64 (n,), metres, infinite where there is no path.
-
-    Raises
-    ------
-    InvalidValueError
-        When a cell lies outside the map.
-    """
-    targets = np.asarray(goals, dtype=np.int64).reshape(-1, 2)
-    _check_inside(targets, grid.shape)
-    lengths = ScipyOptimum(grid, allow_unexplored=allow_unexplored).lengths_from(start)
-    return lengths[targets[:, 0], targets[:, 1]]
-
-
-def _check_inside(cells: LongArray, shape: tuple[int, ...]) -> None:
-    outside = ((cells < 0) | (cells >= shape)).any(axis=1)
-    if outside.any():
-        row, col = cells[outside][0].tolist()
-        raise InvalidValueError(
-            f"cell ({row}, {col}) lies outside the map of {shape[0]} x {shape[1]} cells"
-        )
 
 
 def _move_graph(free: BoolArray) -> sparse.csr_array[np.float64, tuple[int, int]]:

@@ -115,30 +115,6 @@ class TopologicalMap:
         """Dense index of the place that holds a cell of the grid, -1 for an occupied cell."""
         return int(self.level.field_of[cell])
 
-    def boundary_middle(self, arc: int) -> FloatArray:
-        """The point in the middle of an arc's boundary, to draw the arc through.
-
-        Parameters
-        ----------
-        arc
-            Dense index of the arc.
-
-        Returns
-        -------
-        FloatArray
-            `(x, y)` in metres, map frame: the middle of the side between the two cells whose side
-            is nearest the mean of all sides of the boundary, so that it lies on the boundary.
-
-        Raises
-        ------
-        InvalidValueError
-            When there is no such arc.
-        """
-        if not 0 <= arc < self.n_arcs:
-            raise InvalidValueError(f"arc must be from 0 to {self.n_arcs - 1}, got {arc}")
-        middle: FloatArray = self.level.boundary_middles[arc]
-        return middle
-
     @cached_property
     def inclusion(self) -> Inclusion:
         """Which places, obstacles and components lie inside which places."""
