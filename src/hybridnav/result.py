@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from hybridnav.errors import PlanError
 from hybridnav.poses import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav._typing import AnyArray, FloatArray, LongArray, SignArray
 
 Metric = Literal["octile", "any-angle", "clearance-weighted", "dubins", "reeds-shepp"]
@@ -138,6 +136,15 @@ class Route:
     may be cut."""
 
 
+class RouteSource(Protocol):
+    """Data from which a route is found when somebody reads it: naming it takes longer than to plan
+    some paths."""
+
+    def route(self) -> Route:
+        """Find the route."""
+        ...
+
+
 @dataclass(frozen=True)
 class Refinement:
     """History of the path of a sampling-based planner."""
@@ -212,8 +219,8 @@ class PlanResult:
     status: PlanStatus
     metric: Metric = "octile"
     path: Path | None = None
-    route_source: Callable[[], Route] | Route | None = field(default=None, repr=False)
-    """The route, or a function that finds it on demand."""
+    route_source: RouteSource | Route | None = field(default=None, repr=False)
+    """The route, or the data to find it from; nothing of the planner."""
     lower_bound: float = math.inf
     """A proved bound on the optimum in the metric, metres; infinite where there is no path."""
     stats: PlanStats = field(default_factory=PlanStats)
@@ -233,10 +240,11 @@ class PlanResult:
     def route(self) -> Route | None:
         """The places and arcs of the path: chosen before it (`paper`), or derived from it (all
         other presets); None unless there is a path."""
-        return self.route_source() if callable(self.route_source) else self.route_source
+        source = self.route_source
+        return source if source is None or isinstance(source, Route) else source.route()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state with a found route, so that copies hold no planner."""
+        """Return the state with a found route, so that copies hold no map."""
         state = {name: value for name, value in vars(self).items() if name != "route"}
         return state | {"route_source": self.route}
 

@@ -418,7 +418,7 @@ def test_a_map_that_does_not_fit_into_memory(cli, rooms, monkeypatch):
     def exhaust(*_arguments, **_options):
         raise MemoryError
 
-    monkeypatch.setattr("hybridnav.io.load_map", exhaust)
+    monkeypatch.setattr("hybridnav.io.maps.load_map", exhaust)
     assert cli("show", rooms).refuses(3, "out of memory")
 
 
@@ -439,7 +439,7 @@ def test_ctrl_c_ends_without_a_word(cli, rooms, monkeypatch):
     def interrupt(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hybridnav.io.load_map", interrupt)
+    monkeypatch.setattr("hybridnav.io.maps.load_map", interrupt)
     assert cli("show", rooms) == Outcome(130, "", "")
 
 

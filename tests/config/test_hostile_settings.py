@@ -173,7 +173,8 @@ def test_what_cannot_be_written_is_told_before_the_work(capsys, monkeypatch, tmp
     def refuse(*_arguments, **_options):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(hn.io, "load_map", lambda *_, **__: pytest.fail("the map was read"))
+    home = "hybridnav.io.maps.load_map"
+    monkeypatch.setattr(home, lambda *_, **__: pytest.fail("the map was read"))
     # Tests may run as root, who may write everywhere.
     monkeypatch.setattr(Path, "touch", refuse)
     told = _refused(capsys, 2, *QUERY, "--plot", tmp_path / "p.png")

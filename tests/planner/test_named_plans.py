@@ -37,6 +37,10 @@ SIDE = 0.5
 NAMES = ("kitchen", "lab", "store", "hall")
 
 
+def stops_of(planner, stops):
+    return stop_points(planner.topology, planner.preset.planner, stops)
+
+
 def labels():
     label_of = np.full(CLASSES.shape, -1, dtype=np.int32)
     label_of[5:9, 1:6], label_of[5:9, 7:12], label_of[5:9, 13:18] = 0, 1, 2
@@ -180,10 +184,10 @@ def test_a_named_stop_faces_the_way_on_a_turned_map():
         hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms)),
         preset=load_preset("ompl-rrtconnect", overrides=["planner.ompl.space=se2"]),
     )
-    east, west, again = map(np.asarray, stop_points(planner, ["east", "west", "west"]))
+    east, west, again = map(np.asarray, stops_of(planner, ["east", "west", "west"]))
     assert [east[2], west[2]] == pytest.approx([0.7 - math.pi] * 2)
     assert again[2] == 0.0  # no way leads from a point to itself
-    east = np.asarray(stop_points(planner, [(*points["west"], 3.0), "east"])[1])
+    east = np.asarray(stops_of(planner, [(*points["west"], 3.0), "east"])[1])
     assert east[2] == pytest.approx(0.7)
 
 
@@ -198,7 +202,11 @@ def test_a_footprint_fits_at_the_stops_chosen_for_it(driving, half_m):
     walls = shapely.union_all(shapely.box(*low.T, *(low + SIDE).T))
     for start, goal in (("kitchen", "hall"), ("hall", "lab")):
         clear = []
-        for name, pose in zip((start, goal), stop_points(planner, [start, goal]), strict=True):
+        for name, pose in zip(
+            (start, goal),
+            stops_of(planner, [start, goal]),
+            strict=True,
+        ):
             cells = np.argwhere((CLASSES == 1) & (rooms.labels.label_of == NAMES.index(name)))
             room = shapely.points(points_of(cells))
             fits = room[shapely.distance(room, walls) >= math.hypot(half_m, 0.15)]

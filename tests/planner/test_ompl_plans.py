@@ -20,6 +20,7 @@ from benchmarks._ompl_checks import rooms as rooms_with_doors
 from hybridnav.config import load_preset
 from hybridnav.grid.worlds import office_world
 from hybridnav.metrics import VisibilityGraph, segment_faults
+from hybridnav.planner.cell_planner import CellQuery
 from tests.strategies import drawn, occupancy_grid
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def test_states_and_paths_stay_in_the_corridor(planner: str, confine: str) -> No
     inner: Any = made._ompl
     ends = grid.frame.points_of(np.array([(3, 3), (56, 76)]))
     cells: Any = made._cells
-    coarse = cells.plan((3, 3), (56, 76))
+    coarse = cells.plan(CellQuery.between(grid.frame, (3, 3), (56, 76)))
     poses = tuple(np.append(end, 0.0) for end in ends)
     found = inner.plan(coarse.cells, (poses[0], poses[1]), None, tells_search=True)
     assert found.refinement.steps[-1].startswith("corridor: solved")

@@ -9,6 +9,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import networkx as nx
+
 import hybridnav
 
 ROOT = Path(hybridnav.__file__).parents[1]
@@ -49,3 +51,9 @@ def test_nothing_imports_a_private_module_of_another_package() -> None:
         if not f"{name}.".startswith(f"{package_of(other)}.") and package_of(other)
     ]
     assert foreign == []
+
+
+def test_no_imports_form_a_circle() -> None:
+    graph = nx.DiGraph((name, other) for name, others in imports().items() for other in others)
+    circles = [sorted(found) for found in nx.strongly_connected_components(graph) if len(found) > 1]
+    assert circles == []

@@ -37,19 +37,20 @@ def small_grid() -> hn.OccupancyGrid:
 def compile_search(coarse: str) -> None:
     """Compile a kind of search, by a search of a small map."""
     from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph  # noqa: PLC0415
-    from hybridnav.planner.cell_plans import WholeMap  # noqa: PLC0415 - loads numba
+    from hybridnav.planner.cell_planner import CellQuery  # noqa: PLC0415 - loads numba
+    from hybridnav.planner.cell_plans import WholeMap  # noqa: PLC0415
     from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415
     from hybridnav.refine import GridRefiner  # noqa: PLC0415
 
     grid, settings = small_grid(), hn.load_preset(SEARCHES[coarse]).planner
-    refiner = GridRefiner(grid)
+    refiner, query = GridRefiner(grid), CellQuery.between(grid.frame, *_ENDS)
     if coarse == "mesh":
-        OverMesh(grid, refiner, settings).plan(*_ENDS)
+        OverMesh(grid, refiner, settings).plan(query)
     elif coarse == "jumps":
         graph = build_jump_graph(grid.enterable())
         JumpSearch(contract_graph(graph)).path(*_ENDS)  # as on maps of buildings
     else:
-        WholeMap(refiner).plan(*_ENDS)
+        WholeMap(refiner).plan(query)
 
 
 def compile_plan(preset: str) -> None:

@@ -122,7 +122,9 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
         )
     check_names(planner.topology, [start, goal])
     closed = planner.closed(blocked)
-    ends = stop_points(planner, [start, goal], at=at, closed=closed)
+    ends = stop_points(
+        planner.topology, planner.preset.planner, [start, goal], at=at, closed=closed
+    )
     topology = planner.topology
     allowed = planner.preset.planner.allow_unexplored
     search = alternative_search(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)

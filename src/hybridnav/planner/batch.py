@@ -7,60 +7,59 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.grid import CellClass
-from hybridnav.planner.cell_plans import OverPortals
-from hybridnav.planner.jump_plans import OverJumps
-from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav.planner.cell_planner import CellQueries
 from hybridnav.result import PlanBatch, PlanStatus
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.planner.cell_plans import CellPlanner, CellPlans
+    from hybridnav.planner.cell_planner import CellPlanner, CellPlans
     from hybridnav.planner.closed import ClosedCells
-    from hybridnav.planner.planner import HybridPlanner, Smooth
+    from hybridnav.result import PlanResult
 
 
 def plan_many(
-    planner: HybridPlanner,
-    cell_planner: CellPlanner | None,
+    grid: OccupancyGrid,
+    at_once: CellPlanner | None,
     ends: tuple[FloatArray, FloatArray],
-    smooth: Smooth,
     closed: ClosedCells | None,
+    alone: Callable[[FloatArray, FloatArray], PlanResult],
 ) -> PlanBatch:
-    """Return the answers of `planner.plan` to pairs of points, in arrays.
+    """Return the answers to pairs of points, in arrays.
 
     Parameters
     ----------
-    planner
-        Planner of the remaining queries.
-    cell_planner
-        Planner for many queries at once; None leaves all to `planner`.
+    grid
+        The map.
+    at_once
+        Planner for many queries at once; None leaves all to `alone`.
     ends
         Starts and goals, float64 (n, 2) each, or poses (n, 3).
-    smooth
-        `"none"` or `"line-of-sight"`.
     closed
         Closed cells; None for none.
+    alone
+        Plans one of the remaining queries, between two of the `ends`.
     """
     starts, goals = ends
-    n, grid = len(starts), planner.topology.grid
+    n = len(starts)
     status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)
     paths: list[FloatArray] = [np.empty((0, 2))] * n
     headings = [np.empty(0)] * n
     left = np.ones(n, dtype=np.bool_)
     first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
-    asked = np.flatnonzero(_are_free(planner, first) & _are_free(planner, last))
+    asked = np.flatnonzero(_are_free(grid, first) & _are_free(grid, last))
     found = None
-    if len(asked) and isinstance(cell_planner, OverMesh) and not cell_planner.has_budget:
-        pairs = (first[asked], last[asked]), (starts[asked], goals[asked])
-        found = cell_planner.plan_many(*pairs, closed)
-    elif len(asked) and smooth == "none" and isinstance(cell_planner, OverPortals | OverJumps):
-        found = cell_planner.plan_many(first[asked], last[asked])
-    if found is not None:
+    if len(asked) and at_once is not None:
+        cells = first[asked], last[asked]
+        found = at_once.plan_many(CellQueries(cells, (starts[asked], goals[asked]), closed))
+    if at_once is not None and found is not None:
         kept = found.is_done
         if closed is not None:
-            kept = kept & ~_met(closed, found, (first[asked], last[asked]), grid)
+            on_cells = found if at_once.metric == "octile" else None
+            kept = kept & ~_met(closed, cells, grid, on_cells)
         done = asked[kept]
         left[done] = False
         cost[done] = found.cost_m[kept]
@@ -69,7 +68,7 @@ def plan_many(
         for i, k in zip(done.tolist(), np.flatnonzero(kept).tolist(), strict=True):
             paths[i] = found.points[found.path_start[k] : found.path_start[k + 1]]
     for i in np.flatnonzero(left).tolist():
-        result = planner.plan(starts[i], goals[i], smooth=smooth, blocked=closed)
+        result = alone(starts[i], goals[i])
         status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
         if result.path is not None:
             paths[i] = result.path.points
@@ -87,17 +86,17 @@ def plan_many(
 
 def _met(
     closed: ClosedCells,
-    found: CellPlans,
     ends: tuple[LongArray, LongArray],
     grid: OccupancyGrid,
+    found: CellPlans | None,
 ) -> BoolArray:
-    """Return which answers meet closed cells, bool (n,).
+    """Return which queries meet closed cells with an end, or with their paths, bool (n,).
 
-    They meet them with an end or, if paths are of cells, on the path.
+    Only paths of cells are given; None for others.
     """
     across = np.array([grid.shape[1], 1])
     met: BoolArray = closed.holds(ends[0] @ across) | closed.holds(ends[1] @ across)
-    if found.metric != "octile":
+    if found is None:
         return met
     for k in np.flatnonzero(found.is_done & ~met).tolist():
         points = found.points[found.path_start[k] : found.path_start[k + 1]]
@@ -105,9 +104,9 @@ def _met(
     return met
 
 
-def _are_free(planner: HybridPlanner, cells: LongArray) -> BoolArray:
+def _are_free(grid: OccupancyGrid, cells: LongArray) -> BoolArray:
     """Return whether cells (n, 2) lie on the map and are free."""
-    classes = planner.topology.grid.classes
+    classes = grid.classes
     inside = ((cells >= 0) & (cells < classes.shape)).all(axis=1)
     free = np.zeros(len(cells), dtype=np.bool_)
     free[inside] = classes[tuple(cells[inside].T)] == CellClass.FREE

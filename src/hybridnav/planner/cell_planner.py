@@ -1,65 +1,138 @@
-"""The planner of cell paths for a preset."""
+"""The protocol of planners of cell paths, and what it exchanges: queries and plans."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from hybridnav import jumps, mesh, portals
-from hybridnav.errors import InvalidValueError
-from hybridnav.planner.cell_plans import MaxDistance, OverPortals, WholeMap
-from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav._progress import no_progress
+from hybridnav.result import PlanStats
 
 if TYPE_CHECKING:
-    from hybridnav.config import PlannerSettings
-    from hybridnav.planner.cell_plans import CellPlanner, Prepared
-    from hybridnav.refine import GridRefiner
-    from hybridnav.topology import TopologicalMap
+    import numpy as np
+    from numpy.typing import NDArray
 
-_T = TypeVar("_T")
+    from hybridnav._progress import Progress
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import Frame
+    from hybridnav.jumps import JumpSearch
+    from hybridnav.mesh import MeshSearch
+    from hybridnav.planner.closed import ClosedCells
+    from hybridnav.portals import BuiltPortals
+    from hybridnav.pyramid import Level
+    from hybridnav.result import Metric, Route
 
+    Prepared = MeshSearch | JumpSearch | BuiltPortals
+    """What planners of cell paths build of a map."""
 
-def cell_planner(
-    topology: TopologicalMap,
-    refiner: GridRefiner,
-    settings: PlannerSettings,
-    prepared: Prepared | None,
-) -> CellPlanner:
-    """Make the planner of cell paths for some settings.
-
-    Parameters
-    ----------
-    topology
-        The map.
-    refiner
-        Search of cell paths.
-    settings
-        Section `planner` of a preset.
-    prepared
-        Structures that another planner of the same map and settings has built; None for none.
-
-    Raises
-    ------
-    InvalidValueError
-        When these settings do not use structures of the given kind.
-    """
-    grid, coarse = topology.grid, settings.coarse
-    if coarse == "portals":
-        built = _taken(portals.BuiltPortals, prepared, coarse)
-        return OverPortals(topology, refiner, settings, built)
-    if coarse == "mesh":
-        return OverMesh(grid, refiner, settings, _taken(mesh.MeshSearch, prepared, coarse))
-    if coarse == "jumps":
-        from hybridnav.planner.jump_plans import OverJumps  # noqa: PLC0415 - one preset needs it
-
-        return OverJumps(grid, refiner, settings, _taken(jumps.JumpSearch, prepared, coarse))
-    _taken(type(None), prepared, coarse)
-    return MaxDistance(topology, refiner, settings) if coarse != "none" else WholeMap(refiner)
+Cell = tuple[int, int]
 
 
-def _taken(kind: type[_T], prepared: Prepared | None, coarse: str) -> _T | None:
-    if prepared is None or isinstance(prepared, kind):
-        return prepared
-    raise InvalidValueError(
-        f"coarse: {coarse} plans on nothing like a {type(prepared).__name__}: prepared must come "
-        "from a planner of the same preset"
-    )
+class CellQuery(NamedTuple):
+    """One query: two cells that may be entered, points in them, and what is closed for it."""
+
+    cells: tuple[Cell, Cell]
+    points: tuple[FloatArray, FloatArray]
+    """float64 (2,) each, start and goal, `(x, y)` in metres, map frame."""
+    closed: ClosedCells | None = None
+    """Closed cells, not including start and goal; None for none."""
+
+    @classmethod
+    def between(cls, frame: Frame, start: Cell, goal: Cell) -> CellQuery:
+        """Return the query between the centres of two cells."""
+        points = frame.points_of([start, goal])
+        return cls((start, goal), (points[0], points[1]))
+
+
+class CellQueries(NamedTuple):
+    """Many queries with the same closures, arrays of n."""
+
+    cells: tuple[LongArray, LongArray]
+    """int64 (n, 2) each, the cells of the starts, and of the goals; they may be entered."""
+    points: tuple[FloatArray, FloatArray]
+    """float64 (n, 2) each, starts and goals, `(x, y)` in metres, map frame."""
+    closed: ClosedCells | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CellPlan:
+    """A path between two cells; its cells are None if none was found."""
+
+    cells: LongArray | None
+    points: FloatArray | None = None
+    """Centres of the cells, if known already, or the points of an any-angle path."""
+    length_cells: float | None = None
+    """Length of the path, if known already."""
+    bound_cells: float = math.inf
+    """Lower bound on the length of all paths, in cells; infinite where it is proved that there is
+    none."""
+    route: Route | None = None
+    """The route that was chosen before the path; None to derive it from the path."""
+    stats: PlanStats = field(default_factory=PlanStats)
+
+
+@dataclass(frozen=True, eq=False)
+class CellPlans:
+    """Paths of many queries, arrays of n."""
+
+    is_done: BoolArray
+    """bool (n,), whether the answer is that of `plan`; False if `plan` must still be called."""
+    cost_m: FloatArray
+    """float64 (n,), lengths in metres, infinite if there is no path."""
+    lower_bound_m: FloatArray
+    path_start: LongArray
+    """int64 (n + 1,), offsets of the points of each path."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame."""
+
+
+class CellPlanner(Protocol):
+    """Planner of cell paths, or of any-angle paths with their cells, on one map by one method."""
+
+    @property
+    def metric(self) -> Metric:
+        """The metric of all its paths, `octile` or `any-angle`."""
+        ...
+
+    @property
+    def prepared(self) -> Prepared | None:
+        """The structure for queries that is worth keeping, None until it is built."""
+        ...
+
+    def prepare(self, progress: Progress = no_progress) -> object:
+        """Build the structures for queries, once, and report each step; else the first query does
+        it."""
+        ...
+
+    def plan(self, query: CellQuery) -> CellPlan:
+        """Find a path of the quality that the preset requires, which meets no closed cell."""
+        ...
+
+    def plan_many(self, queries: CellQueries) -> CellPlans | None:
+        """Find paths for many queries at once; None where `plan` must be called for each.
+
+        A path between cells may meet a closed cell: the caller looks.
+        """
+        ...
+
+    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:
+        """Return a lower bound on all any-angle paths between the points of a plan with a path, in
+        metres."""
+        ...
+
+    def fields(self, level: Level) -> NDArray[np.int16 | np.int32] | None:
+        """Return the field of each cell to which a refiner can be confined.
+
+        Parameters
+        ----------
+        level
+            The level of the places, whose fields some methods plan in.
+
+        Returns
+        -------
+        NDArray | None
+            int16 or int32 (rows, cols), -1 for cells without a field; None if the method plans
+            without fields.
+        """
+        ...

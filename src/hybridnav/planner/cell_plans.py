@@ -2,100 +2,71 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
-from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import TYPE_CHECKING, Protocol
-
-import numpy as np
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from hybridnav import portals
 from hybridnav import route as routes
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
-from hybridnav.result import Route
+from hybridnav.planner.cell_planner import CellPlan, CellPlans
+from hybridnav.result import PlanStats, Route
 from hybridnav.search.moves import octile_distance_in_cells, path_length_in_cells
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import numpy as np
+    from numpy.typing import NDArray
 
     from hybridnav._progress import Progress
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._typing import FloatArray, IntArray
     from hybridnav.config import PlannerSettings
-    from hybridnav.jumps import JumpSearch
-    from hybridnav.mesh import MeshSearch
+    from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.portals import BuiltPortals, PortalSearch
-    from hybridnav.refine import GridRefiner
+    from hybridnav.pyramid import Level
+    from hybridnav.refine import GridRefiner, Refiner
     from hybridnav.result import Metric
     from hybridnav.route import MaxDistanceSearch
     from hybridnav.topology import TopologicalMap
 
-    Prepared = MeshSearch | JumpSearch | BuiltPortals
-    """What planners of cell paths build of a map."""
 
-Cell = tuple[int, int]
+def round_closed(plan: CellPlan, query: CellQuery, refiner: GridRefiner) -> CellPlan:
+    """Return the plan itself if it meets no closed cell, else the best path round all of them.
 
-
-@dataclass(frozen=True, eq=False)
-class CellPlan:
-    """A path between two cells; its cells are None if there is none."""
-
-    cells: LongArray | None
-    metric: Metric = "octile"
-    points: FloatArray | None = None
-    """Centres of the cells, if known already, or the points of an any-angle path."""
-    length_cells: float | None = None
-    """Length of the path, if known already."""
-    bound_cells: float = 0.0
-    """Lower bound on the length of all paths, in cells."""
-    route_source: Callable[[], Route] | None = None
-    expanded: int = 0
-    expanded_places: int = 0
-    expanded_gates: int = 0
-    corridor_cells: int = 0
-    seconds: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class CellPlans:
-    """Paths of many queries, arrays of n."""
-
-    is_done: BoolArray
-    """bool (n,), whether the answer is that of `plan`; False if `plan` must still be called."""
-    metric: Metric
-    cost_m: FloatArray
-    """float64 (n,), lengths in metres, infinite if there is no path."""
-    lower_bound_m: FloatArray
-    path_start: LongArray
-    """int64 (n + 1,), offsets of the points of each path."""
-    points: FloatArray
-    """float64 (m, 2), (x, y) in metres, map frame."""
-
-
-class CellPlanner(Protocol):
-    """Planner between two cells that may be entered."""
-
-    @property
-    def prepared(self) -> Prepared | None:
-        """The structure for queries that is worth keeping, None until it is built."""
-        ...
-
-    def prepare(self, progress: Progress = no_progress) -> object:
-        """Build the structures for queries, once, and report each step; else the first query does
-        it."""
-        ...
-
-    def plan(self, start: Cell, goal: Cell) -> CellPlan:
-        """Find a path of the quality that the preset requires."""
-        ...
+    Closed cells make no path shorter, so a bound stays valid.
+    """
+    closed = query.closed
+    if closed is None or plan.cells is None or not closed.meets(plan.cells, refiner.grid):
+        return plan
+    began = time.perf_counter()
+    found = refiner.search.search(*query.cells, blocked=closed.flat)
+    seconds = {**plan.stats.seconds, "around": time.perf_counter() - began}
+    expanded = plan.stats.expanded + found.expanded
+    if found.cells is None:
+        return CellPlan(None, stats=PlanStats(expanded=expanded, seconds=seconds))
+    length = path_length_in_cells(found.cells)
+    stats = replace(plan.stats, expanded=expanded, seconds=seconds)
+    return CellPlan(found.cells, length_cells=length, bound_cells=length, stats=stats)
 
 
 class WholeMap:
-    """Grid A* on the whole map: optimal."""
+    """Grid A* on the whole map: optimal; or a refiner of the user's own, with the octile bound.
 
-    def __init__(self, refiner: GridRefiner) -> None:
+    Parameters
+    ----------
+    refiner
+        The search of cells.
+    own
+        A refiner to use in its place where nothing is closed; None for none.
+    """
+
+    metric: Metric = "octile"
+
+    def __init__(self, refiner: GridRefiner, own: Refiner | None = None) -> None:
         self._refiner = refiner
+        self._own = own
 
     @property
     def prepared(self) -> None:
@@ -108,28 +79,59 @@ class WholeMap:
         progress(1, 1)
         return search
 
-    def plan(self, start: Cell, goal: Cell) -> CellPlan:
+    def plan(self, query: CellQuery) -> CellPlan:
         """Find a shortest path; see `CellPlanner`."""
         began = time.perf_counter()
-        cells, expanded = self._refiner.refine(start, goal, None)
-        bound = np.inf if cells is None else path_length_in_cells(cells)
+        cells, expanded = (self._own or self._refiner).refine(*query.cells, None)
+        bound = math.inf if cells is None else path_length_in_cells(cells)
+        if self._own is not None:  # it proves nothing
+            bound = octile_distance_in_cells(*query.cells)
         seconds = {"refine": time.perf_counter() - began}
-        return CellPlan(cells, bound_cells=bound, expanded=expanded, seconds=seconds)
+        stats = PlanStats(expanded=expanded, seconds=seconds)
+        return round_closed(CellPlan(cells, bound_cells=bound, stats=stats), query, self._refiner)
+
+    def plan_many(self, queries: CellQueries) -> None:
+        """None, because each query has a search of its own; see `CellPlanner`."""
+
+    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:  # noqa: ARG002
+        """Return the straight distance; see `CellPlanner`."""
+        return math.dist(*points)
+
+    def fields(self, level: Level) -> None:
+        """None, because the whole map is searched; see `CellPlanner`."""
 
 
 @copies_alike
 class MaxDistance:
-    """The cheapest coarse route by max-distance arcs, and grid A* in its corridor.
+    """The cheapest coarse route by max-distance arcs, and a refiner in its corridor.
 
     If corners may be cut, a path can pass between fields that no arc joins, so that a missing route
     proves nothing: then the whole map is searched.
+
+    Parameters
+    ----------
+    topology
+        The map.
+    refiner
+        The search of cells.
+    settings
+        Whether unexplored cells may be entered, and the corridor.
+    own
+        A refiner to use in its place where nothing is closed; None for none.
     """
 
+    metric: Metric = "octile"
+
     def __init__(
-        self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
+        self,
+        topology: TopologicalMap,
+        refiner: GridRefiner,
+        settings: PlannerSettings,
+        own: Refiner | None = None,
     ) -> None:
         self._topology = topology
         self._refiner = refiner
+        self._own = own
         self._settings = settings
         self._search: MaxDistanceSearch | None = None
         self._building = threading.Lock()
@@ -151,41 +153,54 @@ class MaxDistance:
                     progress(1, 1)
         return self._search
 
-    def plan(self, start: Cell, goal: Cell) -> CellPlan:
+    def plan(self, query: CellQuery) -> CellPlan:
         """Find the shortest path in the corridor; see `CellPlanner`."""
         began = time.perf_counter()
         topology, search = self._topology, self.prepare()
-        route = search.search(topology.place_at(start), topology.place_at(goal))
+        route = search.search(*map(topology.place_at, query.cells))
         seconds = {"coarse": time.perf_counter() - began}
         if route is None and topology.grid.corner_cutting:
-            whole = WholeMap(self._refiner).plan(start, goal)
-            return replace(whole, seconds=seconds | whole.seconds)
+            whole = WholeMap(self._refiner, self._own).plan(query)
+            return replace(whole, stats=replace(whole.stats, seconds=seconds | whole.stats.seconds))
         if route is None:
-            return CellPlan(None, seconds=seconds)
+            return CellPlan(None, stats=PlanStats(seconds=seconds))
         beside = search.enterable if self._settings.corridor == "neighbours" else None
         corridor = routes.corridor_of(topology, route.places, neighbours=beside)
         seconds["coarse"] = time.perf_counter() - began
-        cells, expanded = self._refiner.refine(start, goal, corridor)
+        cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
         seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
-        ids = topology.place_ids, topology.arc_ids
-        return CellPlan(
-            cells,
-            bound_cells=octile_distance_in_cells(start, goal),
-            route_source=partial(_route, *ids, route.places, route.arcs),
+        places, arcs = topology.place_ids[route.places], topology.arc_ids[route.arcs]
+        stats = PlanStats(
             expanded=expanded,
             expanded_places=route.expanded,
             corridor_cells=corridor.n_cells,
             seconds=seconds,
         )
+        plan = CellPlan(
+            cells,
+            bound_cells=octile_distance_in_cells(*query.cells),
+            route=Route(tuple(places.tolist()), tuple(arcs.tolist())),
+            stats=stats,
+        )
+        return round_closed(plan, query, self._refiner)
 
+    def plan_many(self, queries: CellQueries) -> None:
+        """None, because each query has a search of its own; see `CellPlanner`."""
 
-def _route(place_ids: LongArray, arc_ids: LongArray, places: LongArray, arcs: LongArray) -> Route:
-    return Route(tuple(place_ids[places].tolist()), tuple(arc_ids[arcs].tolist()))
+    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:  # noqa: ARG002
+        """Return the straight distance; see `CellPlanner`."""
+        return math.dist(*points)
+
+    def fields(self, level: Level) -> IntArray:
+        """Return the fields of the places; see `CellPlanner`."""
+        return level.field_of
 
 
 @copies_alike
 class OverPortals:
     """The shortest path by the portal table, which is built when the first query needs it."""
+
+    metric: Metric = "octile"
 
     def __init__(
         self,
@@ -226,35 +241,47 @@ class OverPortals:
         """The search over portals, built on first use."""
         return self.prepare()
 
-    def plan(self, start: Cell, goal: Cell) -> CellPlan:
+    def plan(self, query: CellQuery) -> CellPlan:
         """Find a path over portals; see `CellPlanner`."""
         began, seconds = time.perf_counter(), {}
         if self._search is None:
             self.prepare()
             seconds["table"] = time.perf_counter() - began
         now, epsilon = time.perf_counter(), self._settings.epsilon or 0.0
-        found = self.search.path(start, goal, epsilon=epsilon)
+        found = self.search.path(*query.cells, epsilon=epsilon)
         seconds["portals"] = time.perf_counter() - now
-        return CellPlan(
+        plan = CellPlan(
             found.cells,
             points=found.points,
             length_cells=found.length_cells,
             bound_cells=found.lower_bound_cells,
-            expanded=found.expanded,
-            expanded_gates=found.expanded_gates,
-            seconds=seconds,
+            stats=PlanStats(
+                expanded=found.expanded, expanded_gates=found.expanded_gates, seconds=seconds
+            ),
         )
+        return round_closed(plan, query, self._refiner)
 
-    def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
-        """Plan many pairs of cells, int64 (n, 2) each, as far as look-ups answer them."""
+    def plan_many(self, queries: CellQueries) -> CellPlans:
+        """Plan many pairs of cells as far as look-ups answer them; see `CellPlanner`."""
         epsilon = self._settings.epsilon or 0.0
-        found = self.search.many(starts, goals, epsilon=epsilon)
+        found = self.search.many(*queries.cells, epsilon=epsilon)
         per_cell = self._topology.grid.resolution_m
         return CellPlans(
             found.is_done,
-            "octile",
             found.length_cells * per_cell,
             found.lower_bound_cells * per_cell,
             found.path_start,
             found.points,
         )
+
+    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:
+        """Return the bound by the sides of the portals; see `CellPlanner`."""
+        assert plan.cells is not None  # noqa: S101 - the protocol requires a path
+        frame = self._topology.grid.frame
+        start, goal = (frame.position_of(float(point[0]), float(point[1])) for point in points)
+        first, last = tuple(plan.cells[0].tolist()), tuple(plan.cells[-1].tolist())
+        return self.search.any_angle_bound(first, last, (start, goal)) * frame.resolution_m
+
+    def fields(self, level: Level) -> NDArray[np.int16 | np.int32]:  # noqa: ARG002
+        """Return the fields between which portals lie; see `CellPlanner`."""
+        return self.search.field_of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -12,16 +13,19 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.grid.centres import centres
 from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph
-from hybridnav.planner.cell_plans import CellPlan, CellPlans, WholeMap
+from hybridnav.planner.cell_planner import CellPlan, CellPlans
+from hybridnav.planner.cell_plans import WholeMap, round_closed
+from hybridnav.result import PlanStats
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress
-    from hybridnav._typing import LongArray
+    from hybridnav._typing import FloatArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.cell_planner import CellQueries, CellQuery
+    from hybridnav.pyramid import Level
     from hybridnav.refine import GridRefiner
-
-Cell = tuple[int, int]
+    from hybridnav.result import Metric
 
 CONTRACTED_FROM = 2000
 """Least number of corner cells for contraction: in smaller graphs a direct search is as fast."""
@@ -40,12 +44,14 @@ class OverJumps:
     grid
         The map.
     refiner
-        Search of paths where corners may be cut.
+        Search of paths round closed cells, and where corners may be cut.
     settings
         Whether unexplored cells may be entered.
     search
         Search of the graph of the same cells, if it is built already.
     """
+
+    metric: Metric = "octile"
 
     def __init__(
         self,
@@ -56,6 +62,7 @@ class OverJumps:
     ) -> None:
         self._grid = grid
         self._allow_unexplored = settings.allow_unexplored
+        self._refiner = refiner
         self._whole_map = WholeMap(refiner)
         self._search = search
         self._building = threading.Lock()
@@ -80,38 +87,42 @@ class OverJumps:
                     progress(2, 2)
         return self._search
 
-    def plan(self, start: Cell, goal: Cell) -> CellPlan:
+    def plan(self, query: CellQuery) -> CellPlan:
         """Find a shortest path between two cells; see `CellPlanner`."""
         if self._grid.corner_cutting:
-            return self._whole_map.plan(start, goal)
+            return self._whole_map.plan(query)
         began = time.perf_counter()
         seconds = {}
         if self._search is None:
             self.prepare()
             seconds["graph"] = time.perf_counter() - began
         now = time.perf_counter()
-        found = self.prepare().path(start, goal)
+        found = self.prepare().path(*query.cells)
         seconds["jumps"] = time.perf_counter() - now
-        return CellPlan(
+        plan = CellPlan(
             found.cells,
             points=None if found.cells is None else centres(found.cells, self._frame),
             length_cells=found.length_cells,
             bound_cells=found.length_cells,
-            expanded=found.expanded,
-            seconds=seconds,
+            stats=PlanStats(expanded=found.expanded, seconds=seconds),
         )
+        return round_closed(plan, query, self._refiner)
 
-    def plan_many(self, starts: LongArray, goals: LongArray) -> CellPlans:
-        """Find a shortest path for each of many pairs of cells, int64 (n, 2) each, on all cores.
+    def plan_many(self, queries: CellQueries) -> CellPlans | None:
+        """Find a shortest path for each query, on all cores; see `CellPlanner`.
 
         If corners may be cut, no query is answered here.
         """
-        n = len(starts)
         if self._grid.corner_cutting:
-            none, nowhere = np.zeros(n, dtype=np.bool_), np.full(n, np.inf)
-            empty = np.zeros(n + 1, dtype=np.int64)
-            return CellPlans(none, "octile", nowhere, nowhere, empty, np.empty((0, 2)))
-        found = self.prepare().many(starts, goals)
+            return None
+        found = self.prepare().many(*queries.cells)
         cost_m = found.length_cells * self._grid.resolution_m
-        done, points = np.ones(n, dtype=np.bool_), centres(found.cells, self._frame)
-        return CellPlans(done, "octile", cost_m, cost_m, found.path_start, points)
+        done, points = np.ones(len(cost_m), dtype=np.bool_), centres(found.cells, self._frame)
+        return CellPlans(done, cost_m, cost_m, found.path_start, points)
+
+    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:  # noqa: ARG002
+        """Return the straight distance; see `CellPlanner`."""
+        return math.dist(*points)
+
+    def fields(self, level: Level) -> None:
+        """None, because the whole map is searched; see `CellPlanner`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,33 +16,22 @@ from hybridnav._progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
 from hybridnav.mesh import DetourSearch, MeshPath, MeshSearch, build_mesh, shortest_paths
-from hybridnav.planner.cell_plans import CellPlan, CellPlans
+from hybridnav.planner.cell_planner import CellPlan, CellPlans
 from hybridnav.refine import LineOfSight
+from hybridnav.result import PlanStats
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.planner.closed import ClosedCells
+    from hybridnav.pyramid import Level
     from hybridnav.refine import GridRefiner
+    from hybridnav.result import Metric
 
-Cell = tuple[int, int]
 Position = tuple[float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class _Query:
-    """Ends as cells and as (row, col) in grid units, and the closed cells."""
-
-    cells: tuple[Cell, Cell]
-    positions: tuple[Position, Position]
-    closed: ClosedCells | None
-
-    @property
-    def ends(self) -> tuple[tuple[Cell, Cell], tuple[Position, Position]]:
-        """Return the ends in the form of a search's arguments."""
-        return self.cells, self.positions
 
 
 _KEPT = 8
@@ -70,6 +59,8 @@ class OverMesh:
         When the map allows corner cutting.
     """
 
+    metric: Metric = "any-angle"
+
     def __init__(
         self,
         grid: OccupancyGrid,
@@ -94,11 +85,6 @@ class OverMesh:
         self._building = threading.Lock()
 
     @property
-    def has_budget(self) -> bool:
-        """Whether queries end when their time is up."""
-        return self._budget_s is not None
-
-    @property
     def prepared(self) -> MeshSearch | None:
         """The search of the mesh, None until it is built."""
         return self._search
@@ -119,67 +105,48 @@ class OverMesh:
                     self._search = MeshSearch(build_mesh(self._free))
         return self._search
 
-    def plan(self, start: Cell, goal: Cell) -> CellPlan:
-        """Find a shortest path between the centres of two cells; see `CellPlanner`."""
-        points = self._frame.points_of([start, goal])
-        return self.between((start, goal), (points[0], points[1]), None)
-
-    def between(
-        self,
-        cells: tuple[Cell, Cell],
-        ends: tuple[FloatArray, FloatArray],
-        closed: ClosedCells | None,
-    ) -> CellPlan:
-        """Find a shortest path between two points.
+    def plan(self, query: CellQuery) -> CellPlan:
+        """Find a shortest path between two points; see `CellPlanner`.
 
         When the preset's time is up, or if it has a time limit and the mesh is not built yet, the
         answer is a cell path shortened by line of sight, with the proved bound.
-
-        Parameters
-        ----------
-        cells
-            Cells of the points; they may be entered.
-        ends
-            `(x, y)` in metres, map frame.
-        closed
-            Closed cells for this query, not including the ends; None for none.
         """
         began = time.perf_counter()
         seconds = {}
         if self._search is None and self._budget_s is None:
             self._on_mesh()
             seconds["mesh"] = time.perf_counter() - began
-        row, col = self._frame.position_of(float(ends[0][0]), float(ends[0][1]))
-        positions = (row, col), self._frame.position_of(float(ends[1][0]), float(ends[1][1]))
-        query = _Query(cells, positions, closed)
+        start, goal = query.points
+        row, col = self._frame.position_of(float(start[0]), float(start[1]))
+        positions = (row, col), self._frame.position_of(float(goal[0]), float(goal[1]))
         now = time.perf_counter()
-        found, passed, expanded = self._found(query)
+        found, passed, expanded = self._found(query, positions)
         points = None
         if found.positions is not None:
             points = self._frame.points_of_grid(found.positions)
-            points[0], points[-1] = ends
+            points[0], points[-1] = query.points
         seconds["shortest"] = time.perf_counter() - now
         plan = CellPlan(
             passed,
-            metric="any-angle",
             points=points,
             length_cells=found.length_cells,
             bound_cells=found.lower_bound_cells,
-            expanded=expanded,
-            seconds=seconds,
+            stats=PlanStats(expanded_intervals=expanded, seconds=seconds),
         )
         if points is not None or math.isinf(found.lower_bound_cells):
             return plan  # a path, or the proof of none
-        return self._in_sight(query, ends, plan)
+        return self._in_sight(query, plan)
 
-    def _found(self, query: _Query) -> tuple[MeshPath, LongArray | None, int]:
+    def _found(
+        self, query: CellQuery, positions: tuple[Position, Position]
+    ) -> tuple[MeshPath, LongArray | None, int]:
         """Return the path of the search of the mesh, its cells, and the nodes expanded."""
         search = self._search
         if search is None:
-            bound = math.dist(*query.positions)
+            bound = math.dist(*positions)
             return MeshPath(None, math.inf, bound, 0), None, 0
         began = time.perf_counter()
-        found = search.path(*query.ends, epsilon=self._epsilon, budget_s=self._budget_s)
+        found = search.path(query.cells, positions, epsilon=self._epsilon, budget_s=self._budget_s)
         closed, expanded = query.closed, found.expanded
         is_cut_off = found.positions is None and math.isinf(found.lower_bound_cells)
         if closed is None or is_cut_off:
@@ -190,35 +157,29 @@ class OverMesh:
             left_s = self._budget_s
             if left_s is not None:
                 left_s = max(left_s - (time.perf_counter() - began), 0.0)
-            found = detours.path(*query.ends, epsilon=self._epsilon, budget_s=left_s)
+            found = detours.path(query.cells, positions, epsilon=self._epsilon, budget_s=left_s)
             expanded += found.expanded
             # Closed cells make no path shorter.
             bound = max(min(bound, found.length_cells), found.lower_bound_cells)
             found = replace(found, lower_bound_cells=bound)
         return found, self._passed(query, found), expanded
 
-    def _in_sight(
-        self, query: _Query, ends: tuple[FloatArray, FloatArray], plan: CellPlan
-    ) -> CellPlan:
+    def _in_sight(self, query: CellQuery, plan: CellPlan) -> CellPlan:
         """Return the shortest path of cells, shortened by line of sight, with a plan's bound."""
         began = time.perf_counter()
         flat = None if query.closed is None else query.closed.flat
         found = self._refiner.search.search(*query.cells, blocked=flat)
-        points, cells = None, found.cells
-        if cells is not None:
-            sight = self._open_sight if flat is None else self._sight(flat)
-            points = sight.shorten(cells, *ends)
-        seconds = {**plan.seconds, "line-of-sight": time.perf_counter() - began}
-        length = math.inf if points is None else polyline_length(points) / self._frame.resolution_m
-        return replace(
-            plan,
-            cells=cells,
-            points=points,
-            length_cells=length,
-            bound_cells=min(plan.bound_cells, length),
-            expanded=plan.expanded + found.expanded,
-            seconds=seconds,
-        )
+        seconds = {**plan.stats.seconds}
+        expanded = plan.stats.expanded_intervals + found.expanded
+        stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
+        if found.cells is None:
+            return CellPlan(None, stats=stats)
+        sight = self._open_sight if flat is None else self._sight(flat)
+        points = sight.shorten(found.cells, *query.points)
+        seconds["line-of-sight"] = time.perf_counter() - began
+        length = polyline_length(points) / self._frame.resolution_m
+        bound = min(plan.bound_cells, length)
+        return CellPlan(found.cells, points, length_cells=length, bound_cells=bound, stats=stats)
 
     @cached_property
     def _open_sight(self) -> LineOfSight:
@@ -228,25 +189,14 @@ class OverMesh:
         """Return the shortener of cell paths, with some flat cells closed."""
         return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=closed)
 
-    def plan_many(
-        self,
-        cells: tuple[LongArray, LongArray],
-        points: tuple[FloatArray, FloatArray],
-        closed: ClosedCells | None = None,
-    ) -> CellPlans:
-        """Find a shortest path for each of many pairs of points, on all cores.
+    def plan_many(self, queries: CellQueries) -> CellPlans | None:
+        """Find a shortest path for each query, on all cores; see `CellPlanner`.
 
-        Queries whose paths meet closed cells stay undone.
-
-        Parameters
-        ----------
-        cells
-            int64 (n, 2), the cells of the starts, and of the goals; they may be entered.
-        points
-            float64 (n, 2), starts and goals, `(x, y)` in metres, map frame.
-        closed
-            Closed cells; None for none.
+        Queries whose paths meet closed cells stay undone, and with a time limit all of them.
         """
+        if self._budget_s is not None:
+            return None
+        cells, points, closed = queries
         positions = self._frame.positions_of(points[0]), self._frame.positions_of(points[1])
         search = self._on_mesh()
         found = shortest_paths(search, cells, positions, epsilon=self._epsilon)
@@ -263,14 +213,21 @@ class OverMesh:
         np.divide(found.lower_bound_cells, found.length_cells, out=share, where=moves)
         return CellPlans(
             is_done=is_done,
-            metric="any-angle",
             cost_m=cost_m,
             lower_bound_m=cost_m * share,
             path_start=found.path_start,
             points=along,
         )
 
-    def _passed(self, query: _Query, found: MeshPath) -> LongArray | None:
+    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:  # noqa: ARG002
+        """Return the bound of the plan, which is any-angle; see `CellPlanner`."""
+        return plan.bound_cells * self._frame.resolution_m
+
+    def fields(self, level: Level) -> IntArray:
+        """Return the fields of the places, as the mesh has none; see `CellPlanner`."""
+        return level.field_of
+
+    def _passed(self, query: CellQuery, found: MeshPath) -> LongArray | None:
         """Return the cells that a path passes, from start to goal; None without a path."""
         if found.positions is None:
             return None

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.planner.closed import ClosedCells
-    from hybridnav.planner.planner import HybridPlanner
     from hybridnav.topology import TopologicalMap
 
 At = Literal["anywhere", "point"]
@@ -35,7 +35,8 @@ _FACING_M = 1.0
 
 
 def stop_points(
-    planner: HybridPlanner,
+    topology: TopologicalMap,
+    settings: PlannerSettings,
     stops: Sequence[ArrayLike | str],
     *,
     at: At = "anywhere",
@@ -45,11 +46,14 @@ def stop_points(
 
     Parameters
     ----------
-    planner
-        Planner, which determines the cells that may be entered.
+    topology
+        The map.
+    settings
+        Settings of the planner, which determine the cells that may be entered, and whether points
+        have headings.
     stops
         Two or more points `(x, y)` in metres, names of rooms or of named points that passed
-        `check_names`. If the planner needs headings, points are `(x, y, yaw)`, radians.
+        `check_names`. With OMPL in a space with headings, points are `(x, y, yaw)`, radians.
     at
         Position in a room: anywhere, or at the room's point.
     closed
@@ -60,8 +64,8 @@ def stop_points(
     list
         Points `(x, y)` in metres, map frame; given points are unchanged. If no path visits all
         stops, or a point cannot be entered, rooms are represented by their points, and so is a room
-        without a cell at whose centre the robot's footprint fits with any heading. If the planner
-        needs headings, a name becomes `(x, y, yaw)` and faces along the shortest path of cells that
+        without a cell at whose centre the robot's footprint fits with any heading. In a space with
+        headings, a name becomes `(x, y, yaw)` and faces along the shortest path of cells that
         leads to it; the first stop faces along the path that leaves it.
 
     Raises
@@ -71,15 +75,13 @@ def stop_points(
     """
     if at not in get_args(At):
         raise InvalidValueError(f"at must be 'anywhere' or 'point', got {at!r:.80}")
-    topology = planner.topology
-    grid = topology.grid
-    enterable = grid.enterable(allow_unexplored=planner.preset.planner.allow_unexplored)
+    enterable = topology.grid.enterable(allow_unexplored=settings.allow_unexplored)
     if closed is not None:
         enterable = enterable.copy()
         enterable.ravel()[closed.flat] = False
     fixed: list[Any] = [_point_of(topology, stop, at) for stop in stops]
-    points = _chosen(topology, enterable, stops, fixed, _radius_m(planner))
-    if planner.needs_headings:
+    points = _chosen(topology, enterable, stops, fixed, _radius_m(settings))
+    if settings.ompl is not None and settings.ompl.has_heading:
         return _facing_the_way(topology, enterable, stops, points)
     return points
 
@@ -220,12 +222,12 @@ def _cells_in_room(topology: TopologicalMap, enterable: BoolArray, name: str) ->
     return np.flatnonzero(enterable & (labels.label_of == labels.index(name)))
 
 
-def _radius_m(planner: HybridPlanner) -> float:
+def _radius_m(settings: PlannerSettings) -> float:
     """Return the circumscribed radius of a robot's footprint about its base, in metres.
 
     It is 0 for a disc, by which the map was inflated.
     """
-    ompl = planner.preset.planner.ompl
+    ompl = settings.ompl
     if ompl is None or ompl.footprint is None:
         return 0.0
     # Loads shapely.

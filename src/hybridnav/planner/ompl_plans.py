@@ -14,8 +14,7 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.grid.lines import cells_of_line
-from hybridnav.planner.cell_plans import MaxDistance, OverPortals
-from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.differential import driven
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.planner.cell_plans import CellPlanner
+    from hybridnav.planner.cell_planner import CellPlanner
     from hybridnav.refine.ompl import Reply, Search
     from hybridnav.result import Metric
     from hybridnav.topology import TopologicalMap
@@ -59,15 +58,11 @@ def ompl_planner(
     OmplError
         When OMPL is not installed, refuses the settings, or its process does not start.
     """
-    field_of = None
-    if isinstance(cells, OverPortals):
-        field_of = cells.search.field_of
-    elif isinstance(cells, MaxDistance | OverMesh):
-        field_of = topology.level.field_of
+    field_of = cells.fields(topology.level)
     free = np.argwhere(topology.grid.enterable(allow_unexplored=settings.allow_unexplored))
     if len(free):  # kernels loaded at the first query would use up its budget
         row, col = free[0].tolist()
-        cells.plan((row, col), (row, col))
+        cells.plan(CellQuery.between(topology.grid.frame, (row, col), (row, col)))
     return OmplPlanner(topology.grid, settings, field_of)
 
 

@@ -2,40 +2,38 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, get_args
 
 from hybridnav._progress import no_progress
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
-from hybridnav.planner.cell_planner import cell_planner
-from hybridnav.planner.cell_plans import CellPlan, OverPortals
+from hybridnav.planner.batch import plan_many
+from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
-from hybridnav.planner.mesh_plans import OverMesh
+from hybridnav.planner.outcome import Outcomes
 from hybridnav.planner.radius import check_radius
-from hybridnav.refine import GridRefiner, LineOfSight
-from hybridnav.result import Path, PlanResult, PlanStats, PlanStatus, Route
-from hybridnav.route import Walks
+from hybridnav.planner.select import cell_planner
+from hybridnav.refine import LineOfSight
+from hybridnav.result import Path, PlanStatus
 from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, LongArray, PathLike
+    from hybridnav._typing import FloatArray, PathLike
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_plans import Prepared
+    from hybridnav.planner.cell_planner import CellPlan, Prepared
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
-    from hybridnav.result import PlanBatch
+    from hybridnav.result import PlanBatch, PlanResult
     from hybridnav.topology import TopologicalMap
 
-Cell = tuple[int, int]
 Smooth = Literal["none", "line-of-sight"]
 
 
@@ -59,7 +57,7 @@ class HybridPlanner:
     Raises
     ------
     PresetError
-        When the preset does not exist or is not valid.
+        When the preset does not exist or is not valid, or names a refiner that cannot be used.
     InvalidValueError
         When the map has the default radius, not chosen by the caller, and the preset names another.
     """
@@ -75,9 +73,9 @@ class HybridPlanner:
         self.preset = load_preset(preset)
         check_radius(topology.grid, self.preset)
         settings = self.preset.planner
-        self._refiner = GridRefiner(topology.grid, allow_unexplored=settings.allow_unexplored)
-        self._cells = cell_planner(topology, self._refiner, settings, prepared)
+        self._cells = cell_planner(topology, settings, prepared)
         self._closures = Closures(topology)
+        self._outcomes = Outcomes(topology, self.preset)
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
             # Loads modules for these presets only, or reports which one to install.
@@ -143,7 +141,8 @@ class HybridPlanner:
 
             check_names(self.topology, [start, goal])
             blocked = self.closed(blocked)
-            start, goal = stop_points(self, [start, goal], at=at, closed=blocked)
+            settings = self.preset.planner
+            start, goal = stop_points(self.topology, settings, [start, goal], at=at, closed=blocked)
         poses = self._pose("start", start), self._pose("goal", goal)
         return self._between(poses, self._finish_asked_for(smooth), self.closed(blocked), began)
 
@@ -159,18 +158,15 @@ class HybridPlanner:
         grid, allowed = self.topology.grid, self.preset.planner.allow_unexplored
         cells = cells_of_ends(grid, ends, allow_unexplored=allowed)
         if isinstance(cells, PlanStatus):
-            return self._answer(cells, poses)
+            return self._outcomes.answer(cells, poses)
         if closed is not None and (refused := closed.refusal(cells, grid.shape)):
-            return self._answer(refused, poses)
-        if isinstance(self._cells, OverMesh):
-            plan = self._cells.between(cells, ends, closed)
-        else:
-            plan = self._cells.plan(*cells)
-            if closed is not None and plan.cells is not None:
-                plan = self._round(closed, plan, *cells)
-        if self._ompl is not None and plan.cells is not None:
+            return self._outcomes.answer(refused, poses)
+        plan = self._cells.plan(CellQuery(cells, ends, closed))
+        if plan.cells is None:
+            return self._outcomes.no_path(plan, poses, self._cells.metric)
+        if self._ompl is not None:
             return self._by_ompl(self._ompl, plan, poses, closed, began)
-        return self._result(plan, poses, finish, closed)
+        return self._along(plan, poses, finish, closed)
 
     def plan_many(
         self,
@@ -200,10 +196,14 @@ class HybridPlanner:
         if len(first) != len(last):
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
         finish = self._finish_asked_for(smooth)
-        cells = self._cells if self._ompl is None else None
-        from hybridnav.planner.batch import plan_many  # noqa: PLC0415 - loads every method
+        closed = self.closed(blocked)
+        is_kept = finish == "none" or self._cells.metric == "any-angle"
+        at_once = self._cells if self._ompl is None and is_kept else None
 
-        return plan_many(self, cells, (first, last), finish, self.closed(blocked))
+        def alone(start: FloatArray, goal: FloatArray) -> PlanResult:
+            return self.plan(start, goal, smooth=finish, blocked=closed)
+
+        return plan_many(self.topology.grid, at_once, (first, last), closed, alone)
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures for queries now: mesh and graph of corners, jump-point graph, or
@@ -225,51 +225,23 @@ class HybridPlanner:
         if self._ompl is not None:
             self._ompl.close()
 
-    def _round(self, closed: ClosedCells, plan: CellPlan, first: Cell, last: Cell) -> CellPlan:
-        """Return the plan itself if it meets no closed cell, else the best path round all of them.
-
-        Closed cells make no path shorter, so a bound stays valid.
-        """
-        assert plan.cells is not None  # noqa: S101 - the caller has looked
-        if not closed.meets(plan.cells, self.topology.grid):
-            return plan
-        began = time.perf_counter()
-        found = self._refiner.search.search(first, last, blocked=closed.flat)
-        seconds = {**plan.seconds, "around": time.perf_counter() - began}
-        expanded = plan.expanded + found.expanded
-        if found.cells is None:
-            return CellPlan(None, expanded=expanded, seconds=seconds)
-        bound = path_length_in_cells(found.cells)
-        return replace(
-            plan,
-            cells=found.cells,
-            points=None,
-            length_cells=bound,
-            bound_cells=bound,
-            route_source=None,
-            expanded=expanded,
-            seconds=seconds,
-        )
-
-    def _result(
+    def _along(
         self,
         plan: CellPlan,
         poses: tuple[FloatArray, FloatArray],
         finish: Smooth,
         closed: ClosedCells | None,
     ) -> PlanResult:
-        """Return the result of a plan on cells or on the mesh, between two points."""
-        stats = self._stats_of(plan)
-        if plan.cells is None:
-            return self._answer(PlanStatus.NO_PATH, poses, metric=plan.metric, stats=stats)
+        """Return the result of a path of the planner of cell paths."""
+        assert plan.cells is not None  # noqa: S101 - the caller has looked
         grid = self.topology.grid
         bound = plan.bound_cells * grid.resolution_m
-        points, metric = plan.points, plan.metric
+        points, metric = plan.points, self._cells.metric
         if metric == "octile" and finish == "line-of-sight":
             began = time.perf_counter()
             points, metric = self._sight(closed).shorten(plan.cells, *poses), "any-angle"
-            stats.seconds["smooth"] = time.perf_counter() - began
-            bound = self._any_angle_bound(plan, poses)
+            plan.stats.seconds["smooth"] = time.perf_counter() - began
+            bound = self._cells.bound(plan, poses)
         if points is None:
             points = grid.frame.points_of(plan.cells)
         if metric == "octile":
@@ -277,30 +249,11 @@ class HybridPlanner:
         else:
             length_m = polyline_length(points)
             points = points if length_m > 0 else points[:1]
-        if plan.metric == "any-angle" and plan.length_cells:
+        if self._cells.metric == "any-angle" and plan.length_cells:
             # A share of the length, so that a proved optimum has no gap by rounding.
             bound = length_m * (plan.bound_cells / plan.length_cells)
-        return self._answer(
-            PlanStatus.SOLVED,
-            poses,
-            metric=metric,
-            path=Path(plan.cells, points, length_m),
-            route_source=plan.route_source or partial(self._walked, plan.cells),
-            lower_bound=min(bound, length_m),
-            stats=stats,
-        )
-
-    def _any_angle_bound(self, plan: CellPlan, ends: tuple[FloatArray, FloatArray]) -> float:
-        """Return a lower bound on all any-angle paths between two points, in metres."""
-        frame = self.topology.grid.frame
-        if isinstance(self._cells, OverMesh):
-            return plan.bound_cells * frame.resolution_m
-        if not isinstance(self._cells, OverPortals) or plan.cells is None:
-            return math.dist(*ends)
-        start, goal = (frame.position_of(float(end[0]), float(end[1])) for end in ends)
-        first, last = tuple(plan.cells[0].tolist()), tuple(plan.cells[-1].tolist())
-        bound = self._cells.search.any_angle_bound(first, last, (start, goal))
-        return bound * frame.resolution_m
+        path = Path(plan.cells, points, length_m)
+        return self._outcomes.solved(plan, poses, path, metric, min(bound, length_m))
 
     def _pose(self, name: str, given: ArrayLike) -> FloatArray:
         """Return a position and, with OMPL, heading; float64 (2,) or (3,)."""
@@ -322,21 +275,20 @@ class HybridPlanner:
         now = time.perf_counter()
         flat = None if closed is None else closed.flat
         found = planner.plan(plan.cells, poses, flat, spent_s=now - began)
-        seconds = {**plan.seconds, "ompl": time.perf_counter() - now}
-        source = None if found.path is None else partial(self._walked, found.path.cells)
-        bound = max(found.lower_bound, self._any_angle_bound(plan, ends))
+        seconds = {**plan.stats.seconds, "ompl": time.perf_counter() - now}
+        bound = max(found.lower_bound, self._cells.bound(plan, ends))
         if found.path is not None and found.status is PlanStatus.SOLVED:
             bound = min(bound, found.weighted_cost or found.path.length_m)
-        return self._answer(
+        return self._outcomes.answer(
             found.status,
             poses,
             metric=found.metric,
             path=found.path,
-            route_source=source,
+            route_source=self._outcomes.route_of(found.path),
             lower_bound=bound,
             weighted_cost=found.weighted_cost,
             refinement=found.refinement,
-            stats=self._stats_of(replace(plan, seconds=seconds)),
+            stats=replace(plan.stats, seconds=seconds),
         )
 
     def _sight(self, closed: ClosedCells | None) -> LineOfSight:
@@ -360,56 +312,8 @@ class HybridPlanner:
             )
         return smooth
 
-    @cached_property
-    def _walks(self) -> Walks:
-        return Walks(self.topology)
-
-    def _walked(self, cells: LongArray) -> Route:
-        """Return the places and arcs that a path passes."""
-        places, arcs = self._walks.of(cells)
-        ids = self.topology.place_ids, self.topology.arc_ids
-        passed = [int(ids[1][arc]) if arc >= 0 else -1 for arc in arcs]
-        return Route(tuple(ids[0][places].tolist()), tuple(passed))
-
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
         """Return the cells of a closure, None for no closure."""
         if blocked is None or isinstance(blocked, ClosedCells):
             return blocked
         return self._closures.of(blocked)
-
-    def _stats_of(self, plan: CellPlan) -> PlanStats:
-        on_mesh = isinstance(self._cells, OverMesh)
-        return PlanStats(
-            expanded=0 if on_mesh else plan.expanded,
-            expanded_places=plan.expanded_places,
-            expanded_gates=plan.expanded_gates,
-            expanded_intervals=plan.expanded if on_mesh else 0,
-            corridor_cells=plan.corridor_cells,
-            seconds=plan.seconds,
-        )
-
-    def _answer(
-        self, status: PlanStatus, poses: tuple[FloatArray, FloatArray], **outcome: Any
-    ) -> PlanResult:
-        """Return a result that records the ends, the preset and the settings of the pyramid."""
-        # Each result has its own settings, so that a change of one does not affect the next.
-        settings = {
-            key: dict(value) if isinstance(value, dict) else value
-            for key, value in self._settings.items()
-        }
-        start, goal = tuple(poses[0].tolist()), tuple(poses[1].tolist())
-        return PlanResult(status, settings=settings, start=start, goal=goal, **outcome)
-
-    @cached_property
-    def _settings(self) -> dict[str, Any]:
-        pyramid = self.topology.pyramid
-        return {
-            "preset": self.preset.name,
-            "planner": self.preset.planner.model_dump(),
-            "pyramid": {
-                "merge_distance_m": pyramid.merge_distance_m,
-                "linkage": pyramid.linkage,
-                "seed": pyramid.seed,
-                "robot_radius_m": pyramid.grid.robot_radius_m,
-            },
-        }

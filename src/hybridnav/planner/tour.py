@@ -204,7 +204,7 @@ def plan_tour(
         raise InvalidValueError(f"a way needs at least two stops, got {len(stops)}")
     check_names(planner.topology, stops)
     closed = planner.closed(blocked)
-    points = stop_points(planner, stops, at=at, closed=closed)
+    points = stop_points(planner.topology, planner.preset.planner, stops, at=at, closed=closed)
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):
         results.append(planner.plan(*pair, smooth=smooth, blocked=closed))

@@ -39,14 +39,14 @@ class GridRefiner:
     """
 
     def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
-        self._grid = grid
+        self.grid = grid
         self._allow_unexplored = allow_unexplored
 
     @cached_property
     def search(self) -> GridSearch:
         """The search of cells, built on first use."""
-        enterable = self._grid.enterable(allow_unexplored=self._allow_unexplored)
-        return GridSearch(enterable, corner_cutting=self._grid.corner_cutting)
+        enterable = self.grid.enterable(allow_unexplored=self._allow_unexplored)
+        return GridSearch(enterable, corner_cutting=self.grid.corner_cutting)
 
     def refine(
         self, start: Cell, goal: Cell, corridor: Corridor | None

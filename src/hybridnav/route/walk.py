@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav.result import Route
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
@@ -82,3 +85,47 @@ class Walks:
         passable = [side for side in sides if self._place_of[side] >= 0]
         own = (side for side in passable if int(self._place_of[side]) in ends)
         return next(own, passable[0] if passable else None)
+
+
+@copies_alike
+class Routes:
+    """Names the routes of cell paths on one map, by the ids of places and arcs.
+
+    Parameters
+    ----------
+    topology
+        The map; where its arcs cross is computed at the first path.
+    """
+
+    def __init__(self, topology: TopologicalMap) -> None:
+        self._topology = topology
+
+    @cached_property
+    def _walks(self) -> Walks:
+        return Walks(self._topology)
+
+    def of(self, cells: LongArray) -> Route:
+        """Return the places and arcs that a path passes.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), legal moves.
+        """
+        places, arcs = self._walks.of(cells)
+        ids = self._topology.place_ids, self._topology.arc_ids
+        passed = [int(ids[1][arc]) if arc >= 0 else -1 for arc in arcs]
+        return Route(tuple(ids[0][places].tolist()), tuple(passed))
+
+
+@dataclass(frozen=True, eq=False)
+class RouteOfCells:
+    """The route of one cell path, to be found when somebody reads it."""
+
+    routes: Routes
+    cells: LongArray
+    """int64 (n, 2), the path."""
+
+    def route(self) -> Route:
+        """Return the places and arcs that the path passes."""
+        return self.routes.of(self.cells)

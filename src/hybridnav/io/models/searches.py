@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from hybridnav.io.models.container import FiledPart, Part
     from hybridnav.jumps import JumpSearch
     from hybridnav.mesh import CornerGraph, CornerHierarchy, MeshSearch
-    from hybridnav.planner.cell_plans import Prepared
+    from hybridnav.planner.cell_planner import Prepared
     from hybridnav.portals import BuiltPortals
     from hybridnav.topology import TopologicalMap
 

@@ -1,0 +1,84 @@
+"""Results of queries: with their routes, and with the settings that they were planned by."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.result import PlanResult, PlanStatus
+from hybridnav.route import RouteOfCells, Routes
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray
+    from hybridnav.config import Preset
+    from hybridnav.planner.cell_planner import CellPlan
+    from hybridnav.result import Metric, Path
+    from hybridnav.topology import TopologicalMap
+
+Poses = tuple["FloatArray", "FloatArray"]
+
+
+class Outcomes:
+    """Makes the results of one planner.
+
+    Parameters
+    ----------
+    topology
+        The map.
+    preset
+        The preset of the planner.
+    """
+
+    def __init__(self, topology: TopologicalMap, preset: Preset) -> None:
+        self._pyramid = topology.pyramid
+        self._preset = preset
+        self._routes = Routes(topology)
+
+    def answer(self, status: PlanStatus, poses: Poses, **outcome: Any) -> PlanResult:
+        """Return a result that records the ends, the preset and the settings of the pyramid."""
+        # Each result has its own settings, so that a change of one does not affect the next.
+        settings = {
+            key: dict(value) if isinstance(value, dict) else value
+            for key, value in self._settings.items()
+        }
+        start, goal = tuple(poses[0].tolist()), tuple(poses[1].tolist())
+        return PlanResult(status, settings=settings, start=start, goal=goal, **outcome)
+
+    def no_path(self, plan: CellPlan, poses: Poses, metric: Metric) -> PlanResult:
+        """Return the result of a plan without a path."""
+        bound = plan.bound_cells * self._pyramid.grid.resolution_m
+        return self.answer(
+            PlanStatus.NO_PATH, poses, metric=metric, lower_bound=bound, stats=plan.stats
+        )
+
+    def solved(
+        self, plan: CellPlan, poses: Poses, path: Path, metric: Metric, bound_m: float
+    ) -> PlanResult:
+        """Return the result of a plan with a path."""
+        return self.answer(
+            PlanStatus.SOLVED,
+            poses,
+            metric=metric,
+            path=path,
+            route_source=plan.route or self.route_of(path),
+            lower_bound=bound_m,
+            stats=plan.stats,
+        )
+
+    def route_of(self, path: Path | None) -> RouteOfCells | None:
+        """Return what the route of a path is found from, None for no path."""
+        return None if path is None else RouteOfCells(self._routes, path.cells)
+
+    @cached_property
+    def _settings(self) -> dict[str, Any]:
+        pyramid = self._pyramid
+        return {
+            "preset": self._preset.name,
+            "planner": self._preset.planner.model_dump(),
+            "pyramid": {
+                "merge_distance_m": pyramid.merge_distance_m,
+                "linkage": pyramid.linkage,
+                "seed": pyramid.seed,
+                "robot_radius_m": pyramid.grid.robot_radius_m,
+            },
+        }
