@@ -26,6 +26,9 @@ ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").rglob("*.md")))
 MAX_PICTURE_BYTES = 400_000
 
+SAVED = ("python ", "yaml ")
+"""Beginnings of blocks that a reader saves under the name that follows."""
+
 _BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\[[^\]]*\]\(([^)#]+)[^)]*\)")
 _IMAGE = re.compile(r"!\[[^\]]*\]\(([^)]+)\)")
@@ -33,7 +36,8 @@ _ENDS = re.compile(r"--start (\S+) --goal (\S+)")
 
 
 class Example(NamedTuple):
-    """Something a page runs, and what it says comes out; `...` stands for anything."""
+    """Something a page runs, and what it says comes out; `...` stands for anything.
+    For a file that a reader saves, its text and its name."""
 
     language: str
     text: str
@@ -48,6 +52,8 @@ def _examples_of(page: str) -> list[Example]:
     for (language, text), (kind, output) in itertools.pairwise(blocks):
         if language == "python":
             found.append(Example(language, text, output if kind == "text" else ""))
+        elif language.startswith(SAVED):
+            found.append(Example("file", text, language.split()[1]))
         elif language == "console":
             for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
                 command, _, printed = part.partition("\n")
@@ -61,6 +67,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(ROOT / "maps", tmp_path / "maps")
     (tmp_path / "out").mkdir()
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)  # as where Python is started
     return tmp_path
 
 
@@ -118,6 +125,9 @@ def _run_in_shell(text: str, folder: Path) -> str:
 def test_a_page_shows_what_happens(page: str, folder: Path) -> None:
     names: dict[str, object] = {"__name__": "__main__"}
     for example in _examples_of(page):  # in order, in one folder, as a reader types them
+        if example.language == "file":
+            (folder / example.expected).write_text(example.text, encoding="utf-8")
+            continue
         if example.language == "python":
             got = _run_python(example.text, page, names)
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import reprlib
 from pathlib import Path
 from types import NoneType
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 import yaml
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -45,6 +47,9 @@ _REFINED_BY = {
 }
 """What refines each coarse search; OMPL refines them all."""
 
+_REFINERS = ("grid-astar", "gates", "ompl", "none")
+_OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
+
 _MAX_SHOWN = 80
 """Characters of a setting that a message quotes."""
 
@@ -54,6 +59,16 @@ def _no_boolean(value: Any) -> Any:
     if isinstance(value, bool):
         raise PydanticCustomError("number_type", "input should be a number")
     return value
+
+
+def _known_refiner(refine: str) -> str:
+    """Refuse what is neither a refiner of the package nor written like the name of a class."""
+    if refine in _REFINERS or _OWN.fullmatch(refine):
+        return refine
+    known = ", ".join(map(repr, _REFINERS))
+    raise PydanticCustomError(
+        "refiner", f"input should be {known} or a class of your own, module:Class"
+    )
 
 
 _Float = Annotated[float, BeforeValidator(_no_boolean)]
@@ -88,10 +103,11 @@ class PlannerSettings(_Section):
     corridor: Literal["route", "neighbours"] = "route"
     """Fields that `grid-astar` and `ompl` start from: those of the coarse way, or also their
     neighbours. Of no effect with `gates` and `coarse: none`."""
-    refine: Literal["grid-astar", "gates", "ompl", "none"] = "grid-astar"
+    refine: Annotated[str, AfterValidator(_known_refiner)] = "grid-astar"
     """How a path is found: cell by cell in the corridor; over portals, with exact costs between the
     border cells of the fields; by a sampling-based planner; or `none` where the coarse search, on
-    the mesh or the corner cells, has found it."""
+    the mesh or the corner cells, has found it. In place of `grid-astar`, `module:Class` names a
+    refiner of your own, which is imported when a planner is made."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, section of its own; null elsewhere."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
@@ -125,10 +141,11 @@ class PlannerSettings(_Section):
             if self.epsilon is not None:
                 raise PydanticCustomError("bounds_needed", "epsilon goes with no refine: ompl")
             return self
-        if self.refine != _REFINED_BY[self.coarse]:
-            fitting = f"{_REFINED_BY[self.coarse]} or ompl"
+        usual = _REFINED_BY[self.coarse]
+        if self.refine != usual and not (usual == "grid-astar" and ":" in self.refine):
+            own = ", module:Class" if usual == "grid-astar" else ""
             raise PydanticCustomError(
-                "refine_needed", f"coarse: {self.coarse} goes with refine: {fitting}"
+                "refine_needed", f"coarse: {self.coarse} goes with refine: {usual}{own} or ompl"
             )
         if self.coarse == "mesh" and self.smooth != "none":
             raise PydanticCustomError(

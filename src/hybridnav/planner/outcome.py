@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.result import PlanResult, PlanStatus
-from hybridnav.route import RouteOfCells, Routes
+from hybridnav.route.walk import RouteOfCells, Walks
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
@@ -30,9 +30,9 @@ class Outcomes:
     """
 
     def __init__(self, topology: TopologicalMap, preset: Preset) -> None:
-        self._pyramid = topology.pyramid
+        self._topology = topology
         self._preset = preset
-        self._routes = Routes(topology)
+        self._walks = Walks(topology)
 
     def answer(self, status: PlanStatus, poses: Poses, **outcome: Any) -> PlanResult:
         """Return a result that records the ends, the preset and the settings of the pyramid."""
@@ -46,7 +46,7 @@ class Outcomes:
 
     def no_path(self, plan: CellPlan, poses: Poses, metric: Metric) -> PlanResult:
         """Return the result of a plan without a path."""
-        bound = plan.bound_cells * self._pyramid.grid.resolution_m
+        bound = plan.bound_cells * self._topology.grid.resolution_m
         return self.answer(
             PlanStatus.NO_PATH, poses, metric=metric, lower_bound=bound, stats=plan.stats
         )
@@ -67,11 +67,11 @@ class Outcomes:
 
     def route_of(self, path: Path | None) -> RouteOfCells | None:
         """Return what the route of a path is found from, None for no path."""
-        return None if path is None else RouteOfCells(self._routes, path.cells)
+        return None if path is None else RouteOfCells(self._topology, self._walks, path.cells)
 
     @cached_property
     def _settings(self) -> dict[str, Any]:
-        pyramid = self._pyramid
+        pyramid = self._topology.pyramid
         return {
             "preset": self._preset.name,
             "planner": self._preset.planner.model_dump(),

@@ -13,7 +13,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.result import Route
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
+    from hybridnav._typing import IntArray, LongArray
     from hybridnav.topology import Rooms, TopologicalMap
 
 
@@ -24,16 +24,24 @@ class Walks:
     Parameters
     ----------
     topology
-        The map, or its rooms; where its arcs cross is computed here, once.
+        The map, or its rooms; where its arcs cross is computed at the first path.
     """
 
     def __init__(self, topology: TopologicalMap | Rooms) -> None:
         self._cols = topology.grid.shape[1]
-        self._place_of = topology.level.field_of.ravel()
-        edges, arcs = topology.level.boundary_table
-        plain = ~topology.level.is_self_loop[arcs]
+        self._level = topology.level
+
+    @cached_property
+    def _place_of(self) -> IntArray:
+        return self._level.field_of.ravel()
+
+    @cached_property
+    def _table(self) -> tuple[LongArray, LongArray]:
+        """Return the base edges between different places, ascending, and the arc of each."""
+        edges, arcs = self._level.boundary_table
+        plain = ~self._level.is_self_loop[arcs]
         order = np.argsort(edges[plain], kind="stable")
-        self._edges, self._arcs = edges[plain][order], arcs[plain][order]
+        return edges[plain][order], arcs[plain][order]
 
     def of(self, cells: LongArray) -> tuple[list[int], list[int]]:
         """Places and arcs of a path, as dense indices; one arc fewer than places.
@@ -73,7 +81,8 @@ class Walks:
         if row != to_row and col != to_col:
             return -1
         edge = 2 * min(tail, head) + (row != to_row)
-        return int(self._arcs[np.searchsorted(self._edges, edge)])
+        edges, arcs = self._table
+        return int(arcs[np.searchsorted(edges, edge)])
 
     def _side(self, tail: list[int], head: list[int]) -> int | None:
         """The side cell that a diagonal passes; None where both are occupied, and for a step along
@@ -87,45 +96,18 @@ class Walks:
         return next(own, passable[0] if passable else None)
 
 
-@copies_alike
-class Routes:
-    """Names the routes of cell paths on one map, by the ids of places and arcs.
-
-    Parameters
-    ----------
-    topology
-        The map; where its arcs cross is computed at the first path.
-    """
-
-    def __init__(self, topology: TopologicalMap) -> None:
-        self._topology = topology
-
-    @cached_property
-    def _walks(self) -> Walks:
-        return Walks(self._topology)
-
-    def of(self, cells: LongArray) -> Route:
-        """Return the places and arcs that a path passes.
-
-        Parameters
-        ----------
-        cells
-            int64 (n, 2), legal moves.
-        """
-        places, arcs = self._walks.of(cells)
-        ids = self._topology.place_ids, self._topology.arc_ids
-        passed = [int(ids[1][arc]) if arc >= 0 else -1 for arc in arcs]
-        return Route(tuple(ids[0][places].tolist()), tuple(passed))
-
-
 @dataclass(frozen=True, eq=False)
 class RouteOfCells:
-    """The route of one cell path, to be found when somebody reads it."""
+    """The route of one cell path, which is found when somebody reads it."""
 
-    routes: Routes
+    topology: TopologicalMap
+    walks: Walks
     cells: LongArray
-    """int64 (n, 2), the path."""
+    """int64 (n, 2), legal moves."""
 
     def route(self) -> Route:
-        """Return the places and arcs that the path passes."""
-        return self.routes.of(self.cells)
+        """Return the ids of the places and arcs that the path passes."""
+        places, arcs = self.walks.of(self.cells)
+        place_ids, arc_ids = self.topology.place_ids, self.topology.arc_ids
+        passed = [int(arc_ids[arc]) if arc >= 0 else -1 for arc in arcs]
+        return Route(tuple(place_ids[places].tolist()), tuple(passed))
