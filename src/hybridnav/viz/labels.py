@@ -1,9 +1,9 @@
-"""Markers of start and goal with labels, placed where they hide least."""
+"""Labels that hide nothing else, and the markers of start and goal."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import patheffects
@@ -14,15 +14,90 @@ from hybridnav.viz import style
 from hybridnav.viz.layout import text_width
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import ArrayLike
 
     from hybridnav._typing import FloatArray
     from hybridnav.viz.canvas import Canvas
-    from hybridnav.viz.style import Sizes
 
 _SHAPES = {"start": ("o", 6.5), "goal": ("D", 6.0)}
 _SIDES = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
 _OUTSIDE, _OVERLAP = 1000.0, 100.0  # penalties; covering all of the path costs 10
+
+
+class LabelPlacer:
+    """Places labels on a canvas so that none hides another.
+
+    Boxes are the lower left and the upper right corner, `(x, y)` in metres, float64 (2, 2).
+    """
+
+    def __init__(self, canvas: Canvas) -> None:
+        self.canvas = canvas
+        self.taken: list[FloatArray] = []
+        """Boxes of all labels, and of what they must not hide."""
+
+    def keep_free(self, points: Iterable[ArrayLike], reach: float) -> None:
+        """Place nothing nearer to points than a reach in points of the page."""
+        half = np.full(2, reach)
+        self.taken += [self.box(np.asarray(point), half) for point in points]
+
+    def box(self, centre: FloatArray, half_points: FloatArray) -> FloatArray:
+        """Return the box round a centre with half sizes in points of the page."""
+        half = half_points / self.canvas.sizes.points_per_metre
+        return np.stack([centre - half, centre + half])
+
+    def is_in_view(self, box: FloatArray) -> bool:
+        """Return whether a box lies in the picture."""
+        view = self.canvas.view
+        return not ((box[0] < view.low).any() or (box[1] > view.high).any())
+
+    def n_hidden(self, box: FloatArray) -> int:
+        """Return the number of boxes that a box would hide."""
+        if not self.taken:
+            return 0
+        taken = np.stack(self.taken)
+        return int(((taken[:, 0] < box[1]) & (taken[:, 1] > box[0])).all(axis=1).sum())
+
+    def boxes_beside(
+        self, point: FloatArray, half_points: FloatArray, reaches: Sequence[float]
+    ) -> list[FloatArray]:
+        """Return boxes on all sides of a point, at each of some distances in points of the page."""
+        shifts = np.concatenate([_SIDES * (half_points + reach) for reach in reaches])
+        centres = point + shifts / self.canvas.sizes.points_per_metre
+        return [self.box(centre, half_points) for centre in centres]
+
+    def write(self, words: str, box: FloatArray, gid: str, *, halo: float, **font: Any) -> None:
+        """Write words in a box, which is taken from now on.
+
+        Parameters
+        ----------
+        words
+            The words; nothing in them is mathematics.
+        box
+            The box.
+        gid
+            Id of the text in the picture.
+        halo
+            Width of the rim round the letters, in points.
+        **font
+            Properties of a matplotlib text.
+        """
+        x, y = box.mean(axis=0).tolist()
+        text = Text(
+            x,
+            y,
+            words,
+            horizontalalignment="center",
+            verticalalignment="center",
+            parse_math=False,
+            path_effects=[_halo(halo)],
+            zorder=9,
+            **font,
+        )
+        text.set_gid(gid)
+        self.canvas.ax.add_artist(text)
+        self.taken.append(box)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,16 +113,16 @@ def draw_markers(
     markers: Sequence[Marker],
     path: FloatArray,
     *,
-    avoid: Sequence[FloatArray] = (),
+    labels: LabelPlacer | None = None,
 ) -> None:
-    """Draw start and goal, with labels that avoid boxes.
+    """Draw start and goal, with labels that hide as little as possible of other labels and a path.
 
     A marker outside the view is drawn at its rim, with its coordinates.
     """
     ax, view, sizes = canvas.ax, canvas.view, canvas.sizes
+    labels = LabelPlacer(canvas) if labels is None else labels
     points = [np.clip(marker.point, view.low, view.high) for marker in markers]
-    boxes = [_box_round(point, np.full(2, 4.5 * sizes.line), sizes) for point in points]
-    boxes += avoid
+    labels.keep_free(points, 4.5 * sizes.line)
     for marker, point in zip(markers, points, strict=True):
         shape, diameter = _SHAPES[marker.name]
         drawn = Line2D(
@@ -64,55 +139,22 @@ def draw_markers(
         )
         drawn.set_gid(marker.name)
         ax.add_line(drawn)
-        label = marker.name
+        words = marker.name
         if (point != marker.point).any():
-            label += " ({:g}, {:g})".format(*marker.point)
-        centre, box = _place_label(canvas, label, point, boxes, path)
-        boxes.append(box)
-        text = Text(
-            float(centre[0]),
-            float(centre[1]),
-            label,
-            fontsize=sizes.font,
-            fontweight="bold",
-            color=style.INK,
-            horizontalalignment="center",
-            verticalalignment="center",
-            path_effects=[_halo(0.3 * sizes.font)],
-            zorder=9,
-        )
-        text.set_gid(f"{marker.name}-label")
-        ax.add_artist(text)
+            words += " ({:g}, {:g})".format(*marker.point)
+        half = np.array([text_width(words, sizes.font, "bold") / 2, 0.6 * sizes.font])
+        boxes = labels.boxes_beside(point, half, [6.5 * sizes.line])
+        box = boxes[int(np.argmin([_cost(labels, box, path) for box in boxes]))]
+        font = {"fontsize": sizes.font, "fontweight": "bold", "color": style.INK}
+        labels.write(words, box, f"{marker.name}-label", halo=0.3 * sizes.font, **font)
 
 
-def _place_label(
-    canvas: Canvas,
-    label: str,
-    point: FloatArray,
-    boxes: Sequence[FloatArray],
-    path: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the centre and box of a label on the side of its marker where it hides least."""
-    view, sizes = canvas.view, canvas.sizes
-    half = np.array([text_width(label, sizes.font, "bold") / 2, 0.6 * sizes.font])
-    reach = 6.5 * sizes.line
-    centres = point + _SIDES * (half + reach) / sizes.points_per_metre
-    costs = []
-    for centre in centres:
-        low, high = _box_round(centre, half, sizes)
-        outside = bool((low < view.low).any() or (high > view.high).any())
-        hidden = sum(bool(((low < box[1]) & (high > box[0])).all()) for box in boxes)
-        covered = np.count_nonzero(((path >= low) & (path <= high)).all(axis=1)) / max(len(path), 1)
-        costs.append(_OUTSIDE * outside + _OVERLAP * hidden + 10 * covered)
-    centre = centres[np.argmin(costs)]
-    return centre, _box_round(centre, half, sizes)
-
-
-def _box_round(centre: FloatArray, half_points: FloatArray, sizes: Sizes) -> FloatArray:
-    """Return the lower left and upper right corner, in metres, of a box with half sizes in
-    points."""
-    half = half_points / sizes.points_per_metre
-    return np.stack([centre - half, centre + half])
+def _cost(labels: LabelPlacer, box: FloatArray, path: FloatArray) -> float:
+    """Return how much a label in a box would leave the picture, or hide of labels and a path."""
+    covered = ((path >= box[0]) & (path <= box[1])).all(axis=1)
+    share = np.count_nonzero(covered) / max(len(path), 1)
+    outside = not labels.is_in_view(box)
+    return _OUTSIDE * outside + _OVERLAP * labels.n_hidden(box) + 10 * share
 
 
 def _halo(width: float) -> patheffects.withStroke:

@@ -6,18 +6,15 @@ import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import patheffects
-from matplotlib.text import Text
 from scipy import ndimage
 
 from hybridnav.grid import NO_ROOM
 from hybridnav.viz import style
+from hybridnav.viz.labels import LabelPlacer
 from hybridnav.viz.layout import text_width
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
-
-    from numpy.typing import ArrayLike
+    from collections.abc import Collection, Sequence
 
     from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.grid import OccupancyGrid, RoomLabels
@@ -29,7 +26,7 @@ _NAME_SIZES = (0.75, 0.65, 0.55)
 _LEAST_FONT = 4.0
 """Least legible font size, in points."""
 _NUMBER_SIZE = 0.7
-_SIDES = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
+_HALO = 1.5
 _PARTS = 4
 """Parts per side of a room's bounding box, each with a spot for the name."""
 _SAMPLES = 9
@@ -50,16 +47,11 @@ class RoomWriter:
     """
 
     def __init__(self, canvas: Canvas, grid: OccupancyGrid, labels: RoomLabels) -> None:
-        self._canvas = canvas
+        self._sizes = canvas.sizes
         self._grid = grid
-        self._labels = labels
-        self.taken: list[FloatArray] = []
-        """Boxes of all texts: lower left and upper right corner, `(x, y)` in metres."""
-
-    def keep_free(self, points: Iterable[ArrayLike], reach: float) -> None:
-        """Write nothing nearer to points than a reach in points of the page."""
-        half = np.full(2, reach)
-        self.taken += [self._box(np.asarray(point), half) for point in points]
+        self._rooms = labels
+        self.labels = LabelPlacer(canvas)
+        """The names and numbers."""
 
     def number_doors(self, doors: Sequence[Door], *, always: bool = False) -> None:
         """Write the numbers of doors beside their dots.
@@ -71,20 +63,17 @@ class RoomWriter:
         always
             Whether to write a number even if it hides another one, rather than leave it out.
         """
-        font = _NUMBER_SIZE * self._canvas.sizes.font
-        near, far = 1.6 * self._canvas.sizes.line, 5.0
+        size = _NUMBER_SIZE * self._sizes.font
+        font = {"fontsize": size, "fontweight": "bold", "color": style.PATH}
         for door in doors:
-            half = np.array([text_width(str(door.number), font, "bold") / 2, 0.45 * font])
-            shifts = np.concatenate([_SIDES * (half + near), _SIDES * (half + far)])
-            shifts /= self._canvas.sizes.points_per_metre
-            centres = np.asarray(door.position) + shifts
-            boxes = [self._box(centre, half) for centre in centres]
-            hidden = [self._n_hidden(box) for box in boxes]
+            number = str(door.number)
+            half = np.array([text_width(number, size, "bold") / 2, 0.45 * size])
+            reaches = 1.6 * self._sizes.line, 5.0
+            boxes = self.labels.boxes_beside(np.asarray(door.position), half, reaches)
+            hidden = [self.labels.n_hidden(box) for box in boxes]
             best = int(np.argmin(hidden))
-            if hidden[best] and not always:
-                continue
-            self._write(centres[best], str(door.number), font, f"door-{door.number}", bold=True)
-            self.taken.append(boxes[best])
+            if always or not hidden[best]:
+                self.labels.write(number, boxes[best], f"door-{number}", halo=_HALO, **font)
 
     def write_names(self, first: Collection[str] = (), *, lines: Sequence[FloatArray] = ()) -> int:
         """Write each name well inside its room, smaller if necessary.
@@ -103,10 +92,10 @@ class RoomWriter:
             Number of rooms without names: their names would reach into another room, over the rim
             of the picture or over other texts.
         """
-        names = self._labels.names
-        areas = np.bincount(self._labels.label_of.ravel() + 1, minlength=len(names) + 1)[1:]
+        names = self._rooms.names
+        areas = np.bincount(self._rooms.label_of.ravel() + 1, minlength=len(names) + 1)[1:]
         order = sorted(range(len(names)), key=lambda n: (names[n] not in first, -areas[n], n))
-        boxes = ndimage.find_objects(self._labels.label_of + 1, len(names))
+        boxes = ndimage.find_objects(self._rooms.label_of + 1, len(names))
         along = _points_along(lines, self._grid.resolution_m)
         left_out = 0
         for label in order:
@@ -116,68 +105,37 @@ class RoomWriter:
         return left_out
 
     def _wrote_name(self, label: int, window: tuple[slice, ...], along: FloatArray) -> bool:
-        name = self._labels.names[label]
-        points = _depths(self._labels.label_of[window] == label, window, self._grid)
-        spot: tuple[FloatArray, float, FloatArray] | None = None
+        name = self._rooms.names[label]
+        points = _depths(self._rooms.label_of[window] == label, window, self._grid)
+        spot: tuple[float, FloatArray] | None = None
         for size, point in itertools.product(_NAME_SIZES, points):
-            font = max(size * self._canvas.sizes.font, _LEAST_FONT)
+            font = max(size * self._sizes.font, _LEAST_FONT)
             half = np.array([text_width(name, font) / 2, 0.55 * font])
-            box = self._box(point, half)
-            if self._n_hidden(box) or not self._is_in_room(box, label):
+            box = self.labels.box(point, half)
+            if self.labels.n_hidden(box) or not self._is_in_room(box, label):
                 continue
             hides_line = bool(((along >= box[0]) & (along <= box[1])).all(axis=1).any())
             if spot is None or not hides_line:
-                spot = (point, font, box)
+                spot = font, box
             if not hides_line:
                 break
         if spot is None:
             return False
-        point, font, box = spot
-        self._write(point, name, font, f"room-{label}")
-        self.taken.append(box)
+        font, box = spot
+        gid = f"room-{label}"
+        self.labels.write(name, box, gid, halo=_HALO, fontsize=font, color=style.INK)
         return True
 
     def _is_in_room(self, box: FloatArray, label: int) -> bool:
         """Return whether a box lies in the picture and covers no other room; walls may be
         covered."""
-        view = self._canvas.view
-        if (box[0] < view.low).any() or (box[1] > view.high).any():
+        if not self.labels.is_in_view(box):
             return False
         xy = np.meshgrid(*np.linspace(box[0], box[1], _SAMPLES).T)
         cells = self._grid.frame.cells_of(np.stack([axis.ravel() for axis in xy], axis=1))
         cells = cells[((cells >= 0) & (cells < self._grid.shape)).all(axis=1)]
-        found = self._labels.label_of[tuple(cells.T)]
+        found = self._rooms.label_of[tuple(cells.T)]
         return bool(np.isin(found, (label, NO_ROOM)).all())
-
-    def _box(self, centre: FloatArray, half_points: FloatArray) -> FloatArray:
-        half = half_points / self._canvas.sizes.points_per_metre
-        return np.stack([centre - half, centre + half])
-
-    def _n_hidden(self, box: FloatArray) -> int:
-        """Return the number of texts that a box would hide."""
-        if not self.taken:
-            return 0
-        taken = np.stack(self.taken)
-        return int(((taken[:, 0] < box[1]) & (taken[:, 1] > box[0])).all(axis=1).sum())
-
-    def _write(
-        self, point: FloatArray, words: str, font: float, gid: str, *, bold: bool = False
-    ) -> None:
-        text = Text(
-            float(point[0]),
-            float(point[1]),
-            words,
-            fontsize=font,
-            fontweight="bold" if bold else "normal",
-            color=style.PATH if bold else style.INK,
-            horizontalalignment="center",
-            verticalalignment="center",
-            parse_math=False,
-            path_effects=[patheffects.withStroke(linewidth=1.5, foreground=style.FREE)],
-            zorder=9,
-        )
-        text.set_gid(gid)
-        self._canvas.ax.add_artist(text)
 
 
 def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:

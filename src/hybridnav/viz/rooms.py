@@ -84,7 +84,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         *counted, gaps = view.counted()
         words = [grid.name, *counted]
         doors = [door for door in view.doors if not door.is_gap]
-        writer.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
+        writer.labels.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     if names:
         left_out = writer.write_names()
     entries: list[Entry] = [room_entry(left_out)]

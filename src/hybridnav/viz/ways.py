@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from hybridnav.planner.itinerary import Guide
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.labels import Marker, draw_markers
+from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
 from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
 from hybridnav.viz.maps import ground_entries, swatch
 from hybridnav.viz.places import Places
@@ -144,7 +144,7 @@ def plot_alternatives(
         legs = [leg for path in paths for leg in guide.legs(path)]
     ends = list(paths[0].points[[0, -1]]) if paths else []
     lines = [path.points for path in paths]
-    ground, taken = _draw_ground(canvas, topology, legs, lines, style.PALE)
+    ground, labels = _draw_ground(canvas, topology, legs, lines, style.PALE)
     entries: list[Entry] = []
     styles = itertools.product(_DASHES, style.ROUTES)
     for number, (path, (dashes, colour)) in enumerate(zip(paths, styles, strict=False)):
@@ -155,7 +155,7 @@ def plot_alternatives(
         entries.append((sample, f"route {number + 1}, {path.length_m:.2f} m"))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), ends, strict=False)]
     along = np.concatenate(lines) if lines else np.empty((0, 2))
-    draw_markers(canvas, markers, along, avoid=taken)
+    draw_markers(canvas, markers, along, labels=labels)
     told = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
     words = [topology.grid.name, told] if title is None else [title]
     return _finished(canvas, words, entries + ground)
@@ -188,29 +188,29 @@ def _draw_ground(
     legs: Sequence[Leg],
     lines: Sequence[FloatArray],
     strength: float,
-) -> tuple[list[Entry], list[FloatArray]]:
+) -> tuple[list[Entry], LabelPlacer]:
     """Draw rooms with names and doors, or places if there are no rooms, below lines of points.
 
-    Return the entries of the legend, and the boxes of all texts.
+    Return the entries of the legend, and the labels that were placed.
     """
     grid = topology.grid
     if topology.pyramid.rooms is None:
         places = Places(topology.level)
         draw_cells(canvas, grid, topology.level.field_of, places.colours(~places.free))
         entry: Entry = (swatch(style.PLACES, style.PALE), "places")
-        return [entry, *ground_entries(grid)], []
+        return [entry, *ground_entries(grid)], LabelPlacer(canvas)
     rooms = topology.rooms
     draw_room_cells(canvas, rooms.labels, grid, strength=strength)
     passed = list({leg.door.number: leg.door for leg in legs if leg.door is not None}.values())
     doors = _drawn_doors(rooms, passed)
     writer = RoomWriter(canvas, grid, rooms.labels)
-    writer.keep_free([end for line in lines for end in line[[0, -1]]], 0.6 * _STOP_POINTS)
-    writer.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
+    writer.labels.keep_free([end for line in lines for end in line[[0, -1]]], 0.6 * _STOP_POINTS)
+    writer.labels.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     writer.number_doors(passed, always=True)
     named_first = {leg.room for leg in legs if leg.room is not None}
     left_out = writer.write_names(named_first, lines=lines)
     entries: list[Entry] = [room_entry(left_out, strength), *draw_doors(canvas, doors)]
-    return entries + ground_entries(grid), writer.taken
+    return entries + ground_entries(grid), writer.labels
 
 
 def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
