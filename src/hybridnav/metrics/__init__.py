@@ -1,4 +1,9 @@
-"""The judges of paths, optima and losses, whose code shares nothing with the planners."""
+"""The judges of paths, optima and losses.
+
+What is legal and what is shortest they decide by code of their own. With the planners they share
+the grid and its frame, the cells that a line passes, which name a path and judge none, and the
+exact comparison of two products, which tests hold against fractions.
+"""
 
 from hybridnav.metrics.anyangle import MAX_CORNERS, AnyAnglePath, VisibilityGraph
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults

@@ -14,34 +14,11 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav.search.exact import compare_products
 
 CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
 """Codes of a segment: it stays in the free space, leaves the map, enters a cell that is not free,
 passes between two such cells that meet at a corner, runs along a side that two of them share."""
-
-
-@njit(cache=True, nogil=True)
-def _rounding_error(first, second, product):
-    """Return the rounding error of a product (T. J. Dekker: A floating-point technique, 1971)."""
-    scaled = 134217729.0 * first
-    first_high = scaled - (scaled - first)
-    first_low = first - first_high
-    scaled = 134217729.0 * second
-    second_high = scaled - (scaled - second)
-    second_low = second - second_high
-    error = product - first_high * second_high - first_low * second_high
-    return first_low * second_low - (error - first_high * second_low)
-
-
-@njit(cache=True, nogil=True)
-def compare_products(first, second, third, fourth):
-    """Return the sign of first * second - third * fourth, exact."""
-    left, right = first * second, third * fourth
-    # Rounding preserves order: only equal rounded products need their errors.
-    if left == right:
-        left = _rounding_error(first, second, left)
-        right = _rounding_error(third, fourth, right)
-    return int(left > right) - int(left < right)
 
 
 @njit(cache=True, nogil=True)

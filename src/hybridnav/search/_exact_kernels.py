@@ -19,16 +19,21 @@ def _rounding_error(first, second, product):
 
 
 @njit(cache=True, nogil=True)
+def compare_products(first, second, third, fourth):
+    """Return the sign of first * second - third * fourth: 1, -1 or 0, exact."""
+    left, right = first * second, third * fourth
+    # Rounding preserves order: only equal rounded products need their errors.
+    if left == right and left != 0.0:
+        left = _rounding_error(first, second, left)
+        right = _rounding_error(third, fourth, right)
+    return int(left > right) - int(left < right)
+
+
+@njit(cache=True, nogil=True)
 def turn_of(a_row, a_col, b_row, b_col, c_row, c_col):
     """Return the side of the line from a to b on which c lies: 1, -1 or 0, exact.
 
     1 is the right side for points given as (row, col), the left one for (x, y). Differences of
     coordinates must be exact in float64, as those of multiples of 2^-24 below 2^28 are.
     """
-    p, q = b_row - a_row, c_col - a_col
-    r, s = b_col - a_col, c_row - a_row
-    left, right = p * q, r * s
-    # Rounding preserves order: only equal rounded products need their errors.
-    if left == right and left != 0.0:
-        left, right = _rounding_error(p, q, left), _rounding_error(r, s, right)
-    return int(left > right) - int(left < right)
+    return compare_products(b_row - a_row, c_col - a_col, b_col - a_col, c_row - a_row)

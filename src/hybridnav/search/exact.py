@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from hybridnav.search._exact_kernels import turn_of
+from hybridnav.search._exact_kernels import compare_products, turn_of
 
-__all__ = ["turn_of"]
+__all__ = ["compare_products", "turn_of"]
