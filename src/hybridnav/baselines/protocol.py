@@ -17,7 +17,15 @@ CUT_CORNERS = "moves past corners are not in its graph"
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A path at any angle, with the claims of its method."""
+    """A path at any angle, with the claims of its method.
+
+    Examples
+    --------
+    >>> from hybridnav.baselines import Line
+    >>> line = Line(points=np.array([[0.5, 0.5], [2.5, 0.5]]), length_m=2.0)
+    >>> line.lower_bound_m
+    0.0
+    """
 
     points: FloatArray
     """float64 (n, 2), (x, y) in metres, map frame, from the centre of the start's cell to that of
@@ -33,7 +41,14 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A method's answer to one query."""
+    """A method's answer to one query.
+
+    Examples
+    --------
+    >>> from hybridnav.baselines import Answer
+    >>> Answer(cells=np.array([[0, 0], [0, 1]]), expanded=2).is_path
+    True
+    """
 
     cells: LongArray | None
     """int64 (n, 2), the path as (row, col) from start to goal, legal moves of the octile grid; None
