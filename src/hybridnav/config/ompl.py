@@ -132,7 +132,14 @@ _Coordinate = Annotated[_Float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
 
 
 class OmplSettings(BaseModel):
-    """Section `ompl` of the planner: sampling-based search inside the corridor."""
+    """Section `ompl` of the planner: sampling-based search inside the corridor.
+
+    Examples
+    --------
+    >>> from hybridnav.config import OmplSettings
+    >>> OmplSettings(planner="RRTstar").space
+    'r2'
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -80,7 +80,14 @@ class _Section(BaseModel):
 
 
 class PyramidSettings(_Section):
-    """Section `pyramid`: how the map is inflated and contracted."""
+    """Section `pyramid`: how the map is inflated and contracted.
+
+    Examples
+    --------
+    >>> from hybridnav.config import PyramidSettings
+    >>> PyramidSettings(merge_distance_m=2.0).linkage
+    'radius'
+    """
 
     merge_distance_m: Annotated[_Float, Field(gt=0)] = 4.0
     """U_d in metres, infinity (.inf) allowed."""
@@ -93,7 +100,14 @@ class PyramidSettings(_Section):
 
 
 class PlannerSettings(_Section):
-    """Section `planner`: coarse search, corridor, refinement."""
+    """Section `planner`: coarse search, corridor, refinement.
+
+    Examples
+    --------
+    >>> from hybridnav.config import PlannerSettings
+    >>> PlannerSettings(coarse="jumps", refine="none").coarse
+    'jumps'
+    """
 
     coarse: Literal["max-distance", "portals", "mesh", "jumps", "none"] = "max-distance"
     """What is planned on: the places, by that attribute of their arcs, which chooses the route; or
@@ -162,7 +176,13 @@ class PlannerSettings(_Section):
 
 
 class Preset(_Section):
-    """A planner's configuration: sections `pyramid` and `planner`, and what it is for."""
+    """A planner's configuration: sections `pyramid` and `planner`, and what it is for.
+
+    Examples
+    --------
+    >>> print(hn.load_preset("paper").to_yaml().splitlines()[0])
+    description: max-distance arcs, corridor, grid A*
+    """
 
     name: str = "custom"
     description: str = ""
@@ -180,7 +200,13 @@ class Preset(_Section):
 
 
 def preset_names() -> list[str]:
-    """Names of the presets that come with the package, in alphabetical order."""
+    """Names of the presets that come with the package, in alphabetical order.
+
+    Examples
+    --------
+    >>> hn.preset_names()[:3]
+    ['grid-astar', 'octile', 'ompl-bitstar']
+    """
     return sorted({file.stem for folder in _FOLDERS for file in folder.glob("*.yaml")})
 
 
@@ -225,6 +251,12 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
         When there is no such preset or file; names the ones there are.
     PresetError
         When a key is unknown or a value is out of range; names the key and where it stands.
+
+    Examples
+    --------
+    >>> preset = hn.load_preset("portals", overrides=["planner.epsilon=0.01"])
+    >>> preset.planner.epsilon
+    0.01
     """
     preset = source if isinstance(source, Preset) else _read(_find(source))
     tree, given = preset.model_dump(), list(overrides)
