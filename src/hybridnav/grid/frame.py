@@ -45,6 +45,14 @@ class Frame:
     InvalidValueError
         When a value is not finite, the resolution is not within 0.1 mm and 1 km, or the origin
         farther than a million kilometres.
+
+    Examples
+    --------
+    >>> frame = hn.Frame(resolution_m=0.5, origin_m=(1.0, 2.0))
+    >>> frame.cells_of([2.2, 3.0])
+    array([2, 2])
+    >>> frame.points_of([2, 2])
+    array([2.25, 3.25])
     """
 
     resolution_m: float = 1.0

@@ -82,6 +82,14 @@ class OccupancyGrid:
     InvalidValueError
         When the array is not two-dimensional, empty, too large or holds values outside [0, 1], or
         a threshold, the radius or the least area is out of range.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 0.0, 0.5, 1.0]]), robot_radius_m=0)
+    >>> grid.classes
+    array([[1, 1, 2, 0]], dtype=uint8)
+    >>> grid.class_counts()
+    {'free': 2, 'unexplored': 1, 'occupied': 1, 'blocked': 0}
     """
 
     probability: NDArray[np.float32] = field(repr=False)
@@ -259,5 +267,11 @@ def drop_islands(grid: OccupancyGrid, least_area_m2: float) -> OccupancyGrid:
     ------
     InvalidValueError
         When the area is negative or not finite.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 0.0, 0.0, 1.0, 0.0]]), robot_radius_m=0)
+    >>> hn.drop_islands(grid, 2.0).classes
+    array([[1, 1, 1, 0, 0]], dtype=uint8)
     """
     return replace(grid, least_island_m2=least_area_m2)

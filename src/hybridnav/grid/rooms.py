@@ -51,6 +51,13 @@ class RoomLabels:
         When a name is given twice, empty, too long, not one printable line or reads as a point
         (`1,2`), a label has no name, a point is not finite, or the number of a door is not a
         positive whole one.
+
+    Examples
+    --------
+    >>> labels = np.array([[0, 0, -1, 1]])
+    >>> rooms = hn.RoomLabels(("kitchen", "hall"), labels)
+    >>> rooms.index("hall")
+    1
     """
 
     names: tuple[str, ...]
