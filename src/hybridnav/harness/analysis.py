@@ -324,6 +324,13 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     ------
     InvalidValueError
         When a line is no record, or there is no such metric.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.harness import load_study
+    >>> load_study(Path("run")).labels  # of the example of `evaluate`
+    ['grid-astar', 'octile']
     """
     check_yardstick(metric)
     preparations: dict[tuple[str, str], Record] = {}

@@ -47,6 +47,14 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
     InvalidValueError
         When a run has no records, the two share no method, map and pair, or there is no such
         metric.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.harness import compare_runs
+    >>> rows = compare_runs(Path("run"), Path("run"))  # of the example of `evaluate`
+    >>> rows[0]["pairs"], rows[0]["difference, points"]
+    (5, 0.0)
     """
     studies = _loaded(first, metric), _loaded(second, metric)
     rows: list[Row] = []

@@ -74,6 +74,13 @@ def write_outputs(
     -------
     Study
         What was found; `faults` lists every counter-example.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.harness import write_outputs
+    >>> write_outputs(Path("run")).faults  # of the example of `evaluate`
+    []
     """
     study = load_study(folder, root=root, metric=metric)
     overall = rows_of_study(study)

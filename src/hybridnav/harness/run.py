@@ -48,7 +48,14 @@ _PAIRS_PER_TASK = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
-    """What a run evaluates; see `evaluate`."""
+    """What a run evaluates; see `evaluate`.
+
+    Examples
+    --------
+    >>> from hybridnav.harness import RunSettings
+    >>> RunSettings(maps=("office.yaml",), presets=("shortest", "paper"), pairs=50).workers
+    1
+    """
 
     maps: tuple[str, ...]
     presets: tuple[str | Preset, ...] = ("shortest",)
@@ -77,7 +84,7 @@ class RunSettings:
 
 
 def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no_progress) -> int:
-    """Answer all pairs on all maps by all methods, and append the records to a folder.
+    r"""Answer all pairs on all maps by all methods, and append the records to a folder.
 
     A record that is there already is not made again, so a run that was killed goes on where it was.
     The baseline "grid-astar" is always among the methods: its lengths are the optimum.
@@ -102,6 +109,15 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
         When a setting is out of range, or the folder cannot be written.
     MapError, PresetError
         When a map, a scenario file or a preset cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.harness import RunSettings, evaluate
+    >>> _ = Path("hall.map").write_text("type octile\nheight 2\nwidth 3\nmap\n...\n.@.\n")
+    >>> settings = RunSettings(maps=("hall.map",), presets=("octile",), pairs=5)
+    >>> evaluate(settings, "run")
+    12
     """
     path = Path(folder)
     read_map.cache_clear()  # a file may have changed since the last run of this process

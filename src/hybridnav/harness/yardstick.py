@@ -36,6 +36,13 @@ class AnyAngleOptimum:
     grid
         The map. Without corner cutting: an any-angle path never passes between two blocked cells
         that meet at a corner.
+
+    Examples
+    --------
+    >>> from hybridnav.harness import AnyAngleOptimum
+    >>> optimum = AnyAngleOptimum(hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0))
+    >>> optimum.length_m((0, 0), (0, 3))
+    3.0
     """
 
     def __init__(self, grid: OccupancyGrid) -> None:
