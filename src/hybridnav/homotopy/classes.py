@@ -94,6 +94,17 @@ class HomotopyClasses:
     ------
     InvalidValueError
         When the area is negative or not a number.
+
+    Examples
+    --------
+    >>> from hybridnav.homotopy import HomotopyClasses
+    >>> probability = np.zeros((3, 3))
+    >>> probability[1, 1] = 1.0
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
+    >>> classes = HomotopyClasses(hn.TopologicalMap(pyramid))
+    >>> ring = [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 1), (2, 0), (1, 0), (0, 0)]
+    >>> classes.word_of_path(np.array(ring))
+    (-1,)
     """
 
     def __init__(

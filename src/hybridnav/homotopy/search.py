@@ -69,6 +69,16 @@ def alternative_search(
     -------
     AlternativeSearch
         The same object for the same arguments.
+
+    Examples
+    --------
+    >>> from hybridnav.homotopy import alternative_search
+    >>> probability = np.zeros((5, 5))
+    >>> probability[1:4, 1:4] = 1.0
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
+    >>> paths = alternative_search(hn.TopologicalMap(pyramid)).paths((0, 0), (4, 4), 3)
+    >>> [path.length_cells for path in paths.paths]
+    [8.0, 8.0]
     """
     kept = _KEPT.setdefault(topology, {})
     asked = bool(allow_unexplored), float(least_hole_m2)
@@ -111,6 +121,16 @@ class AlternativeSearch:
     InvalidValueError
         When the area is negative, or the grid allows corner cutting: a path between two blocked
         cells that meet at a corner goes through a hole.
+
+    Examples
+    --------
+    >>> from hybridnav.homotopy import AlternativeSearch
+    >>> probability = np.zeros((5, 5))
+    >>> probability[2, 2] = 1.0
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
+    >>> paths = AlternativeSearch(hn.TopologicalMap(pyramid)).paths((0, 0), (4, 4), 3)
+    >>> len(paths.paths), paths.complete
+    (2, True)
     """
 
     def __init__(
