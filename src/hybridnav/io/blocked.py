@@ -65,6 +65,14 @@ def load_blocked(path: PathLike, grid: OccupancyGrid) -> Blocked:
     MapError
         When the file cannot be read, closes nothing, an area closes no cell of the map, or a mask
         is not of the map's size.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> line = '{"type": "LineString", "coordinates": [[1.0, 0.0], [1.0, 2.0]]}'
+    >>> _ = Path("closed.geojson").write_text(line)
+    >>> hn.load_blocked("closed.geojson", hn.example_map("figure1")).polygons
+    (<LINESTRING (1 0, 1 2)>,)
     """
     if Path(path).suffix.lower() in _GEOJSON:
         return _areas(path, grid)

@@ -37,6 +37,13 @@ def example_map(name: str = "office", *, robot_radius_m: float | None = None) ->
     ------
     InvalidValueError
         When there is no such map, or the radius is negative or not finite.
+
+    Examples
+    --------
+    >>> hn.example_map("office").shape
+    (580, 960)
+    >>> hn.example_map("figure1").class_counts()
+    {'free': 330, 'unexplored': 341, 'occupied': 205, 'blocked': 324}
     """
     make = _WORLDS.get(name)
     if make is None:

@@ -65,6 +65,17 @@ def load_map(
     -----
     MapWarning
         When the thresholds of a ROS map call grey 205, the usual mark of unknown cells, free.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> _ = Path("tiny.pgm").write_bytes(b"P5 3 1 255 " + bytes([254, 205, 0]))
+    >>> _ = Path("tiny.yaml").write_text(
+    ...     "{image: tiny.pgm, resolution: 0.1, origin: [0, 0, 0], negate: 0, "
+    ...     "free_thresh: 0.196, occupied_thresh: 0.65}"
+    ... )
+    >>> hn.load_map("tiny.yaml", robot_radius_m=0).classes
+    array([[1, 2, 0]], dtype=uint8)
     """
     suffix = Path(path).suffix.lower()
     if suffix == MODEL_SUFFIX:

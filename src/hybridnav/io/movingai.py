@@ -63,7 +63,7 @@ def load_movingai_map(
     occupied_threshold: float | None = None,
     max_cells: int = DEFAULT_MAX_CELLS,
 ) -> OccupancyGrid:
-    """Load an octile map: cells of 1 m, the lower-left corner at (0, 0).
+    r"""Load an octile map: cells of 1 m, the lower-left corner at (0, 0).
 
     Parameters
     ----------
@@ -91,6 +91,14 @@ def load_movingai_map(
         When the file is no such map, or holds too many cells; the text names the line.
     InvalidValueError
         When the radius, a threshold or the limit is out of range.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.io import load_movingai_map
+    >>> _ = Path("tiny.map").write_text("type octile\nheight 1\nwidth 3\nmap\n.@.\n")
+    >>> load_movingai_map("tiny.map").classes
+    array([[1, 0, 1]], dtype=uint8)
     """
     check_max_cells(max_cells)
     where = f"map {printable(path)}"
@@ -173,7 +181,7 @@ def _misfit(body: bytes, shape: tuple[int, int], first_line: int) -> str:
 
 
 def read_scenarios(path: PathLike) -> list[Scenario]:
-    """Read a scenario file.
+    r"""Read a scenario file.
 
     Parameters
     ----------
@@ -191,6 +199,14 @@ def read_scenarios(path: PathLike) -> list[Scenario]:
         When the file is not there.
     MapError
         When the file is no such file; the text names the line.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.io import read_scenarios
+    >>> _ = Path("tiny.scen").write_text("version 1\n0 tiny.map 3 1 0 0 2 0 2.0\n")
+    >>> read_scenarios("tiny.scen")[0].goal
+    (0, 2)
     """
     where = f"scenarios {printable(path)}"
     with open_file(path, what="scenarios", error=MapError, missing=MapNotFoundError) as stream:

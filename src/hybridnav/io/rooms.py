@@ -53,7 +53,7 @@ class _Read:
 
 
 def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
-    """Read the rooms of a map.
+    r"""Read the rooms of a map.
 
     Parameters
     ----------
@@ -83,6 +83,16 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         When one of them cannot be read; a room has no name or the name of another one, leaves the
         map, overlaps another or has no free cell; a named point lies outside the map or in an
         obstacle; or the number of a door is invalid or occurs twice.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> square = "[[0, 0], [2, 0], [2, 2], [0, 2]]"
+    >>> _ = Path("rooms.yaml").write_text(f"rooms:\n- name: kitchen\n  polygon: {square}\n")
+    >>> grid = hn.OccupancyGrid(np.zeros((2, 4)), robot_radius_m=0)
+    >>> hn.load_rooms("rooms.yaml", grid).label_of
+    array([[ 0,  0, -1, -1],
+           [ 0,  0, -1, -1]], dtype=int32)
     """
     values = read_yaml(
         path, what="rooms", error=RoomsError, missing=RoomsNotFoundError, limits=LIMITS

@@ -52,6 +52,14 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     RoomsError
         When the file cannot be written, or could not be read again: a room has no free cell, a
         named point lies outside the map or in an obstacle, or there are too many rooms.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+    >>> rooms = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> hn.save_rooms("rooms.yaml", rooms, grid)
+    >>> hn.load_rooms("rooms.yaml", grid).names
+    ('kitchen', 'hall')
     """
     where = f"rooms {printable(path)}"
     check_rooms(rooms.names, rooms.label_of, where, grid)

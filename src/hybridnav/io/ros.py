@@ -77,6 +77,18 @@ def load_ros_map(
     -----
     MapWarning
         When the thresholds call grey 205, the usual mark of unknown cells, free.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.io import load_ros_map
+    >>> _ = Path("tiny.pgm").write_bytes(b"P5 3 1 255 " + bytes([254, 205, 0]))
+    >>> _ = Path("tiny.yaml").write_text(
+    ...     "{image: tiny.pgm, resolution: 0.1, origin: [0, 0, 0], negate: 0, "
+    ...     "free_thresh: 0.196, occupied_thresh: 0.65}"
+    ... )
+    >>> load_ros_map("tiny.yaml").frame.resolution_m
+    0.1
     """
     check_max_cells(max_cells)
     description = _read_description(Path(path), free_threshold, occupied_threshold)

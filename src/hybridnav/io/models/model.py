@@ -49,6 +49,13 @@ class Model:
         When the parts are not those of one map.
     MapError
         When the map has more cells.
+
+    Examples
+    --------
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> hn.save(hn.TopologicalMap(pyramid), "figure1.hnm")
+    >>> hn.load("figure1.hnm")
+    Model(grid, pyramid)
     """
 
     def __init__(

@@ -48,6 +48,12 @@ def save(
         When the path has another ending, or the planners are not on one topological map.
     ModelError
         When the file cannot be written.
+
+    Examples
+    --------
+    >>> hn.save(hn.example_map("figure1"), "figure1.hnm")
+    >>> hn.load("figure1.hnm").grid.shape
+    (30, 40)
     """
     if not is_model(path):
         raise InvalidValueError(
