@@ -105,6 +105,14 @@ def build_jump_graph(free: BoolArray) -> JumpGraph:
     D. Harabor, T. Uras, P. Stuckey, S. Koenig: Regarding jump point search and subgoal graphs,
     2019. T. Uras, S. Koenig, C. Hernández: Subgoal graphs for optimal pathfinding in eight-neighbor
     grids, 2013 (arcs where no other corner cell lies between).
+
+    Examples
+    --------
+    >>> from hybridnav.jumps import build_jump_graph
+    >>> free = np.ones((4, 6), dtype=bool)
+    >>> free[1:3, 2:4] = False
+    >>> build_jump_graph(free).n_corners
+    4
     """
     rows, cols = (np.flatnonzero(free.any(axis=axis)) for axis in (1, 0))
     low = (int(rows[0]), int(cols[0])) if len(rows) else (0, 0)
@@ -144,6 +152,14 @@ def contract_graph(graph: JumpGraph) -> JumpGraph:
     -----
     R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies: faster and simpler
     hierarchical routing in road networks, 2008.
+
+    Examples
+    --------
+    >>> from hybridnav.jumps import build_jump_graph, contract_graph
+    >>> free = np.ones((4, 6), dtype=bool)
+    >>> free[1:3, 2:4] = False
+    >>> contract_graph(build_jump_graph(free)).is_contracted
+    True
     """
     kinds = (graph.places & (1 << KIND_BITS) - 1).astype(np.uint8)
     effort = _SETTLED, _MOST_LOOKED * len(graph.ahead)

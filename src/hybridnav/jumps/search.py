@@ -81,6 +81,13 @@ class JumpSearch:
     -----
     D. Harabor, T. Uras, P. Stuckey, S. Koenig: Regarding jump point search and subgoal graphs,
     2019.
+
+    Examples
+    --------
+    >>> from hybridnav.jumps import JumpSearch, build_jump_graph
+    >>> search = JumpSearch(build_jump_graph(np.ones((3, 4), dtype=bool)))
+    >>> search.path((0, 0), (2, 3)).length_cells
+    3.8284271247461903
     """
 
     def __init__(self, graph: JumpGraph) -> None:
