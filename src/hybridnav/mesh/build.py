@@ -97,6 +97,14 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
     -----
     S. Hertel, K. Mehlhorn: Fast triangulation of simple polygons, 1983 (merging). J. Hopcroft,
     R. Tarjan: Algorithm 447, efficient algorithms for graph manipulation, 1973 (blocks).
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import build_mesh
+    >>> free = np.ones((4, 6), dtype=bool)
+    >>> free[1:3, 2:4] = False
+    >>> build_mesh(free).n_polygons
+    4
     """
     cells = np.ascontiguousarray(free)
     kinds = kinds_of(cells)

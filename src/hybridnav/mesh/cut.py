@@ -38,6 +38,14 @@ def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh
     ConvexMesh
         The polygons that were cut stay as walled-in ones, with -1 as their `component`; those in
         their place come last. `polygon_at` is that of `mesh`.
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import build_mesh, cut_mesh
+    >>> free = np.ones((3, 4), dtype=bool)
+    >>> mesh = build_mesh(free)
+    >>> cut_mesh(mesh, free, np.array([5])).n_polygons
+    2
     """
     closed = closed[mesh.polygon_at.ravel()[closed] >= 0]
     if not len(closed):

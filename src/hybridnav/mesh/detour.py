@@ -49,6 +49,18 @@ class DetourSearch:
         The search of the map with these cells open.
     flat
         int64 (m,), the closed cells, sorted, each once.
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import DetourSearch, MeshSearch, build_mesh
+    >>> search = MeshSearch(build_mesh(np.ones((3, 5), dtype=bool)))
+    >>> closed = np.array([2, 7])  # flat cells
+    >>> detour = DetourSearch(search, closed)
+    >>> detour.path(((0, 0), (0, 4)), ((0.5, 0.5), (0.5, 4.5))).positions
+    array([[0.5, 0.5],
+           [2. , 2. ],
+           [2. , 3. ],
+           [0.5, 4.5]])
     """
 
     def __init__(self, search: MeshSearch, flat: LongArray) -> None:

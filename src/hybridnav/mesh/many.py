@@ -71,6 +71,14 @@ def shortest_paths(
     -------
     MeshPaths
         The paths in the order of the pairs.
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import MeshSearch, build_mesh, shortest_paths
+    >>> search = MeshSearch(build_mesh(np.ones((3, 4), dtype=bool)))
+    >>> starts, goals = np.array([[0, 0], [0, 0]]), np.array([[0, 3], [2, 0]])
+    >>> shortest_paths(search, (starts, goals), (starts + 0.5, goals + 0.5)).length_cells
+    array([3., 2.])
     """
     where = np.concatenate(cells, axis=1)
     ends = np.concatenate([rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1)

@@ -160,6 +160,13 @@ class MeshSearch:
     -----
     M. L. Cui, D. D. Harabor, A. Grastien: Compromise-free pathfinding on a navigation mesh, 2017
     (Polyanya).
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import MeshSearch, build_mesh
+    >>> search = MeshSearch(build_mesh(np.ones((3, 4), dtype=bool)))
+    >>> search.path(((0, 0), (2, 3)), ((0.5, 0.5), (2.5, 3.5))).length_cells
+    3.605551275463989
     """
 
     def __init__(self, mesh: ConvexMesh) -> None:

@@ -62,6 +62,14 @@ def trace_search(
     -------
     SearchTrace
         Without intervals if start and goal lie in one polygon or are not connected.
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import build_mesh, trace_search
+    >>> free = np.array([[True, False, True], [True, True, True]])
+    >>> trace = trace_search(build_mesh(free), ((0, 0), (0, 2)), ((0.5, 0.5), (0.5, 2.5)))
+    >>> len(trace.intervals), round(trace.path.length_cells, 3)
+    (2, 2.414)
     """
     ends = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
     path, whole, real = _nodes(mesh, cells, positions)
