@@ -60,6 +60,13 @@ class VisibilityGraph:
     -----
     T. Lozano-Perez, M. A. Wesley: An algorithm for planning collision-free paths among polyhedral
     obstacles, 1979.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import VisibilityGraph
+    >>> graph = VisibilityGraph(hn.OccupancyGrid(np.zeros((3, 4)), robot_radius_m=0))
+    >>> graph.shortest((0, 0), (2, 0)).length_m
+    2.0
     """
 
     def __init__(

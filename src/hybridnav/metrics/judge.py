@@ -80,6 +80,13 @@ def judge_path(
     ------
     InvalidValueError
         When the cells are no integer array of shape (n, 2).
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import judge_path
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 0.0], [0.0, 1.0]]), robot_radius_m=0)
+    >>> judge_path(grid, [(0, 1), (1, 0)], start=(0, 1), goal=(1, 0)).faults
+    ('the step from (0, 1) to (1, 0) cuts a corner',)
     """
     path = _checked_cells(cells)
     if not len(path):
@@ -146,6 +153,13 @@ def segment_faults(
     ------
     InvalidValueError
         When the points are no finite array of shape (n, 2) or there is none.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import segment_faults
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 1.0, 0.0]]), robot_radius_m=0)
+    >>> segment_faults(grid, [(0.5, 0.5), (2.5, 0.5)])
+    ('the segment from (0.500, 0.500) to (2.500, 0.500) m enters a blocked cell',)
     """
     xy = checked_points(points)
     positions = grid_positions(grid.frame, xy)

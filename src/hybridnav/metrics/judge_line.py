@@ -59,6 +59,13 @@ def judge_line(
     ------
     InvalidValueError
         When the points are no finite array of shape (n, 2) or there is none.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import judge_line
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 3)), robot_radius_m=0)
+    >>> judge_line(grid, [(0.5, 0.5), (2.5, 0.5)], start=(0, 0), goal=(0, 2)).ok
+    True
     """
     xy = checked_points(points)
     steps = np.diff(xy, axis=0)
@@ -94,6 +101,16 @@ def line_cells(
     ------
     InvalidValueError
         When the points are no finite array of shape (n, 2) or there is none.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import line_cells
+    >>> grid = hn.OccupancyGrid(np.zeros((2, 3)), robot_radius_m=0)
+    >>> line_cells(grid, [(0.5, 0.5), (2.5, 1.5)])
+    array([[0, 0],
+           [0, 1],
+           [1, 1],
+           [1, 2]])
     """
     positions = grid_positions(grid.frame, checked_points(points))
     free = free_classes(allow_unexplored=allow_unexplored)[grid.classes]

@@ -32,6 +32,14 @@ class ScipyOptimum:
         The map.
     allow_unexplored
         Whether unexplored cells may be entered.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import ScipyOptimum
+    >>> optimum = ScipyOptimum(hn.OccupancyGrid(np.zeros((2, 3)), robot_radius_m=0))
+    >>> optimum.lengths_from((0, 0)).round(3)
+    array([[0.   , 1.   , 2.   ],
+           [1.   , 1.414, 2.414]])
     """
 
     def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:

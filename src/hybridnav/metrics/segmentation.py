@@ -56,6 +56,12 @@ def compare_rooms(true: AnyArray, found: AnyArray) -> RoomAgreement:
     ------
     InvalidValueError
         When the shapes differ or there are no cells.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import compare_rooms
+    >>> compare_rooms(np.array([0, 0, 0, 1]), np.array([5, 5, 6, 6])).partners
+    array([5, 6])
     """
     if true.shape != found.shape or true.ndim != 1 or len(true) == 0:
         raise InvalidValueError(

@@ -94,6 +94,12 @@ def summarise(losses: ArrayLike, *, seed: int = 0, resamples: int = 2000) -> Sum
     Notes
     -----
     Percentile bootstrap: B. Efron: Bootstrap methods: another look at the jackknife, 1979.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import summarise
+    >>> summarise([0.0, 0.0, 0.04]).median
+    0.0
     """
     values = np.asarray(losses, dtype=np.float64).ravel()
     if not np.isfinite(values).all():
@@ -149,6 +155,12 @@ def paired_difference(
     Notes
     -----
     F. Wilcoxon: Individual comparisons by ranking methods, 1945.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import paired_difference
+    >>> paired_difference([1.0, 2.0, 3.0], [1.5, 2.5, 3.5]).mean
+    -0.5
     """
     one, other = (np.asarray(values, dtype=np.float64) for values in (first, second))
     if one.shape != other.shape or one.ndim != 1:
@@ -194,6 +206,12 @@ def distance_buckets(optima_m: ArrayLike, *, edges: ArrayLike | None = None) -> 
     ------
     InvalidValueError
         When the edges are not increasing and finite, or there is none.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import distance_buckets
+    >>> distance_buckets([1.0, 2.0, 30.0], edges=[10.0]).indices
+    array([0, 0, 1])
     """
     lengths = np.asarray(optima_m, dtype=np.float64).ravel()
     known = np.isfinite(lengths)
@@ -232,6 +250,12 @@ def thrun_count(n_nodes: float, mean_plan_length: float) -> float:
     Notes
     -----
     S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, 1998.
+
+    Examples
+    --------
+    >>> from hybridnav.metrics import thrun_count
+    >>> thrun_count(200, 12.5)
+    2500.0
     """
     return float(n_nodes) * float(mean_plan_length)
 
