@@ -109,6 +109,7 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
 
     Examples
     --------
+    >>> from hybridnav.refine.curves import shortest_curve
     >>> round(shortest_curve((0, 0, 0), (0, 2, 3.14159265), radius_m=1, reverses=False).length_m, 6)
     3.141593
     """

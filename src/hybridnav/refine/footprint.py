@@ -38,6 +38,7 @@ class Footprint:
 
     Examples
     --------
+    >>> from hybridnav.refine.footprint import Footprint
     >>> Footprint([[0.3, 0.2], [0.3, -0.2], [-0.1, -0.2], [-0.1, 0.2]]).inscribed_radius_m
     0.1
     """

@@ -36,6 +36,17 @@ class GridRefiner:
         The map; its blocked and occupied cells are never entered.
     allow_unexplored
         Whether unexplored cells may be entered.
+
+    Examples
+    --------
+    >>> from hybridnav.refine import GridRefiner
+    >>> refiner = GridRefiner(hn.OccupancyGrid(np.zeros((2, 4)), robot_radius_m=0))
+    >>> cells, expanded = refiner.refine((0, 0), (1, 3), None)
+    >>> cells
+    array([[0, 0],
+           [1, 1],
+           [1, 2],
+           [1, 3]])
     """
 
     def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:

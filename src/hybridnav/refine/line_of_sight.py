@@ -44,6 +44,15 @@ class LineOfSight:
         Whether unexplored cells may be entered.
     closed
         int64 (n,), flat cells that may not be entered either; None for none.
+
+    Examples
+    --------
+    >>> from hybridnav.refine import LineOfSight
+    >>> sight = LineOfSight(hn.OccupancyGrid(np.zeros((2, 4)), robot_radius_m=0))
+    >>> cells = np.array([[0, 0], [0, 1], [0, 2], [1, 3]])
+    >>> sight.shorten(cells, np.array([0.5, 0.5]), np.array([3.5, 1.5]))
+    array([[0.5, 0.5],
+           [3.5, 1.5]])
     """
 
     def __init__(

@@ -62,6 +62,13 @@ class MotionCheck:
         When `inside` does not have the shape of the map, a closed cell lies outside it, or the
         footprint is refused, reaches more than 5000 cells, or is narrower than the inflation of the
         map.
+
+    Examples
+    --------
+    >>> from hybridnav.refine import MotionCheck
+    >>> check = MotionCheck(hn.OccupancyGrid(np.array([[0.0, 1.0, 0.0]]), robot_radius_m=0))
+    >>> check.state_valid(0.5, 0.5), check.motion_valid(0.5, 0.5, 2.5, 0.5)
+    (True, False)
     """
 
     def __init__(
