@@ -136,6 +136,12 @@ def load(
         When a map cannot be read, or has more than `max_cells`.
     InvalidValueError
         When the radius, a threshold or the limit is out of range.
+
+    Examples
+    --------
+    >>> hn.save(hn.example_map("figure1"), "figure1.hnm")
+    >>> hn.load("figure1.hnm").grid.name
+    'figure1'
     """
     from hybridnav.io.models import Model, is_model, open_model  # noqa: PLC0415 - loads numba
 

@@ -37,6 +37,14 @@ class MaxDistanceSearch:
         The map to search; both attributes are computed here, once.
     allow_unexplored
         Whether unexplored places may be passed.
+
+    Examples
+    --------
+    >>> from hybridnav.route import MaxDistanceSearch
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
+    >>> topology = hn.TopologicalMap(pyramid)
+    >>> MaxDistanceSearch(topology).search(0, topology.n_places - 1).places
+    array([0, 1, 2, 3, 4, 5, 6])
     """
 
     def __init__(self, topology: TopologicalMap, *, allow_unexplored: bool = False) -> None:

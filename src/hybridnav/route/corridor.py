@@ -48,6 +48,13 @@ def corridor_of(
     -------
     Corridor
         The places, and the number of their cells.
+
+    Examples
+    --------
+    >>> from hybridnav.route import corridor_of
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
+    >>> corridor_of(hn.TopologicalMap(pyramid), np.array([0, 1])).n_cells
+    10
     """
     inside = np.zeros(topology.n_places, dtype=np.bool_)
     inside[places] = True

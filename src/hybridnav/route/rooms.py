@@ -37,6 +37,15 @@ class RoomSearch:
         The room level.
     allow_unexplored
         Whether unexplored parts may be passed.
+
+    Examples
+    --------
+    >>> from hybridnav.route import RoomSearch
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+    >>> labels = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    >>> RoomSearch(topology.rooms).search("kitchen", "hall").rooms
+    ('kitchen', 'hall')
     """
 
     def __init__(self, rooms: Rooms, *, allow_unexplored: bool = False) -> None:

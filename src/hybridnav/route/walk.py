@@ -25,6 +25,14 @@ class Walks:
     ----------
     topology
         The map, or its rooms; where its arcs cross is computed at the first path.
+
+    Examples
+    --------
+    >>> from hybridnav.route import Walks
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
+    >>> walks = Walks(hn.TopologicalMap(pyramid))
+    >>> walks.of(np.array([[0, col] for col in range(30)]))
+    ([0, 1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
     """
 
     def __init__(self, topology: TopologicalMap | Rooms) -> None:
