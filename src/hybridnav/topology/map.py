@@ -49,6 +49,15 @@ class TopologicalMap:
     ----------
     pyramid
         The pyramid that holds the places: at its apex, or below its rooms.
+
+    Examples
+    --------
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> topology = hn.TopologicalMap(pyramid)
+    >>> topology.n_places, topology.n_arcs
+    (10, 15)
+    >>> topology.place_at((5, 13))
+    0
     """
 
     def __init__(self, pyramid: DualGraphPyramid) -> None:

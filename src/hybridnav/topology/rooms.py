@@ -22,7 +22,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Door:
-    """A connected boundary between two rooms on the map as measured, the same for every robot."""
+    """A connected boundary between two rooms on the map as measured, the same for every robot.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+    >>> labels = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    >>> door = topology.rooms.doors[0]
+    >>> door.number, door.rooms, door.position
+    (1, ('kitchen', 'hall'), (2.0, 0.5))
+    """
 
     number: int
     """From 1; what people are told. A file of rooms keeps it."""
@@ -64,6 +74,14 @@ class Rooms:
     ------
     InvalidValueError
         When it has none.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+    >>> labels = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    >>> topology.rooms.names
+    ('kitchen', 'hall')
     """
 
     def __init__(self, pyramid: DualGraphPyramid) -> None:

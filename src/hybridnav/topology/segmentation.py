@@ -76,6 +76,11 @@ def find_rooms(
     ------
     InvalidValueError
         When the method is not known, the area out of range, or there are too many rooms.
+
+    Examples
+    --------
+    >>> hn.find_rooms(hn.example_map("figure1")).names
+    ('room-1',)
     """
     if method not in get_args(Segmentation):
         raise InvalidValueError(
