@@ -93,6 +93,12 @@ def method_styles(names: Iterable[str]) -> dict[str, MethodStyle]:
     -------
     dict
         By name. No two of the first 35 styles share colour and dashes, or colour and marker.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import method_styles
+    >>> list(method_styles(["shortest", "paper"]))
+    ['shortest', 'paper']
     """
     return {
         name: MethodStyle(
@@ -140,6 +146,12 @@ def plot_losses(
     ------
     InvalidValueError
         When there is no method, or one has no finite loss.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_losses
+    >>> plot_losses({"paper": [0.0, 0.1, 0.3]}, title="losses").get_title()
+    'losses'
     """
     known = {name: _known(name, values) for name, values in losses.items()}
     ax, sizes = _opened(ax, width_in, known, title)
@@ -206,6 +218,12 @@ def plot_speed(  # noqa: PLR0913 - all but two have defaults
     ------
     InvalidValueError
         When there is no method, or one has no finite loss or no finite time above 0.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_speed
+    >>> plot_speed({"paper": [0.0, 0.1]}, {"paper": 0.5}, title="speed").get_title()
+    'speed'
     """
     means = {name: float(_known(name, values).mean()) for name, values in losses.items()}
     for name in means:

@@ -65,6 +65,13 @@ def plot_dual(
     ------
     InvalidValueError
         When the level has more than 20,000 vertices.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_dual
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"))
+    >>> plot_dual(hn.TopologicalMap(pyramid), title="graph and dual").get_title()
+    'graph and dual'
     """
     level = drawable(places)
     canvas = Canvas.opened(ax, width_in, known_view(level.grid))

@@ -72,6 +72,13 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
         When there is no such level, or none above it.
     InvalidValueError
         When the level has more than 20,000 vertices.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_kernels
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> plot_kernels(pyramid, 2, title="level 2 to 3").get_title()
+    'level 2 to 3'
     """
     lower = drawable(pyramid[level])
     upper = pyramid[lower.index + 1]

@@ -68,6 +68,13 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
         When there is no such level.
     InvalidValueError
         When there are no levels or no columns, or not as many axes as levels.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_levels
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> len(plot_levels(pyramid, [0, 2, 4]))
+    3
     """
     chosen = [pyramid[index] for index in (range(len(pyramid)) if levels is None else levels)]
     if not chosen or columns < 1:

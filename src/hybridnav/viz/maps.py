@@ -52,6 +52,13 @@ def plot_map(
     -------
     Axes
         The axes drawn on; `axes.figure` is the figure.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_map
+    >>> ax = plot_map(hn.example_map("figure1"), title="Figure 1")
+    >>> ax.get_title()
+    'Figure 1'
     """
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     # Occupied and blocked cells have their own colours: only two classes are looked up.
@@ -102,6 +109,13 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
     -------
     Axes
         The axes drawn on; `axes.figure` is the figure.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_places
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> plot_places(hn.TopologicalMap(pyramid), title="places").get_title()
+    'places'
     """
     level = places.level if isinstance(places, TopologicalMap) else places
     grid, drawn = level.grid, Places(level)
@@ -140,6 +154,13 @@ def plot_level(
     -------
     Axes
         The axes drawn on; `axes.figure` is the figure.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_level
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> plot_level(pyramid[3]).get_aspect()
+    1.0
     """
     sizes = f"{level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
     title = f"{level.grid.name}, level {level.index}: {sizes}"

@@ -67,6 +67,12 @@ def plot_mesh(
     ------
     InvalidValueError
         When the mesh belongs to a map of another size.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_mesh
+    >>> plot_mesh(hn.example_map("figure1"), title="mesh").get_title()
+    'mesh'
     """
     mesh = build_mesh(grid.classes == CellClass.FREE) if mesh is None else mesh
     check_mesh(grid, mesh)

@@ -69,6 +69,13 @@ def plot_figure1(
     ------
     InvalidValueError
         When the level has more than 20,000 vertices, or there are not four axes.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_figure1
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"))
+    >>> len(plot_figure1(hn.TopologicalMap(pyramid)))
+    4
     """
     level = drawable(places)
     if axes is None:

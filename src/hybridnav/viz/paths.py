@@ -69,6 +69,12 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
     ------
     InvalidValueError
         When points are not finite pairs.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_paths
+    >>> plot_paths(hn.example_map("figure1"), [(0.5, 0.5), (2.0, 2.5)], title="path").get_title()
+    'path'
     """
     lines = [_checked(path), _checked([] if shortest is None else shortest)]
     points = np.concatenate(lines)

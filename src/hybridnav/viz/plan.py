@@ -75,6 +75,14 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     ------
     InvalidValueError
         When start, goal or optimum is not finite or the optimum is negative.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_plan
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> result = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5))
+    >>> plot_plan(topology, result, title="plan").get_title()
+    'plan'
     """
     if optimum_m is not None and not (math.isfinite(optimum_m) and optimum_m >= 0):
         raise InvalidValueError(f"optimum must be a length in metres >= 0, got {optimum_m}")

@@ -73,6 +73,14 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     InvalidValueError
         When labels come without their map or with one of another shape, or a topological map has
         no rooms.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_rooms
+    >>> grid = hn.OccupancyGrid(np.zeros((4, 8)), robot_radius_m=0)
+    >>> rooms = hn.RoomLabels(("kitchen",), np.zeros((4, 8), dtype=int))
+    >>> plot_rooms(rooms, grid, title="rooms").get_title()
+    'rooms'
     """
     view, labels, grid = _view_of(rooms, grid)
     canvas = Canvas.opened(ax, width_in, known_view(grid))

@@ -47,6 +47,11 @@ def save_figure(picture: Axes | Figure, path: PathLike, *, dpi: float = 200) -> 
     ------
     InvalidValueError
         When the suffix is unknown, the file cannot be written or the dpi are out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_map, save_figure
+    >>> save_figure(plot_map(hn.example_map("figure1")), "figure1.png")
     """
     file = Path(path)
     suffix = file.suffix.lower()

@@ -72,6 +72,17 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     ------
     InvalidValueError
         When the corridor or the mesh has another shape than the grid.
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import build_mesh, trace_search
+    >>> from hybridnav.viz import plot_search
+    >>> grid = hn.example_map("figure1")
+    >>> ends = (5, 5), (25, 20)
+    >>> centres = tuple((row + 0.5, col + 0.5) for row, col in ends)
+    >>> trace = trace_search(build_mesh(grid.enterable()), ends, centres)
+    >>> plot_search(grid, trace, title="search").get_title()
+    'search'
     """
     if corridor is not None:
         corridor = np.asarray(corridor, dtype=np.bool_)

@@ -153,6 +153,13 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     ------
     InvalidValueError
         When the level has more than 20,000 vertices.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_topology
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"))
+    >>> plot_topology(hn.TopologicalMap(pyramid), title="graph").get_title()
+    'graph'
     """
     level = drawable(places)
     canvas = Canvas.opened(ax, width_in, known_view(level.grid))

@@ -79,6 +79,14 @@ def plot_tour(
     -------
     Axes
         The axes drawn on; `axes.figure` is the figure.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_tour
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> tour = hn.plan_tour(hn.HybridPlanner(topology), [(0.5, 0.5), (2.0, 2.5), (0.5, 0.5)])
+    >>> plot_tour(topology, tour, title="tour").get_title()
+    'tour'
     """
     told = f"{tour.length_m:.1f} m" if tour.solved else str(tour.status)
     paths = [result.path.points for result in tour.results if result.path is not None]
@@ -135,6 +143,14 @@ def plot_alternatives(
     -------
     Axes
         The axes drawn on; `axes.figure` is the figure.
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_alternatives
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> found = hn.plan_alternatives(hn.HybridPlanner(topology), (0.5, 0.5), (2.0, 2.5), 2)
+    >>> plot_alternatives(topology, found, title="alternatives").get_title()
+    'alternatives'
     """
     paths = [alternative.path for alternative in alternatives]
     canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
