@@ -37,7 +37,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, order=True)
 class LevelArc:
-    """An arc together with its level: at another level, the same index is another arc."""
+    """An arc together with its level: at another level, the same index is another arc.
+
+    Examples
+    --------
+    >>> hn.LevelArc(0, 7)
+    LevelArc(level=0, index=7)
+    """
 
     level: int
     """Index of the level in its pyramid."""
@@ -52,6 +58,13 @@ class Level:
     Vertices are numbered in the order of their surviving cells, arcs in the order of the base edges
     that represent them. Everything is computed on first use and then kept; arrays are not
     writeable.
+
+    Examples
+    --------
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> level = pyramid[-1]
+    >>> level.n_vertices, level.n_arcs, level.areas
+    (10, 15, array([ 76,  61,  47, 124,  61,  45,  99,  56,  39,  63]))
     """
 
     def __init__(

@@ -40,6 +40,14 @@ class Resistance:
     InvalidValueError
         When the clearance has another shape, is not finite or negative, or the share is not in
         that range.
+
+    Examples
+    --------
+    >>> from hybridnav.pyramid import Resistance
+    >>> grid = hn.example_map("figure1")
+    >>> resistance = Resistance(np.ones(grid.shape), share=0.7)
+    >>> hn.DualGraphPyramid.build(grid, resistance=resistance)[-1].n_vertices
+    3
     """
 
     clearance: FloatArray
