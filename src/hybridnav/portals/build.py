@@ -152,6 +152,14 @@ def build_portals(  # noqa: PLR0913 - independent choices
         When they would take more than `max_bytes`.
     PathTooLongError
         When a path inside a field may be longer than 6,600 cells, or a field is not connected.
+
+    Examples
+    --------
+    >>> from hybridnav.portals import build_portals
+    >>> grid = hn.OccupancyGrid(np.zeros((2, 4)), robot_radius_m=0)
+    >>> portals = build_portals(grid, np.array([[0, 0, 1, 1], [0, 0, 1, 1]], dtype=np.int32))
+    >>> portals.n_fields, portals.n_gates
+    (2, 4)
     """
     spacings = spacing_cells, gate_spacing_cells
     if min(spacings) < 1 or spacing_cells % gate_spacing_cells:

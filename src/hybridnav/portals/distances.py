@@ -50,6 +50,14 @@ def build_tables(portals: Portals, options: PortalOptions = DEFAULT_OPTIONS) -> 
     -------
     Tables
         Rounded by as many bits as the longest way needs.
+
+    Examples
+    --------
+    >>> from hybridnav.portals import build_portals, build_tables
+    >>> grid = hn.OccupancyGrid(np.zeros((2, 4)), robot_radius_m=0)
+    >>> portals = build_portals(grid, np.array([[0, 0, 1, 1], [0, 0, 1, 1]], dtype=np.int32))
+    >>> build_tables(portals).distance.shape
+    (2, 4)
     """
     source_at = np.full(portals.n_gates, -1, dtype=np.int32)
     source_at[portals.source_gate] = np.arange(len(portals.source_gate))

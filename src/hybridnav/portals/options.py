@@ -46,6 +46,7 @@ class PortalOptions:
 
     Examples
     --------
+    >>> from hybridnav.portals import PortalOptions
     >>> PortalOptions(all_gates_levels=0, sparse_spacings_cells=(32,)).spacing_cells
     16
     """

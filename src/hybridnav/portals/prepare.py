@@ -72,6 +72,13 @@ def prepare_portals(
     ------
     InvalidValueError
         When no level of the map has portals within the limits.
+
+    Examples
+    --------
+    >>> from hybridnav.portals import prepare_portals
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> prepare_portals(topology).has_all_gates
+    True
     """
     enterable = topology.grid.enterable(allow_unexplored=allow_unexplored)
     field_of, portals, has_all_gates = _first_that_fits(

@@ -79,6 +79,16 @@ class PortalSearch:
         Searches inside fields, over cells that paths may use.
     frame
         Turns cells into points.
+
+    Examples
+    --------
+    >>> from hybridnav.portals import PortalSearch, prepare_portals
+    >>> from hybridnav.refine import GridRefiner
+    >>> grid = hn.example_map("figure1")
+    >>> built = prepare_portals(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    >>> search = PortalSearch(built, GridRefiner(grid).search, grid.frame)
+    >>> round(search.path((5, 5), (25, 20)).length_cells, 3)
+    27.385
     """
 
     def __init__(self, built: BuiltPortals, cell_search: GridSearch, frame: Frame) -> None:
