@@ -29,7 +29,18 @@ MOST = 20
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """A path and its class."""
+    """A path and its class.
+
+    Examples
+    --------
+    >>> probability = np.zeros((5, 5))
+    >>> probability[1:4, 1:4] = 1.0
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
+    >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid))
+    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3)
+    >>> found[0].word == found[1].word
+    False
+    """
 
     path: Path
     word: Word
@@ -38,7 +49,18 @@ class Alternative:
 
 @dataclass(frozen=True, eq=False)
 class Alternatives(Sequence[Alternative]):
-    """Paths of different classes, the shortest first, and whether they are complete."""
+    """Paths of different classes, the shortest first, and whether they are complete.
+
+    Examples
+    --------
+    >>> probability = np.zeros((5, 5))
+    >>> probability[1:4, 1:4] = 1.0
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
+    >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid))
+    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3)
+    >>> len(found), found.complete
+    (2, True)
+    """
 
     found: tuple[Alternative, ...]
     """The paths; none if no path exists."""
@@ -113,6 +135,16 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
     InvalidValueError
         When the count or the area is out of range, an end is not valid, a closed item is not on the
         map, the planner refines with OMPL, or its grid allows corner cutting.
+
+    Examples
+    --------
+    >>> probability = np.zeros((5, 5))
+    >>> probability[1:4, 1:4] = 1.0
+    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
+    >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid))
+    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3)
+    >>> [one.path.length_m for one in found]
+    [8.0, 8.0]
     """
     wanted = _checked(count)
     if planner.preset.planner.refine == "ompl":

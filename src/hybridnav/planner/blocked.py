@@ -66,6 +66,12 @@ class Blocked:
     InvalidValueError
         When ids are not integers, cells are not integers of shape (n, 2), names are not text, or an
         area has fewer than three points, is not finite, intersects itself or is of another kind.
+
+    Examples
+    --------
+    >>> closed = hn.Blocked(cells=[(0, 2)]) | hn.Blocked(places=[3])
+    >>> closed.cells, closed.places
+    (array([[0, 2]]), (3,))
     """
 
     arcs: Sequence[int | LevelArc] = ()

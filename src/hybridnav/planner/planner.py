@@ -60,6 +60,14 @@ class HybridPlanner:
         When the preset does not exist or is not valid, or names a refiner that cannot be used.
     InvalidValueError
         When the map has the default radius, not chosen by the caller, and the preset names another.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> planner = hn.HybridPlanner(topology, preset="shortest")
+    >>> result = planner.plan((0.5, 0.5), (2.0, 2.5))
+    >>> print(result.status, round(result.cost, 3), result.gap)
+    solved 2.546 0.0
     """
 
     def __init__(

@@ -34,7 +34,15 @@ _COUNTS = (
 
 @dataclass(frozen=True, eq=False)
 class Tour:
-    """A tour through stops: a plan between each two, and the legs of all plans."""
+    """A tour through stops: a plan between each two, and the legs of all plans.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> stops = [(0.5, 0.5), (1.5, 0.5), (0.5, 0.5)]
+    >>> round(hn.plan_tour(hn.HybridPlanner(topology), stops).length_m, 3)
+    2.0
+    """
 
     results: tuple[PlanResult, ...]
     """Plans from stop to stop, up to the first that is not solved."""
@@ -199,6 +207,14 @@ def plan_tour(
     InvalidValueError
         When there are fewer than two stops, a name is not known, a point is not two finite numbers,
         or a closed item is not on the map.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> stops = [(0.5, 0.5), (2.0, 2.5), (0.5, 0.5)]
+    >>> tour = hn.plan_tour(hn.HybridPlanner(topology), stops)
+    >>> tour.solved, len(tour.results)
+    (True, 2)
     """
     if len(stops) < 2:  # noqa: PLR2004
         raise InvalidValueError(f"a way needs at least two stops, got {len(stops)}")
