@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,7 @@ def remember_portals(replace: Callable[[object, str, object], None]) -> None:
     replace(portals, "prepare_portals", shared_portals)
 
 
+@functools.wraps(prepare_portals)
 def shared_portals(topology: TopologicalMap, **choices: Any) -> BuiltPortals:
     """Return what `prepare_portals` returns, of large maps the same object each time."""
     if topology.grid.classes.size < LEAST_CELLS:

@@ -21,7 +21,14 @@ Metric = Literal["octile", "any-angle", "clearance-weighted", "dubins", "reeds-s
 
 
 class PlanStatus(StrEnum):
-    """Outcome of a plan, as a value, not an error."""
+    """Outcome of a plan, as a value, not an error.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> print(hn.HybridPlanner(topology).plan((-1.0, 0.0), (0.5, 0.5)).status)
+    start outside the map
+    """
 
     SOLVED = "solved"
     START_OUTSIDE = "start outside the map"
@@ -43,7 +50,21 @@ class PlanStatus(StrEnum):
 @dataclass(frozen=True, eq=False)
 class Path:
     """A path through the grid, between the centres of two cells, or at any angle between two
-    points."""
+    points.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> path = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5)).path
+    >>> path.points
+    array([[0.5, 0.5],
+           [1.3, 1.2],
+           [1.4, 1.4],
+           [1.6, 1.9],
+           [2. , 2.5]])
+    >>> len(path.poses(spacing_m=0.25))
+    13
+    """
 
     cells: LongArray
     """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A path
@@ -127,7 +148,15 @@ class Path:
 
 @dataclass(frozen=True)
 class Route:
-    """The topological answer: the places passed and the arcs between them."""
+    """The topological answer: the places passed and the arcs between them.
+
+    Examples
+    --------
+    >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+    >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid))
+    >>> planner.plan((0.5, 0.5), (2.0, 2.5)).route
+    Route(places=(2, 0, 5, 9), arcs=(0, 3, 11))
+    """
 
     places: tuple[int, ...]
     """Ids of the places, from that of the start to that of the goal."""
@@ -179,7 +208,16 @@ class PlanStats:
 
 @dataclass(frozen=True, eq=False)
 class PlanBatch:
-    """Outcomes of many queries, arrays of n."""
+    """Outcomes of many queries, arrays of n.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> planner = hn.HybridPlanner(topology)
+    >>> batch = planner.plan_many([(0.5, 0.5), (0.5, 0.5)], [(2.0, 2.5), (1.5, 0.5)])
+    >>> batch.cost.round(3)
+    array([2.546, 1.   ])
+    """
 
     status: AnyArray
     """str (n,), the values of `PlanStatus`."""
@@ -214,6 +252,13 @@ class PlanResult:
     """Outcome of one query; `path` and `route` are None unless it is solved.
 
     The path of an approximate result ends short of the goal.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> result = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5))
+    >>> result.solved, round(result.cost, 3), result.gap
+    (True, 2.546, 0.0)
     """
 
     status: PlanStatus

@@ -1,0 +1,129 @@
+"""The examples in docstrings run, print what they show, and no public name lacks one."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src" / "hybridnav"
+REFERENCE = ROOT / "docs" / "reference"
+_NAME = re.compile(r"^\.\. auto(?:class|function):: hybridnav\.([\w.]+)", re.MULTILINE)
+_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+_FINDER = doctest.DocTestFinder(recurse=False)
+
+RETURNED = {
+    "baselines.Method",
+    "combinatorial.CombinatorialMap",
+    "harness.Study",
+    "homotopy.ClassPath",
+    "homotopy.ClassPaths",
+    "io.Scenario",
+    "jumps.JumpGraph",
+    "jumps.JumpPath",
+    "jumps.JumpPaths",
+    "mesh.ConvexMesh",
+    "mesh.CornerGraph",
+    "mesh.CornerHierarchy",
+    "mesh.MeshPath",
+    "mesh.MeshPaths",
+    "mesh.SearchTrace",
+    "metrics.AnyAnglePath",
+    "metrics.Buckets",
+    "metrics.PairedDifference",
+    "metrics.RoomAgreement",
+    "metrics.Summary",
+    "metrics.Verdict",
+    "portals.BuiltPortals",
+    "portals.PortalAnswers",
+    "portals.Portals",
+    "portals.Tables",
+    "pyramid.DualGraph",
+    "pyramid.FaceKind",
+    "refine.Refiner",
+    "result.PlanStats",
+    "result.Refinement",
+    "route.CoarseRoute",
+    "route.Corridor",
+    "route.RoomRoute",
+    "topology.Component",
+    "topology.Obstacle",
+}
+"""Protocols, and results of functions whose examples show them."""
+
+
+def _thing(name: str) -> Any:
+    module, _, attribute = name.rpartition(".")
+    return getattr(importlib.import_module(f"hybridnav.{module}".rstrip(".")), attribute)
+
+
+def _names() -> Iterator[str]:
+    """Classes and functions of the reference, but for errors."""
+    for page in sorted(REFERENCE.glob("*.md")):
+        for name in _NAME.findall(page.read_text(encoding="utf-8")):
+            thing = _thing(name)
+            if not (inspect.isclass(thing) and issubclass(thing, Exception)):
+                yield name
+
+
+NAMES = list(_names())
+OTHERS = ["refine.curves.shortest_curve", "refine.footprint.Footprint"]
+"""Names with examples that are not in the reference."""
+
+
+def _examples(name: str) -> doctest.DocTest:
+    """The examples of a docstring; they assume the two imports that the reference names."""
+    (found,) = _FINDER.find(_thing(name), name, globs={"hn": hn, "np": np})
+    return found
+
+
+def _run(name: str) -> None:
+    runner = doctest.DocTestRunner(optionflags=_FLAGS)
+    report: list[str] = []
+    runner.run(_examples(name), out=report.append)
+    assert runner.tries > 0
+    assert runner.failures == 0, "".join(report)
+
+
+@pytest.fixture(scope="module")
+def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder in which the example of `evaluate` ran, which others of the harness read."""
+    folder = tmp_path_factory.mktemp("evaluated")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        _run("harness.evaluate")
+    return folder
+
+
+@pytest.mark.parametrize("name", [*(name for name in NAMES if name not in RETURNED), *OTHERS])
+def test_the_example_prints_what_it_shows(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    reads_run = name == "harness.evaluate" or 'Path("run")' in (inspect.getdoc(_thing(name)) or "")
+    monkeypatch.chdir(request.getfixturevalue("evaluated") if reads_run else tmp_path)
+    if name != "harness.evaluate":  # whose example made the run
+        _run(name)
+
+
+def test_every_example_runs() -> None:
+    """The docstrings with examples are those of the names above."""
+    written = sum(path.read_text("utf-8").count("Examples\n") for path in SOURCE.rglob("*.py"))
+    assert written == len(NAMES) - len(RETURNED) + len(OTHERS)
+
+
+def test_what_has_no_example_is_known() -> None:
+    assert set(NAMES) >= RETURNED
+    assert not [name for name in RETURNED if _examples(name).examples]
+    assert not [name for name in RETURNED if inspect.isfunction(_thing(name))]
