@@ -290,7 +290,7 @@ def test_a_reference_that_finds_no_path_where_there_is_one_is_caught():
     assert answer.cells is None
     judge = Judge(ROOMS, Prepared(method, None, 0, 0), reference=True)
     length_m, faults = judge.faults(pair, answer)
-    assert faults == ["solvability: no path was found, moves on the grid say otherwise"]
+    assert faults == ["solvability: no path was found, which moves on the grid contradict"]
     assert judge.oracles(answer, pair, length_m)[1] == [
         "the optimum by scipy is 4.000000 m, not inf m"
     ]

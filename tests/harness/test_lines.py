@@ -38,7 +38,7 @@ FAULTS = {
     faulty.LineBesideTheGoal: "the last point",
     faulty.LineFromElsewhere: "the first point",
     faulty.LineSaidOptimal: "m is above the any-angle optimum",
-    faulty.LineForAll: "solvability: solved, the whole grid says no path",
+    faulty.LineForAll: "solvability: solved, but on the whole grid: no path",
     faulty.LineOfNothing: "no answer to judge: points need finite coordinates",
     faulty.LineUnsaid: "not nan m as reported",
     faulty.LineOverHomelessCells: "the path leaves the regions",

@@ -29,7 +29,7 @@ MapQuery = tuple[str, QueryKey]
 
 
 def query_key(record: Record) -> QueryKey:
-    """What makes two records answers to one query on a map."""
+    """Return the key that the records of all methods share for one query on a map."""
     return record["kind"], tuple(record["start"]), tuple(record["goal"])
 
 
@@ -68,7 +68,7 @@ class Outcome:
         ]
 
     def figure(self, key: str) -> FloatArray:
-        """One number of each record."""
+        """Return one number of each record."""
         values = (record and record.get(key) for record in self._matched)
         return np.array([math.nan if value is None else value for value in values], dtype=float)
 
@@ -84,7 +84,7 @@ class Outcome:
 
     @cached_property
     def any_angle_optima_m(self) -> FloatArray:
-        """Lengths of the any-angle optimum between the same ends; NaN where corners are cut."""
+        """Lengths of the any-angle optimum between the same ends; NaN if paths may cut corners."""
         known = [record.get("any_angle_m", math.nan) for record in self.references]
         return np.array(known, dtype=float)
 
@@ -126,13 +126,13 @@ class Outcome:
         return {(self.map_name, query_key(self.references[at])) for at in np.flatnonzero(solved)}
 
     def among(self, pairs: set[MapQuery]) -> BoolArray:
-        """Whether each pair is one of some."""
+        """Return whether each pair is one of some."""
         mine = [(self.map_name, query_key(record)) in pairs for record in self.references]
         return np.array(mine, dtype=np.bool_)
 
     @cached_property
     def lengths_m(self) -> FloatArray:
-        """Lengths of the method's own paths in which no fault was found."""
+        """Lengths of the method's own paths without faults."""
         return np.where(self._by_grid, math.nan, self._sound_m)
 
     @cached_property
@@ -227,27 +227,27 @@ class Outcome:
 
 
 def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:
-    """Lengths over the best ones, minus one, without what is rounding: what is still below zero is
-    a line that cuts corners by less than its judge can see."""
+    """Return lengths over the best ones, minus one. Values that are below zero by rounding alone
+    become zero."""
     loss = lengths / best - 1
     rounded: FloatArray = np.where((loss <= SLACK) & (loss >= -LINE_SLACK), 0.0, loss)
     return rounded
 
 
 def nanmean(values: FloatArray) -> float:
-    """Mean of the finite values, NaN where there is none."""
+    """Return the mean of the finite values, NaN if there are none."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else math.nan
 
 
 def nanquantile(values: FloatArray, share: float) -> float:
-    """Quantile of the finite values, NaN where there is none."""
+    """Return a quantile of the finite values, NaN if there are none."""
     finite = values[np.isfinite(values)]
     return float(np.quantile(finite, share)) if finite.size else math.nan
 
 
 def pairs_in_common(outcomes: Iterable[Outcome]) -> set[MapQuery]:
-    """Pairs that all methods solved; those that solved none at all are left out."""
+    """Return the pairs that all methods solved; methods without a solved pair are left out."""
     solved: dict[str, set[MapQuery]] = {}
     for outcome in outcomes:
         solved.setdefault(outcome.label, set()).update(outcome.solved_keys)
@@ -274,11 +274,11 @@ class Study:
         return list(dict.fromkeys(outcome.label for outcome in self.outcomes))
 
     def of_map(self, name: str) -> list[Outcome]:
-        """Outcomes on one map."""
+        """Return the outcomes on one map."""
         return [outcome for outcome in self.outcomes if outcome.map_name == name]
 
     def of_method(self, label: str) -> list[Outcome]:
-        """Outcomes of one method."""
+        """Return the outcomes of one method."""
         return [outcome for outcome in self.outcomes if outcome.label == label]
 
     @property
@@ -292,7 +292,7 @@ class Study:
         return sum(outcome.failures for outcome in self.outcomes)
 
     def pooled(self, label: str, name: str) -> FloatArray:
-        """An array of a method, such as "losses" or "seconds", over all its maps."""
+        """Return an array of a method, such as "losses" or "seconds", over all its maps."""
         arrays = [getattr(outcome, name) for outcome in self.of_method(label)]
         return np.concatenate(arrays) if arrays else np.empty(0)
 
@@ -372,10 +372,10 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
 
 
 def _map_labels(preparations: dict[tuple[str, str], Record], root: Path | None) -> dict[str, str]:
-    """Name of each map, with a part of its hash where two maps have one name."""
+    """Return the name of each map, with a part of its hash if two maps share a name."""
     named = {sha: _map_label(record, root) for (sha, _), record in preparations.items()}
     for (sha, _), record in preparations.items():
-        if record["status"] == "ready":  # of a lost worker only the file's name is known
+        if record["status"] == "ready":  # a lost worker leaves only the file's name
             named[sha] = _map_label(record, root)
     taken: dict[str, list[str]] = {}
     for sha, name in named.items():

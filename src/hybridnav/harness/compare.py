@@ -29,7 +29,7 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
     Parameters
     ----------
     first, second
-        Folders of runs. Where each has a single method beside the reference, those two are
+        Folders of two runs. Where each has a single method beside the reference, those two are
         compared even under different names.
     metric
         What losses refer to, see `load_study`. With "both", where the two methods have different
@@ -91,7 +91,7 @@ def _methods(first: Study, second: Study) -> list[tuple[str, str]]:
 
 
 def _paired(first: Outcome, second: Outcome) -> _Sample:
-    """Losses and seconds of the pairs that both runs have: first, second, first, second."""
+    """Return losses and seconds of the common pairs: first, second, first, second."""
     places = [
         {query_key(record): at for at, record in enumerate(outcome.references)}
         for outcome in (first, second)

@@ -68,7 +68,7 @@ class Consistency:
         self._links = np.unique(crossing_keys)
 
     def _arc_crossings(self, topology: TopologicalMap) -> tuple[LongArray, LongArray]:
-        """Cell pairs on the boundaries between free places, and the arc of each."""
+        """Return the cell pairs on the boundaries between free places, and the arc of each."""
         base, arc = topology.level.boundary_table
         cell = base >> 1
         crossings = np.stack([cell, cell + np.where(base & 1, self._cols, 1)], axis=1)
@@ -76,19 +76,20 @@ class Consistency:
         return crossings[kept], arc[kept]
 
     def _legal_moves(self, *, corner_cutting: bool) -> LongArray:
-        """All moves between free cells, each in one direction, as flat cells (n, 2)."""
+        """Return all moves between free cells, each in one direction, as flat cells (n, 2)."""
         masks = legal_moves(self._free, corner_cutting).ravel()
         along = [moves_along(masks, self._cols, direction) for direction in (0, 2, 1, 3)]
         return np.concatenate([np.stack(ends, axis=1) for ends in along])
 
     def _keys(self, regions: IntArray) -> LongArray:
-        """One number for each unordered pair of regions."""
+        """Return one number for each unordered pair of regions."""
         low, high = regions.min(axis=1), regions.max(axis=1)
         keys: LongArray = low.astype(np.int64) * self._count + high
         return keys
 
     def check_regions(self) -> list[tuple[str, tuple[Cell, Cell]]]:
-        """Every region is connected, and solvability agrees for every pair of free cells.
+        """Check that every region is connected, and that solvability agrees for every pair of free
+        cells.
 
         Returns
         -------
@@ -130,7 +131,7 @@ class Consistency:
     def check_plan(
         self, start: Cell, goal: Cell, nodes: Sequence[int], arcs: Sequence[int] | None
     ) -> str | None:
-        """Whether a topological plan has a metric path inside its regions, in order.
+        """Check that a topological plan has a metric path inside its regions, in order.
 
         Parameters
         ----------
@@ -162,7 +163,8 @@ class Consistency:
         return None
 
     def _cross(self, reached: set[int], here: int, there: int, arc: int | None) -> set[int]:
-        """Pieces of a region that a crossing from the reached pieces of another leads to."""
+        """Return the pieces of a region that a crossing from the reached pieces of another leads
+        to."""
         key = min(here, there) * self._count + max(here, there)
         rows = slice(*np.searchsorted(self._key, [key, key + 1]))
         crossings, piece = self._crossings[rows], self._piece
@@ -177,7 +179,7 @@ class Consistency:
         }
 
     def check_walk(self, cells: LongArray) -> str | None:
-        """Whether a metric path maps to a walk in the topological layer.
+        """Check that a metric path maps to a walk in the topological layer.
 
         A diagonal between two regions passes one of its side cells, whichever gives a walk.
 
@@ -218,7 +220,7 @@ class Consistency:
         return linked
 
     def joined(self, start: Cell, goal: Cell) -> bool:
-        """Whether the metric layer joins two cells, by scipy's connected components."""
+        """Return whether the metric layer joins two cells, by scipy's connected components."""
         first, last = start[0] * self._cols + start[1], goal[0] * self._cols + goal[1]
         return bool(self._whole[first] == self._whole[last])
 

@@ -1,4 +1,4 @@
-"""What the answers of other methods, and above all the optimum, say against an answer."""
+"""Contradictions of an answer by the answers of other methods, and above all by the optimum."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ ANSWERED = ("solved", "no path")
 
 
 def is_line(record: Record) -> bool:
-    """Whether a record is about any-angle paths: they are set beside such paths only."""
+    """Return whether a record holds an any-angle path, which is compared with such paths only."""
     return bool(record.get("metric") == "any-angle")
 
 
 def against(record: Record, reference: Record) -> str | None:
-    """What is known otherwise against an answer.
+    """Return the contradiction of an answer by the optima, None if there is none.
 
     Parameters
     ----------
     record
-        Of the answer.
+        Record of the answer.
     reference
         The reference's record of the same pair, which holds both optima.
 
     Returns
     -------
     str or None
-        What is wrong.
+        The contradiction.
     """
     if {record["status"], reference["status"]} == set(ANSWERED):
-        return f"solvability: {record['status']}, the whole grid says {reference['status']}"
+        return f"solvability: {record['status']}, but on the whole grid: {reference['status']}"
     if record.get("length_m") is None or reference.get("length_m") is None:
         return None
     if is_line(record):

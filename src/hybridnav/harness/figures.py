@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _CASE_WIDTH_IN = 4.0
 _CASE_DPI = 144.0
 _CASE_COLOURS = 32
-"""Cells have four; the others are of lines and of what smooths their rims."""
+"""Cells have four; lines and their smooth rims have the others."""
 
 _OF_LOSSES = (
     "Each line is the share of pairs whose loss is above the value below it; at 0, the share with "

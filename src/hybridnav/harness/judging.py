@@ -73,18 +73,18 @@ class Judge:
             self._regions = np.zeros(int(self._region_of.max(initial=-1)) + 1, dtype=np.bool_)
 
     def faults(self, pair: Pair, answer: Answer) -> tuple[float | None, list[str]]:
-        """Length of the path, counted anew, and all that is wrong with the answer."""
+        """Return the length of the path, counted anew, and all faults of the answer."""
         length_m, faults = self._judged_path(pair, answer)
         checks = self._consistency
         if checks is None:
             return length_m, faults
         if answer.nodes is not None:
-            arcs = answer.arcs if self._has_arcs else None  # of what other map is not known here
+            arcs = answer.arcs if self._has_arcs else None  # they may belong to another map
             wrong = checks.check_plan(pair.start, pair.goal, answer.nodes, arcs)
             faults += [wrong] if wrong else []
         if not answer.gave_up and answer.is_path != checks.joined(pair.start, pair.goal):
             found = "a path" if answer.is_path else "no path"
-            faults.append(f"solvability: {found} was found, moves on the grid say otherwise")
+            faults.append(f"solvability: {found} was found, which moves on the grid contradict")
         if answer.is_path and not faults:
             wrong = checks.check_walk(self._cells_of(answer))
             faults += [wrong] if wrong else []
@@ -109,13 +109,14 @@ class Judge:
     def oracles(
         self, answer: Answer, pair: Pair, length_m: float | None
     ) -> tuple[Record, list[str]]:
-        """What else is known about a pair, and how the reference's answer contradicts it."""
+        """Return the other optima of a pair, and their contradictions by the reference's answer."""
         if self._oracles is None:
             return {}, []
         return self._oracles.ask(answer, pair, length_m)
 
     def plan_optimum_m(self, pair: Pair, answer: Answer) -> float | None:
-        """Length of the best path inside the regions of the plan; None without plan or path."""
+        """Return the length of the best path inside the regions of the plan; None without plan or
+        path."""
         if answer.nodes is None or self._search is None:
             return None
         self._regions[list(answer.nodes)] = True
@@ -163,7 +164,7 @@ class Oracles:
         return None
 
     def ask(self, answer: Answer, pair: Pair, length_m: float | None) -> tuple[Record, list[str]]:
-        """Fields of the record, and faults."""
+        """Return fields of the record, and faults."""
         known: Record = {}
         faults = []
         length = math.inf if length_m is None else length_m
@@ -188,8 +189,8 @@ class Oracles:
     def _against_yardstick(
         self, optimum: float, pair: Pair, length: float, *, sampled: bool
     ) -> list[str]:
-        """What the path of cells, and on a sample the visibility graph, say against the any-angle
-        optimum, metres both."""
+        """Compare the any-angle optimum with the path of cells, and on a sample with the visibility
+        graph; return faults. Both lengths are metres."""
         words = f"the any-angle optimum by the mesh is {optimum:.6f} m"
         if not optimum <= length * (1 + SLACK):
             return [f"{words}, a path of cells has {length:.6f} m"]

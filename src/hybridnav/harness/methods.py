@@ -1,4 +1,4 @@
-"""Every method that the harness knows, by name: presets of our planner, and baselines."""
+"""All methods of the harness by name: presets of our planner, and baselines."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class MethodSpec:
 def preset_spec(
     source: str | Preset, *, merge_distance_m: float | None = None, seed: int | None = None
 ) -> MethodSpec:
-    """Method of a preset, its merge distance and seed overridden where given.
+    """Return the method of a preset, with its merge distance and seed where they are given.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def _check_metric(preset: Preset) -> None:
 def baseline_spec(
     name: str, *, merge_distance_m: float | None = None, seed: int | None = None
 ) -> MethodSpec:
-    """Method of a baseline.
+    """Return the method of a baseline.
 
     Raises
     ------
@@ -189,7 +189,7 @@ class HybridMethod:
         )
 
     def close(self) -> None:
-        """End the process that a planner with OMPL has."""
+        """End the process of a planner with OMPL."""
         self._planner.close()
 
 
@@ -197,7 +197,7 @@ _GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
 
 
 def _line(result: PlanResult) -> Line | None:
-    """The path of a solved query where it is at any angle."""
+    """Return the path of a solved query if it is an any-angle path."""
     if result.metric != "any-angle" or result.path is None or not result.solved:
         return None
     how = result.refinement
@@ -210,7 +210,7 @@ def _line(result: PlanResult) -> Line | None:
 
 
 def _stages(result: PlanResult) -> dict[str, float]:
-    """Seconds by stage, called as every method calls them."""
+    """Return seconds by stage, under the names that all methods use."""
     seconds = dict(result.stats.seconds)
     if "ompl" in seconds:
         seconds["refine"] = seconds.pop("ompl")
@@ -224,7 +224,7 @@ def _dense(ids: Any, named: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _nbytes(thing: Any, seen: set[int]) -> int:
-    """Bytes of all arrays that a thing of this package holds, each counted once."""
+    """Return the bytes of all arrays that a thing of this package holds, each counted once."""
     if id(thing) in seen:
         return 0
     seen.add(id(thing))
@@ -256,7 +256,7 @@ class Prepared:
     method_seconds: float
 
     def close(self) -> None:
-        """End the processes that it has; it answers no more."""
+        """End the processes of the method, which answers no more."""
         close = getattr(self.method, "close", None)
         if callable(close):
             close()

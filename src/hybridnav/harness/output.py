@@ -62,18 +62,18 @@ def write_outputs(
     Parameters
     ----------
     folder
-        The run's.
+        The run's folder.
     title
-        Of the report.
+        Title of the report.
     root
-        Folder by whose paths maps below it are called; else by their names.
+        Maps below this folder are named by their paths from it; None names them by their files.
     metric
-        What losses refer to, see `load_study`.
+        Reference of losses; see `load_study`.
 
     Returns
     -------
     Study
-        What was found; `faults` lists every counter-example.
+        The results; `faults` lists every counter-example.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def write_outputs(
 
 
 def markdown(overall: Sequence[Row], study: Study) -> str:
-    """The tables of all maps together, one for each of Thrun's criteria."""
+    """Return the tables of all maps together, one for each of Thrun's criteria."""
     found = len(study.faults)
     return (
         f"## Consistency\n\n{study.checks:,} answers checked, {found} counter-examples, "
@@ -145,7 +145,7 @@ def _report(
 
 
 def _machines(study: Study) -> dict[str, str]:
-    """Versions and host of the runs, as the records have them; several where they differ."""
+    """Return versions and host of the runs, as recorded; several if they differ."""
     found: dict[str, dict[str, None]] = {}
     for outcome in study.outcomes:
         for key, value in outcome.preparation.get("environment", {}).items():
@@ -197,7 +197,7 @@ def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
 
 
 def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
-    """Those for charts: each with those that its losses can be set beside."""
+    """Return the methods for charts, each with those that its losses are compared with."""
     if study.metric == "octile":
         return [outcome for outcome in outcomes if outcome.metric == "octile"]
     others = [outcome for outcome in outcomes if outcome.label != REFERENCE]
@@ -207,7 +207,8 @@ def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
 
 
 def _worst(outcome: Outcome) -> list[WorstCase]:
-    """Counter-examples, and the pairs with the largest losses: two of presets, one of others."""
+    """Return counter-examples, and the pairs with the largest losses: two of presets, one of
+    others."""
     cases = [_case(outcome, record, fault) for record, fault in outcome.faults[:WORST_CASES]]
     if outcome.label != REFERENCE:
         shown = WORST_CASES if outcome.preparation.get("preset") is not None else 1

@@ -51,7 +51,8 @@ class Pair:
 
 
 def components(grid: OccupancyGrid) -> tuple[IntArray, LongArray]:
-    """4-connected components of free cells: int32 label of each cell, 0 for none, and their sizes.
+    """Return the 4-connected components of free cells: an int32 label for each cell, 0 for none,
+    and their sizes.
 
     Without corner cutting these are what paths can join.
     """
@@ -70,11 +71,12 @@ def sample_pairs(
     grid
         The map, inflated.
     count
-        Pairs in its largest component of free cells: as many in each of five classes of equal
-        width between the least distance and the 95th percentile of distances of random pairs, the
-        last one open. One more for every twenty joins two components, where there are two.
+        Pairs in its largest component of free cells, equally many in each of five classes of
+        distance. The classes are equally wide between the least distance and the 95th percentile
+        of the distances of random pairs; the last one is open. For every twenty pairs one more
+        joins two components, if there are two.
     seed
-        Of the generator (PCG64).
+        Seed of the generator (PCG64).
     least_distance_m
         Straight-line distance below which no pair of the largest component lies; halved as long
         as the component has no such pair.
@@ -112,7 +114,8 @@ def sample_pairs(
 def _stratified(
     cells: LongArray, count: int, least_cells: float, rng: np.random.Generator
 ) -> LongArray:
-    """Indices (count, 2) of cells, as many in each class of distance as there are to be had."""
+    """Return indices (count, 2) of cells, equally many in each class of distance if there are
+    enough."""
     draws = rng.integers(len(cells), size=(max(40 * count, 2000), 2))
     apart = np.hypot(*(cells[draws[:, 0]] - cells[draws[:, 1]]).T)
     least = least_cells
@@ -137,7 +140,7 @@ def _stratified(
 
 
 def _across(labels: IntArray, largest: int, count: int, rng: np.random.Generator) -> list[Pair]:
-    """Pairs from the largest component to others: no path joins them."""
+    """Return pairs from the largest component to others, which no path joins."""
     inside = np.argwhere(labels == largest)
     outside = np.argwhere((labels > 0) & (labels != largest))
     starts = inside[rng.integers(len(inside), size=count)]
@@ -147,7 +150,7 @@ def _across(labels: IntArray, largest: int, count: int, rng: np.random.Generator
 
 
 def lattice_pairs(grid: OccupancyGrid, step_m: float) -> list[Pair]:
-    """All pairs, each in one direction, of the free cells on a lattice.
+    """Return all pairs, each in one direction, of the free cells on a lattice.
 
     Parameters
     ----------
@@ -178,7 +181,7 @@ def lattice_pairs(grid: OccupancyGrid, step_m: float) -> list[Pair]:
 
 
 def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[Pair]:
-    """The pairs of a MovingAI scenario file, with the optimum that it states.
+    """Return the pairs of a MovingAI scenario file, with their optima as stated there.
 
     On an inflated map, or where diagonals may cut corners, what is stated does not hold: there
     pairs go without it, and those with an end that is not free are left out.

@@ -1,4 +1,4 @@
-"""Paths as short text, so that every record holds its own: runs of equal moves."""
+"""Paths as short text, runs of equal moves, so that every record can hold its own."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def encode_path(cells: LongArray) -> str:
 
 
 def path_steps(text: str) -> int:
-    """Steps of a path written by `encode_path`."""
+    """Return the steps of a path written by `encode_path`."""
     runs = _RUN.finditer(text)
     return sum(int(run.group(2)) if run.group(1) else 1 for run in runs)
 
 
 def decode_path(start: Cell, text: str) -> LongArray:
-    """Cells of a path from its first cell and its moves.
+    """Return the cells of a path from its first cell and its moves.
 
     Raises
     ------

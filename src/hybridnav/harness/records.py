@@ -37,24 +37,25 @@ _LIBRARIES = ("numpy", "scipy", "numba")
 
 
 def map_digest(grid: OccupancyGrid) -> str:
-    """SHA-256 over what planners see of a map: size, resolution, classes, moves."""
+    """Return the SHA-256 of all that planners see of a map: its size, resolution, classes and
+    moves."""
     digest = hashlib.sha256(repr((grid.shape, grid.resolution_m, grid.corner_cutting)).encode())
     digest.update(np.ascontiguousarray(grid.classes).tobytes())
     return digest.hexdigest()
 
 
 def pair_id(map_sha: str, spec: MethodSpec, pair: Pair) -> str:
-    """Id of the record of one query: the same for equal map, settings and pair."""
+    """Return the id of the record of one query: the same for equal map, settings and pair."""
     return f"{map_sha[:12]}/{spec.name}-{spec.digest}/{pair.key}"
 
 
 def preparation_id(map_sha: str, spec: MethodSpec) -> str:
-    """Id of the record of a method's preparation for a map."""
+    """Return the id of the record of a method's preparation for a map."""
     return f"{map_sha[:12]}/{spec.name}-{spec.digest}/preparation"
 
 
 def environment() -> dict[str, str]:
-    """Versions and host, part of every preparation's record."""
+    """Return versions and host, a part of every preparation's record."""
     versions = {name: importlib.metadata.version(name) for name in _LIBRARIES}
     return {
         "hybridnav": hybridnav.__version__,
@@ -71,7 +72,7 @@ class RecordFile:
     Parameters
     ----------
     folder
-        Where `records.jsonl` is or will be.
+        Folder of `records.jsonl`, which may be missing.
 
     Raises
     ------
@@ -132,7 +133,7 @@ def _drop_cut_line(path: Path) -> None:
 
 
 def read_records(folder: Path) -> list[Record]:
-    """All whole records of a run, in the order written; none where there is no file.
+    """Return all whole records of a run in the order written; none without a file.
 
     Raises
     ------

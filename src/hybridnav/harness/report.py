@@ -64,7 +64,7 @@ class MapSection:
 
 @dataclass(frozen=True, eq=False)
 class ReportData:
-    """All that a report holds."""
+    """Contents of a report."""
 
     title: str
     facts: list[tuple[str, str]]
@@ -78,8 +78,8 @@ class ReportData:
     overall_losses: dict[str, FloatArray] = field(default_factory=dict)
     overall_times_ms: dict[str, float] = field(default_factory=dict)
     metric_of: dict[str, str] = field(default_factory=dict)
-    """Per method, the metric of its paths where losses refer to it, octile unless said otherwise:
-    each has charts of its own."""
+    """Per method, the metric of its losses, octile if it is missing here: each metric has charts of
+    its own."""
 
 
 def render_report(report: ReportData) -> str:

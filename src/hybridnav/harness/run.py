@@ -39,8 +39,7 @@ if TYPE_CHECKING:
 RUNS_FILE = "runs.jsonl"
 
 MOVINGAI_MERGE_DISTANCE_M = 40.0
-"""On MovingAI maps, whose cells are 1 m by agreement, the robot is a point and places are 40 cells
-wide unless said otherwise."""
+"""Default on MovingAI maps, whose cells are 1 m by agreement; the robot is a point there."""
 
 _PAIRS = 100
 _PAIRS_PER_TASK = 2000
@@ -86,22 +85,22 @@ class RunSettings:
 def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no_progress) -> int:
     r"""Answer all pairs on all maps by all methods, and append the records to a folder.
 
-    A record that is there already is not made again, so a run that was killed goes on where it was.
-    The baseline "grid-astar" is always among the methods: its lengths are the optimum.
+    Records that exist are kept, so a run that was killed resumes. The baseline "grid-astar" is
+    always among the methods: its lengths are the optimum.
 
     Parameters
     ----------
     settings
         What to evaluate.
     folder
-        Made where it is not there; holds `records.jsonl` and `runs.jsonl`.
+        Created if it is missing; receives `records.jsonl` and `runs.jsonl`.
     progress
-        Called with the numbers of records that are there and that there will be.
+        Called with the number of finished records and of all.
 
     Returns
     -------
     int
-        How many records were made.
+        Number of new records.
 
     Raises
     ------
@@ -151,7 +150,7 @@ def _run(settings: RunSettings, tasks: Sequence[Task]) -> Iterator[list[Record]]
 
 
 def _missing(task: Task, there: set[str]) -> Task | None:
-    """The part of a task without records, None where there is no such part."""
+    """Return the part of a task without records, None if there is no such part."""
     pairs = tuple(
         pair for pair, name in zip(task.pairs, task.ids[1:], strict=True) if name not in there
     )
@@ -165,7 +164,7 @@ def _new_ids(task: Task, there: set[str]) -> set[str]:
 
 
 def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
-    """Tasks of one map, the reference's first."""
+    """Return the tasks of one map, the reference's first."""
     suffix = Path(name).suffix.lower()
     ros = suffix != ".map"
     radius_m = settings.robot_radius_m
@@ -188,7 +187,7 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
 
 
 def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[MethodSpec]:
-    """The methods of a run on a map, the reference first, none twice."""
+    """Return the methods of a run on a map, the reference first, none twice."""
     names = dict.fromkeys((REFERENCE, *settings.baselines))
     specs = [baseline_spec(name, merge_distance_m=merge_distance_m) for name in names]
     for preset in settings.presets:

@@ -62,7 +62,7 @@ EFFICIENCY_COLUMNS = (
 
 
 def loss_columns(metric: Yardstick) -> tuple[str, ...]:
-    """Columns of a table of losses: the loss over the optimum that is asked for leads."""
+    """Return the columns of a table of losses; the loss over the requested optimum comes first."""
     leading, other = "any-angle loss %", "octile loss %"
     if metric != "octile":
         return _LOSS_COLUMNS
@@ -73,7 +73,7 @@ def loss_columns(metric: Yardstick) -> tuple[str, ...]:
 def figures(
     outcomes: Sequence[Outcome], references: Sequence[Outcome], common: set[MapQuery]
 ) -> Row:
-    """The figures of one method on some maps.
+    """Return the figures of one method on some maps.
 
     Parameters
     ----------
@@ -149,15 +149,15 @@ def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> R
 
 
 def _break_even(price: float, gain: float) -> float:
-    """Queries after which a gain for each has paid a price, seconds both; infinite where there is
-    none, NaN where nothing is known or the method is the reference itself."""
+    """Return the queries after which a gain for each has paid a price, seconds both. The result is
+    infinite without a gain, and NaN if nothing is known or the method is the reference itself."""
     if not abs(gain) > 0:
         return math.nan
     return math.ceil(max(price, 0.0) / gain) if gain > 0 else math.inf
 
 
 def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Quotients, NaN where there is none."""
+    """Return quotients, NaN for a zero divisor."""
     quotients: FloatArray = np.divide(
         first, second, out=np.full(len(first), math.nan), where=second > 0
     )
@@ -174,7 +174,7 @@ def _pooled(parts: list[FloatArray]) -> FloatArray:
 
 
 def rows_of_map(study: Study, name: str) -> list[Row]:
-    """One row for each method on a map."""
+    """Return one row for each method on a map."""
     outcomes = study.of_map(name)
     reference = [outcome for outcome in outcomes if outcome.label == REFERENCE]
     common = pairs_in_common(outcomes)
@@ -185,7 +185,7 @@ def rows_of_map(study: Study, name: str) -> list[Row]:
 
 
 def rows_of_study(study: Study) -> list[Row]:
-    """One row for each method, over all maps that it was run on."""
+    """Return one row for each method, over all of its maps."""
     references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
     common = pairs_in_common(study.outcomes)
     rows = []
@@ -197,7 +197,8 @@ def rows_of_study(study: Study) -> list[Row]:
 
 
 def rows_by_distance(study: Study, name: str) -> list[Row]:
-    """Mean loss in per cent by the length of the optimum, one row for each method on a map."""
+    """Return the mean loss in per cent by the length of the optimum, one row for each method on a
+    map."""
     rows = []
     for outcome in study.of_map(name):
         buckets = distance_buckets(outcome.optima_m)
@@ -211,7 +212,7 @@ def rows_by_distance(study: Study, name: str) -> list[Row]:
 
 
 def to_csv(rows: Sequence[Row]) -> str:
-    """Rows as CSV, numbers in full."""
+    """Return rows as CSV, numbers in full."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     out = io.StringIO()
     writer = csv.DictWriter(out, columns, restval="", lineterminator="\n")
@@ -225,7 +226,7 @@ def _blank(value: str | float) -> str | float:
 
 
 def to_markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
-    """Rows as a table in Markdown, numbers rounded to three digits."""
+    """Return rows as a table in Markdown, numbers rounded to three digits."""
     columns = (
         list(dict.fromkeys(key for row in rows for key in row)) if columns is None else columns
     )
@@ -237,7 +238,8 @@ def to_markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> st
 
 
 def text_of(value: str | float) -> str:
-    """A value for people: three digits, thousands separated, nothing for what there is not."""
+    """Return a value as text for people: three digits, thousands separated, an empty text for no
+    value."""
     if isinstance(value, (str, int)):
         return value.replace("|", "\\|") if isinstance(value, str) else f"{value:,}"
     if math.isnan(value):

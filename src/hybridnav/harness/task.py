@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MapSpec:
-    """A map file and how it is read."""
+    """A map file and its reading."""
 
     path: str
     robot_radius_m: float | None
@@ -42,7 +42,7 @@ class MapSpec:
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker is sent."""
+    """The work of one worker: a map, a method, and pairs."""
 
     map: MapSpec
     map_sha: str
@@ -50,7 +50,7 @@ class Task:
     pairs: tuple[Pair, ...]
 
     attempt: int = 0
-    """How often it was lost before it began."""
+    """Number of times that the task was lost before it began."""
 
     @cached_property
     def ids(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class Task:
 
 @lru_cache(maxsize=2)
 def read_map(spec: MapSpec) -> OccupancyGrid:
-    """The grid of a map file; the last two are kept."""
+    """Return the grid of a map file; the last two are kept."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MapWarning)
         grid = load_map(spec.path, robot_radius_m=spec.robot_radius_m, max_cells=spec.max_cells)
@@ -140,7 +140,7 @@ def _about(grid: OccupancyGrid, task: Task) -> Record:
 
 
 def _plain(settings: Record) -> Record:
-    """Settings without infinities, which JSON has no number for."""
+    """Return settings without infinities, which JSON has no number for."""
     plain: Record = {}
     for key, value in settings.items():
         if isinstance(value, dict):
@@ -190,7 +190,7 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
         TypeError,
         ValueError,
     ) as error:
-        # No cells, regions or arcs of this map: as wrong as an answer can be.
+        # The answer names no cells, regions or arcs of this map.
         reason = _reason(error)
         return {"status": "error", "error": reason, "faults": [f"no answer to judge: {reason}"]}
 
@@ -219,7 +219,8 @@ def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
 
 
 def _of_line(line: Line) -> Record:
-    """What the record of an any-angle path has beside that of a path of cells."""
+    """Return the fields that the record of an any-angle path has beside those of a path of
+    cells."""
     return {
         "metric": "any-angle",
         "lower_bound_m": float(line.lower_bound_m) if math.isfinite(line.lower_bound_m) else None,
@@ -229,7 +230,7 @@ def _of_line(line: Line) -> Record:
 
 
 def _plan_steps(answer: Answer) -> int | None:
-    """Steps of the plan in the topological layer, None where there is no plan."""
+    """Return the steps of the plan in the topological layer, None if there is no plan."""
     if answer.plan_steps is not None:
         return int(answer.plan_steps)
     return None if answer.nodes is None else len(answer.nodes) - 1

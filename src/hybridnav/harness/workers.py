@@ -25,14 +25,14 @@ _FLUSH_S = 0.2
 _ATTEMPTS = 2
 
 CONNECT_S = 10.0
-"""How long a scheduler may take to answer, seconds."""
+"""Seconds within which a scheduler must answer."""
 
 
 def _serve(connection: Connection, turn: Any) -> None:
     """Run tasks until the other side hangs up; records go back in batches.
 
-    `turn` is shared with the other side: the index of the record that is being made, since a batch
-    that was not sent yet says nothing of it when the process ends.
+    `turn` is shared with the other side: the index of the current record, which a process that ends
+    before it sends its batch cannot report otherwise.
     """
     try:
         while True:
@@ -68,7 +68,7 @@ class _Worker:
         self.missing = list(task.ids)
         self.heard = time.monotonic()
         self._turn.value = 0
-        with suppress(OSError):  # it died while idle: the next look at it will say so
+        with suppress(OSError):  # it died while idle, which the next poll notices
             self.connection.send(task)
 
     def failed_at(self, task: Task) -> int:
@@ -138,7 +138,7 @@ def run_local(tasks: Sequence[Task], *, workers: int, timeout_s: float) -> Itera
 
 
 def _listen(worker: _Worker, *, heard: bool) -> tuple[list[Record], bool]:
-    """What a worker sent, and whether its task ended, well or not."""
+    """Return what a worker sent, and whether its task ended, well or not."""
     if not heard:
         return [], False
     try:
