@@ -60,8 +60,8 @@ PARAMETERS: dict[str, dict[str, str]] = {
         "range": "setRange",
     },
 }
-"""The planners, and of each the parameters by OMPL's names with the methods that set them; the
-bindings have no parameter sets."""
+"""For each planner the parameters by OMPL's names, with the methods that set them; the bindings
+have no parameter sets."""
 
 ROADMAPS = frozenset({"PRM", "PRMstar"})
 """Planners that grow a roadmap, in both directions of travel."""
@@ -71,7 +71,7 @@ WHOLE = {
     "ordering_batch_size",
     "samples_per_batch",
 }
-"""Parameters that are counts."""
+"""Parameters whose values are counts."""
 REAL = {
     "goal_bias",
     "prune_threshold",
@@ -84,8 +84,8 @@ _LIMITS = {"goal_bias": (0.0, 1.0), "prune_threshold": (0.0, 1.0), "rewire_facto
 _MOST = 1_000_000
 
 DIRECTED = frozenset({"BITstar", "RRT", "RRTConnect"})
-"""Planners that ask for each motion the way it is driven, whatever the state space says of itself;
-the others take what is valid one way for valid the other."""
+"""Planners that check each motion in its own direction in every state space; the others assume that
+a motion valid one way is valid the other."""
 Space = Literal["r2", "se2", "differential", "dubins", "reeds-shepp"]
 Confinement = Literal["chain", "mask", "prm"]
 
@@ -98,7 +98,8 @@ def _no_boolean(value: Any) -> Any:
 
 
 def _corners(value: Any) -> Any:
-    """Corners of a footprint given as a shapely polygon or in Nav2's form, a string of a list."""
+    """Return the corners of a footprint given as a shapely polygon or in Nav2's form, a string of a
+    list."""
     exterior = getattr(value, "exterior", None)
     if exterior is not None:
         if len(value.interiors):
@@ -146,38 +147,38 @@ class OmplSettings(BaseModel):
     planner: str = "RRTConnect"
     """OMPL's name of the planner, one of `PARAMETERS`."""
     parameters: dict[str, bool | int | float] = Field(default_factory=dict)
-    """Its parameters by OMPL's names; OMPL's own values for those that are not given."""
+    """Its parameters by OMPL's names; missing ones have OMPL's own values."""
     space: Space = "r2"
-    """State space: a disc that moves in any direction (`r2`); a footprint that moves in any
-    direction, sideways too, while it turns (`se2`, a holonomic robot); one that turns on the spot,
-    drives straight ahead, and turns again (`differential`); or one that drives curves, forwards
-    (`dubins`) or both ways (`reeds-shepp`)."""
+    """State space. `r2`: a disc that moves in any direction. `se2`: a footprint that moves in any
+    direction, sideways too, while it turns (a holonomic robot). `differential`: one that turns on
+    the spot, drives straight ahead, and turns again. `dubins`: one that drives curves forwards.
+    `reeds-shepp`: one that drives curves both ways."""
     footprint: Annotated[
         tuple[tuple[_Coordinate, _Coordinate], ...] | None, BeforeValidator(_corners)
     ] = Field(default=None, min_length=3, max_length=1000)
     """Corners in metres in the robot's frame, x ahead: a list, Nav2's string of it, or a shapely
     polygon or its WKT. Null for the disc that the map was inflated for."""
     turning_radius_m: Annotated[_Float, Field(gt=0, le=1e4)] | None = None
-    """Of `dubins` and `reeds-shepp`."""
+    """Turning radius of `dubins` and `reeds-shepp`."""
     reverses: bool = False
-    """Of `differential`: whether the robot may drive backwards too, where it cannot drive ahead."""
+    """With `differential`: whether the robot may also drive backwards if it cannot drive ahead."""
     budget_s: Annotated[_Float, Field(ge=0.01, le=3600)] = 1.0
     """Seconds that a query may take; kept to within 10 %."""
     iterations: Annotated[_Int, Field(ge=1, le=1_000_000_000)] | None = None
     """Iterations of planners and of simplification that a query may take, instead of the seconds,
     which stay as a limit: what is reached before it repeats for equal seeds."""
     seed: Annotated[_Int, Field(ge=1, lt=2**31)] = 1
-    """Of OMPL's random numbers."""
+    """Seed of OMPL's random numbers."""
     objective: Literal["length", "clearance"] = "length"
-    """What is made small: the length, or the length weighted by nearness to obstacles."""
+    """Quantity to minimise: the length, or the length weighted by nearness to obstacles."""
     clearance_m: Annotated[_Float, Field(gt=0, le=1e4)] = 0.5
-    """With `clearance`: how far obstacles are felt."""
+    """With `clearance`: distance up to which obstacles add to the cost."""
     clearance_weight: Annotated[_Float, Field(ge=0, le=1e3)] = 2.0
     """With `clearance`: a metre beside an obstacle costs 1 + this, `clearance_m` away 1."""
     confine: Confinement = "chain"
-    """How the search is kept in the corridor: as a chain of small problems, field by field; as one
-    problem whose states and motions are refused outside (`mask`); or by drawing the states of PRM
-    and PRMstar from the corridor's cells (`prm`)."""
+    """Confinement to the corridor. `chain`: a chain of small problems, field by field. `mask`: one
+    problem that refuses states and motions outside. `prm`: PRM and PRMstar draw their states from
+    the corridor's cells."""
     simplify: bool = True
     """Whether paths are shortened by OMPL's PathSimplifier."""
     smooth: bool = False

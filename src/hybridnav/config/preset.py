@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 
 _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")
-"""Where presets are: inside an installed package, or beside `src` in a checkout."""
+"""Folders of presets: inside an installed package, or beside `src` in a checkout."""
 
 DEFAULT_ROBOT_RADIUS_M = 0.25
-"""Radius of the robot in metres where nobody gives one: of presets and of every map."""
+"""Default radius of the robot in metres, for presets and for maps."""
 
 _REFINED_BY = {
     "max-distance": "grid-astar",
@@ -110,27 +110,27 @@ class PlannerSettings(_Section):
     """
 
     coarse: Literal["max-distance", "portals", "mesh", "jumps", "none"] = "max-distance"
-    """What is planned on: the places, by that attribute of their arcs, which chooses the route; or
-    portals between fields grown for planning alone, a mesh of convex polygons of free space, the
-    corner cells at which shortest paths of cells turn, or `none`, the cells of the whole map at
-    once, so that the route is read off the path."""
+    """Structure to plan on. `max-distance`: the places, by that attribute of their arcs, which
+    chooses the route. `portals`: portals between fields grown for planning alone. `mesh`: convex
+    polygons of free space. `jumps`: the corner cells at which shortest paths of cells turn. `none`:
+    the cells of the whole map. All but the first derive the route from the path."""
     corridor: Literal["route", "neighbours"] = "route"
-    """Fields that `grid-astar` and `ompl` start from: those of the coarse way, or also their
-    neighbours. Of no effect with `gates` and `coarse: none`."""
+    """Fields in which `grid-astar` and `ompl` begin: those of the coarse way, or also their
+    neighbours. It has no effect with `gates` and `coarse: none`."""
     refine: Annotated[str, AfterValidator(_known_refiner)] = "grid-astar"
-    """How a path is found: cell by cell in the corridor; over portals, with exact costs between the
-    border cells of the fields; by a sampling-based planner; or `none` where the coarse search, on
-    the mesh or the corner cells, has found it. In place of `grid-astar`, `module:Class` names a
-    refiner of your own, which is imported when a planner is made."""
+    """Search for the path. `grid-astar`: cell by cell in the corridor. `gates`: over portals, with
+    exact costs between the border cells of the fields. `ompl`: by a sampling-based planner. `none`:
+    the coarse search, on the mesh or the corner cells, has found it. In place of `grid-astar`,
+    `module:Class` names a refiner of your own, which is imported when a planner is made."""
     ompl: OmplSettings | None = None
-    """With `refine: ompl`, section of its own; null elsewhere."""
+    """With `refine: ompl`, a section of its own; otherwise null."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
     """With `gates`, and on the mesh: the search ends once no path can be shorter by more than this
     part; null or 0 for the optimum."""
     budget_s: Annotated[_Float, Field(ge=0)] | None = None
-    """On the mesh: seconds after which a query returns the best path so far, with the bound that is
-    proved by then; null for as long as the optimum takes. Until the planner is prepared, such
-    queries shorten a path of cells by line of sight."""
+    """On the mesh: seconds after which a query returns the best path so far, with its proved bound;
+    null for no limit. Until the planner is prepared, such queries shorten a path of cells by line
+    of sight."""
     smooth: Literal["none", "line-of-sight"] = "none"
     """Whether the path is shortened to an any-angle one."""
     allow_unexplored: bool = False
@@ -190,7 +190,7 @@ class Preset(_Section):
     planner: PlannerSettings = PlannerSettings()
 
     def to_yaml(self) -> str:
-        """The preset as a YAML file would give it, every key present."""
+        """Return the preset as the text of a YAML file, every key present."""
         # Unless it escapes them, PyYAML reads back line breaks such as U+0085 as spaces.
         plain = self.description.isprintable()
         text: str = yaml.safe_dump(
@@ -200,7 +200,7 @@ class Preset(_Section):
 
 
 def preset_names() -> list[str]:
-    """Names of the presets that come with the package, in alphabetical order.
+    """Return the names of the presets in the package, in alphabetical order.
 
     Examples
     --------
@@ -211,7 +211,7 @@ def preset_names() -> list[str]:
 
 
 def is_preset_name(source: PathLike) -> bool:
-    """Whether this is the name of a preset; with a suffix or a separator it is a path.
+    """Return whether this is the name of a preset; with a suffix or a separator it is a path.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     ----------
     source
         Name of a preset that comes with the package, or a path to a YAML file: anything with a
-        suffix or a separator is a path. A `Preset` is taken as it is.
+        suffix or a separator is a path. A `Preset` stays as it is.
     overrides
         Settings that win over the file, each `section.key=value`, the value in YAML; checked
         together.
@@ -248,9 +248,9 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     Raises
     ------
     PresetNotFoundError
-        When there is no such preset or file; names the ones there are.
+        When there is no such preset or file; the message lists those that exist.
     PresetError
-        When a key is unknown or a value is out of range; names the key and where it stands.
+        When a key is unknown or a value is out of range; the message names the key and its place.
 
     Examples
     --------

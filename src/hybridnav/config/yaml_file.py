@@ -56,7 +56,7 @@ def read_yaml(
     what
         What the file is to its reader, as messages begin with it: "map", "preset".
     error
-        What to raise when the file cannot be read.
+        Class of the error for an unreadable file.
     missing
         What to raise when there is no such file; `error` by default.
     limits
@@ -140,7 +140,7 @@ def open_file(
 
 
 def parse_value(text: str) -> Any:
-    """The value of a text of YAML that the user typed; numbers as in files.
+    """Return the value of a text of YAML that the user typed; numbers as in files.
 
     Parameters
     ----------
