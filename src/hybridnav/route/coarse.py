@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CoarseRoute:
-    """Places and arcs of a coarse route, as dense indices, and what the search took."""
+    """Places and arcs of a coarse route, as dense indices, and the effort of the search."""
 
     places: LongArray
     arcs: LongArray
@@ -27,8 +27,8 @@ class CoarseRoute:
 class MaxDistanceSearch:
     """Cheapest routes by the max-distance attribute of arcs, the paper's own rule.
 
-    A route costs the sum of `max_distance_m` over its arcs; routes of equal cost, such as those
-    through two doors between the same rooms, are told apart by the sum of `through_m`. Dijkstra's
+    A route costs the sum of `max_distance_m` over its arcs. The sum of `through_m` decides between
+    routes of equal cost, such as those through two doors between the same rooms. Dijkstra's
     algorithm: an attribute is no path length, so no distance in the plane bounds it.
 
     Parameters
@@ -61,7 +61,7 @@ class MaxDistanceSearch:
         )
 
     def search(self, start: int, goal: int) -> CoarseRoute | None:
-        """Cheapest route between two places.
+        """Find a cheapest route between two places.
 
         Parameters
         ----------

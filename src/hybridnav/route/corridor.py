@@ -22,9 +22,10 @@ class Corridor:
     places: BoolArray
     """bool (n_places,), those in the corridor."""
     n_cells: int
+    """Number of cells in the corridor."""
 
     def mask(self) -> BoolArray:
-        """bool (rows, cols), the cells in the corridor."""
+        """Return the cells in the corridor, bool (rows, cols)."""
         inside: BoolArray = (self.field_of >= 0) & self.places[self.field_of]
         return inside
 

@@ -25,7 +25,7 @@ class RoomRoute:
 
 
 class RoomSearch:
-    """Searches the room level for the routes that are shortest through the middles of rooms.
+    """Search of the room level for the routes that are shortest through the middles of rooms.
 
     An arc costs `through_m`, the way from the surviving cell of one room across its boundary to
     that of the next. That is no bound on a path from elsewhere, but there is a route wherever there
@@ -70,7 +70,7 @@ class RoomSearch:
         Parameters
         ----------
         start, goal
-            Names of rooms. Of rooms in several parts the largest ones that a route joins are taken.
+            Names of rooms. If a room has several parts, the largest that a route reaches counts.
 
         Returns
         -------
@@ -95,7 +95,7 @@ class RoomSearch:
         return RoomRoute(names, tuple(walk.arcs.tolist()))
 
     def _vertices_of(self, name: str) -> LongArray:
-        """Parts of a room that may be entered, free ones first, then by area."""
+        """Return the parts of a room that may be entered, free ones first, then by area."""
         rooms = self._rooms
         is_named = rooms.label_of_vertex == rooms.labels.index(name)
         found = np.flatnonzero(is_named & self._allowed)
@@ -103,7 +103,7 @@ class RoomSearch:
 
 
 def _parts(arcs: IntArray, n_vertices: int) -> LongArray:
-    """The connected component of each vertex."""
+    """Return the connected component of each vertex."""
     from scipy.sparse import coo_array  # noqa: PLC0415 - most planners search no rooms
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
 

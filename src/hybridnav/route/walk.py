@@ -1,4 +1,4 @@
-"""The walk through the topological map that a cell path makes."""
+"""The walk of a cell path through the topological map."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @copies_alike
 class Walks:
-    """Finds the places and arcs that paths pass.
+    """The places and arcs that paths pass.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Walks:
         return edges[plain][order], arcs[plain][order]
 
     def of(self, cells: LongArray) -> tuple[list[int], list[int]]:
-        """Places and arcs of a path, as dense indices; one arc fewer than places.
+        """Return places and arcs of a path, as dense indices; one arc fewer than places.
 
         Parameters
         ----------
@@ -65,8 +65,8 @@ class Walks:
         return places, arcs
 
     def crossings(self, cells: LongArray) -> tuple[list[int], list[int], list[int]]:
-        """Places and arcs of a path, as `of` gives them, and the step that crosses each arc: from
-        `cells[step]` to the next."""
+        """Return the result of `of`, and the step that crosses each arc: from `cells[step]` to the
+        next cell."""
         steps: list[int] = []
         flat = cells[:, 0] * self._cols + cells[:, 1]
         place = self._place_of[flat]
@@ -84,7 +84,8 @@ class Walks:
         return places, arcs, steps
 
     def _arc_between(self, tail: int, head: int) -> int:
-        """The arc whose boundary lies between two neighbours; -1 where they meet at a corner."""
+        """Return the arc whose boundary lies between two neighbours; -1 if they meet at a
+        corner."""
         (row, col), (to_row, to_col) = divmod(tail, self._cols), divmod(head, self._cols)
         if row != to_row and col != to_col:
             return -1
@@ -93,8 +94,8 @@ class Walks:
         return int(arcs[np.searchsorted(edges, edge)])
 
     def _side(self, tail: list[int], head: list[int]) -> int | None:
-        """The side cell that a diagonal passes; None where both are occupied, and for a step along
-        a side."""
+        """Return the side cell that a diagonal passes; None if both are occupied, and for a step
+        along a side."""
         if tail[0] == head[0] or tail[1] == head[1]:
             return None
         ends = {int(self._place_of[cell[0] * self._cols + cell[1]]) for cell in (tail, head)}
