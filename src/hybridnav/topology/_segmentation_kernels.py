@@ -10,7 +10,8 @@ from hybridnav.search.arrays import find
 
 @njit(cache=True, nogil=True)
 def flood_basins(clearance, order, cols, ratio, broad):
-    """Basin of each flat cell, -1 outside `order`, by a flood from the clearest cells down.
+    """Return the basin of each flat cell, -1 outside `order`, by a flood from the clearest cells
+    down.
 
     `order` holds flat cells by falling clearance, none on the rim of the grid. Where two basins
     meet they merge, unless the clearance there is below `ratio` times that of the lower peak and

@@ -57,7 +57,7 @@ class RoomBoundaries:
 
     @property
     def n_boundaries(self) -> int:
-        """How many there are."""
+        """Number of boundaries."""
         return len(self.labels)
 
     @classmethod
@@ -133,7 +133,7 @@ class RoomBoundaries:
     def _nearest(
         self, known: Mapping[int, Point], pairs: Mapping[int, list[int]]
     ) -> list[tuple[int, int]]:
-        """Known numbers with their boundaries, each at most once."""
+        """Return known numbers with their boundaries, each at most once."""
         if not known or not len(self.edges):
             return []
         from scipy.spatial import KDTree  # noqa: PLC0415 - rooms without known doors need none

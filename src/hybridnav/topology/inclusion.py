@@ -1,8 +1,8 @@
 """Inclusion: what lies inside a place, and which places lie round a thing.
 
 A self-loop of the graph is a bridge of its dual: it cuts the faces in two, and its place encloses
-the part that does not hold the outside. Faces joined by the dual edges of other arcs make a block;
-blocks and self-loops make a tree for each component, and obstacles hang the trees of walled-off
+the part that does not hold the outside. Faces joined by the dual edges of other arcs make a block.
+Blocks and self-loops make a tree for each component. Obstacles hang the trees of walled-off
 components below the face of the component that surrounds them.
 """
 
@@ -63,7 +63,7 @@ class Inclusion:
         """int64 (n_obstacles,), face that holds each obstacle, -1 for the rim."""
 
     def _find_obstacle_faces(self) -> LongArray:
-        """Face that holds each obstacle, -1 for the rim."""
+        """Return the face that holds each obstacle, -1 for the rim."""
         face = np.full(self._n_obstacles, -1, dtype=np.int64)
         darts = self._level.face_darts(self._islands.obstacle_cell[1:], _EAST)
         face[1:] = self._level.dual.face_of[darts]
@@ -170,7 +170,7 @@ class Inclusion:
         return self._obstacle_component[obstacle]
 
     def ring_round_places(self, places: LongArray) -> LongArray:
-        """The cycle of places round a connected set of places, counter-clockwise.
+        """Return the cycle of places round a connected set of places, counter-clockwise.
 
         Parameters
         ----------
@@ -204,7 +204,7 @@ class Inclusion:
         return self._walk(int(start), gone)
 
     def ring_round_obstacle(self, obstacle: int) -> LongArray:
-        """The cycle of places round an obstacle, counter-clockwise; empty for the rim."""
+        """Return the cycle of places round an obstacle, counter-clockwise; empty for the rim."""
         face = self.face_of_obstacle[obstacle]
         if face < 0:
             return np.empty(0, dtype=np.int64)
@@ -212,11 +212,12 @@ class Inclusion:
         return self._walk(int(start), np.zeros(self._level.n_arcs, dtype=np.bool_))
 
     def ring_round_component(self, component: int) -> LongArray:
-        """The cycle of places round a walled-off component; empty where only the rim is."""
+        """Return the cycle of places round a walled-off component; empty if only the rim surrounds
+        it."""
         return self.ring_round_obstacle(int(self._islands.surrounding_obstacle[component]))
 
     def _walk(self, start: int, gone: BoolArray) -> LongArray:
-        """Places along the face on the right of a dart, in a map without some arcs."""
+        """Return the places along the face on the right of a dart, in a map without some arcs."""
         sigma = self._level.sigma
         places: list[int] = []
         dart = start
@@ -237,7 +238,7 @@ class Inclusion:
 
 
 def _inherited(flag: BoolArray, parent: LongArray) -> BoolArray:
-    """Flags of a forest handed down from every parent to all below it."""
+    """Hand the flags of a forest down from every parent to all below it; return them."""
     while True:
         more = flag | _at(flag, parent)
         if (more == flag).all():
@@ -246,12 +247,12 @@ def _inherited(flag: BoolArray, parent: LongArray) -> BoolArray:
 
 
 def _at(flag: BoolArray, index: LongArray) -> BoolArray:
-    """The flag at each index, False at -1."""
+    """Return the flag at each index, False at -1."""
     return np.append(flag, False)[index]
 
 
 def _value_at(values: LongArray, index: LongArray) -> LongArray:
-    """The value at each index, -1 at -1."""
+    """Return the value at each index, -1 at -1."""
     return np.append(values, -1)[index]
 
 
@@ -263,7 +264,7 @@ def _groups(arcs: LongArray | IntArray, n_vertices: int) -> LongArray:
 
 
 def _loop_tree(level: Level) -> tuple[LongArray, LongArray]:
-    """The self-loop above each block of faces (-1: a root), and the block of each face."""
+    """Return the self-loop above each block of faces (-1: a root), and the block of each face."""
     dual = level.dual
     loops = np.flatnonzero(level.is_self_loop)
     block_of_face = _groups(dual.edges[~level.is_self_loop], dual.n_faces)

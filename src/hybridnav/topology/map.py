@@ -121,7 +121,8 @@ class TopologicalMap:
         return areas
 
     def place_at(self, cell: tuple[int, int]) -> int:
-        """Dense index of the place that holds a cell of the grid, -1 for an occupied cell."""
+        """Return the dense index of the place that holds a cell of the grid, -1 for an occupied
+        cell."""
         return int(self.level.field_of[cell])
 
     @cached_property
@@ -211,7 +212,8 @@ class TopologicalMap:
             raise InvalidValueError(f"places must be connected by arcs, got {places!s:.80}")
 
     def unexplored_islands(self) -> list[tuple[int, ...]]:
-        """Sets of connected unexplored places that other places enclose, as dense indices."""
+        """Return the sets of connected unexplored places that other places enclose, as dense
+        indices."""
         import networkx as nx  # noqa: PLC0415 - on demand
 
         unexplored = self.classes == CellClass.UNEXPLORED
@@ -222,7 +224,8 @@ class TopologicalMap:
         return sorted(island for island in islands if self.enclosed_by(island))
 
     def parallel_arcs(self) -> int:
-        """Arcs beyond the first between the same two places: doors that a simple graph loses."""
+        """Return the number of arcs beyond the first between the same two places: doors that a
+        simple graph loses."""
         from hybridnav.pyramid.simple import report_of  # noqa: PLC0415 - most maps are never asked
 
         return report_of(self.arcs, self.n_places).n_parallel_dropped

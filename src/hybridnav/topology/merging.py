@@ -123,7 +123,7 @@ class Pieces:
             heapq.heappush(heap, (int(self._free[opened]), opened))
 
     def _solidity(self, u: int, v: int) -> float:
-        """Area of two pieces by that of the convex hull of both."""
+        """Return the area of two pieces divided by that of the convex hull of both."""
         _, hull_area = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
         return float((self._areas[u] + self._areas[v]) / hull_area)
 
@@ -147,8 +147,8 @@ class Pieces:
         self._borders[v] = {}
 
     def _breadth(self, piece: int) -> float:
-        """How broad a piece is on the whole: its area by its length, in cells, without its reach
-        into the walls on both sides."""
+        """Return the mean breadth of a piece: its area divided by its length, in cells, without its
+        reach into the walls on both sides."""
         corners = self._hulls[piece]
         length = np.hypot(*(corners[:, None] - corners[None]).T).max()
         return float(self._areas[piece] / length) - 2 * self._reach
@@ -163,12 +163,14 @@ class Pieces:
 
 
 def least_cells(least_m2: float, cell_m2: float) -> int:
-    """Fewest cells that make an area, so that 2 m2 are 200 cells of a decimetre and not 201."""
+    """Return the fewest cells that make an area, so that 2 m2 are 200 cells of a decimetre and not
+    201."""
     return math.ceil(least_m2 / cell_m2 * (1 - _ROUNDING))
 
 
 def grown(label_of: IntArray, reach_cells: float) -> IntArray:
-    """Labels spread to the cells of none within reach, walls or not: each takes the nearest one."""
+    """Return labels spread to the unlabelled cells within reach, walls or not: each takes the
+    nearest one."""
     if (label_of < 0).all():
         return label_of.copy()
     distance, nearest = ndimage.distance_transform_edt(label_of < 0, return_indices=True)
@@ -177,7 +179,7 @@ def grown(label_of: IntArray, reach_cells: float) -> IntArray:
 
 
 def _common_sides(label_of: IntArray) -> dict[tuple[int, int], int]:
-    """Sides between cells of two pieces, counted by pair, the lower piece first."""
+    """Return the sides between cells of two pieces, counted by pair, the lower piece first."""
     pairs = []
     for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
         between = (tail >= 0) & (head >= 0) & (tail != head)
@@ -187,7 +189,7 @@ def _common_sides(label_of: IntArray) -> dict[tuple[int, int], int]:
 
 
 def _hulls(label_of: IntArray, n_pieces: int) -> list[FloatArray]:
-    """Corners of the convex hull of each piece, (row, col) in cells."""
+    """Return the corners of the convex hull of each piece, (row, col) in cells."""
     hulls = []
     for piece, window in enumerate(ndimage.find_objects(label_of + 1, n_pieces)):
         inside = label_of[window] == piece
@@ -201,7 +203,7 @@ def _hulls(label_of: IntArray, n_pieces: int) -> list[FloatArray]:
 
 
 def _hull(points: FloatArray) -> tuple[FloatArray, float]:
-    """Corners and area of the convex hull of points that span an area."""
+    """Return corners and area of the convex hull of points that span an area."""
     try:
         hull = ConvexHull(points)
     except QhullError:  # pragma: no cover - cells always span an area, however Qhull rounds

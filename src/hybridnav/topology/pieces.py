@@ -1,4 +1,5 @@
-"""Pieces of free space, cut at its narrow places: where the segmentation into rooms begins."""
+"""Pieces of free space, cut at its narrow places: the first stage of the segmentation into
+rooms."""
 
 from __future__ import annotations
 
@@ -39,15 +40,15 @@ _WALL_SLACK_M = 0.15
 """A wall bends by so much at most where it continues another, on either side."""
 _LEAST_TILT_RAD = 0.02
 LEAST_PIECE_M2 = 1.0
-"""Smaller pieces between wall lines go to neighbours, unless still smaller rooms are wanted."""
+"""Smaller pieces between wall lines go to neighbours, unless the caller allows smaller rooms."""
 
 
 def watershed_pieces(grid: OccupancyGrid) -> IntArray:
     """Cut free space along the watersheds of the clearance, where passages are narrow.
 
-    The distance transform is flooded from its peaks; two basins merge where they meet unless the
-    saddle is low against the lower peak (a relative persistence, in place of h-maxima, so that
-    broad rooms may have broad doors). S. Beucher, C. Lantuejoul: Use of watersheds in contour
+    The distance transform is flooded from its peaks. Two basins merge where they meet unless the
+    saddle is low against the lower peak: a relative persistence, in place of h-maxima, so that
+    broad rooms may have broad doors. S. Beucher, C. Lantuejoul: Use of watersheds in contour
     detection, 1979; for rooms R. Bormann, F. Jordan, W. Li, J. Hampp, M. Haegele: Room
     segmentation: survey, implementation, and analysis, ICRA 2016.
 
@@ -65,8 +66,8 @@ def watershed_pieces(grid: OccupancyGrid) -> IntArray:
 
 
 def _basins(grid: OccupancyGrid, *, ratio: float, broad_m: float) -> IntArray:
-    """Basins of the clearance; they merge where it is not below `ratio` of that of the lower peak,
-    or not below `broad_m`."""
+    """Return the basins of the clearance. Two merge where it is not below `ratio` times that of the
+    lower peak, or not below `broad_m`."""
     free = grid.measured == CellClass.FREE
     clearance = np.pad(_clearance(grid), 1)
     inside = np.flatnonzero(np.pad(free, 1))
@@ -79,20 +80,20 @@ def _basins(grid: OccupancyGrid, *, ratio: float, broad_m: float) -> IntArray:
 
 
 def _clearance(grid: OccupancyGrid) -> FloatArray:
-    """Clearance in cells of the map as it was measured; 1 everywhere without an occupied cell, so
-    that all is one piece."""
+    """Return the clearance in cells of the map as measured. Without an occupied cell it is 1
+    everywhere, so that all is one piece."""
     clearance = clearance_cells(grid.measured == CellClass.OCCUPIED)
     clearance[~np.isfinite(clearance)] = 1.0
     return clearance
 
 
 def contracted_pieces(grid: OccupancyGrid) -> IntArray:
-    """Take the fields of the apex of a pyramid in which narrow boundaries resist.
+    """Return the fields of the apex of a pyramid in which narrow boundaries resist.
 
-    Above fine places of the map as it was measured the pyramid goes on: at each level the stars of
-    a maximal independent edge set are contracted, widest arcs first, but no arc whose boundary has
-    less clearance than a share of the greatest in either field. So doors resist, two doors between
-    the same rooms one by one, and the apex is what they leave apart.
+    The pyramid grows on above fine places of the map as it was measured. Each level contracts the
+    stars of a maximal independent edge set, widest arcs first, but no arc whose boundary has less
+    clearance than a share of the greatest in either field. So doors resist, two doors between the
+    same rooms one by one, and separate the vertices of the apex.
 
     Parameters
     ----------
@@ -140,9 +141,9 @@ def walled_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> I
 def wall_line_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> IntArray:
     """Cut free space along the lines of its walls, where they continue behind an opening.
 
-    In the two main directions of the building, a gap between wall and wall on one line is taken for
-    an opening: up to 6 m where both sides hold enough wall, doors up to 1.5 m where one does. What
-    the cuts leave connected is a piece; small ones go to their neighbours. Kin to the wall lines
+    In the two main directions of the building, a gap between two walls on one line counts as an
+    opening: up to 6 m with enough wall on both sides, up to 1.5 m (doors) with enough on one. Cells
+    that stay connected form a piece; small ones go to their neighbours. Kin to the wall lines
     of M. Luperto, F. Amigoni: Extracting structure of buildings using layout reconstruction, 2019.
 
     Parameters
@@ -179,7 +180,7 @@ def wall_line_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -
 
 
 def main_direction(occupied: BoolArray) -> float:
-    """Angle that turns the rows of a grid into the direction of most walls, in radians.
+    """Return the angle that turns the rows of a grid into the direction of most walls, in radians.
 
     Parameters
     ----------
@@ -201,7 +202,7 @@ def main_direction(occupied: BoolArray) -> float:
 
 
 def _gaps(occupied: BoolArray, free: BoolArray, resolution_m: float) -> BoolArray:
-    """Cells between walls that continue each other along rows or columns."""
+    """Return the cells between walls that continue each other along rows or columns."""
     slack = max(1, round(_WALL_SLACK_M / resolution_m))
     longest, short, window, side, both = (
         max(1, round(length_m / resolution_m))
@@ -230,13 +231,15 @@ def _upright(slack: int) -> BoolArray:
 
 
 def _rotation(tilt_rad: float) -> FloatArray:
-    """Turns offsets (row, col) of an upright image into those of the grid."""
+    """Return the matrix that turns offsets (row, col) of an upright image into those of the
+    grid."""
     cosine, sine = math.cos(tilt_rad), math.sin(tilt_rad)
     return np.array([[cosine, sine], [-sine, cosine]])
 
 
 def _turned(mask: BoolArray, tilt_rad: float) -> BoolArray:
-    """A mask on an image that is turned so that walls run along its rows, large enough for all."""
+    """Return a mask on an image that is turned so that walls run along its rows, large enough for
+    all."""
     side = math.ceil(math.hypot(*mask.shape)) + 2
     turn = _rotation(tilt_rad)
     middle = (np.array(mask.shape) - 1) / 2

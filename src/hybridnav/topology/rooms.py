@@ -35,7 +35,7 @@ class Door:
     """
 
     number: int
-    """From 1; what people are told. A file of rooms keeps it."""
+    """Number for people, from 1. A file of rooms keeps it."""
     rooms: tuple[str | None, str | None]
     """Names of the rooms on both sides; None for what lies in no room."""
     position: tuple[float, float]
@@ -112,7 +112,7 @@ class Rooms:
         return free
 
     def name_of(self, label: int) -> str | None:
-        """The name of a label, None for -1."""
+        """Return the name of a label, None for -1."""
         return None if label == NO_ROOM else self.names[label]
 
     def vertices_of(self, name: str) -> LongArray:
@@ -179,7 +179,7 @@ class Rooms:
         )
 
     def door(self, number: int) -> Door:
-        """The door with a number.
+        """Return the door with a number.
 
         Raises
         ------
@@ -251,8 +251,9 @@ class Rooms:
         )
 
     def point_of(self, name: str) -> tuple[float, float]:
-        """The point that stands for a room: its named point, else where most clearance is, in the
-        largest part that the robot's radius leaves free; where it leaves none, in the whole room.
+        """Return the point that stands for a room: its named point, else the point of most
+        clearance in the largest part that the robot's radius leaves free, or in the whole room if
+        it leaves none.
 
         Parameters
         ----------
@@ -278,7 +279,7 @@ class Rooms:
         return float(x), float(y)
 
     def _measured(self, name: str) -> LongArray:
-        """Cells (row, col) of a room that were measured as free."""
+        """Return the cells (row, col) of a room that were measured as free."""
         inside = self.labels.label_of == self.labels.index(name)
         cells: LongArray = np.argwhere(inside & (self.grid.measured == CellClass.FREE))
         return cells

@@ -136,14 +136,14 @@ def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
 
 
 def _pieces(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
-    """Where free space is cut."""
+    """Return the pieces into which free space is cut."""
     if method == "walls":
         return walled_pieces(grid, least_m2=min(least_m2, LEAST_PIECE_M2))
     return watershed_pieces(grid) if method == "watershed" else contracted_pieces(grid)
 
 
 def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
-    """Labels spread into walls, and through unexplored cells, but never out behind a wall.
+    """Return labels spread into walls, and through unexplored cells, but never out behind a wall.
 
     A wall of one cell is all that parts two rooms on some maps: what is free and has no room, or is
     unexplored, takes none through it.
@@ -160,7 +160,7 @@ def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
 
 
 def _outside(grid: OccupancyGrid) -> BoolArray:
-    """Free cells outside of what the map shows, which no room may have.
+    """Return the free cells outside the building, which belong to no room.
 
     They are connected along sides, nothing bounds them outwards: they reach all four sides of the
     map and fill at least half of its border. And free space that they cannot reach lies inside
@@ -182,7 +182,8 @@ def _outside(grid: OccupancyGrid) -> BoolArray:
 
 
 def _walled(grid: OccupancyGrid) -> OccupancyGrid:
-    """The map with walls where most of its free space ends at unexplored cells: the rim of those.
+    """Return the map with the rim of its unexplored cells as walls if most of its free space ends
+    there.
 
     A scan whose thresholds call most walls unexplored has no other ones. Where obstacles bound free
     space, unexplored pockets are shadows of furniture, and no walls.
@@ -198,7 +199,8 @@ def _walled(grid: OccupancyGrid) -> OccupancyGrid:
 
 
 def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
-    """Labels of at least some cells, renumbered by their first cells from the top row down."""
+    """Return labels of at least some cells, renumbered by their first cells from the top row
+    down."""
     areas = np.bincount(label_of[label_of >= 0])
     found, first = np.unique(label_of[::-1], return_index=True)
     kept = found >= 0
