@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
 
@@ -16,6 +17,8 @@ from hybridnav.viz import style
 from hybridnav.viz.style import Sizes
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from matplotlib.axes import Axes
 
     from hybridnav._typing import AnyArray, ByteArray, FloatArray
@@ -123,6 +126,10 @@ class Canvas:
         """Width of the map in points."""
         return float(self.view.size[0]) * self.sizes.points_per_metre
 
+    def add_lines(self, lines: Iterable[FloatArray], **look: Any) -> None:
+        """Draw lines of points `(x, y)` in metres; `look` is that of a `LineCollection`."""
+        self.ax.add_collection(LineCollection(list(lines), **look), autolim=False)
+
 
 def _show(ax: Axes, view: View) -> None:
     ax.set_xlim(view.low[0], view.high[0])
@@ -154,7 +161,7 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
     end = low + block * np.array(image.shape[:2])
     (up_x, up_y), (along_x, along_y) = grid.frame.axes_m.tolist()
     to_map = Affine2D.from_values(along_x, along_y, up_x, up_y, *grid.frame.origin_m)
-    drawn = ax.imshow(
+    ax.imshow(
         image,
         origin="lower",
         extent=(float(low[1]), float(end[1]), float(low[0]), float(end[0])),
@@ -162,8 +169,8 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
         # Average if the page is coarser than the map: thin walls must not vanish.
         interpolation="antialiased",
         zorder=0,
+        gid="cells",
     )
-    drawn.set_gid("cells")
     _show(ax, view)  # imshow set the limits to those of an image without yaw
 
 

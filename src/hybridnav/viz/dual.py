@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from hybridnav.pyramid.dual import FaceKind
@@ -18,7 +17,6 @@ from hybridnav.viz.topology import draw_ground, drawable, finish
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridnav._typing import FloatArray
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.layout import Entry
@@ -93,17 +91,21 @@ def draw_dual(canvas: Canvas, level: Level) -> None:
     """Draw dual edges and dual vertices."""
     ax, sizes, frame = canvas.ax, canvas.sizes, level.grid.frame
     drawn = Boundaries(level)
-    _add_lines(canvas, drawn.lines, level, style.INK, 1.3, "dual-edges")
+    look = {"capstyle": "round", "joinstyle": "round", "zorder": 3}
+    edges = map(frame.points_of_grid, drawn.lines)
+    width = 1.3 * sizes.line
+    canvas.add_lines(edges, colors=style.INK, linewidths=width, **look, gid="dual-edges")
     for kind in (FaceKind.PROTECTED, FaceKind.OUTSIDE):
         _, _, colour, _ = _MARKERS[kind]
         holes = [hole for face, hole in drawn.holes.items() if level.dual.kinds[face] == kind]
-        links = [link for hole in holes for link in hole.links]
-        _add_lines(canvas, links, level, colour, 1.0, f"{kind.name.lower()}-links")
+        links = [frame.points_of_grid(link) for hole in holes for link in hole.links]
+        gid = f"{kind.name.lower()}-links"
+        canvas.add_lines(links, colors=colour, linewidths=sizes.line, **look, gid=gid)
     for kind, (marker, size, colour, _) in _MARKERS.items():
         at = frame.points_of_grid(drawn.positions[level.dual.kinds == kind])
         if kind == FaceKind.OUTSIDE:  # may lie outside the visible part of the map
             at = np.clip(at, canvas.view.low, canvas.view.high)
-        dots = ax.scatter(
+        ax.scatter(
             at[:, 0],
             at[:, 1],
             s=(size * sizes.line) ** 2,
@@ -113,24 +115,8 @@ def draw_dual(canvas: Canvas, level: Level) -> None:
             linewidths=0.5 * sizes.line,
             clip_on=kind != FaceKind.OUTSIDE,
             zorder=5,
+            gid=f"{kind.name.lower()}-faces",
         )
-        dots.set_gid(f"{kind.name.lower()}-faces")
-
-
-def _add_lines(  # noqa: PLR0913, PLR0917 - independent properties of a line
-    canvas: Canvas, lines: list[FloatArray], level: Level, colour: str, width: float, gid: str
-) -> None:
-    points = [level.grid.frame.points_of_grid(line) for line in lines]
-    drawn = LineCollection(
-        points,
-        colors=colour,
-        linewidths=width * canvas.sizes.line,
-        capstyle="round",
-        joinstyle="round",
-        zorder=3,
-    )
-    drawn.set_gid(gid)
-    canvas.ax.add_collection(drawn, autolim=False)
 
 
 def dual_entries(level: Level, sizes: Sizes) -> list[Entry]:

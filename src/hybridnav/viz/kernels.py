@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from hybridnav.grid import CellClass
@@ -91,15 +90,14 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
     curves = graph.curves(_CLEARANCE * canvas.sizes.line / canvas.sizes.points_per_metre)
     for label, (colour, width, dashes) in _STROKES.items():
         arcs = np.flatnonzero(kinds[label]).tolist()
-        lines = LineCollection(
+        canvas.add_lines(
             [curves[arc] for arc in arcs if arc in curves],
             colors=colour,
             linewidths=width * canvas.sizes.line,
             linestyles=[dashes],
             zorder=3,
+            gid=label.replace(" ", "-"),
         )
-        lines.set_gid(label.replace(" ", "-"))
-        canvas.ax.add_collection(lines, autolim=False)
     cols = lower.grid.shape[1]
     survives = np.isin(lower.cells @ [cols, 1], upper.cells @ [cols, 1])
     _draw_dots(canvas, graph.positions, survives, lower.classes == CellClass.FREE)
@@ -126,7 +124,7 @@ def _draw_dots(canvas: Canvas, at: FloatArray, survives: BoolArray, free: BoolAr
     for (label, (size, face)), mask in zip(_DOTS.items(), (survives, ~survives), strict=True):
         edges = [style.INK if is_free else style.UNEXPLORED_NODE for is_free in free[mask]]
         fill = edges if label == "surviving" else face
-        dots = canvas.ax.scatter(
+        canvas.ax.scatter(
             at[mask, 0],
             at[mask, 1],
             s=(size * canvas.sizes.line) ** 2,
@@ -134,8 +132,8 @@ def _draw_dots(canvas: Canvas, at: FloatArray, survives: BoolArray, free: BoolAr
             edgecolors=edges,
             linewidths=0.9 * canvas.sizes.line,
             zorder=4,
+            gid=label.replace(" ", "-"),
         )
-        dots.set_gid(label.replace(" ", "-"))
 
 
 def _entries(canvas: Canvas, kinds: dict[str, BoolArray], survives: BoolArray) -> list[Entry]:

@@ -113,8 +113,8 @@ def add_scale_bar(canvas: Canvas) -> float:
         linewidth=2.2 * sizes.line,
         solid_capstyle="butt",
         clip_on=False,
+        gid="scale-bar",
     )
-    bar.set_gid("scale-bar")
     ax.add_line(bar)
     label = Text(
         left + length,
@@ -124,8 +124,8 @@ def add_scale_bar(canvas: Canvas) -> float:
         fontsize=sizes.font,
         verticalalignment="center_baseline",
         color=style.INK,
+        gid="scale-bar-label",
     )
-    label.set_gid("scale-bar-label")
     ax.add_artist(label)
     label.set_clip_on(False)
     text = text_width(label.get_text(), sizes.font)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -82,14 +82,15 @@ def plot_mesh(
     draw_cells(canvas, grid, grid.classes, colours)
     corners = grid.frame.points_of_grid(mesh.corners)
     rings = np.split(corners[mesh.begins], mesh.first[1:-1]) if mesh.n_polygons else []
-    fill = PolyCollection(rings, facecolors=_POLYGON, alpha=_FULL, linewidths=0, zorder=1)
-    fill.set_gid("polygons")
+    fill = PolyCollection(
+        rings, facecolors=_POLYGON, alpha=_FULL, linewidths=0, zorder=1, gid="polygons"
+    )
     canvas.ax.add_collection(fill, autolim=False)
     draw_sides(canvas, grid, mesh)
     convex = mesh.is_convex
     x, y = corners[convex].T
-    dots = canvas.ax.scatter(x, y, s=(1.5 * line) ** 2, c=style.HOLE, linewidths=0, zorder=4)
-    dots.set_gid("corners")
+    size = (1.5 * line) ** 2
+    canvas.ax.scatter(x, y, s=size, c=style.HOLE, linewidths=0, zorder=4, gid="corners")
     dot = Line2D([], [], ls="", marker="o", ms=3.5 * line, mfc=style.HOLE, mec="none")
     entries: list[Entry] = [
         (Patch(fc=_POLYGON, alpha=_FULL), "convex polygon"),
@@ -116,11 +117,8 @@ def draw_sides(canvas: Canvas, grid: OccupancyGrid, mesh: ConvexMesh) -> None:
     # The twin begins at the end of the side.
     ends = np.stack([mesh.begins[slots], mesh.begins[mesh.twins[slots]]], axis=1)
     lines = grid.frame.points_of_grid(mesh.corners[ends].reshape(-1, 2)).reshape(-1, 2, 2)
-    drawn = LineCollection(
-        list(lines), colors=_SIDE, linewidths=0.45 * canvas.sizes.line, alpha=0.6, zorder=3
-    )
-    drawn.set_gid("sides")
-    canvas.ax.add_collection(drawn, autolim=False)
+    width = 0.45 * canvas.sizes.line
+    canvas.add_lines(lines, colors=_SIDE, linewidths=width, alpha=0.6, zorder=3, gid="sides")
 
 
 def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> list[Entry]:
@@ -131,12 +129,10 @@ def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> l
     views = _views(trace)
     rings = grid.frame.points_of_grid(views.reshape(-1, 2)).reshape(-1, 4, 2)
     shades = _ORDER(np.linspace(0, 1, max(n, 2))[:n])
-    cones = PolyCollection(list(rings), facecolors=shades, linewidths=0, zorder=2)
-    cones.set_gid("views")
+    cones = PolyCollection(list(rings), facecolors=shades, linewidths=0, zorder=2, gid="views")
     ax.add_collection(cones, autolim=False)
     x, y = grid.frame.points_of_grid(np.unique(trace.roots, axis=0)).T
-    roots = ax.scatter(x, y, s=(2.4 * line) ** 2, c=style.HOLE, linewidths=0, zorder=5)
-    roots.set_gid("roots")
+    ax.scatter(x, y, s=(2.4 * line) ** 2, c=style.HOLE, linewidths=0, zorder=5, gid="roots")
     swatches = tuple(Patch(fc=_ORDER(share)) for share in (0.0, 0.5, 1.0))
     dot = Line2D([], [], ls="", marker="o", ms=3.5 * line, mfc=style.HOLE, mec="none")
     entries: list[Entry] = [
@@ -147,9 +143,7 @@ def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> l
     ends = grid.frame.points_of_grid(trace.ends)
     if trace.path.positions is not None:
         points = grid.frame.points_of_grid(trace.path.positions)
-        way = Line2D(*points.T, color=style.PATH, lw=1.8 * line, zorder=6)
-        way.set_gid("path")
-        ax.add_line(way)
+        ax.add_line(Line2D(*points.T, color=style.PATH, lw=1.8 * line, zorder=6, gid="path"))
         entries.append((Line2D([], [], color=style.PATH, lw=1.8 * line), "shortest path"))
     for point, marker in zip(ends, "os", strict=True):
         ax.plot(

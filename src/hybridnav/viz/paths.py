@@ -94,8 +94,8 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
             linewidth=_SHORTEST_WIDTH * width,
             linestyle=_SHORTEST_DASHES,
             zorder=7.5,
+            gid="shortest",
         )
-        line.set_gid("shortest")
         canvas.ax.add_line(line)
         entries.append((line, "shortest path"))
     ends = next((line[[0, -1]] for line in lines if len(line)), np.empty((0, 2)))

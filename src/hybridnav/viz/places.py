@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
 
 from hybridnav.grid import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.colouring import colour_vertices
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
     from hybridnav._typing import BoolArray, ByteArray, FloatArray
     from hybridnav.pyramid import Level
     from hybridnav.viz.canvas import Canvas
@@ -98,20 +93,22 @@ def draw_arcs(canvas: Canvas, places: Places, *, self_loops: bool = False) -> No
 
     Unexplored places cover most of many maps: their arcs must not hide those between free ones.
     """
-    ax, sizes, level = canvas.ax, canvas.sizes, places.level
+    sizes, level = canvas.sizes, places.level
     seen = places.large[level.arcs].all(axis=1) & ~level.is_self_loop
     n_free = places.free[level.arcs].sum(axis=1)
     width = min(0.9 * sizes.line, 0.3 * places.dot(sizes))
+    look: dict[str, Any] = {"capstyle": "round", "joinstyle": "round", "zorder": 3}
     for free_ends, colour, share, gid in (
         (0, style.UNEXPLORED_ARC, 0.6, "unexplored-arcs"),
         (1, style.RIM_ARC, 0.6, "rim-arcs"),
         (2, style.ARC, 1.0, "arcs"),
     ):
         lines = places.lines(seen & (n_free == free_ends))
-        _add_lines(ax, lines, colour, share * width, gid=gid)
+        canvas.add_lines(lines, colors=colour, linewidths=share * width, **look, gid=gid)
     if self_loops:
         loops = places.loops(level.is_self_loop)
-        _add_lines(ax, loops, style.ARC, 0.7 * width, gid="self-loops")
+        look |= {"colors": style.ARC, "linewidths": 0.7 * width}
+        canvas.add_lines(loops, **look, gid="self-loops")
 
 
 def draw_dots(canvas: Canvas, places: Places) -> None:
@@ -121,17 +118,6 @@ def draw_dots(canvas: Canvas, places: Places) -> None:
         (~places.free, style.UNEXPLORED_DOT, 0.75, "unexplored-dots"),
         (places.free, style.INK, 1.0, "free-dots"),
     ):
-        points = places.positions[mask & places.large]
+        x, y = places.positions[mask & places.large].T
         size = (share * diameter) ** 2
-        dots = ax.scatter(points[:, 0], points[:, 1], s=size, c=colour, linewidths=0, zorder=4)
-        dots.set_gid(gid)
-
-
-def _add_lines(
-    ax: Axes, lines: Sequence[FloatArray], colour: str, width: float, *, gid: str
-) -> None:
-    drawn = LineCollection(
-        lines, colors=colour, linewidths=width, capstyle="round", joinstyle="round", zorder=3
-    )
-    drawn.set_gid(gid)
-    ax.add_collection(drawn, autolim=False)
+        ax.scatter(x, y, s=size, c=colour, linewidths=0, zorder=4, gid=gid)

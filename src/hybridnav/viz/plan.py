@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import patheffects
-from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
@@ -146,22 +145,19 @@ def _corridor(topology: TopologicalMap, result: PlanResult) -> BoolArray:
 def _draw_route(canvas: Canvas, topology: TopologicalMap, route: Route, places: Places) -> None:
     arcs = np.isin(topology.arc_ids, route.arcs)
     width = _ROUTE_WIDTH * canvas.sizes.line
-    lines = LineCollection(
-        places.lines(arcs), colors=style.INK, linewidths=width, capstyle="round", zorder=5
-    )
-    lines.set_gid("route")
-    canvas.ax.add_collection(lines, autolim=False)
-    stops = places.positions[np.isin(topology.place_ids, route.places)]
-    dots = canvas.ax.scatter(
-        stops[:, 0],
-        stops[:, 1],
+    look = {"colors": style.INK, "linewidths": width, "capstyle": "round", "zorder": 5}
+    canvas.add_lines(places.lines(arcs), **look, gid="route")
+    x, y = places.positions[np.isin(topology.place_ids, route.places)].T
+    canvas.ax.scatter(
+        x,
+        y,
         s=max(places.dot(canvas.sizes), 2.4 * width) ** 2,
         c=style.FREE,
         edgecolors=style.INK,
         linewidths=0.7 * width,
         zorder=6,
+        gid="route-places",
     )
-    dots.set_gid("route-places")
 
 
 def draw_path(canvas: Canvas, points: FloatArray) -> None:
@@ -171,16 +167,15 @@ def draw_path(canvas: Canvas, points: FloatArray) -> None:
         linewidth=(PATH_WIDTH + _CASING) * factor, foreground=style.FREE, capstyle="round"
     )
     line = Line2D(
-        points[:, 0],
-        points[:, 1],
+        *points.T,
         color=style.PATH,
         linewidth=PATH_WIDTH * factor,
         solid_capstyle="round",
         solid_joinstyle="round",
         path_effects=[casing],
         zorder=7,
+        gid="path",
     )
-    line.set_gid("path")
     canvas.ax.add_line(line)
 
 

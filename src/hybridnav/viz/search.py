@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -102,8 +101,7 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
         counts = [f"{sizes[0]:,} states", f"{sizes[1]:,} motions"]
     line = canvas.sizes.line
     if path is not None:
-        way = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5)
-        way.set_gid("path")
+        way = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5, gid="path")
         canvas.ax.add_line(way)
         entries.append((Line2D([], [], color=style.PATH, lw=1.8 * line), "path"))
     if corridor is not None:
@@ -119,16 +117,12 @@ def _draw_states(canvas: Canvas, search: Search | None) -> list[Entry]:
     entries: list[Entry] = []
     if search is not None and len(search.edges):
         lines = np.array(search.edges, dtype=np.float64).reshape(-1, 2, 2)
-        drawn = LineCollection(list(lines), colors=_EDGE, linewidths=0.5 * line, zorder=3)
-        drawn.set_gid("motions")
-        canvas.ax.add_collection(drawn, autolim=False)
+        canvas.add_lines(lines, colors=_EDGE, linewidths=0.5 * line, zorder=3, gid="motions")
         entries.append((Line2D([], [], color=_EDGE, lw=1.2 * line), "motions of the trees"))
     if search is not None and len(search.states):
-        at = np.array(search.states, dtype=np.float64).reshape(-1, 2)
-        dots = canvas.ax.scatter(
-            at[:, 0], at[:, 1], s=(1.3 * line) ** 2, c=_STATE, linewidths=0, zorder=4
-        )
-        dots.set_gid("states")
+        x, y = np.array(search.states, dtype=np.float64).reshape(-1, 2).T
+        size = (1.3 * line) ** 2
+        canvas.ax.scatter(x, y, s=size, c=_STATE, linewidths=0, zorder=4, gid="states")
         dot = Line2D([], [], ls="", marker="o", ms=3 * line, mfc=_STATE, mec="none")
         entries.append((dot, "states drawn"))
     return entries

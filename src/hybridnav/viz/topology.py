@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
@@ -38,6 +37,7 @@ LEAST_AREA_M2 = 0.1
 """Area in square metres below which places, and the holes inside self-loops, are noise."""
 FAINT = 0.4
 """Share of its colour that the map keeps under a graph."""
+_DASHED: dict[str, Any] = {"linestyles": [style.SELF_LOOP_DASHES], "capstyle": "butt"}
 _CLASSES = (style.BLOCKED, style.FREE, style.UNEXPLORED)
 _CLEARANCE = 3.2  # points on a picture of full width
 _LEAST_CLEARANCE = 1.5  # cells: less would follow their steps
@@ -194,23 +194,23 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
     """Draw arcs, self-loops and places."""
     sizes, level = canvas.sizes, graph.level
     width, metre = 1.1 * sizes.line, sizes.points_per_metre
+    look = {"linewidths": width, "capstyle": "round", "joinstyle": "round", "zorder": 3}
     if simple:
-        lines = list(graph.positions[np.unique(np.sort(level.arcs[graph.plain], axis=1), axis=0)])
-        _add_lines(canvas, lines, style.INK, width, gid="edges")
+        pairs = np.unique(np.sort(level.arcs[graph.plain], axis=1), axis=0)
+        canvas.add_lines(graph.positions[pairs], colors=style.INK, **look, gid="edges")
     else:
         curves = graph.curves(_CLEARANCE * sizes.line / metre)
         for mask, colour, gid in graph.kinds():
             lines = [curves[arc] for arc in np.flatnonzero(mask).tolist() if arc in curves]
-            drawn = _add_lines(canvas, lines, colour, width, gid=gid)
-            if gid == "self-loops":
-                drawn.set(linestyle=[style.SELF_LOOP_DASHES], capstyle="butt")
+            own = look | _DASHED if gid == "self-loops" else look
+            canvas.add_lines(lines, colors=colour, **own, gid=gid)
     free = level.classes == CellClass.FREE
     for mask, colour, size, gid in (
         (~free, style.UNEXPLORED_NODE, 4.2, "unexplored-dots"),
         (free, style.INK, 5.2, "free-dots"),
     ):
         at = graph.positions[mask & graph.seen]
-        dots = canvas.ax.scatter(
+        canvas.ax.scatter(
             at[:, 0],
             at[:, 1],
             s=(size * sizes.line) ** 2,
@@ -218,19 +218,8 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
             edgecolors=style.FREE,
             linewidths=0.5 * sizes.line,
             zorder=4,
+            gid=gid,
         )
-        dots.set_gid(gid)
-
-
-def _add_lines(
-    canvas: Canvas, lines: Sequence[FloatArray], colour: str, width: float, *, gid: str
-) -> LineCollection:
-    drawn = LineCollection(
-        list(lines), colors=colour, linewidths=width, capstyle="round", joinstyle="round", zorder=3
-    )
-    drawn.set_gid(gid)
-    canvas.ax.add_collection(drawn, autolim=False)
-    return drawn
 
 
 def _words(graph: Graph, *, simple: bool) -> list[str]:
