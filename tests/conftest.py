@@ -1,8 +1,11 @@
 """Fixtures for every test."""
 
+import json
 import os
 import signal
+import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -13,6 +16,45 @@ from tests.portal_memory import remember_portals
 # Time is for benchmarks: a first call that imports or compiles is no failure.
 settings.register_profile("hybridnav", deadline=None)
 settings.load_profile("hybridnav")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one command did."""
+
+    code: object
+    out: str
+    err: str
+
+    @property
+    def answer(self):
+        """The JSON object on stdout, read strictly: no NaN, no Infinity, one line."""
+        assert self.out.count("\n") == 1
+        return json.loads(self.out, parse_constant=pytest.fail)
+
+    def refuses(self, code, *words):
+        """Check that there is no result and one line that says why."""
+        assert (self.code, self.out) == (code, "")
+        assert self.err.startswith("hybridnav: ")
+        assert self.err.count("\n") == 1
+        assert self.err.strip().isprintable()
+        for word in words:
+            assert word in self.err
+        return True
+
+
+@pytest.fixture
+def cli(monkeypatch, capsys):
+    """Run the command line in this process."""
+    from hybridnav.cli import main
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["hybridnav", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return Outcome(ended.value.code, *capsys.readouterr())
+
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,6 @@ import io
 import json
 import math
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav.cli import main
 from hybridnav.cli.rendering import summary
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -22,44 +20,6 @@ OFFICE_QUERY = (OFFICE, "--start", "1.0,13.2", "--goal", "40.6,19.4")
 GREYS = {"#": 0, ".": 254, "?": 205}
 SHADED = {"free_thresh": 0.25}
 """A threshold that calls grey 205 free."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What one command did."""
-
-    code: object
-    out: str
-    err: str
-
-    @property
-    def answer(self):
-        """The JSON object on stdout, read strictly: no NaN, no Infinity, one line."""
-        assert self.out.count("\n") == 1
-        return json.loads(self.out, parse_constant=pytest.fail)
-
-    def refuses(self, code, *words):
-        """Check that there is no result and one line that says why."""
-        assert (self.code, self.out) == (code, "")
-        assert self.err.startswith("hybridnav: ")
-        assert self.err.count("\n") == 1
-        assert self.err.strip().isprintable()
-        for word in words:
-            assert word in self.err
-        return True
-
-
-@pytest.fixture
-def cli(monkeypatch, capsys):
-    """Run the command line in this process."""
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["hybridnav", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return Outcome(ended.value.code, *capsys.readouterr())
-
-    return run
 
 
 @pytest.fixture
@@ -440,7 +400,8 @@ def test_ctrl_c_ends_without_a_word(cli, rooms, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("hybridnav.io.maps.load_map", interrupt)
-    assert cli("show", rooms) == Outcome(130, "", "")
+    done = cli("show", rooms)
+    assert (done.code, done.out, done.err) == (130, "", "")
 
 
 class _Terminal(io.StringIO):

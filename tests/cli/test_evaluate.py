@@ -6,7 +6,7 @@ import json
 import pytest
 
 from hybridnav.harness.records import RECORDS_FILE, read_records
-from tests.cli.test_commands import FIGURE, cli  # noqa: F401 - a fixture
+from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
 from tests.harness.test_faults import ROOMS, ROOT, name_of, run_here, write_map
 
@@ -36,7 +36,7 @@ def scenarios(folder, *lines, size="20\t11"):
     return path
 
 
-def test_an_evaluation_of_the_figure(cli, tmp_path):  # noqa: F811
+def test_an_evaluation_of_the_figure(cli, tmp_path):
     out = tmp_path / "deep" / "run"
     arguments = ["evaluate", FIGURE, "--preset", "paper", "--baseline", "simple-graph"]
     arguments += ["--pairs", 20, "--seed", 5, "-o", out]
@@ -67,7 +67,7 @@ def test_an_evaluation_of_the_figure(cli, tmp_path):  # noqa: F811
     assert "| paper | figure1 | 20 |" in beside.out
 
 
-def test_a_counter_example_is_an_exit_code(cli, rooms, tmp_path):  # noqa: F811
+def test_a_counter_example_is_an_exit_code(cli, rooms, tmp_path):
     out = tmp_path / "run"
     bad = name_of(faulty.ThroughWall)
     done = cli("evaluate", rooms, "--baseline", bad, "--pairs", 12, "-o", out)
@@ -82,7 +82,7 @@ def test_a_counter_example_is_an_exit_code(cli, rooms, tmp_path):  # noqa: F811
 
 
 @pytest.mark.usefixtures("here")
-def test_corner_cutting_is_a_counter_example(cli, tmp_path):  # noqa: F811
+def test_corner_cutting_is_a_counter_example(cli, tmp_path):
     path = write_map(tmp_path, ["...###", "...###", "###...", "###..."])
     query = ("evaluate", path, "--corner-cutting", "--pairs", 5, "-o", tmp_path / "run")
     assert cli(*query).refuses(2, "such as portals")
@@ -92,7 +92,7 @@ def test_corner_cutting_is_a_counter_example(cli, tmp_path):  # noqa: F811
 
 
 @pytest.mark.usefixtures("here")
-def test_the_pairs_of_a_lattice(cli, tmp_path):  # noqa: F811
+def test_the_pairs_of_a_lattice(cli, tmp_path):
     path = write_map(tmp_path, ["....", "....", "...."])
     out = tmp_path / "run"
     done = cli("evaluate", path, "--all-pairs", 2, "--preset", "grid-astar", "-o", out)
@@ -103,7 +103,7 @@ def test_the_pairs_of_a_lattice(cli, tmp_path):  # noqa: F811
 
 
 @pytest.mark.usefixtures("here")
-def test_a_scenario_file_and_its_optimum(cli, rooms, tmp_path):  # noqa: F811
+def test_a_scenario_file_and_its_optimum(cli, rooms, tmp_path):
     # From the left room to the right one, along the third row: 10 straight steps.
     right = scenarios(tmp_path, "4\t3\t14\t3\t10", "1\t1\t1\t1\t0", "1\t1\t3\t2\t2.41421356")
     done = cli("evaluate", rooms, "--scen", right, "--preset", "paper", "-o", tmp_path / "right")
@@ -122,7 +122,7 @@ def test_a_scenario_file_and_its_optimum(cli, rooms, tmp_path):  # noqa: F811
 
 
 @pytest.mark.usefixtures("here")
-def test_the_loss_over_the_metric_that_is_asked_for_leads(cli, rooms, tmp_path):  # noqa: F811
+def test_the_loss_over_the_metric_that_is_asked_for_leads(cli, rooms, tmp_path):
     out = tmp_path / "run"
     arguments = ["evaluate", rooms, "--preset", "grid-astar", "--pairs", 10, "-o", out]
     loss = {}
@@ -138,7 +138,7 @@ def test_the_loss_over_the_metric_that_is_asked_for_leads(cli, rooms, tmp_path):
     assert loss["any-angle"] == float(row["any-angle loss %"])
 
 
-def test_wrong_usage_and_unreadable_files(cli, rooms, tmp_path):  # noqa: F811
+def test_wrong_usage_and_unreadable_files(cli, rooms, tmp_path):
     out = ("-o", tmp_path / "run")
     other = scenarios(tmp_path, "1\t1\t2\t2\t1.41", size="8\t8")
     file = tmp_path / "file"
@@ -172,7 +172,7 @@ def test_wrong_usage_and_unreadable_files(cli, rooms, tmp_path):  # noqa: F811
     assert not (tmp_path / "run" / RECORDS_FILE).exists() or not read_records(tmp_path / "run")
 
 
-def test_a_damaged_record_is_named(cli, rooms, tmp_path):  # noqa: F811
+def test_a_damaged_record_is_named(cli, rooms, tmp_path):
     out = tmp_path / "run"
     out.mkdir()
     (out / RECORDS_FILE).write_text("nonsense\n")
@@ -180,6 +180,6 @@ def test_a_damaged_record_is_named(cli, rooms, tmp_path):  # noqa: F811
     assert cli("compare", out, out).refuses(2, "records.jsonl, line 1")
 
 
-def test_runs_that_cannot_be_compared(cli, tmp_path):  # noqa: F811
+def test_runs_that_cannot_be_compared(cli, tmp_path):
     assert cli("compare", tmp_path, tmp_path / "none").refuses(2, "no records there")
     assert cli("compare", tmp_path, tmp_path, "--metric", "l2").refuses(2, "got metric 'l2'")

@@ -10,7 +10,6 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.grid.worlds import figure1_world
-from tests.cli.test_commands import cli  # noqa: F401 - a fixture
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 QUERY = ("--start", "0.55,0.55", "--goal", "2.55,2.85")
@@ -18,7 +17,7 @@ SMALL = ("--robot-radius", "0", "--set", "pyramid.merge_distance_m=2")
 
 
 @pytest.fixture
-def model(cli, tmp_path):  # noqa: F811
+def model(cli, tmp_path):
     path = tmp_path / "m.hnm"
     done = cli("build", FIGURE, "-o", path, *SMALL, "--preset", "shortest", "--preset", "octile")
     assert done.code == 0
@@ -27,7 +26,7 @@ def model(cli, tmp_path):  # noqa: F811
     return path
 
 
-def test_a_model_is_planned_on_as_its_map_is(cli, model):  # noqa: F811
+def test_a_model_is_planned_on_as_its_map_is(cli, model):
     for preset in ((), ("--preset", "octile"), ("--preset", "paper")):
         on_map = cli("plan", FIGURE, *QUERY, *SMALL, *preset, "--json")
         on_model = cli("plan", model, *QUERY, *preset, "--json")
@@ -39,7 +38,7 @@ def test_a_model_is_planned_on_as_its_map_is(cli, model):  # noqa: F811
         assert "graph" not in answer["seconds"]
 
 
-def test_what_the_command_line_states_wins_over_a_model(cli, model):  # noqa: F811
+def test_what_the_command_line_states_wins_over_a_model(cli, model):
     done = cli("plan", model, *QUERY, "--robot-radius", "0.05", "--json")
     assert done.answer["settings"]["pyramid"]["robot_radius_m"] == 0.05
     assert done.err.count("\n") == 1
@@ -49,14 +48,14 @@ def test_what_the_command_line_states_wins_over_a_model(cli, model):  # noqa: F8
     assert done.err == ""
 
 
-def test_show_takes_a_model(cli, model):  # noqa: F811
+def test_show_takes_a_model(cli, model):
     shown = cli("show", model)
     assert shown.code == 0
     assert shown.out.split("seconds")[0] == cli("show", FIGURE, *SMALL).out.split("seconds")[0]
 
 
 @pytest.mark.full
-def test_evaluate_takes_a_model(cli, model, tmp_path):  # noqa: F811
+def test_evaluate_takes_a_model(cli, model, tmp_path):
     done = cli("evaluate", model, "-o", tmp_path / "run", "--pairs", "3", "--preset", "shortest")
     assert done.code == 0
     radius = {record["robot_radius_m"] for record in _records(tmp_path / "run", "preparation")}
@@ -69,7 +68,7 @@ def _records(folder, kind):
     return [record for record in read_records(folder) if record["type"] == kind]
 
 
-def test_rooms_of_a_model_are_listed_and_planned_between(cli, tmp_path):  # noqa: F811
+def test_rooms_of_a_model_are_listed_and_planned_between(cli, tmp_path):
     grid = figure1_world().grid(robot_radius_m=0.0)
     label_of = np.zeros(grid.shape, np.int32)
     label_of[:, grid.shape[1] // 2 :] = 1
@@ -86,7 +85,7 @@ def test_rooms_of_a_model_are_listed_and_planned_between(cli, tmp_path):  # noqa
     assert done.answer["status"] == "solved"
 
 
-def test_a_model_is_built_of_a_model(cli, model, tmp_path):  # noqa: F811
+def test_a_model_is_built_of_a_model(cli, model, tmp_path):
     small = tmp_path / "small.hnm"
     done = cli("build", model, "-o", small, "--compress")
     assert done.code == 0
@@ -95,7 +94,7 @@ def test_a_model_is_built_of_a_model(cli, model, tmp_path):  # noqa: F811
     assert hn.load(small).planner("octile").prepared is not None
 
 
-def test_wrong_use_is_told_before_the_work(cli, tmp_path):  # noqa: F811
+def test_wrong_use_is_told_before_the_work(cli, tmp_path):
     out = ("-o", tmp_path / "m.hnm")
     assert cli("build", FIGURE, "-o", tmp_path / "m.yaml").refuses(2, "must end in .hnm")
     assert cli("build", FIGURE, "-o", tmp_path / "no" / "m.hnm").refuses(2, "cannot write")
@@ -108,13 +107,13 @@ def test_wrong_use_is_told_before_the_work(cli, tmp_path):  # noqa: F811
     assert cli("evaluate", tmp_path / "m.hnm", "-o", tmp_path / "run").refuses(3, "no model")
 
 
-def test_a_model_of_more_cells_than_allowed_names_the_option(cli, model):  # noqa: F811
+def test_a_model_of_more_cells_than_allowed_names_the_option(cli, model):
     refused = cli("plan", model, *QUERY, "--max-cells", "100")
     assert refused.refuses(3, "--max-cells")
 
 
 @pytest.fixture
-def kept(cli, tmp_path):  # noqa: F811
+def kept(cli, tmp_path):
     """Plan on a map and keep what was prepared; what is said of that, and the answer."""
     for path in FIGURE.parent.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
@@ -209,7 +208,7 @@ def test_rooms_are_kept_too_and_found_again_as_they_are(kept, tmp_path):
     assert not kept()[0]
 
 
-def test_the_cache_folder_is_that_of_the_user(cli, tmp_path, monkeypatch):  # noqa: F811
+def test_the_cache_folder_is_that_of_the_user(cli, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
     done = cli("plan", FIGURE, *QUERY, *SMALL, "--keep")
     assert f"MB in {tmp_path / 'caches' / 'hybridnav'}" in done.err
@@ -220,7 +219,7 @@ def test_the_cache_folder_is_that_of_the_user(cli, tmp_path, monkeypatch):  # no
     assert str(tmp_path / "home" / ".cache" / "hybridnav") in done.err
 
 
-def test_a_folder_that_cannot_be_written_costs_no_answer(cli, tmp_path):  # noqa: F811
+def test_a_folder_that_cannot_be_written_costs_no_answer(cli, tmp_path):
     (tmp_path / "file").touch()
     done = cli("plan", FIGURE, *QUERY, *SMALL, "--keep-in", tmp_path / "file")
     assert done.code == 0
@@ -242,7 +241,7 @@ def test_what_was_not_used_for_longest_makes_room(kept, tmp_path, monkeypatch):
     assert second != first
 
 
-def test_a_model_is_planned_on_though_keeping_was_asked_for(cli, model, tmp_path):  # noqa: F811
+def test_a_model_is_planned_on_though_keeping_was_asked_for(cli, model, tmp_path):
     done = cli("plan", model, *QUERY, "--keep-in", tmp_path / "kept")
     assert (done.code, done.err) == (0, "")
     assert not (tmp_path / "kept").exists()

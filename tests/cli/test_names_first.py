@@ -3,7 +3,6 @@
 import pytest
 
 import hybridnav as hn
-from tests.cli.test_commands import cli  # noqa: F401 - the fixture
 from tests.topology.test_doors import flat, map_file  # noqa: F401 - the fixture
 
 
@@ -28,7 +27,7 @@ def test_names_are_checked_before_anything_is_built(cli, map_file, monkeypatch):
     ],
 )
 def test_what_is_closed_is_checked_before_it_costs(  # noqa: PLR0913, PLR0917
-    cli,  # noqa: F811
+    cli,
     map_file,  # noqa: F811
     monkeypatch,
     closed,

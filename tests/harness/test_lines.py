@@ -27,7 +27,7 @@ from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from hybridnav.harness.yardstick import Yardstick
 from hybridnav.io import load_map
 from hybridnav.metrics import VisibilityGraph
-from tests.cli.test_commands import FIGURE, cli  # noqa: F401 - a fixture
+from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
 from tests.harness.test_faults import ROOMS, ROOT, name_of, run_here, write_map
 
@@ -310,7 +310,7 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
         ("{objective: clearance}", "objective clearance"),
     ],
 )
-def test_a_preset_in_another_metric_is_refused_in_one_line(cli, tmp_path, settings, words):  # noqa: F811
+def test_a_preset_in_another_metric_is_refused_in_one_line(cli, tmp_path, settings, words):
     settings = settings if settings.startswith("{") else f"{{{settings}}}"
     arguments = ["--preset", "ompl-rrtconnect", "--set", f"planner.ompl={settings}"]
     done = cli("evaluate", FIGURE, *arguments, "-o", tmp_path / "run")
@@ -370,7 +370,7 @@ def ompl_processes_with(mark):
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="needs /proc")
-def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):  # noqa: F811
+def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):
     pytest.importorskip("ompl")
     mark = uuid.uuid4().hex
     monkeypatch.setenv(MARK, mark)

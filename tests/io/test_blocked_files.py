@@ -14,7 +14,6 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.grid import Frame
-from tests.cli.test_commands import cli  # noqa: F401 - the fixture
 from tests.strategies import drawn, examples, occupancy_grid
 
 # Two rooms over a hall; kitchen and lab have a door each to the hall and one between them.
@@ -252,7 +251,7 @@ NAMED = ("--from", "kitchen", "--to", "lab", "--at", "point")
 POINTS = ("--start", "1.5,5.5", "--goal", "7.5,5.5")
 
 
-def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path: Any) -> None:  # noqa: F811
+def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path: Any) -> None:
     topology = hn.TopologicalMap(
         hn.DualGraphPyramid.build(
             grid := hn.load_map(query[1]), rooms=hn.load_rooms(tmp_path / "rooms.yaml", grid)
@@ -287,7 +286,7 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
 
 @pytest.mark.parametrize("ends", [POINTS, ("--from", "1.5,5.5", "--to", "7.5,5.5")])
 def test_json_has_the_same_keys_however_ends_are_given(
-    cli: Any,  # noqa: F811
+    cli: Any,
     query: Any,
     tmp_path: Any,
     ends: Any,
@@ -305,7 +304,7 @@ def test_json_has_the_same_keys_however_ends_are_given(
 
 
 def test_a_comparison_closes_the_same_for_the_whole_grid(
-    cli: Any,  # noqa: F811
+    cli: Any,
     query: Any,
     tmp_path: Any,
 ) -> None:
@@ -334,7 +333,7 @@ def test_a_comparison_closes_the_same_for_the_whole_grid(
     ],
 )
 def test_what_names_nothing_is_refused_by_the_command(  # noqa: PLR0913, PLR0917
-    cli: Any,  # noqa: F811
+    cli: Any,
     query: Any,
     tmp_path: Any,
     ends: Any,
@@ -346,6 +345,6 @@ def test_what_names_nothing_is_refused_by_the_command(  # noqa: PLR0913, PLR0917
     assert cli(*query, *ends, "--blocked", closed).refuses(code, *words)
 
 
-def test_a_comparison_knows_no_doors(cli: Any, query: Any) -> None:  # noqa: F811
+def test_a_comparison_knows_no_doors(cli: Any, query: Any) -> None:
     refused = cli(*query, *POINTS, "--compare", "--blocked", "door:1")
     assert refused.refuses(2, "--compare", "files as --blocked")

@@ -19,7 +19,6 @@ from hybridnav.grid import CellClass
 from hybridnav.homotopy import AlternativeSearch, alternative_search
 from hybridnav.metrics import judge_path
 from hybridnav.route import Walks
-from tests.cli.test_commands import cli  # noqa: F401 - the fixture
 from tests.oracle.rays import Rays
 from tests.planner.test_named_plans import map_file  # noqa: F401 - the fixture
 from tests.strategies import class_grids, drawn, occupancy_grid
@@ -317,7 +316,7 @@ def two_doors_file(tmp_path):
     return path
 
 
-def test_the_command_line_leads_through_either_door(cli, two_doors_file):  # noqa: F811
+def test_the_command_line_leads_through_either_door(cli, two_doors_file):
     ends = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
     query = ("plan", two_doors_file, *ends, "--robot-radius", "0", "--alternatives", "3")
     done = cli(*query)
@@ -335,7 +334,7 @@ def test_the_command_line_leads_through_either_door(cli, two_doors_file):  # noq
     assert "route 2" not in small
 
 
-def test_the_command_line_tells_no_more_from_gave_up(cli, two_doors_file, monkeypatch):  # noqa: F811
+def test_the_command_line_tells_no_more_from_gave_up(cli, two_doors_file, monkeypatch):
     ends = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
     query = ("plan", two_doors_file, *ends, "--robot-radius", "0", "--alternatives", "3")
     assert "gave up" not in cli(*query).out

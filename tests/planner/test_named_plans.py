@@ -17,7 +17,6 @@ from hybridnav.planner.named import stop_points
 from hybridnav.result import Path
 from hybridnav.route import RoomSearch
 from hybridnav.viz import plot_rooms, plot_tour
-from tests.cli.test_commands import cli  # noqa: F401 - the fixture
 from tests.strategies import drawn, occupancy_grid
 
 # Kitchen and lab over a hall, a store that cannot be reached; cells of half a metre.
@@ -303,7 +302,7 @@ def map_file(tmp_path):
     return path
 
 
-def test_plan_takes_names_from_the_file_beside_the_map(cli, map_file):  # noqa: F811
+def test_plan_takes_names_from_the_file_beside_the_map(cli, map_file):
     done = cli("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
     assert done.code == 0
     assert "house, kitchen to lab" in done.out
@@ -312,7 +311,7 @@ def test_plan_takes_names_from_the_file_beside_the_map(cli, map_file):  # noqa: 
     assert done.err == ""
 
 
-def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):  # noqa: F811
+def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):
     done = cli(
         *("plan", map_file, "--from", "sink", "--via", "lab", "--to", "1.25,1.25", "--json"),
         *("--at", "point", "--robot-radius", "0", "--plot", tmp_path / "tour.svg"),
@@ -329,7 +328,7 @@ def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):  # n
     assert (tmp_path / "tour.svg").read_text().count('id="path"') == 2
 
 
-def test_every_length_and_cost_names_its_metric(cli, map_file):  # noqa: F811
+def test_every_length_and_cost_names_its_metric(cli, map_file):
     query = ("plan", map_file, "--from", "sink", "--to", "lab", "--robot-radius", "0")
     done = cli(*query, "--alternatives", "2")
     lines = [line for line in done.out.splitlines() if line.startswith(("length", "route"))]
@@ -346,7 +345,7 @@ def test_every_length_and_cost_names_its_metric(cli, map_file):  # noqa: F811
     assert "(clearance-weighted)" in told["bound"]
 
 
-def test_plan_takes_stops_with_headings(cli, map_file):  # noqa: F811
+def test_plan_takes_stops_with_headings(cli, map_file):
     pytest.importorskip("ompl")
     done = cli(
         *("plan", map_file, "--from", "kitchen", "--to", "8.25,0.75,1.5", "--robot-radius", "0"),
@@ -356,13 +355,13 @@ def test_plan_takes_stops_with_headings(cli, map_file):  # noqa: F811
     assert done.answer["stops"] == ["kitchen", [8.25, 0.75, 1.5]]
 
 
-def test_plan_to_a_room_out_of_reach_exits_with_1(cli, map_file):  # noqa: F811
+def test_plan_to_a_room_out_of_reach_exits_with_1(cli, map_file):
     done = cli("plan", map_file, "--from", "kitchen", "--to", "store", "--robot-radius", "0")
     assert done.code == 1
     assert "status     no path" in done.out
 
 
-def test_plan_without_a_file_finds_rooms_and_says_so(cli, map_file):  # noqa: F811
+def test_plan_without_a_file_finds_rooms_and_says_so(cli, map_file):
     (map_file.parent / "rooms.yaml").unlink()
     query = ("plan", map_file, "--from", "room-1", "--to", "room-1", "--robot-radius", "0")
     done = cli(*query, "--set", "pyramid.merge_distance_m=2")
@@ -381,17 +380,17 @@ def test_plan_without_a_file_finds_rooms_and_says_so(cli, map_file):  # noqa: F8
         (["--from", "kitchen", "--to", "nan,1"], ["finite"]),
     ],
 )
-def test_wrong_names_and_options_end_in_one_line(cli, map_file, arguments, words):  # noqa: F811
+def test_wrong_names_and_options_end_in_one_line(cli, map_file, arguments, words):
     assert cli("plan", map_file, "--robot-radius", "0", *arguments).refuses(2, *words)
 
 
-def test_a_bad_file_of_rooms_is_unreadable_input(cli, map_file):  # noqa: F811
+def test_a_bad_file_of_rooms_is_unreadable_input(cli, map_file):
     (map_file.parent / "rooms.yaml").write_text("rooms: 7\n")
     query = ("plan", map_file, "--from", "kitchen", "--to", "lab")
     assert cli(*query).refuses(3, "rooms.yaml", "expected a list")
 
 
-def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):  # noqa: F811
+def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):
     out, picture = tmp_path / "found.yaml", tmp_path / "found.svg"
     query = ("rooms", map_file, "-o", out, "--robot-radius", "0", "--plot", picture)
     done = cli(*query)
@@ -404,21 +403,21 @@ def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):  # noqa: F
     assert cli(*query, "--force").code == 0
 
 
-def test_rooms_lists_those_of_a_file(cli, map_file):  # noqa: F811
+def test_rooms_lists_those_of_a_file(cli, map_file):
     done = cli("rooms", map_file, "--rooms", map_file.parent / "rooms.yaml", "--robot-radius", "0")
     assert "kitchen" in done.out
     assert "hall (1: 0.50 m)" in done.out
 
 
 @pytest.mark.parametrize("option", [("--method", "walls"), ("--least-area", "1")])
-def test_rooms_of_a_file_are_not_found_too(cli, map_file, option):  # noqa: F811
+def test_rooms_of_a_file_are_not_found_too(cli, map_file, option):
     query = ("rooms", map_file, "--rooms", map_file.parent / "rooms.yaml", *option)
     assert cli(*query).refuses(2, option[0], "--rooms")
 
 
-def test_rooms_refuses_an_endless_least_area(cli, map_file):  # noqa: F811
+def test_rooms_refuses_an_endless_least_area(cli, map_file):
     assert cli("rooms", map_file, "--least-area", "inf").refuses(2, "least area", "inf")
 
 
-def test_rooms_refuses_an_unknown_method(cli, map_file):  # noqa: F811
+def test_rooms_refuses_an_unknown_method(cli, map_file):
     assert cli("rooms", map_file, "--method", "magic").refuses(2, "walls, watershed", "'magic'")

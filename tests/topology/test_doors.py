@@ -14,7 +14,6 @@ import hybridnav as hn
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.io.rooms_paint import without_slivers
 from hybridnav.viz import plot_rooms
-from tests.cli.test_commands import cli  # noqa: F401 - the fixture
 from tests.strategies import drawn, examples, occupancy_grid
 from tests.topology.test_room_level import labelled
 
@@ -304,7 +303,7 @@ def map_file(tmp_path):
     return path
 
 
-def test_list_picture_file_json_and_words_tell_the_same_doors(cli, map_file, tmp_path):  # noqa: F811
+def test_list_picture_file_json_and_words_tell_the_same_doors(cli, map_file, tmp_path):
     out = tmp_path / "again.yaml"
     query = ("rooms", map_file, "--rooms", tmp_path / "rooms.yaml", "--robot-radius")
     told = cli(*query, "0.4", "-o", out, "--plot", tmp_path / "rooms.svg").out
@@ -327,7 +326,7 @@ def test_list_picture_file_json_and_words_tell_the_same_doors(cli, map_file, tmp
             assert leg["room"] in door["rooms"]
 
 
-def test_a_room_that_does_not_fit_is_marked_in_the_list(cli, map_file):  # noqa: F811
+def test_a_room_that_does_not_fit_is_marked_in_the_list(cli, map_file):
     rooms_file = map_file.parent / "rooms.yaml"
     slit = "[[3.6, 0.3], [3.9, 0.3], [3.9, 2.1], [3.6, 2.1]]"
     corners = {"kitchen": "[[0.3, 0.3], [1.8, 0.3], [1.8, 2.1], [0.3, 2.1]]", "slit": slit}
@@ -343,7 +342,7 @@ def test_a_room_that_does_not_fit_is_marked_in_the_list(cli, map_file):  # noqa:
     assert way.refuses(2, "'slit'", "no free cell for this robot radius")
 
 
-def test_no_listed_area_is_below_the_one_that_was_asked_for(cli, map_file):  # noqa: F811
+def test_no_listed_area_is_below_the_one_that_was_asked_for(cli, map_file):
     query = ("rooms", map_file, "--least-area", "2.7", "-o", map_file.parent / "found.yaml")
     found = cli(*query, "--robot-radius", "0.25", "--json").answer["rooms"]
     assert found

@@ -12,7 +12,6 @@ import hybridnav as hn
 from hybridnav.grid import RoomLabels
 from hybridnav.planner.alternatives import Alternatives
 from hybridnav.viz import plot_alternatives, plot_rooms, plot_tour
-from tests.cli.test_commands import cli  # noqa: F401 - the fixture
 from tests.strategies import drawn, occupancy_grid
 
 # A ring of corridor round a block, and a closet that nothing leads to.
@@ -190,7 +189,7 @@ def test_alternatives_on_a_map_without_rooms_and_without_a_path():
 
 
 @pytest.mark.parametrize("ends", [("0.75,1.75", "3.75,1.75"), ("west", "3.75,1.75")])
-def test_the_command_draws_all_routes(cli, tmp_path, ring, ends):  # noqa: F811 - the fixture
+def test_the_command_draws_all_routes(cli, tmp_path, ring, ends):
     grid = occupancy_grid(RING, resolution_m=0.5)
     image = np.where(np.flipud(grid.measured) == hn.CellClass.OCCUPIED, 0, 254).astype(np.uint8)
     (tmp_path / "m.pgm").write_bytes(b"P5\n13 7\n255\n" + image.tobytes())
