@@ -16,8 +16,7 @@ from hybridnav.grid import CellClass
 from hybridnav.portals import build_portals
 from hybridnav.search.moves import DIAGONAL, STRAIGHT
 from tests.oracle.grid import move_graph
-from tests.search.test_search import block_labels
-from tests.strategies import MAX_SIDE, class_grids, occupancy_grid, scenes
+from tests.strategies import MAX_SIDE, block_labels, class_grids, occupancy_grid, scenes
 
 if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid

@@ -160,3 +160,13 @@ def scenes(draw: st.DrawFn, max_side: int = MAX_SIDE) -> Scene:
         merge_distance_m=merge_cells * resolution_m,
         seed=draw(st.integers(0, 1000)),
     )
+
+
+def block_labels(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.int32]:
+    """Labels of square blocks, several blocks of one label, with ragged borders."""
+    side, n_labels = int(rng.integers(1, 9)), int(rng.integers(1, 7))
+    rows, cols = shape
+    coarse = rng.integers(n_labels, size=(rows // side + 1, cols // side + 1), dtype=np.int32)
+    labels: NDArray[np.int32] = coarse.repeat(side, axis=0)[:rows].repeat(side, axis=1)[:, :cols]
+    noisy = rng.random(shape) < rng.choice([0.0, 0.05])
+    return np.where(noisy, rng.integers(n_labels, size=shape, dtype=np.int32), labels)

@@ -8,7 +8,7 @@ import pytest
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
-from tests.harness.test_faults import ROOMS, ROOT, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, ROOT, name_of, run_here, write_map
 
 OUTPUTS = {RECORDS_FILE, "runs.jsonl", "summary.csv", "maps.csv", "summary.md", "report.html"}
 

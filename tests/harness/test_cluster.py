@@ -15,7 +15,7 @@ from hybridnav.harness import workers
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from tests.harness import faulty_methods as faulty
-from tests.harness.test_faults import ROOMS, ROOT, name_of, write_map
+from tests.harness.small_runs import ROOMS, ROOT, name_of, write_map
 from tests.harness.test_run import timeless
 
 N_PAIRS = 30

@@ -2,7 +2,6 @@
 
 import csv
 from collections import Counter
-from pathlib import Path
 
 import pytest
 
@@ -10,24 +9,8 @@ from hybridnav.harness.analysis import load_study
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.task import run_task
 from tests.harness import faulty_methods as faulty
-
-ROOT = Path(__file__).parents[2]
-ROOMS = [
-    "####################",
-    "#........#.........#",
-    "#........#.........#",
-    "#..................#",
-    "#........#.........#",
-    "#........#.........#",
-    "######.#######.#####",
-    "#........#.........#",
-    "#........#......####",
-    "#........#......#..#",
-    "####################",
-]
-"""Four rooms in a row of doors, and a closet without one."""
+from tests.harness.small_runs import ROOMS, ROOT, name_of, write_map
 
 FAULTS = {
     faulty.ThroughWall: "is not free",
@@ -48,22 +31,6 @@ FAULTS = {
 SOUND = (faulty.Sound, faulty.SoundPlaces, faulty.HonestlyLong)
 FAILING = (faulty.Raises, faulty.CannotBeMade, faulty.FailsAtOnce)
 N_PAIRS = 40
-
-
-def name_of(method):
-    return f"{method.__module__}:{method.__name__}"
-
-
-def write_map(folder, lines, name="rooms"):
-    body = "".join(f"{line}\n" for line in lines).replace("#", "@")
-    path = folder / f"{name}.map"
-    path.write_text(f"type octile\nheight {len(lines)}\nwidth {len(lines[0])}\nmap\n{body}")
-    return path
-
-
-def run_here(tasks, **_settings):
-    """Instead of `run_local`: no process is started, where none is what a test is about."""
-    return (list(run_task(task)) for task in tasks)
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ from hybridnav.io import load_map
 from hybridnav.metrics import VisibilityGraph
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
-from tests.harness.test_faults import ROOMS, ROOT, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, ROOT, name_of, run_here, write_map
 
 FAULTS = {
     faulty.LineThroughWall: "m enters a blocked cell",

@@ -24,7 +24,7 @@ from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.io import load_map
 from tests.harness import faulty_methods as faulty
-from tests.harness.test_faults import ROOMS, ROOT, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, ROOT, name_of, run_here, write_map
 
 N_PAIRS = 60
 TIMES = ("seconds", "stages", "pyramid_seconds", "method_seconds", "environment")

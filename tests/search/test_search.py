@@ -26,7 +26,7 @@ from hybridnav.search.moves import (
     path_length_in_cells,
 )
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
-from tests.strategies import class_grids, drawn, examples
+from tests.strategies import block_labels, class_grids, drawn, examples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,16 +41,6 @@ seeds = st.integers(0, 2**32 - 1)
 def random_cell(inside: Bools, rng: np.random.Generator) -> tuple[int, int]:
     row, col = rng.choice(np.argwhere(inside)).tolist()
     return row, col
-
-
-def block_labels(shape: tuple[int, ...], rng: np.random.Generator) -> Labels:
-    """Labels of square blocks, several blocks of one label, with ragged borders."""
-    side, n_labels = int(rng.integers(1, 9)), int(rng.integers(1, 7))
-    rows, cols = shape
-    coarse = rng.integers(n_labels, size=(rows // side + 1, cols // side + 1), dtype=np.int32)
-    labels: Labels = coarse.repeat(side, axis=0)[:rows].repeat(side, axis=1)[:, :cols]
-    noisy = rng.random(shape) < rng.choice([0.0, 0.05])
-    return np.where(noisy, rng.integers(n_labels, size=shape, dtype=np.int32), labels)
 
 
 def check_search(  # noqa: PLR0913 - the search's own parameters

@@ -1,0 +1,37 @@
+"""What small runs of the harness share: a map, names of methods, runs in this process."""
+
+from pathlib import Path
+
+from hybridnav.harness.task import run_task
+
+ROOT = Path(__file__).parents[2]
+ROOMS = [
+    "####################",
+    "#........#.........#",
+    "#........#.........#",
+    "#..................#",
+    "#........#.........#",
+    "#........#.........#",
+    "######.#######.#####",
+    "#........#.........#",
+    "#........#......####",
+    "#........#......#..#",
+    "####################",
+]
+"""Four rooms in a row of doors, and a closet without one."""
+
+
+def name_of(method):
+    return f"{method.__module__}:{method.__name__}"
+
+
+def write_map(folder, lines, name="rooms"):
+    body = "".join(f"{line}\n" for line in lines).replace("#", "@")
+    path = folder / f"{name}.map"
+    path.write_text(f"type octile\nheight {len(lines)}\nwidth {len(lines[0])}\nmap\n{body}")
+    return path
+
+
+def run_here(tasks, **_settings):
+    """Instead of `run_local`: no process is started, where none is what a test is about."""
+    return (list(run_task(task)) for task in tasks)
