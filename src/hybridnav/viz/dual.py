@@ -11,8 +11,9 @@ from hybridnav.pyramid.dual import FaceKind
 from hybridnav.viz import style
 from hybridnav.viz.boundaries import Boundaries
 from hybridnav.viz.canvas import Canvas, known_view
+from hybridnav.viz.layout import finish
 from hybridnav.viz.places import Places
-from hybridnav.viz.topology import draw_ground, drawable, finish
+from hybridnav.viz.topology import draw_ground, drawable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,8 +84,8 @@ def plot_dual(
         f"{counts[FaceKind.PROTECTED]} protected",
         f"{counts[FaceKind.OUTSIDE]} outside",
     ]
-    finish(canvas, dual_entries(level, canvas.sizes), words if title is None else [title])
-    return canvas.ax
+    entries = dual_entries(level, canvas.sizes)
+    return finish(canvas, entries, words if title is None else [title], framed=True)
 
 
 def draw_dual(canvas: Canvas, level: Level) -> None:

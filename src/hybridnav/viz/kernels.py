@@ -10,8 +10,9 @@ from matplotlib.lines import Line2D
 from hybridnav.grid import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, known_view
+from hybridnav.viz.layout import finish
 from hybridnav.viz.places import Places
-from hybridnav.viz.topology import Graph, draw_ground, drawable, finish
+from hybridnav.viz.topology import Graph, draw_ground, drawable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,8 +108,8 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
         f"{n_gone} arcs contracted",
         *([f"{n_removed} removed"] if removed else []),
     ]
-    finish(canvas, _entries(canvas, kinds, survives), words if title is None else [title])
-    return canvas.ax
+    entries = _entries(canvas, kinds, survives)
+    return finish(canvas, entries, words if title is None else [title], framed=True)
 
 
 def _kinds(pyramid: DualGraphPyramid, level: int, n_arcs: int) -> dict[str, BoolArray]:

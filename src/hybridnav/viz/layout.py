@@ -189,6 +189,28 @@ def _columns(widths: Sequence[float], font: float, room: float) -> int:
     return best
 
 
+def frame_axes(canvas: Canvas) -> None:
+    """Leave a thin frame round the map, without ticks."""
+    canvas.ax.set(xticks=[], yticks=[])
+    for spine in canvas.ax.spines.values():
+        spine.set(linewidth=0.6, color=style.ARC)
+
+
+def finish(
+    canvas: Canvas, entries: Sequence[Entry], words: Sequence[str], *, framed: bool = False
+) -> Axes:
+    """Add title, scale bar and legend, and a thin frame or none, and return the axes."""
+    if framed:
+        frame_axes(canvas)
+    else:
+        canvas.ax.set_axis_off()
+    add_title(canvas, words)
+    bar = add_scale_bar(canvas)
+    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
+    fit_height(canvas, legend)
+    return canvas.ax
+
+
 def fit_height(canvas: Canvas, legend: Legend) -> None:
     """Set the height of a new figure to that of the map and the items round it."""
     if not canvas.is_new:

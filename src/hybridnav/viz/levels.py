@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from hybridnav.errors import InvalidValueError
 from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
-from hybridnav.viz.layout import add_title, wrapped
+from hybridnav.viz.layout import add_title, frame_axes, wrapped
 from hybridnav.viz.places import Places
-from hybridnav.viz.topology import Graph, draw_graph, draw_ground, frame_axes
+from hybridnav.viz.topology import Graph, draw_graph, draw_ground
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

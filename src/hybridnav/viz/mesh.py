@@ -15,9 +15,8 @@ from hybridnav.grid import CellClass
 from hybridnav.mesh import build_mesh
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries
-from hybridnav.viz.topology import frame_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,8 +97,8 @@ def plot_mesh(
         (dot, "corner that paths bend round"),
     ]
     counts = [f"{mesh.n_polygons:,} polygons", f"{int(convex.sum()):,} convex corners"]
-    finish(canvas, grid, entries, [grid.name, *counts] if title is None else [title])
-    return canvas.ax
+    words = [grid.name, *counts] if title is None else [title]
+    return finish(canvas, entries + ground_entries(grid), words, framed=True)
 
 
 def check_mesh(grid: OccupancyGrid, mesh: ConvexMesh) -> None:
@@ -180,13 +179,3 @@ def _met(roots: FloatArray, points: FloatArray, intervals: FloatArray) -> FloatA
     share = np.divide(reach, cross, out=np.zeros(len(cross)), where=cross != 0)
     met: FloatArray = roots + share.clip(0, 1)[:, None] * way
     return met
-
-
-def finish(canvas: Canvas, grid: OccupancyGrid, entries: list[Entry], words: list[str]) -> None:
-    """Add the frame, title, scale bar and legend."""
-    frame_axes(canvas)
-    add_title(canvas, words)
-    bar = add_scale_bar(canvas)
-    below = 0.35 * canvas.sizes.font
-    legend = add_legend(canvas, entries + ground_entries(grid), bar=bar, below=below)
-    fit_height(canvas, legend)

@@ -12,7 +12,7 @@ from hybridnav.viz import style
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
 from hybridnav.viz.colouring import colour_vertices
 from hybridnav.viz.dual import draw_dual, dual_entries
-from hybridnav.viz.layout import add_legend
+from hybridnav.viz.layout import add_legend, frame_axes
 from hybridnav.viz.topology import (
     FAINT,
     LEAST_AREA_M2,
@@ -20,7 +20,6 @@ from hybridnav.viz.topology import (
     draw_graph,
     draw_ground,
     drawable,
-    frame_axes,
     graph_entries,
 )
 

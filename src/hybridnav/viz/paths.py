@@ -13,7 +13,7 @@ from hybridnav.grid import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import Marker, draw_markers
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries
 from hybridnav.viz.plan import PATH_WIDTH, draw_path
 
@@ -103,15 +103,8 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
     draw_markers(canvas, markers, points)
     if (grid.classes == CellClass.UNEXPLORED).any():
         entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
-    canvas.ax.set(xticks=[], yticks=[])
-    for spine in canvas.ax.spines.values():
-        spine.set(linewidth=0.6, color=style.ARC)
-    add_title(canvas, [grid.name if title is None else title])
-    bar = add_scale_bar(canvas)
-    entries += ground_entries(grid)
-    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
-    fit_height(canvas, legend)
-    return canvas.ax
+    words = [grid.name if title is None else title]
+    return finish(canvas, entries + ground_entries(grid), words, framed=True)
 
 
 def _checked(given: ArrayLike) -> FloatArray:

@@ -14,7 +14,7 @@ from hybridnav.route import corridor_of
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.labels import Marker, draw_markers
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import arc_handle, ground_entries, swatch
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 
@@ -102,13 +102,9 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
         path = result.path.points
         draw_path(canvas, path)
     draw_markers(canvas, markers, path)
-    canvas.ax.set_axis_off()
-    add_title(canvas, _words(topology, result, optimum_m) if title is None else [title])
-    bar = add_scale_bar(canvas)
+    words = _words(topology, result, optimum_m) if title is None else [title]
     entries = _entries(result, places, strong, canvas.sizes) + ground_entries(grid)
-    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
-    fit_height(canvas, legend)
-    return canvas.ax
+    return finish(canvas, entries, words)
 
 
 def _markers(result: PlanResult, start: ArrayLike | None, goal: ArrayLike | None) -> list[Marker]:

@@ -13,7 +13,7 @@ from hybridnav.topology import Rooms, TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.colouring import colour_vertices
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries, swatch
 from hybridnav.viz.room_labels import RoomWriter
 
@@ -99,13 +99,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     if view is not None:
         entries += draw_doors(canvas, doors, f"{gaps} left out" if gaps else "")
         writer.number_doors(sorted(doors, key=lambda door: -door.width_m))
-    entries += ground_entries(grid)
-    canvas.ax.set_axis_off()
-    add_title(canvas, words if title is None else [title])
-    bar = add_scale_bar(canvas)
-    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
-    fit_height(canvas, legend)
-    return canvas.ax
+    return finish(canvas, entries + ground_entries(grid), words if title is None else [title])
 
 
 def _view_of(

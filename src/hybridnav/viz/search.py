@@ -12,7 +12,9 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.mesh import SearchTrace
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.mesh import check_mesh, draw_intervals, finish
+from hybridnav.viz.layout import finish
+from hybridnav.viz.maps import ground_entries
+from hybridnav.viz.mesh import check_mesh, draw_intervals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,8 +109,8 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     if corridor is not None:
         (colour,) = style.rgb(_CORRIDOR, strength=_STRENGTH) / 255
         entries.append((Patch(fc=colour), "corridor"))
-    finish(canvas, grid, entries, [grid.name, *counts] if title is None else [title])
-    return canvas.ax
+    words = [grid.name, *counts] if title is None else [title]
+    return finish(canvas, entries + ground_entries(grid), words, framed=True)
 
 
 def _draw_states(canvas: Canvas, search: Search | None) -> list[Entry]:

@@ -17,7 +17,7 @@ from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.curves import Arc
 from hybridnav.viz.fields import Field
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.layout import finish
 from hybridnav.viz.loops import Loops
 
 if TYPE_CHECKING:
@@ -167,8 +167,7 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     graph = Graph(level, least_area_m2)
     draw_graph(canvas, graph, simple=simple)
     words = _words(graph, simple=simple) if title is None else [title]
-    finish(canvas, graph_entries(graph, canvas.sizes, simple=simple), words)
-    return canvas.ax
+    return finish(canvas, graph_entries(graph, canvas.sizes, simple=simple), words, framed=True)
 
 
 def drawable(places: Level | TopologicalMap) -> Level:
@@ -261,19 +260,3 @@ def graph_entries(graph: Graph, sizes: Sizes, *, simple: bool) -> list[Entry]:
         loop = Line2D([], [], color=style.SELF_LOOP, lw=width, ls=style.SELF_LOOP_DASHES)
         entries.append((loop, "self-loop"))
     return entries
-
-
-def frame_axes(canvas: Canvas) -> None:
-    """Leave a thin frame round the map, without ticks."""
-    canvas.ax.set(xticks=[], yticks=[])
-    for spine in canvas.ax.spines.values():
-        spine.set(linewidth=0.6, color=style.ARC)
-
-
-def finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
-    """Add the title, frame, scale bar and legend."""
-    add_title(canvas, words)
-    frame_axes(canvas)
-    bar = add_scale_bar(canvas)
-    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
-    fit_height(canvas, legend)

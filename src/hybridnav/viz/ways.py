@@ -13,7 +13,7 @@ from hybridnav.planner.itinerary import Guide
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
-from hybridnav.viz.layout import add_legend, add_scale_bar, add_title, fit_height
+from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries, swatch
 from hybridnav.viz.places import Places
 from hybridnav.viz.room_labels import RoomWriter
@@ -109,7 +109,7 @@ def plot_tour(
         canvas.ax.add_line(stops)
     if paths:
         entries.insert(0, (Line2D([], [], color=style.PATH, lw=_TOUR_WIDTH), "path"))
-    return _finished(canvas, [topology.grid.name, told] if title is None else [title], entries)
+    return finish(canvas, entries, [topology.grid.name, told] if title is None else [title])
 
 
 def plot_alternatives(
@@ -174,7 +174,7 @@ def plot_alternatives(
     draw_markers(canvas, markers, along, labels=labels)
     told = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
     words = [topology.grid.name, told] if title is None else [title]
-    return _finished(canvas, words, entries + ground)
+    return finish(canvas, entries + ground, words)
 
 
 def _route_line(
@@ -233,12 +233,3 @@ def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
     """Return the doors wide enough to draw, and all that the path passes."""
     numbers = {door.number for door in passed}
     return [d for d in rooms.doors if not d.is_gap or d.number in numbers]
-
-
-def _finished(canvas: Canvas, words: Sequence[str], entries: Sequence[Entry]) -> Axes:
-    canvas.ax.set_axis_off()
-    add_title(canvas, words)
-    bar = add_scale_bar(canvas)
-    legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
-    fit_height(canvas, legend)
-    return canvas.ax
