@@ -40,11 +40,21 @@ LevelOption = Annotated[
         "--level", metavar="N", help="Level to describe and draw: 0 the base, -1 the apex."
     ),
 ]
+RegionsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--regions",
+        metavar="N",
+        min=1,
+        help="Go on above the places: to regions of at most N cells, then to the apex.",
+    ),
+]
 
 
 def show(
     map_file: MapArgument,
     level: LevelOption = -1,
+    regions: RegionsOption = None,
     preset: PresetOption = None,
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
@@ -62,6 +72,8 @@ def show(
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, seconds, reading)
     pyramid = grow_topology(model, settings, seconds).pyramid
+    if regions is not None:
+        pyramid = pyramid.with_regions(regions)
     if not -len(pyramid) <= level < len(pyramid):
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
     if not model.is_filed:
@@ -98,14 +110,25 @@ def _describe_map(pyramid: hn.DualGraphPyramid) -> str:
 def _describe_levels(pyramid: hn.DualGraphPyramid, shown: hn.Level) -> str:
     """A table of all levels; `factor` is how many times fewer vertices than one level down."""
     lines = [f"{'level':>5} {'vertices':>12} {'arcs':>12} {'self-loops':>12} {'factor':>7}"]
-    below = None
+    below, names = None, _names_of(pyramid)
     for index, size in enumerate(pyramid.stats.sizes):
         factor = f"{below / size.vertices:.2f}" if below else ""
-        mark = " <" if index == shown.index else ""
+        mark = f"  {names[index]}" if index in names else ""
+        mark += " <" if index == shown.index else ""
         counts = f"{size.vertices:>12,} {size.arcs:>12,} {size.self_loops:>12,}"
         lines.append(f"{index:>5} {counts} {factor:>7}{mark}".rstrip())
         below = size.vertices
     return "\n".join(lines)
+
+
+def _names_of(pyramid: hn.DualGraphPyramid) -> dict[int, str]:
+    """Name the levels of a pyramid that goes on above its places."""
+    if len(pyramid) == pyramid.place_level + 1:
+        return {}
+    tops = [("places", pyramid.place_level)]
+    tops += [] if pyramid.region_cells is None else [("regions", pyramid.region_level)]
+    tops += [] if pyramid.rooms is None else [("rooms", pyramid.room_level)]
+    return {at: ", ".join(name for name, top in tops if top == at) for _, at in tops}
 
 
 def _describe_level(level: hn.Level) -> str:

@@ -260,6 +260,39 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
     return sigma, origin, protected
 
 
+@guarded
+@njit(cache=True, nogil=True)
+def sweeps(survivors, edge_end, level, cols):
+    """Return the integral of x dy from each field's surviving cell to its cells, int32 (n_cells,).
+
+    The way leads along contracted edges, which span the field as a tree; the integral is modulo
+    2^32. `survivors`, int64 (n_vertices,), are flat cells; `edge_end`, uint8 (2 n_cells,), is the
+    record of the `level`.
+    """
+    n_cells = edge_end.size // 2
+    sweep = np.zeros(n_cells, np.int32)
+    stack = np.empty((n_cells, 2), np.int32)
+    for root in survivors:
+        stack[0, 0], stack[0, 1] = root, -1
+        size = 1
+        while size > 0:
+            size -= 1
+            cell, came_by = stack[size]
+            for edge in (2 * cell, 2 * cell + 1, 2 * (cell - 1), 2 * (cell - cols) + 1):
+                if edge < 0 or edge == came_by:
+                    continue
+                end = edge_end[edge]
+                if end == 0 or end & 1 or end >= 2 * level + 2:
+                    continue
+                first, second = edge_ends(edge, cols)
+                beyond = second if first == cell else first
+                rise = (beyond - cell) // cols if edge & 1 else 0
+                sweep[beyond] = sweep[cell] + rise * (cell % cols)
+                stack[size, 0], stack[size, 1] = beyond, edge
+                size += 1
+    return sweep
+
+
 @njit(cache=True, nogil=True)
 def way_to_rim(start, inside, field_of, edge_end, level, cols, came):
     """Return the base edges from a face in a field to the nearest rim, int64, the last one first.

@@ -23,7 +23,7 @@ UNDECIDED = -1
 
 _NO_KEY = np.uint64(0xFFFFFFFFFFFFFFFF)
 # A key holds the attribute (13 bits), a seeded hash (21 bits) and the position (30 bits).
-_ATTRIBUTE_MAX = 8191
+ATTRIBUTE_MAX = 8191
 _POSITION = np.uint64(0x3FFFFFFF)
 _LOW_HALF = np.uint64(0xFFFFFFFF)
 
@@ -60,7 +60,7 @@ def make_key(attribute, base_edge, seed, position):
     h ^= h >> np.uint64(13)
     h = h * np.uint64(0xC2B2AE35) & _LOW_HALF
     h ^= h >> np.uint64(16)
-    high = np.uint64(min(attribute, _ATTRIBUTE_MAX)) << np.uint64(51)
+    high = np.uint64(min(attribute, ATTRIBUTE_MAX)) << np.uint64(51)
     return high | h >> np.uint64(11) << np.uint64(30) | np.uint64(position)
 
 
@@ -201,15 +201,23 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
 
 
 @njit(cache=True, nogil=True)
-def open_candidates(origin, keys, ways, best):
-    """Let either end of every candidate survive, and give each vertex its least key in `best`."""
+def open_candidates(origin, base_edge, arcs, ranks, seed, keys, ways, best):
+    """Fill `keys` with some arcs in the order of their ranks; let either end of each survive.
+
+    `arcs`, int64 (n,), are edges, `ranks`, int64 (n,), their attributes, at most `ATTRIBUTE_MAX`,
+    the least first; `origin`, int32 (2 n_edges,), and `base_edge`, int32 (n_edges,), are those of
+    the darts, `seed` orders equal ranks. Out: `keys`, uint64 (n,); `ways`, uint8 by edge, which end
+    may survive; `best`, uint64 by vertex, its least key.
+    """
     for v in range(best.size):
         best[v] = _NO_KEY
-    for key in keys:
-        edge = key & _POSITION
-        dart = edge << np.uint64(1)
+    for i in range(arcs.size):
+        edge = arcs[i]
+        key = make_key(ranks[i], base_edge[edge], seed, edge)
+        keys[i] = key
         ways[edge] = EITHER_MAY_SURVIVE
-        for end in (origin[dart], origin[dart + np.uint64(1)]):
+        for dart in (2 * edge, 2 * edge + 1):
+            end = np.uint32(origin[dart])
             best[end] = min(best[end], key)
 
 

@@ -16,19 +16,19 @@ import numpy as np
 from hybridnav.combinatorial import darts as dart_kernels
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _kernels
-from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents
+from hybridnav.pyramid.expansion import Expansion
 from hybridnav.pyramid.hulls import merge_hulls
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Linkage, Record
-from hybridnav.pyramid.resistance import Steering
+from hybridnav.pyramid.resistance import Resisting
 from hybridnav.pyramid.scratch import Scratch
+from hybridnav.pyramid.start import N_CLASSES, kinds_of, start_at_base, start_at_level
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from hybridnav._typing import ByteArray, IntArray
+    from hybridnav.pyramid.level import Level
     from hybridnav.pyramid.resistance import Resistance
-
-    KindArray = NDArray[np.uint8] | NDArray[np.uint16]
+    from hybridnav.pyramid.start import Start
+    from hybridnav.pyramid.steering import Steering
 
 KERNEL = _kernels.select_stars
 """The kernel whose compiled form shows that a pyramid was built before."""
@@ -40,12 +40,14 @@ _LINKAGES: dict[Linkage, int] = {
 }
 
 _ROUNDING = 1e-9
+_FARTHEST = 2.0**62
+_NO_LIMIT = int(_FARTHEST)
 
 
 def squared_limit(merge_distance_m: float, resolution_m: float) -> int:
     """Return the least squared distance in cells that is not strictly below the merge distance."""
     ratio = merge_distance_m / resolution_m
-    return math.ceil(min(ratio * ratio * (1 - _ROUNDING), 2.0**62))
+    return math.ceil(min(ratio * ratio * (1 - _ROUNDING), _FARTHEST))
 
 
 def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its own
@@ -79,7 +81,10 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
         The rule by which arcs resist above the places.
     """
     kinds = classes if rooms is None else kinds_of(classes, rooms)
-    run = _Decimation(kinds, _LINKAGES[linkage], limit, seed)
+    began = time.perf_counter()
+    start = start_at_base(kinds, limit)
+    run = _Decimation(start, seed, _LINKAGES[linkage], limit)
+    run.stats.seconds["base"] = time.perf_counter() - began
     run.exhaust()
     if rooms is not None:
         run.lift_limit()
@@ -88,72 +93,88 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
         run.exhaust()
     if resistance is not None:
         run.lift_limit()
-        run.steer(resistance)
+        run.steer(Resisting(resistance, run.field_of(), run.n_vertices))
         run.exhaust()
     run.finish()
     return run.record, run.stats
 
 
-_N_CLASSES = 2
-"""Classes of vertices: free and unexplored."""
-_MOST_KINDS = 256
-"""Kinds that one byte distinguishes."""
+def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
+    places: Level,
+    record: Record,
+    stats: BuildStats,
+    *,
+    most_cells: int,
+    seed: int,
+    rooms: IntArray | None = None,
+) -> tuple[Record, BuildStats]:
+    """Contract the arcs of the place level in the order of the expansion rating, up to the apex.
 
+    There are two rounds: up to a number of cells a field, which makes the regions, and without such
+    a limit. With rooms the first two stay inside them, and a third one forgets them.
 
-def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
-    """Return the kind of each cell, one number for its class and its room.
+    Parameters
+    ----------
+    places
+        The level to start at.
+    record, stats
+        Those of its pyramid, which stay as they are.
+    most_cells
+        Most cells of a region.
+    seed
+        Breaks ties between arcs of equal rating.
+    rooms
+        int32, label of each cell's room, -1 for none.
 
-    0 is occupied, `CellClass` outside rooms, and so on, two kinds for each room.
+    Returns
+    -------
+    Record, BuildStats
+        Up to the level of the places they describe the same levels.
     """
-    n_kinds = _N_CLASSES * (int(rooms.max()) + 2) + 1
-    kinds = np.where(classes == 0, 0, _N_CLASSES * (rooms + 1) + classes)
-    kinds = kinds.astype(np.uint8 if n_kinds <= _MOST_KINDS else np.uint16)
-    kinds.flags.writeable = False  # as the classes are: another type is compiled once more
-    return kinds
+    classes = places.grid.classes
+    kinds = classes if rooms is None else kinds_of(classes, rooms)
+    run = _Decimation(start_at_level(places, record, kinds), seed)
+    run.recall(stats)
+    expansion = Expansion(places, most_cells)
+    run.steer(expansion)
+    run.exhaust()
+    expansion.lift_limit()
+    run.exhaust()
+    if rooms is not None:
+        run.forget_rooms()
+        run.exhaust()
+    run.finish()
+    return run.record, run.stats
 
 
 class _Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
-    def __init__(self, kinds: KindArray, linkage: int, limit: int, seed: int) -> None:
+    def __init__(
+        self, start: Start, seed: int, linkage: int = _kernels.SURVIVOR, limit: int = _NO_LIMIT
+    ) -> None:
         self.stats = BuildStats()
         self._began = time.perf_counter()
-        self._cols = kinds.shape[1]
         self._linkage = linkage
         self._limit = limit
         self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
         self._steering: Steering | None = None
-        self.record = Record(
-            np.empty(kinds.size, np.uint8),
-            np.empty(kinds.size, np.int32),
-            np.empty(2 * kinds.size, np.uint8),
-        )
-        self._level = 0
+        self.record, self._darts, self._vertices, self._level, self._cols = start
         self._loops = [0]
-        self._darts, self._vertices = self._base(kinds)
         self._whole_at = int(self._vertices.whole_at.max(initial=0))
         self._scratch = Scratch.of_size(len(self._vertices.cells), len(self._darts.base_edge))
-        self._lap("base")
 
-    def _base(self, kinds: KindArray) -> tuple[dart_kernels.Darts, _kernels.Vertices]:
-        record = self.record
-        power = block_powers(kinds, max_power(self._limit))
-        new_edge = np.empty(2 * kinds.size, np.int32)
-        n_vertices, n_edges = _base_kernels.mark_base(
-            kinds,
-            power,
-            (TEMPLATES[0], steps_to_parents(kinds.shape[1]), *TEMPLATES[3:]),
-            record.vertex_end,
-            record.vertex_parent,
-            record.edge_end,
-            new_edge,
-        )
-        vertices = _kernels.Vertices(
-            *_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices)
-        )
-        darts = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
-        return dart_kernels.Darts(*darts), vertices
+    def recall(self, stats: BuildStats) -> None:
+        """Take over what is known of the levels up to this one."""
+        self._loops = [size.self_loops for size in stats.sizes[: self._level + 1]]
+        self.stats.seconds = dict(stats.seconds)
+        self.stats.tops = [self._level]
+
+    @property
+    def n_vertices(self) -> int:
+        """Vertices of the current level."""
+        return len(self._vertices.cells)
 
     def exhaust(self) -> None:
         """Contract until no edge may be contracted, and record the level reached."""
@@ -163,17 +184,17 @@ class _Decimation:
 
     def lift_limit(self) -> None:
         """Let vertices merge however far apart they are."""
-        self._limit = squared_limit(math.inf, 1.0)
+        self._limit = _NO_LIMIT
         self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
 
-    def steer(self, resistance: Resistance) -> None:
-        """Let arcs resist from here on."""
-        self._steering = Steering(resistance)
+    def steer(self, steering: Steering) -> None:
+        """Let a steering decide from here on which arcs are contracted, in place of distances."""
+        self._steering = steering
 
     def forget_rooms(self) -> None:
         """Reduce the kind of each vertex to its class."""
         kinds = self._vertices.classes
-        kinds[:] = (kinds - 1) % _N_CLASSES + 1
+        kinds[:] = (kinds - 1) % N_CLASSES + 1
 
     def step(self) -> bool:
         """Build the next level; return False if this one is the apex."""
@@ -244,7 +265,7 @@ class _Decimation:
 
     def _find_candidates(self) -> int:
         if self._steering is not None:
-            return self._find_yielding(self._steering)
+            return self._find_steered(self._steering)
         count = self._try_candidates()
         if count == _kernels.UNDECIDED:
             self._start_hulls()
@@ -268,24 +289,24 @@ class _Decimation:
             )
         )
 
-    def _find_yielding(self, steering: Steering) -> int:
-        """Fill the keys with the arcs that do not resist, and return their number."""
+    def _find_steered(self, steering: Steering) -> int:
+        """Fill the keys with the arcs that the steering offers, and return their number."""
         scratch, darts = self._scratch, self._darts
-        count = steering.candidates(
-            self._field_of(), darts, self._vertices, scratch.keys, self._seed
+        arcs, ranks = steering.candidates(self.field_of, darts, self._vertices)
+        keys, base_edge = scratch.keys[: len(arcs)], darts.base_edge
+        _kernels.open_candidates(
+            darts.origin, base_edge, arcs, ranks, self._seed, keys, scratch.state, scratch.best
         )
-        origin, keys = darts.origin, scratch.keys[:count]
-        _kernels.open_candidates(origin, keys, scratch.state, scratch.best)
-        return count
+        return len(arcs)
 
     def _start_hulls(self) -> None:
         """Build the hull of every vertex, once bounding boxes no longer decide every edge."""
         self._hulls = _kernels.Hulls(
-            *_hull_kernels.field_hulls(self._field_of(), self._cols, self._vertices.boxes)
+            *_hull_kernels.field_hulls(self.field_of(), self._cols, self._vertices.boxes)
         )
         self._lap("hulls")
 
-    def _field_of(self) -> IntArray:
+    def field_of(self) -> IntArray:
         """Return the current vertex of each flat cell, int32 (n_cells,), -1 for none."""
         record = self.record
         labels: IntArray = _field_kernels.label_fields(
@@ -304,7 +325,9 @@ class _Decimation:
             record.vertex_end,
             record.vertex_parent,
         )
-        if len(self._hulls.start):
+        if self._steering is not None:
+            self._steering.merge(scratch.new_vertex[scratch.parent], n_vertices)
+        elif len(self._hulls.start):
             merged_into = scratch.new_vertex[scratch.parent]
             self._hulls = merge_hulls(self._hulls, merged_into, n_vertices)
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))

@@ -154,6 +154,11 @@ class Level:
         """int64 (n_vertices,), cells in each receptive field."""
         return self._extents[0]
 
+    @property
+    def boxes(self) -> IntArray:
+        """int32 (n_vertices, 4), the least row and column of each field, and the greatest."""
+        return self._extents[1]
+
     @cached_property
     def base_edges(self) -> LongArray:
         """int64 (n_arcs,), base edge that represents each arc: 2 * flat cell, + 1 for north."""
@@ -274,7 +279,7 @@ class Level:
             self.arcs,
             max_distance_m=self.max_distance_m.tolist(),
             through_m=self.through_m.tolist(),
-            n_cracks=np.bincount(self.boundary_table[1], minlength=self.n_arcs).tolist(),
+            n_cracks=self.n_cracks.tolist(),
             base_pair=self.base_pairs.tolist(),
         )
 
@@ -294,15 +299,14 @@ class Level:
             own field), and `vertices` [u, v] on its two sides. The graph has the attributes of
             `to_networkx` and `n_isolated`.
         """
-        n_cracks = np.bincount(self.boundary_table[1], minlength=self.n_arcs)
         isolated = self.n_vertices - len(np.unique(self.arcs))
         kinds = [FaceKind(kind).name.lower() for kind in self.dual.kinds.tolist()]
         return multigraph(
             {**self._about(), "n_isolated": isolated},
             ((face, {"kind": kind}) for face, kind in enumerate(kinds)),
             self.dual.edges,
-            length_m=(n_cracks * np.float64(self._grid.resolution_m)).tolist(),
-            n_cracks=n_cracks.tolist(),
+            length_m=(self.n_cracks * np.float64(self._grid.resolution_m)).tolist(),
+            n_cracks=self.n_cracks.tolist(),
             vertices=self.arcs.tolist(),
         )
 
@@ -326,9 +330,7 @@ class Level:
     def max_distance_m(self) -> FloatArray:
         """float64 (n_arcs,), largest distance between the centre of a cell of one field and the
         centre of a cell of the other; for a self-loop the diameter of its field. In metres."""
-        start, points = _hull_kernels.field_hulls(
-            self._labels[0], self._grid.shape[1], self._extents[1]
-        )
+        start, points = _hull_kernels.field_hulls(self._labels[0], self._grid.shape[1], self.boxes)
         squared = _hull_kernels.hull_distances(start, points, self.arcs)
         return _frozen(np.sqrt(squared) * self._grid.resolution_m)
 
@@ -390,6 +392,16 @@ class Level:
         edges, arc = self.boundary_table
         middles = middles_of(sides_of(edges, self._grid.shape[1]), arc, self.n_arcs)
         return _frozen(self._grid.frame.points_of_grid(middles))
+
+    @cached_property
+    def n_cracks(self) -> LongArray:
+        """int64 (n_arcs,), cell sides of each boundary: the length of the arc's dual edge.
+
+        Only a dual graph has it: neither an adjacency of fields nor their distances contain how
+        long the line is along which two fields meet.
+        """
+        counts: LongArray = np.bincount(self.boundary_table[1], minlength=self.n_arcs)
+        return _frozen(counts)
 
     @cached_property
     def boundary_table(self) -> tuple[LongArray, LongArray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, get_args, overload
 
@@ -28,10 +28,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class DualGraphPyramid:
-    """A hierarchy of plane graphs with their duals, from single cells to places.
+    """A hierarchy of plane graphs with their duals, from single cells to places and above.
 
-    `pyramid[0]` is the base, `pyramid[-1]` the apex; `len(pyramid)` counts the levels. Made by
-    `DualGraphPyramid.build`.
+    `pyramid[0]` is the base, `pyramid[-1]` the apex, the level at which contraction ended;
+    `len(pyramid)` counts the levels. `DualGraphPyramid.build` ends at the places, unless rooms or a
+    resistance let it go on; `with_regions` goes on from there, to one vertex for each connected set
+    of cells of one class.
 
     Examples
     --------
@@ -49,7 +51,11 @@ class DualGraphPyramid:
     rooms: RoomLabels | None = field(repr=False)
     """The rooms that the pyramid was built with."""
     _record: Record = field(repr=False)
+    region_cells: int | None = field(repr=False, default=None)
+    """Most cells of a region, None for a pyramid without regions."""
     _levels: dict[int, Level] = field(repr=False, default_factory=dict)
+    _below: DualGraphPyramid | None = field(repr=False, default=None)
+    """The pyramid that this one goes on above: both have the same levels up to the places."""
 
     @classmethod
     def build(  # noqa: PLR0913 - all but the grid have defaults
@@ -137,6 +143,67 @@ class DualGraphPyramid:
         )
         return cls(grid, float(merge_distance_m), linkage, seed, stats, rooms, record)
 
+    def with_regions(self, most_cells: int) -> DualGraphPyramid:
+        """Let contraction go on above the places: to regions, and from there to the apex.
+
+        All levels up to the places are those of this pyramid. Above them, the arcs with the
+        greatest *expansion rating* are contracted first: the squared length of the boundaries
+        between two fields over the product of their areas, both in cells. Regions are what has
+        grown when no two fields may merge without having more than so many cells. From there
+        contraction goes on without this limit. With rooms, regions lie inside rooms, and the levels
+        of the rooms and of the building come above them.
+
+        Parameters
+        ----------
+        most_cells
+            Most cells of a region, >= 1; a place that has more is a region by itself.
+
+        Returns
+        -------
+        DualGraphPyramid
+            This pyramid itself if it has such regions, else another one.
+
+        Raises
+        ------
+        InvalidValueError
+            When the number is not a whole number >= 1.
+
+        Examples
+        --------
+        >>> import hybridnav as hn
+        >>> grid = hn.load_map("maps/office/office.yaml", robot_radius_m=0.25)
+        >>> pyramid = hn.DualGraphPyramid.build(grid).with_regions(22_000)
+        >>> [pyramid[at].n_vertices for at in (pyramid.place_level, pyramid.region_level, -1)]
+        [156, 78, 51]
+        """
+        if isinstance(most_cells, bool) or not isinstance(most_cells, int) or most_cells < 1:
+            raise InvalidValueError(
+                f"regions have at most {most_cells!r:.60} cells, expected a whole number >= 1"
+            )
+        if self.region_cells == most_cells:
+            return self
+        if self._below is not None:
+            return self._below.with_regions(most_cells)
+        # A model holds what it builds.
+        from hybridnav.pyramid.decimation import go_on_above  # noqa: PLC0415
+
+        record, stats = go_on_above(
+            self[self.place_level],
+            self._record,
+            self.stats,
+            most_cells=most_cells,
+            seed=self.seed,
+            rooms=None if self.rooms is None else self.rooms.label_of,
+        )
+        return replace(
+            self,
+            stats=stats,
+            region_cells=most_cells,
+            _record=record,
+            _levels={},
+            _below=self,
+        )
+
     @property
     def record(self) -> Record:
         """Level and kind of the end of each vertex and edge, from which all levels are rebuilt."""
@@ -146,6 +213,19 @@ class DualGraphPyramid:
     def place_level(self) -> int:
         """Index of the level of the places: the apex, unless contraction went on above it."""
         return self.stats.tops[0]
+
+    @property
+    def region_level(self) -> int:
+        """Index of the level of the regions.
+
+        Raises
+        ------
+        InvalidValueError
+            When the pyramid has no regions.
+        """
+        if self.region_cells is None:
+            raise InvalidValueError("this pyramid has no regions: use pyramid.with_regions(...)")
+        return self.stats.tops[1]
 
     @property
     def room_level(self) -> int:
@@ -158,7 +238,7 @@ class DualGraphPyramid:
         """
         if self.rooms is None:
             raise InvalidValueError("this pyramid has no rooms: build it with rooms=...")
-        return self.stats.tops[1]
+        return self.stats.tops[-2]
 
     def __len__(self) -> int:
         return len(self.stats.sizes)
@@ -175,6 +255,8 @@ class DualGraphPyramid:
         at = index + len(self) if index < 0 else index
         if not 0 <= at < len(self):
             raise IndexError(f"the pyramid has levels 0 to {len(self) - 1}, got {index}")
+        if self._below is not None and at <= self.place_level:
+            return self._below[at]
         if at not in self._levels:  # one call, so that all threads share one level
             self._levels.setdefault(at, Level(self.grid, self._record, at, self._find_islands))
         return self._levels[at]
@@ -267,6 +349,8 @@ class DualGraphPyramid:
     @cached_property
     def islands(self) -> Islands:
         """Return the obstacles and components of the grid, with their nesting."""
+        if self._below is not None:
+            return self._below.islands
         from hybridnav.pyramid.islands import Islands  # noqa: PLC0415 - loads scipy.ndimage
 
         return Islands.of_classes(self.grid.classes)

@@ -9,10 +9,13 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid import _field_kernels, _resistance_kernels
+from hybridnav.pyramid import _field_kernels, _steering_kernels
+from hybridnav.pyramid._kernels import ATTRIBUTE_MAX
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, IntArray, KeyArray
+    from collections.abc import Callable
+
+    from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.combinatorial.darts import Darts
     from hybridnav.pyramid._kernels import Vertices
 
@@ -108,37 +111,48 @@ class Resistance:
         return widths
 
 
-class Steering:
-    """A resistance on the arcs of the level that is being contracted."""
+class Resisting:
+    """A steering by resistance; see `Steering`.
 
-    def __init__(self, resistance: Resistance) -> None:
+    Parameters
+    ----------
+    resistance
+        The rule.
+    field_of
+        int32 (n_cells,), the vertex of each cell at the level to start from, -1 for none.
+    n_vertices
+        Vertices of that level.
+    """
+
+    def __init__(self, resistance: Resistance, field_of: IntArray, n_vertices: int) -> None:
         self._resistance = resistance
-        self._widths = self._peaks = np.empty(0)
+        self._peaks = resistance.peaks(field_of, n_vertices)
+        self._widths = np.empty(0)
 
     def candidates(
-        self, field_of: IntArray, darts: Darts, vertices: Vertices, keys: KeyArray, seed: np.uint64
-    ) -> int:
-        """Fill `keys` with the arcs that do not resist, and return their number."""
-        self._peaks = self._resistance.peaks(field_of, len(vertices.cells))
-        self._widths = self._resistance.widths(field_of, darts.base_edge)
-        return int(
-            _resistance_kernels.yielding(
-                darts.origin,
-                darts.base_edge,
-                vertices.classes,
-                self._widths,
-                self._peaks,
-                self._resistance.share,
-                seed,
-                keys,
-            )
-        )
+        self, field_of: Callable[[], IntArray], darts: Darts, vertices: Vertices
+    ) -> tuple[LongArray, LongArray]:
+        """Return the arcs that do not resist, and the narrowness of each."""
+        widths = self._widths = self._resistance.widths(field_of(), darts.base_edge)
+        u, v = darts.origin[::2], darts.origin[1::2]
+        lower = np.minimum(self._peaks[u], self._peaks[v])
+        kinds = vertices.classes
+        may = (u != v) & (kinds[u] == kinds[v]) & (widths >= self._resistance.share * lower)
+        arcs, widest = np.flatnonzero(may), widths.max(initial=0.0)
+        narrowness = 1.0 - widths[arcs] / widest if widest > 0 else np.ones(len(arcs))
+        return arcs, (ATTRIBUTE_MAX * narrowness).astype(np.int64)
 
     def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
         """Undo the joins of stars that would merge two rooms through the threshold between them."""
         leaves = np.flatnonzero(kernel_dart >= 0)
         widths = self._widths[kernel_dart[leaves] >> 1]
         leaves = leaves[np.argsort(-widths, kind="stable")]
-        _resistance_kernels.refuse_narrow_leaves(
+        _steering_kernels.refuse_narrow_leaves(
             leaves, parent, kernel_dart, self._widths, self._peaks, self._resistance.share
         )
+
+    def merge(self, merged_into: IntArray, n_vertices: int) -> None:
+        """Let each vertex of the next level have the highest peak of its sons."""
+        peaks = np.zeros(n_vertices)
+        np.maximum.at(peaks, merged_into, self._peaks)
+        self._peaks = peaks

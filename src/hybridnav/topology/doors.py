@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.grid.clearance import clearance_cells
 from hybridnav.pyramid.cracks import ends_of, find_cracks, middles_of, sides_of
-from hybridnav.pyramid.decimation import kinds_of
+from hybridnav.pyramid.start import kinds_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -60,7 +60,8 @@ class _PyramidValues(_Values):
         list[tuple[_COUNT, _COUNT, _COUNT]], Field(min_length=1, max_length=MAX_LEVELS)
     ]
     seconds: dict[str, float]
-    tops: Annotated[list[_COUNT], Field(min_length=1, max_length=3)]
+    tops: Annotated[list[_COUNT], Field(min_length=1, max_length=4)]
+    region_cells: Annotated[int, Field(ge=1)] | None = None
 
 
 def values_of(kind: type[_T], filed: FiledPart) -> _T:
@@ -221,6 +222,7 @@ def pyramid_part(pyramid: DualGraphPyramid) -> Part:
         "sizes": [[size.vertices, size.arcs, size.self_loops] for size in pyramid.stats.sizes],
         "seconds": dict(pyramid.stats.seconds),
         "tops": list(pyramid.stats.tops),
+        "region_cells": pyramid.region_cells,
     }
     return PYRAMID.part(pyramid.record, {}, values)
 
@@ -236,14 +238,21 @@ def pyramid_of(
         When the part is not as `pyramid_part` has written it.
     """
     values = values_of(_PyramidValues, filed)
-    wanted = 1 if rooms is None else 2
+    wanted = 1 + (rooms is not None) + (values.region_cells is not None)
     if len(values.tops) < wanted or max(values.tops) >= len(values.sizes):
         raise refusal(filed, f"tops are {values.tops}, of {len(values.sizes)} levels")
     record = Record(**PYRAMID.read(filed, known))
     sizes = [LevelSize(*size) for size in values.sizes]
     stats = BuildStats(sizes, dict(values.seconds), list(values.tops))
     return DualGraphPyramid(
-        grid, values.merge_distance_m, values.linkage, values.seed, stats, rooms, record
+        grid,
+        values.merge_distance_m,
+        values.linkage,
+        values.seed,
+        stats,
+        rooms,
+        record,
+        values.region_cells,
     )
 
 

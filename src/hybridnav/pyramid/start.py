@@ -1,0 +1,120 @@
+"""Where a decimation starts: at the blocks of the base, or at a level that another one has made."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav.combinatorial._kernels import Darts
+from hybridnav.pyramid import _base_kernels, _field_kernels
+from hybridnav.pyramid._kernels import Vertices
+from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents
+from hybridnav.pyramid.record import SURVIVES, Record
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._typing import ByteArray, IntArray
+    from hybridnav.pyramid.level import Level
+
+    KindArray = NDArray[np.uint8] | NDArray[np.uint16]
+
+N_CLASSES = 2
+"""Classes of vertices: free and unexplored."""
+_MOST_KINDS = 256
+"""Kinds that one byte distinguishes."""
+
+
+class Start(NamedTuple):
+    """The level at which a decimation starts; its arrays are worked on in place."""
+
+    record: Record
+    darts: Darts
+    vertices: Vertices
+    level: int
+    cols: int
+
+
+def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
+    """Return the kind of each cell, one number for its class and its room.
+
+    0 is occupied, `CellClass` outside rooms, and so on, two kinds for each room.
+    """
+    n_kinds = N_CLASSES * (int(rooms.max()) + 2) + 1
+    kinds = np.where(classes == 0, 0, N_CLASSES * (rooms + 1) + classes)
+    kinds = kinds.astype(np.uint8 if n_kinds <= _MOST_KINDS else np.uint16)
+    kinds.flags.writeable = False  # as the classes are: another type is compiled once more
+    return kinds
+
+
+def start_at_base(kinds: KindArray, limit: int) -> Start:
+    """Fill the record for the blocks of the base, and return their darts and vertices.
+
+    Parameters
+    ----------
+    kinds
+        uint8 or uint16 (rows, cols); see `kinds_of`.
+    limit
+        See `squared_limit`; no block is wider than half of it.
+    """
+    record = Record(
+        np.empty(kinds.size, np.uint8),
+        np.empty(kinds.size, np.int32),
+        np.empty(2 * kinds.size, np.uint8),
+    )
+    power = block_powers(kinds, max_power(limit))
+    new_edge = np.empty(2 * kinds.size, np.int32)
+    n_vertices, n_edges = _base_kernels.mark_base(
+        kinds,
+        power,
+        (TEMPLATES[0], steps_to_parents(kinds.shape[1]), *TEMPLATES[3:]),
+        record.vertex_end,
+        record.vertex_parent,
+        record.edge_end,
+        new_edge,
+    )
+    vertices = Vertices(*_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices))
+    darts = Darts(*_base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges))
+    return Start(record, darts, vertices, 0, kinds.shape[1])
+
+
+def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
+    """Forget what a record has above a level, and return the darts and vertices of the level.
+
+    Parameters
+    ----------
+    level
+        A level at which all blocks are whole, such as that of the places.
+    record
+        The record of its pyramid; it is copied.
+    kinds
+        uint8 or uint16 (rows, cols), kinds that no field of the level mixes.
+    """
+    record = _up_to(level.index, record)
+    cols = kinds.shape[1]
+    row, col = level.cells.T
+    vertices = Vertices(
+        level.cells.astype(np.int32),
+        level.boxes.copy(),
+        kinds[row, col],
+        np.zeros(level.n_vertices, np.uint8),
+    )
+    plane = level.darts
+    sweep = _field_kernels.sweeps(row * cols + col, record.edge_end, level.index, cols)
+    darts = Darts(
+        plane.sigma.copy(),
+        plane.origin.copy(),
+        sweep[(level.base_pairs @ (cols, 1)).ravel()],
+        plane.protected.copy(),
+        plane.base_edge.copy(),
+    )
+    return Start(record, darts, vertices, level.index, cols)
+
+
+def _up_to(level: int, record: Record) -> Record:
+    """Return a record with which all that is left at a level survives."""
+    vertex_end, edge_end = record.vertex_end.copy(), record.edge_end.copy()
+    vertex_end[vertex_end > level] = SURVIVES
+    edge_end[edge_end >= min(2 * level + 2, SURVIVES)] = SURVIVES
+    return Record(vertex_end, record.vertex_parent.copy(), edge_end)
