@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._typing import FloatArray, IntArray, LongArray
-    from hybridnav.combinatorial._kernels import Darts
+    from hybridnav.combinatorial.darts import Darts
     from hybridnav.pyramid._kernels import Vertices
     from hybridnav.pyramid.level import Level
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -33,22 +32,6 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import Record
-
-
-@dataclass(frozen=True, order=True)
-class LevelArc:
-    """An arc together with its level: at another level, the same index is another arc.
-
-    Examples
-    --------
-    >>> hn.LevelArc(0, 7)
-    LevelArc(level=0, index=7)
-    """
-
-    level: int
-    """Index of the level in its pyramid."""
-    index: int
-    """Dense index of the arc at that level."""
 
 
 @copies_alike

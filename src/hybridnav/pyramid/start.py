@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.combinatorial._kernels import Darts
+from hybridnav.combinatorial.darts import Darts
 from hybridnav.pyramid import _base_kernels, _field_kernels
 from hybridnav.pyramid._kernels import Vertices
 from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents

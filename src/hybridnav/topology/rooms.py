@@ -10,8 +10,8 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass
+from hybridnav.pyramid.arc import LevelArc
 from hybridnav.pyramid.cracks import ends_of
-from hybridnav.pyramid.level import LevelArc
 from hybridnav.topology.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
 
 if TYPE_CHECKING:

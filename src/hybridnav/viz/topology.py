@@ -21,8 +21,6 @@ from hybridnav.viz.layout import finish
 from hybridnav.viz.loops import Loops
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.axes import Axes
 
     from hybridnav._typing import AnyArray, BoolArray, ByteArray, FloatArray
