@@ -10,7 +10,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
+from hybridnav.grid import CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.pyramid import DualGraphPyramid
 
 if TYPE_CHECKING:
@@ -170,3 +170,17 @@ def block_labels(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np
     labels: NDArray[np.int32] = coarse.repeat(side, axis=0)[:rows].repeat(side, axis=1)[:, :cols]
     noisy = rng.random(shape) < rng.choice([0.0, 0.05])
     return np.where(noisy, rng.integers(n_labels, size=shape, dtype=np.int32), labels)
+
+
+@st.composite
+def labelled(draw: st.DrawFn) -> tuple[Classes, RoomLabels]:
+    """A map, and labels on it that are blocks, noise, or one room for all."""
+    classes = draw(class_grids(min(MAX_SIDE, 20)))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n_rooms = draw(st.sampled_from([1, 2, 3, 200]))
+    block = draw(st.integers(1, 9))
+    rows, cols = classes.shape
+    coarse = rng.integers(-1, n_rooms, (rows // block + 1, cols // block + 1))
+    labels = np.kron(coarse, np.ones((block, block), dtype=int))[:rows, :cols]
+    names = tuple(f"r{i}" for i in range(n_rooms))
+    return classes, RoomLabels(names, labels)

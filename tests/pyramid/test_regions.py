@@ -16,8 +16,7 @@ from scipy import ndimage
 import hybridnav as hn
 from tests.oracle.checks import check_attributes, check_level, check_step
 from tests.oracle.pyramid import Base, boundaries
-from tests.strategies import MAX_SIDE, Scene, drawn, examples, occupancy_grid, scenes
-from tests.test_room_level import labelled
+from tests.strategies import MAX_SIDE, Scene, drawn, examples, labelled, occupancy_grid, scenes
 
 if TYPE_CHECKING:
     from hybridnav.pyramid import Level

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.grid import RoomLabels
-from tests.strategies import MAX_SIDE, class_grids, drawn, examples, occupancy_grid
+from tests.strategies import drawn, examples, labelled, occupancy_grid
 
 TWO_ROOMS = drawn(
     "#########",
@@ -31,20 +31,6 @@ def left_and_right(classes, middle):
     labels = np.zeros(classes.shape, dtype=np.int32)
     labels[:, middle:] = 1
     return named(labels)
-
-
-@st.composite
-def labelled(draw):
-    """A map, and labels on it that are blocks, noise, or one room for all."""
-    classes = draw(class_grids(min(MAX_SIDE, 20)))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    n_rooms = draw(st.sampled_from([1, 2, 3, 200]))
-    block = draw(st.integers(1, 9))
-    rows, cols = classes.shape
-    coarse = rng.integers(-1, n_rooms, (rows // block + 1, cols // block + 1))
-    labels = np.kron(coarse, np.ones((block, block), dtype=int))[:rows, :cols]
-    names = tuple(f"r{i}" for i in range(n_rooms))
-    return classes, RoomLabels(names, labels)
 
 
 def connected_parts(classes, kinds):
