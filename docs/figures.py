@@ -11,12 +11,14 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.mesh import build_mesh, trace_search
-from hybridnav.viz import plot_level, plot_mesh, plot_rooms, plot_search, save_figure
+from hybridnav.viz import plot_level, plot_levels, plot_mesh, plot_rooms, plot_search, save_figure
 
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
 LEVELS = (6, 8, 10, -1)
+REGION_CELLS = 26_420
+"""A tenth of the free cells, as portals have it."""
 START, GOAL = (1.0, 13.2), (40.6, 19.4)
 
 
@@ -38,6 +40,14 @@ def draw_levels(file: Path) -> None:
     for ax in figure.axes[:2]:  # one legend under each column is enough
         ax.get_legend().remove()
     save_figure(figure, file, dpi=110)
+
+
+def draw_regions(file: Path) -> None:
+    """Draw the levels of the office above its places: places, regions, apex."""
+    pyramid = hn.DualGraphPyramid.build(hn.load_map(OFFICE, robot_radius_m=0.25))
+    pyramid = pyramid.with_regions(REGION_CELLS)
+    levels = pyramid.place_level, pyramid.region_level, -1
+    save_figure(plot_levels(pyramid, levels, graph_up_to=0)[0].figure, file, dpi=150)
 
 
 def draw_rooms(file: Path) -> None:
@@ -71,6 +81,7 @@ if __name__ == "__main__":
     for draw, name in (
         (draw_route, "office-route.png"),
         (draw_levels, "office-levels.png"),
+        (draw_regions, "office-regions.png"),
         (draw_rooms, "office-rooms.png"),
         (draw_mesh, "mesh-office.png"),
         (draw_search, "mesh-search.png"),

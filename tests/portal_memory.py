@@ -63,6 +63,7 @@ def _key_of(
         grid.resolution_m,
         grid.corner_cutting,
         pyramid.merge_distance_m,
+        pyramid.linkage,
         pyramid.seed,
         allow_unexplored,
         options or PortalOptions(),

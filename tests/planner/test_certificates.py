@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.portals import PortalOptions
 from tests.certificates import (
     DIRECTIONS,
     Cell,
@@ -144,7 +145,7 @@ def test_bounds_hold_for_all_pairs(name: str, corner_cutting: bool, spacing: int
 
 def test_bounds_hold_inside_fields_across_borders_and_where_fields_only_touch() -> None:
     topology = built(Scene(np.ones((24, 24), dtype=np.uint8), 1.0, 1.5, 1))
-    planners = planners_of(topology)
+    planners = planners_of(topology, options=PortalOptions(least_regions=50))
     field_of = search_of(planners[-1]).field_of
     borders = {
         frozenset(pair)
@@ -160,7 +161,7 @@ def test_bounds_hold_inside_fields_across_borders_and_where_fields_only_touch() 
             kind = "inside" if len(fields) == 1 else "across" if fields in borders else "touching"
             kinds[kind].append((cell, beside))
     touching = {frozenset((int(field_of[a]), int(field_of[b]))) for a, b in kinds["touching"]}
-    assert len(touching) == 6
+    assert len(touching) == 8
     for one, other in map(sorted, touching):
         ends = (np.argwhere(field_of == field).tolist() for field in (one, other))
         kinds["touching"] += [((a, b), (c, d)) for (a, b), (c, d) in itertools.product(*ends)]

@@ -10,7 +10,6 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.portals import PortalOptions, PortalSearch, prepare_portals
-from hybridnav.portals.fields import routing_levels
 from hybridnav.search.grid_search import GridSearch
 from tests.strategies import occupancy_grid
 
@@ -18,10 +17,8 @@ if TYPE_CHECKING:
     from hybridnav.portals import BuiltPortals
 
 WRONG = [
-    ("merge_distance_factor", 0),
-    ("merge_distance_factor", math.inf),
-    ("merge_distance_factor", "2"),
-    ("least_fields", 0),
+    ("least_regions", 0),
+    ("least_regions", 12.0),
     ("spacing_cells", 0),
     ("spacing_cells", 2.0),
     ("spacing_cells", True),
@@ -59,13 +56,30 @@ def shortest(topology: hn.TopologicalMap, built: BuiltPortals) -> float:
     return search.path((2, 3), (37, 35)).length_cells
 
 
-def test_the_first_fields_are_as_large_as_the_factor_asks_for() -> None:
+def test_the_fields_are_the_regions_of_the_pyramid_and_as_small_as_the_option_asks_for() -> None:
     topology = floor()
-    sizes = []
-    for factor in (0.5, 1.0, 2.0):
-        options = PortalOptions(merge_distance_factor=factor, least_fields=1)
-        sizes.append(next(routing_levels(topology, options)).n_vertices)
-    assert sizes[0] > sizes[1] > sizes[2]
+    free = topology.grid.enterable()
+    for least in (6, 12, 24):
+        most_cells = -(-int(free.sum()) // least)
+        pyramid = topology.pyramid.with_regions(most_cells)
+        regions = pyramid[pyramid.region_level]
+        built = prepare_portals(topology, options=PortalOptions(least_regions=least))
+        np.testing.assert_array_equal(built.field_of[free], regions.field_of[free])
+        assert np.bincount(built.field_of[free]).max() <= most_cells
+        assert built.portals.n_fields >= least
+
+
+@pytest.mark.parametrize("distance_m", [9.0, math.inf])
+def test_where_places_are_too_large_a_level_below_them_is_routed_on(distance_m: float) -> None:
+    free = floor().grid.enterable()
+    grid = occupancy_grid(free.astype(np.uint8))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=distance_m))
+    built = prepare_portals(topology, options=PortalOptions(least_regions=24))
+    places = topology.level.field_of[free]
+    sizes = np.bincount(built.field_of[free])
+    assert sizes.max() <= 2 * math.ceil(free.sum() / 24) < np.bincount(places).max()
+    pairs = np.unique(np.stack([built.field_of[free], places]), axis=1)
+    assert pairs.shape[1] == built.portals.n_fields > topology.n_places
 
 
 def test_every_choice_of_options_finds_paths_as_short() -> None:
@@ -76,7 +90,7 @@ def test_every_choice_of_options_finds_paths_as_short() -> None:
         PortalOptions(all_gates_levels=0, sparse_spacings_cells=(8,)),
         PortalOptions(least_bytes=0, most_bytes_per_cell=0, most_sparse_bytes_per_cell=math.inf),
         PortalOptions(dropped_bits=4),
-        PortalOptions(least_fields=1, merge_distance_factor=1.0),
+        PortalOptions(least_regions=3),
     ]
     built = [prepare_portals(topology, options=options) for options in choices]
     assert [found.has_all_gates for found in built] == [True, False, False, True, True]

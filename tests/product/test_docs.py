@@ -152,7 +152,7 @@ def behaviour() -> dict[str, str]:
             "CONTRIBUTING.md",
             {
                 "| the places of the `TopologicalMap` |": "chosen on places",
-                "| portals between the fields of a second pyramid": "read off the path",
+                "| portals between the regions": "read off the path",
                 "| the corner cells at which shortest paths of cells turn |": "read off the path",
                 "| a convex mesh of free space": "read off the path",
                 "| the cells of the whole grid |": "read off the path",

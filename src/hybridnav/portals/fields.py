@@ -1,4 +1,4 @@
-"""Fields to route on: levels of pyramids that are grown for planning alone."""
+"""Fields to route on: regions, a level of the pyramid above the places."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
 from hybridnav.portals.options import DEFAULT_OPTIONS
-from hybridnav.pyramid import DualGraphPyramid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,50 +16,35 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import BoolArray
     from hybridnav.portals.options import PortalOptions
-    from hybridnav.pyramid import Level
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.pyramid import DualGraphPyramid, Level
+
+_LARGEST = 2
+"""A field has at most so many times the cells of a region: places may be larger."""
 
 
 def routing_levels(
-    topology: TopologicalMap, options: PortalOptions = DEFAULT_OPTIONS
+    pyramid: DualGraphPyramid, enterable: BoolArray, options: PortalOptions = DEFAULT_OPTIONS
 ) -> Iterator[Level]:
-    """Yield levels to route on: the one with the largest fields that make enough of them first,
-    then larger ones, which have fewer portals, then smaller ones, which have shorter paths.
+    """Yield the levels of a pyramid to route on, the best one first.
+
+    The first is that of the regions, or where a place has more than twice the cells of a region,
+    the next one below without such fields; then all levels below follow.
 
     Parameters
     ----------
-    topology
-        The map; its grid, its merge distance and its seed are used.
+    pyramid
+        The pyramid of a map; it goes on above the places.
+    enterable
+        bool (rows, cols), cells that may be entered, in whole fields.
     options
-        How large and how many the fields of the first level are.
+        How many regions there are at least.
     """
-    pyramid, resolution_m = topology.pyramid, topology.grid.resolution_m
-    widest_m = 2 * max(topology.grid.shape) * resolution_m
-
-    def level_of(distance_m: float) -> Level:
-        return DualGraphPyramid.build(
-            topology.grid, merge_distance_m=distance_m, linkage="survivor", seed=pyramid.seed
-        )[-1]
-
-    first_m = min(options.merge_distance_factor * pyramid.merge_distance_m, widest_m)
-    level = level_of(first_m)
-    while not _has_fields(level, options.least_fields) and first_m >= 8 * resolution_m:
-        first_m /= 2
-        level = level_of(first_m)
-    yield level
-    distance_m = 2 * first_m
-    while distance_m < 2 * widest_m:
-        yield level_of(distance_m)
-        distance_m *= 2
-    distance_m = first_m / 2
-    while distance_m > resolution_m:
-        yield level_of(distance_m)
-        distance_m /= 2
-
-
-def _has_fields(level: Level, least: int) -> bool:
-    large = level.areas[level.classes == CellClass.FREE] > level.areas.max(initial=0) / 100
-    return int(large.sum()) >= least
+    most_cells = -(-max(int(enterable.sum()), 1) // options.least_regions)
+    pyramid = pyramid.with_regions(most_cells)
+    for index in range(pyramid.region_level, -1, -1):
+        level = pyramid[index]
+        if np.bincount(level.field_of[enterable]).max(initial=0) <= _LARGEST * most_cells:
+            yield level
 
 
 def compact_labels(

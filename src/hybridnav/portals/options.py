@@ -16,15 +16,15 @@ class PortalOptions:
 
     Parameters
     ----------
-    merge_distance_factor
-        Merge distance of the fields by that of the places: fewer, larger fields route faster.
-    least_fields
-        With fewer large fields than this, half the merge distance is tried: a field is searched
-        cell by cell where start and goal share it.
+    least_regions
+        A region has at most so great a part of the cells that may be entered. Fewer, larger regions
+        have fewer border cells, and are searched cell by cell more often: where start and goal lie
+        in the same one.
     spacing_cells
         Side of the lattice squares of portals where every border cell is a gate, in cells.
     all_gates_levels
-        Levels that are tried with a gate at every border cell, before fewer gates are.
+        Levels that are tried with a gate at every border cell, before fewer gates are: that of the
+        regions, then those below.
     sparse_spacings_cells
         Sides of the lattice squares of portals and gates, in cells, which are tried in this order
         where a gate at every border cell takes too much memory: open floors have long borders.
@@ -51,8 +51,7 @@ class PortalOptions:
     16
     """
 
-    merge_distance_factor: float = 2.0
-    least_fields: int = 16
+    least_regions: int = 10
     spacing_cells: int = 16
     all_gates_levels: int = 2
     sparse_spacings_cells: tuple[int, ...] = (16, 32, 64, 128, 256)
@@ -67,9 +66,6 @@ class PortalOptions:
             self._check(name, _is_whole(getattr(self, name), least), f"a whole number >= {least}")
         for name in ("most_bytes_per_cell", "most_sparse_bytes_per_cell", "least_bytes"):
             self._check(name, _is_real(getattr(self, name)), "a number >= 0")
-        factor = self.merge_distance_factor
-        is_size = _is_real(factor) and 0 < factor <= _LARGEST_FACTOR
-        self._check("merge_distance_factor", is_size, f"a number > 0 and <= {_LARGEST_FACTOR:g}")
         self._check("dropped_bits", self.dropped_bits <= _MOST_BITS, f"at most {_MOST_BITS}")
         spacings = self.sparse_spacings_cells
         is_list = isinstance(spacings, tuple) and all(_is_whole(at, 2) for at in spacings)
@@ -92,7 +88,7 @@ def _is_real(value: object) -> bool:
 
 
 _WHOLE = {
-    "least_fields": 1,
+    "least_regions": 1,
     "spacing_cells": 1,
     "all_gates_levels": 0,
     "rows_at_once": 1,
@@ -100,6 +96,5 @@ _WHOLE = {
 }
 """The least of each whole number."""
 _MOST_BITS = 30
-_LARGEST_FACTOR = 1e6
 
 DEFAULT_OPTIONS = PortalOptions()

@@ -49,13 +49,14 @@ def prepare_portals(
 ) -> BuiltPortals:
     """Build the portals of a map, those of the first fields that fit into memory.
 
-    The fields are not the places: a level of its own, grown with the linkage "survivor" and a
-    larger merge distance, routes better and costs less.
+    The fields are the regions of `topology.pyramid.with_regions(...)`, a level above the places.
+    Where these take too much memory, or paths inside them are too long, fewer border cells become
+    gates, and levels below are tried.
 
     Parameters
     ----------
     topology
-        The map; its grid, its merge distance and its seed are used.
+        The map; its pyramid goes on above the places.
     allow_unexplored
         Whether unexplored cells may be entered.
     options
@@ -98,7 +99,8 @@ def _first_that_fits(
 ) -> tuple[NDArray[np.int16 | np.int32], Portals, bool]:
     """Return fields, their portals, and whether every border cell is a gate."""
     n_cells = max(int(enterable.sum()), 1)
-    for level, spacing, gate_spacing in _choices(topology, options):
+    levels = routing_levels(topology.pyramid, enterable, options)
+    for level, spacing, gate_spacing in _choices(levels, options):
         field_of = compact_labels(level.field_of, enterable)
         has_all_gates = gate_spacing == 1
         per_cell = options.most_sparse_bytes_per_cell
@@ -119,9 +121,8 @@ def _first_that_fits(
     raise InvalidValueError("no level of the map makes portals of an acceptable size")
 
 
-def _choices(topology: TopologicalMap, options: PortalOptions) -> Iterator[tuple[Level, int, int]]:
+def _choices(levels: Iterator[Level], options: PortalOptions) -> Iterator[tuple[Level, int, int]]:
     """Yield levels and the spacings of portals and of gates, those with gates everywhere first."""
-    levels = routing_levels(topology, options)
     first = list(islice(levels, options.all_gates_levels))
     for level in first:
         yield level, options.spacing_cells, 1

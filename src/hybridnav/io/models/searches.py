@@ -63,6 +63,7 @@ def made_for(settings: PlannerSettings, topology: TopologicalMap) -> dict[str, A
     if settings.coarse == "portals":
         key |= {
             "merge_distance_m": plain(topology.pyramid.merge_distance_m),
+            "linkage": topology.pyramid.linkage,
             "seed": topology.pyramid.seed,
         }
     return {"made_for": key}
