@@ -55,7 +55,7 @@ class Tree(NamedTuple):
 
     @classmethod
     def of_room(cls, room: int) -> Tree:
-        """A tree of the identity alone, with room for so many words and products."""
+        """Return a tree of the identity alone, with room for some words and products."""
         arrays = [np.empty(room, np.int32) for _ in range(8)]
         tree = cls._make([*arrays, np.zeros(2, np.int64)])
         tree.above[0] = tree.child[0] = tree.sibling[0] = tree.known[0] = -1
@@ -85,7 +85,7 @@ class States(NamedTuple):
 
     @classmethod
     def of_room(cls, room: int) -> States:
-        """No states yet, with room for so many."""
+        """Return room for some states."""
         kinds = {"cost": np.int64, "status": np.uint8}
         return cls(*(np.empty(room, kinds.get(field, np.int32)) for field in cls._fields))
 
@@ -113,7 +113,8 @@ def _times_letter(tree, word, letter):
 
 @njit(cache=True, nogil=True)
 def _times(tree, letters, word, number):
-    """The product with a numbered word, or with the inverse of one; -1 when there is no room."""
+    """Return the product with a numbered word, or with the inverse of one; -1 when there is no
+    room."""
     if number == 0 or word < 0:
         return word
     at = tree.known[word]
@@ -140,7 +141,7 @@ def _times(tree, letters, word, number):
 
 @njit(cache=True, nogil=True)
 def _along(of_edge, cell, direction, cols):
-    """Numbered word of a step to a neighbour by a side; directions 0, 2, 4, 6."""
+    """Return the numbered word of a step to a neighbour by a side; directions 0, 2, 4, 6."""
     if direction == 0:
         return np.int64(of_edge[2 * cell])
     if direction == 2:
@@ -178,7 +179,7 @@ def _after(tree, letters, of_edge, word, cell, direction, cols):
 
 @njit(cache=True, nogil=True)
 def _leads_to(states, earlier, later):
-    """Whether the path to one taken state passes another."""
+    """Return whether the path to one expanded state passes another."""
     depth = states.depth[earlier]
     if depth > states.depth[later]:
         return False
@@ -257,7 +258,7 @@ def _push(heap, n, key):
 
 @njit(cache=True, nogil=True)
 def _pop(heap, n):
-    """Take the least of n keys out."""
+    """Remove the least of n keys and return it."""
     least, key = heap[0], heap[n - 1]
     n -= 1
     at = 0
@@ -401,7 +402,7 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, state
 
 @njit(cache=True, nogil=True)
 def path_to(states, state):
-    """Flat cells of the path to a state, from the start."""
+    """Return the flat cells of the path to a state, from the start."""
     cells = np.empty(states.depth[state] + 1, np.int64)
     for i in range(states.depth[state], -1, -1):
         cells[i] = states.cell[state]
@@ -411,7 +412,7 @@ def path_to(states, state):
 
 @njit(cache=True, nogil=True)
 def word_at(tree, word):
-    """Letters of a word of the tree."""
+    """Return the letters of a word of the tree."""
     count = 0
     at = word
     while at > 0:

@@ -1,4 +1,4 @@
-"""Kernel that finds what hangs on a graph behind passages."""
+"""Kernel that finds the parts of a graph behind passages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def behind_passages(first, neighbour, is_passage, start, goal):
-    """Nodes that some passage, when it is taken out, parts from start and goal; bool (n,).
+    """Return the nodes that the removal of some passage separates from start and goal; bool (n,).
 
     One depth-first search with low points (J. Hopcroft, R. E. Tarjan 1973) on the graph whose node
     n has the neighbours neighbour[first[n]:first[n + 1]], without parallel edges.

@@ -10,13 +10,13 @@ from hybridnav.search.arrays import grow
 
 @njit(cache=True, nogil=True)
 def spread_words(enterable, removed, word_of):
-    """Words of the removed edges, so that every full 2x2 block of cells reads the identity.
+    """Return words of the removed edges, so that every full 2x2 block of cells reads the identity.
 
-    `word_of` holds for each base edge a signed number of a word, 0 the identity, a minus its
-    inverse, as read from the lower cell to the higher one. The removed edges join the blocks to
-    trees; from the leaves on each gets what the other three sides of its block leave. Where these
-    are more than one word, the product is a new number: the rows that are returned, three signed
-    factors each, numbered on from the highest given.
+    `word_of` holds for each base edge the signed number of a word, read from the lower cell to the
+    higher one: 0 for the identity, negative for an inverse. The removed edges join the blocks to
+    trees; from the leaves on, each edge receives the product of the other three sides of its block.
+    A product of more than one word has a new number, above the highest present. The result holds
+    these products, three signed factors in each row.
     """
     rows, cols = enterable.shape
     unknown = np.zeros(rows * cols, np.int8)
@@ -78,7 +78,7 @@ def spread_words(enterable, removed, word_of):
 
 @njit(cache=True, nogil=True)
 def _side(at, side, cols):
-    """Base edge on the south, east, north or west side of a block."""
+    """Return the base edge on the south, east, north or west side of a block."""
     if side == 0:
         return 2 * at
     if side == 1:
@@ -90,14 +90,14 @@ def _side(at, side, cols):
 
 @njit(cache=True, nogil=True)
 def _along(word_of, at, side, cols):
-    """The word of a side as it is met counter-clockwise round the block."""
+    """Return the word of a side, read counter-clockwise round the block."""
     word = np.int64(word_of[_side(at, side, cols)])
     return word if side < 2 else -word
 
 
 @njit(cache=True, nogil=True)
 def _beyond(at, side, cols):
-    """The block on the other side of a side, -1 below the first row."""
+    """Return the block on the other side of a side, -1 below the first row."""
     if side == 0:
         return at - cols
     if side == 1:

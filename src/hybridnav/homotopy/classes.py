@@ -1,15 +1,15 @@
 """Homotopy classes of routes on a plane graph, as reduced words of a free group.
 
 Two routes between the same places are of one class when one can be pushed into the other without
-crossing a hole. Every arc gets a word so that round an ordinary face the words cancel and round a
-hole they leave one generator; the class of a route is the reduced product along its arcs,
-self-loops included. To search with such signatures is the idea of S. Bhattacharya, M. Likhachev,
-V. Kumar: Topological constraints in search-based robot path planning, 2012.
+crossing a hole. Every arc has a word: round an ordinary face the words cancel, and round a hole
+they leave one generator. The class of a route is the reduced product along its arcs, self-loops
+included. The search with such signatures is an idea of S. Bhattacharya, M. Likhachev, V. Kumar:
+Topological constraints in search-based robot path planning, 2012.
 
-Cells have words too. A base edge that was contracted reads the identity, one that stands for an arc
-reads its word, and one that was removed as redundant reads what the full 2x2 blocks beside it leave
-it, so that every such block reads the identity: a path of cells has the class of its route, however
-it winds through the fields and round what one field encloses.
+Cells have words too. A contracted base edge reads the identity, and one that stands for an arc
+reads its word. A removed one reads a word with which the full 2x2 blocks beside it read the
+identity. So a path of cells has the class of its route, however it winds through the fields and
+round the holes inside one field.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _EAST, _SOUTH = 0, 3
 
 
 def product(*words: Word) -> Word:
-    """The reduced product of reduced words.
+    """Return the reduced product of reduced words.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def product(*words: Word) -> Word:
 
 
 def inverse(word: Word) -> Word:
-    """The inverse of a word."""
+    """Return the inverse of a word."""
     return tuple(-letter for letter in reversed(word))
 
 
@@ -74,11 +74,11 @@ class CellWords(NamedTuple):
 class HomotopyClasses:
     """Words of the arcs between places that may be entered, and of the steps between their cells.
 
-    Places that may not be entered are taken out of the graph first: the faces round them become one
-    hole. What is left may fall into connected parts; for each a spanning tree of the dual is rooted
-    at its outer face. Arcs that it does not cross get the empty word; from the leaves to the root,
-    the arc between a face and its parent gets the word that makes the face's boundary, read in
-    rotation order from that arc, the identity, or one new generator for a hole.
+    Places that may not be entered are removed from the graph first: the faces round them become one
+    hole. The rest may fall into connected parts; for each a spanning tree of the dual is rooted at
+    its outer face. Arcs that the tree does not cross have the empty word. From the leaves to the
+    root, the arc between a face and its parent receives a word: with it the face's boundary, read
+    in rotation order from that arc, is the identity, or one new generator for a hole.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class HomotopyClasses:
         self._assign()
 
     def word_of_route(self, darts: Iterable[int]) -> Word:
-        """The class of a route.
+        """Return the class of a route.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class HomotopyClasses:
         return product(*(inverse(words[d >> 1]) if d & 1 else words[d >> 1] for d in darts))
 
     def word_of_path(self, cells: LongArray) -> Word:
-        """The class of a path of cells.
+        """Return the class of a path of cells.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class HomotopyClasses:
         return CellWords(np.sign(of_edge) * renumbered[np.abs(of_edge)], distinct)
 
     def _round(self, start: int) -> list[int]:
-        """The darts of a face's boundary, in rotation order from one of them."""
+        """Return the darts of a face's boundary, in rotation order from one of them."""
         darts, dart = [start], int(self.phi[start])
         while dart != start:
             darts.append(dart)
@@ -209,8 +209,7 @@ class HomotopyClasses:
         return darts
 
     def _measure(self, topology: TopologicalMap) -> None:
-        """Find the outer faces, and the areas of the holes: what the cells that may be entered
-        surround."""
+        """Find the outer faces, and the areas of the holes among the cells that may be entered."""
         cells = self.enterable_cells
         masked = np.where(cells, np.uint8(CellClass.FREE), np.uint8(CellClass.OCCUPIED))
         islands = Islands.of_classes(masked)
@@ -253,7 +252,7 @@ class HomotopyClasses:
 
 
 def _phi_without(sigma: LongArray | np.ndarray, kept: BoolArray) -> LongArray:
-    """Next dart round the face in the map of the kept arcs alone, -1 for darts of others."""
+    """Return the next dart round the face in the map of the kept arcs alone, -1 for other darts."""
     n_darts = len(sigma)
     following = np.full(n_darts, -1, dtype=np.int64)
     stays = np.repeat(kept, 2)

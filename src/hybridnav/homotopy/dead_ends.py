@@ -1,4 +1,4 @@
-"""Dead ends: parts of a map that no path enters which does not wind."""
+"""Dead ends: parts of a map that only winding paths enter."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ Cell = tuple[int, int]
 
 
 class DeadEnds:
-    """What lies behind narrow passages of a map.
+    """The parts of a map behind narrow passages.
 
-    A *passage* is a run of cells along a row or a column from one blocked cell to the next. What it
-    parts from start and goal a path can enter and leave through it alone, at two cells that see
-    each other along it. If the loop between the two can be drawn together, the way along the
-    passage is shorter and of the same class; else the path winds, where the passage is at most as
-    wide as `reach`. So no path goes there that is a shortest of its class and does not wind.
+    A *passage* is a run of cells along a row or a column from one blocked cell to the next. A path
+    enters and leaves the part behind it through the passage alone, at two cells that see each other
+    along it. If the loop between the two can be drawn together, the way along the passage is
+    shorter and of the same class. Otherwise the path winds if the passage is at most as wide as
+    `reach`. So no shortest path of a class that does not wind goes there.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class DeadEnds:
             cells, run_of = _short_runs(enterable if along_rows else enterable.T, reach + 1)
             if not along_rows:
                 cells = cells % rows * cols + cells // rows
-            # Passages that cross are no two nodes: of such only the one along a row counts.
+            # Crossing passages are not two nodes: only the one along a row counts.
             crossed = np.bincount(run_of, self._node_of[cells] >= 0)[run_of] > 0
             numbers, run_of = np.unique(run_of[~crossed], return_inverse=True)
             self._node_of[cells[~crossed]] = n_passages + run_of
@@ -54,7 +54,7 @@ class DeadEnds:
         self._graph = _neighbours(self._node_of.reshape(enterable.shape), n_passages + n_parts)
 
     def left(self, start: Cell, goal: Cell) -> BoolArray:
-        """The cells that remain for paths from start to goal.
+        """Return the cells that remain for paths from start to goal.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class DeadEnds:
 
 
 def _short_runs(enterable: BoolArray, longest: int) -> tuple[LongArray, LongArray]:
-    """Flat cells of the runs along rows that are not too long, and the number of each one's run."""
+    """Return the flat cells of the short runs along rows, and the number of each cell's run."""
     cols = enterable.shape[1]
     steps = np.diff(np.pad(enterable, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begins = np.nonzero(steps == 1)
@@ -92,7 +92,7 @@ def _short_runs(enterable: BoolArray, longest: int) -> tuple[LongArray, LongArra
 
 
 def _neighbours(node_of: IntArray, n_nodes: int) -> sparse.csr_array:
-    """Which nodes hold cells that share a side, each pair in both directions."""
+    """Return the nodes that hold cells with a common side, each pair in both directions."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
     for one, other in ((node_of[:, :-1], node_of[:, 1:]), (node_of[:-1], node_of[1:])):
         between = (one >= 0) & (other >= 0) & (one != other)

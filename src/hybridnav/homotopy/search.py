@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 
 MOST_STATES = 1_000_000
-"""Pairs of a cell and a word that a search looks at before it gives up, if not told otherwise."""
+"""Default number of pairs of a cell and a word that a search examines before it gives up."""
 _LARGEST_GAP_M = 1.0
 """A path that comes back nearer to itself than this winds, however large holes are that count."""
 
@@ -43,12 +43,12 @@ class ClassPath:
 
 @dataclass(frozen=True, eq=False)
 class ClassPaths:
-    """What a search found."""
+    """Outcome of a search."""
 
     paths: tuple[ClassPath, ...]
     """The shortest first, no class twice."""
     complete: bool
-    """Whether there are as many as were asked for, or all: False where the search gave up."""
+    """Whether these are as many as requested, or all; False if the search gave up."""
     shortest_cells: float
     """Octile length of a shortest path from start to goal, infinite where there is none."""
 
@@ -94,18 +94,18 @@ def alternative_search(
 
 
 class AlternativeSearch:
-    """Searches cells together with the words of the ways to them.
+    """Search over pairs of a cell and the word of the way to it.
 
     A* over pairs of a cell and a reduced word, with the exact length of the way that is left as the
-    estimate. A path *winds* when it comes back after it circled a hole: when it stands on, or sees
-    along a row or a column, at most the side of a square hole of the least area off (and one cell
-    at least, 1 m at most, half the shortest path at most), a cell that it has passed, and the loop
-    between the two can not be drawn together. Paths that wind are not pursued: turns round a
+    estimate. A path *winds* when it returns after it has circled a hole: it stands on a cell that
+    it has passed, or sees one along a row or a column, and the loop between the two cannot be drawn
+    together. It sees as far as the side of a square hole of the least area, but at least one cell,
+    at most 1 m, and at most half the shortest path. Paths that wind are not pursued: turns round a
     pillar, and ways through a door, round a table and out again.
 
-    A class whose shortest paths none of them wind is found, with a shortest path, before any class
-    that is longer. A class of which some shortest path winds may be found with a path that does
-    not, or not at all; one whose paths all wind, never.
+    A class without a winding shortest path is found, with a shortest path, before any longer class.
+    A class with some winding shortest path is found with another path, or not at all; a class whose
+    paths all wind is never found.
 
     Parameters
     ----------
