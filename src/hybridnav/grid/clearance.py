@@ -44,7 +44,7 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
 
 
 def _within_rows(occupied: BoolArray, most: int) -> BoolArray:
-    """The cells of which some row has an occupied one within a squared distance."""
+    """Return the cells that have an occupied cell of some row within a squared distance."""
     cols = np.arange(occupied.shape[1], dtype=np.int32)
     far = np.int32(occupied.shape[1] + _FEW_ROWS)
     before = np.maximum.accumulate(np.where(occupied, cols, -far), axis=1)
@@ -59,7 +59,7 @@ def _within_rows(occupied: BoolArray, most: int) -> BoolArray:
 
 
 def _within_distance(occupied: BoolArray, most: int) -> BoolArray:
-    """The same by the distance transform."""
+    """Return the same by the distance transform."""
     from scipy import ndimage  # noqa: PLC0415 - half a second that smaller radii do not need
 
     nearest = ndimage.distance_transform_edt(~occupied, return_distances=False, return_indices=True)

@@ -1,4 +1,4 @@
-"""How many cells a grid may have."""
+"""Limits on the number of cells of a grid."""
 
 MAX_CELLS = 178_956_970
 """Cells a grid may have at most: Pillow's own limit for an image, and well inside int32."""

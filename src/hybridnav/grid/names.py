@@ -17,7 +17,7 @@ Segmentation = Literal["walls", "watershed", "contraction"]
 
 
 def read_point(text: str) -> tuple[float, ...] | None:
-    """The numbers of a text like `1,2` or `1,2,0.5`, None where it is none: then it is a name."""
+    """Return the numbers of a text like `1,2` or `1,2,0.5`; None for a name."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -43,7 +43,7 @@ def check_names(names: tuple[str, ...]) -> None:
 
 
 def did_you_mean(name: str, known: tuple[str, ...]) -> str:
-    """A clause that names what may have been meant: the nearest names, else some of all."""
+    """Return a clause that suggests the nearest names, else some of all."""
     if not known:
         return ": the map has no names"
     folded: dict[str, str] = {}
