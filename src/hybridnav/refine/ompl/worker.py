@@ -197,7 +197,7 @@ class Worker:
 
 
 _NO_START = (
-    "the process that runs OMPL does not start; `python -c 'import ompl.geometric'` may say why"
+    "the process of OMPL does not start; `python -c 'import ompl.geometric'` may show the reason"
 )
 
 
