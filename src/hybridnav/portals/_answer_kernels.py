@@ -15,8 +15,8 @@ from hybridnav.portals._side_kernels import best_gates, side_costs, ways_by_side
 def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     """Find the cheapest path over gates between two cells that may be entered.
 
-    Pairs of sides, one of the start's field and one of the goal's, are looked at in the order of
-    what bounds their ways from below, until no other one can be better by more than `epsilon`.
+    Pairs of sides, one of the start's field and one of the goal's, are examined in the order of the
+    lower bounds on their ways, until no other pair can be better by more than `epsilon`.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     Returns
     -------
     tuple
-        The lower cost of the way over gates and `inside`; a lower bound on both; how many stored
-        paths were walked to find the ends; the path's cells and points, which are empty if it does
-        not cost less than `inside`.
+        The lower cost of the way over gates and `inside`; a lower bound on both; the number of
+        stored paths that were walked to find the ends; the path's cells and points, which are empty
+        if it does not cost less than `inside`.
     """
     cells, points = np.empty((0, 2), np.int64), np.empty((0, 2), np.float64)
     side_start = portals.side_start

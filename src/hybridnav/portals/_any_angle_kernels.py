@@ -9,7 +9,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def least_over_boxes(box, portal, between, sides, start, goal):
-    """Least length of a way from a point to another over portals.
+    """Return the least length of a way from a point to another over portals.
 
     `sides` are the first side of the start's field and its end, and those of the goal's field.
     """
@@ -27,7 +27,7 @@ def least_over_boxes(box, portal, between, sides, start, goal):
 
 @njit(cache=True, nogil=True)
 def _gap(box, side, point):
-    """Distance from a point to a side's box."""
+    """Return the distance from a point to a side's box."""
     down = max(box[side, 0] - point[0], point[0] - box[side, 1], 0.0)
     right = max(box[side, 2] - point[1], point[1] - box[side, 3], 0.0)
     return np.hypot(down, right)

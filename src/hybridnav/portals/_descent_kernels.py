@@ -18,10 +18,10 @@ from hybridnav.search.arrays import grow
 def descend(portals, tables, gate, source, last):
     """Follow shortest paths from a gate to a source, and cross from there to gate `last`.
 
-    `last` is -1 to end at the source. Returns the gates by which the way leaves fields, those by
-    which it enters the next, and the costs between inside the fields: leg 0 to the first gate left,
-    then from each gate entered to the next one left, and if there is no `last` to the source. The
-    last result is the cost of all crossings, FAR where rounded distances lead nowhere.
+    `last` is -1 to end at the source. Return the gates by which the way leaves fields, those by
+    which it enters the next, and the costs inside the fields: leg 0 to the first gate, then from
+    each gate entered to the next one left, and without `last` to the source. The last result is the
+    cost of all crossings, FAR if rounded distances lead nowhere.
     """
     gate_field = tables.gate_field
     gate_start = portals.gate_start

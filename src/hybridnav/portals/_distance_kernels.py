@@ -1,7 +1,7 @@
-"""The two calls behind which the distances between gates stand.
+"""The two calls that read the distances between gates.
 
-Nothing else reads how `Tables` stores distances: another exact method replaces this file, what
-fills the tables (`_table_kernels.py`) and what asks for it (`distances.py`).
+Nothing else knows the layout of distances in `Tables`: another exact method replaces this file, the
+kernels that fill the tables (`_table_kernels.py`), and their caller (`distances.py`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from hybridnav.portals._path_kernels import FAR, UNREACHED
 def distances(tables, source, gates, out):
     """Fill `out`, int64 (n,), with the costs of shortest paths from a source to n gates.
 
-    Rounded down by as many bits as `tables.shift`, FAR where there is no path. Many gates at once,
-    as reading the arrays of a named tuple costs more than a look-up.
+    They are rounded down by `tables.shift` bits, FAR for no path. One call serves many gates,
+    because reading the arrays of a named tuple costs more than a look-up.
     """
     table, shift = tables.distance, tables.shift
     for i in range(gates.size):

@@ -53,11 +53,12 @@ def leaps_in_field(near, n, out):
 
 @njit(cache=True, nogil=True)
 def wave(near, n, source, cost, ring, order):
-    """Costs from one cell to all of its field, and the cells in the order they are reached.
+    """Fill in the costs from one cell to all of its field, and the cells in the order reached;
+    return the number of cells reached.
 
     Dijkstra's algorithm with buckets one straight step wide: no step is shorter, so a bucket is
     final when its turn comes, and three buckets in turn are enough. `ring` is scratch, (3, size).
-    Gives the number of cells reached.
+
     """
     cost[:n] = TOO_FAR
     count = np.zeros(3, np.int64)
@@ -142,9 +143,9 @@ def _sweep(near, order, begin, end, step, cost, row, stale, lanes):
 def relax(near, n, order, prefix, cost, row, stale, lanes):
     """Compute the costs from all lanes' sources, which lie among the first cells of the order.
 
-    The order is one source's: round the sources it is swept to and fro until nothing changes, from
-    there on once or twice is nearly always enough. It ends when no cell can be improved, so the
-    costs are exact whatever the order is.
+    The order is that of one source. Its first cells are swept to and fro until nothing changes;
+    then one or two sweeps over all cells are nearly always enough. The sweeps end when no cell can
+    be improved, so the costs are exact in any order.
 
     Parameters
     ----------
@@ -241,7 +242,8 @@ def _pack(directions_of_lane, n, row):
 
 @njit(cache=True, nogil=True)
 def shift_of(cost):
-    """Bits to drop so that twice the largest cost, which bounds all in the field, fits uint16."""
+    """Return the bits to drop so that twice the largest cost, which bounds all in the field, fits
+    uint16."""
     bound = 2 * np.int64(cost.max())
     shift = 0
     while bound >> shift > np.iinfo(np.uint16).max:

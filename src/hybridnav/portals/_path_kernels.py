@@ -1,4 +1,4 @@
-"""Kernels that portal routes are made of: stored paths, and the cells of a way.
+"""Kernels of the parts of portal routes: stored paths, and the cells of a way.
 
 Directions are those of `search.moves`: 0 to 7, east and on counter-clockwise, with `LEAP` set
 where as many moves lead that way.
@@ -21,7 +21,7 @@ UNREACHED = np.uint32(0xFFFFFFFF)
 
 @njit(cache=True, nogil=True)
 def position_of(index, cols, cell):
-    """Position of a cell in the order of `Portals.position`."""
+    """Return the position of a cell in the order of `Portals.position`."""
     row, col = np.uint64(cell // cols), np.uint64(cell % cols)
     tile = (row >> np.uint64(3)) * np.uint64(cols + 7 >> 3) + (col >> np.uint64(3))
     inside = (row & np.uint64(7)) << np.uint64(3) | (col & np.uint64(7))
@@ -30,7 +30,7 @@ def position_of(index, cols, cell):
 
 @njit(cache=True, nogil=True)
 def field_at(portals, cols, cell):
-    """The field of a cell that may be entered."""
+    """Return the field of a cell that may be entered."""
     index = portals.position
     field_start = portals.field_start
     position = position_of(index, cols, cell)
@@ -96,7 +96,7 @@ def stored_costs(portals, field, cols, gates, count, cell, costs):
 
 @njit(cache=True, nogil=True)
 def moves_of(cost):
-    """Moves of a path of an integer cost."""
+    """Return the number of moves of a path from its integer cost."""
     diagonal = cost % STRAIGHT * _INVERSE % STRAIGHT
     return (cost - diagonal * DIAGONAL) // STRAIGHT + diagonal
 

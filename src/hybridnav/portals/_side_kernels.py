@@ -16,7 +16,8 @@ from hybridnav.search.moves import octile_cost
 
 @njit(cache=True, nogil=True)
 def side_costs(portals, cols, field, cell):
-    """Costs from a cell to the nearest gate of each of its field's sides, rounded down."""
+    """Return the costs from a cell to the nearest gate of each of its field's sides, rounded
+    down."""
     side_start = portals.side_start
     side_cost_start = portals.side_cost_start
     index = portals.position
@@ -35,7 +36,7 @@ def side_costs(portals, cols, field, cell):
 
 @njit(cache=True, nogil=True)
 def ways_by_sides(between, shift, first, last, low_start, low_goal):
-    """Lower bounds on the ways by each pair of sides of two fields, int64; FAR for none.
+    """Return lower bounds on the ways by each pair of sides of two fields, int64; FAR for none.
 
     `first` and `last` are the first sides of the two.
     """
@@ -110,7 +111,7 @@ def _walk(portals, cols, cell, field, begin, end, is_wanted, known):
 @guarded
 @njit(cache=True, nogil=True)
 def entries_of(portals, source_at, begin, end):
-    """Crossings by which paths enter a field over the gates `side_gates[begin:end]`.
+    """Return the crossings by which paths enter a field over the gates `side_gates[begin:end]`.
 
     For each the gate's place, a source, and the cost of the move from the source, 0 where the gate
     has a source itself.

@@ -18,9 +18,9 @@ def costs_to_gates(
 ):  # fmt: skip
     """Fill in the costs of shortest paths from some gates to all gates; return the greatest cost.
 
-    Label correction, field by field: what has come to a field's gates across its borders goes on to
-    all its other gates at once, as the costs between them are those of whole paths; the field whose
-    news are cheapest comes first. It ends when there is no news.
+    Label correction, field by field: improved costs at a field's gates go on to all its other gates
+    at once, because the costs between them are those of whole paths. The field with the cheapest
+    improvement comes first. The search ends when no gate has improved.
 
     Parameters
     ----------

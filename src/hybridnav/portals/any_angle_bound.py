@@ -20,7 +20,7 @@ Position = tuple[float, float]
 
 
 class AnyAngleBound:
-    """Bounds the length of every path in free space between two points.
+    """A bound on the length of every path in free space between two points.
 
     A path that leaves a field passes one of its portals, through the square of one of the portal's
     border cells. Between two portals it is at least as long as the straight line between the boxes
@@ -40,7 +40,7 @@ class AnyAngleBound:
         self._portal[portals.portal_sides] = np.arange(len(portals.portal_sides))[:, None]
 
     def of(self, field: int, goal_field: int, start: Position, goal: Position) -> float:
-        """No path between two points is shorter, in cells.
+        """Return a lower bound in cells on all paths between two points.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class AnyAngleBound:
 
 
 def _gaps(box: FloatArray, other: FloatArray) -> FloatArray:
-    """Distances between boxes, four numbers along the last axis."""
+    """Return the distances between boxes, four numbers along the last axis."""
     down = np.maximum(box[..., 0] - other[..., 1], other[..., 0] - box[..., 1])
     right = np.maximum(box[..., 2] - other[..., 3], other[..., 2] - box[..., 3])
     gaps: FloatArray = np.hypot(np.maximum(down, 0), np.maximum(right, 0))

@@ -93,7 +93,7 @@ class Portals(NamedTuple):
 
     @property
     def n_fields(self) -> int:
-        """F."""
+        """Number of fields, F."""
         return len(self.field_start) - 1
 
     @property
@@ -103,12 +103,12 @@ class Portals(NamedTuple):
 
     @property
     def n_gates(self) -> int:
-        """G."""
+        """Number of gates, G."""
         return len(self.gate_cell)
 
     @property
     def n_sides(self) -> int:
-        """R."""
+        """Number of sides, R."""
         return len(self.side_gates_start) - 1
 
 
@@ -137,7 +137,7 @@ def build_portals(  # noqa: PLR0913 - independent choices
     allow_unexplored
         Whether unexplored cells are entered too.
     max_bytes
-        What portals, and a table from all sources to all gates, may take.
+        Most memory of portals, and of a table from all sources to all gates.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def build_portals(  # noqa: PLR0913 - independent choices
 
 
 def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
-    """The arrays that need searches inside the fields, field by field."""
+    """Return the arrays that need searches inside the fields, field by field."""
     sizes, gate_start = np.diff(layout.field_start), layout.gate_start
     clique_start = offsets_of(np.diff(gate_start) ** 2)
     side_cost_start = offsets_of(sizes * np.diff(layout.side_start))
@@ -232,7 +232,7 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
 
 
 def _scratch(largest: int) -> tuple[NDArray[Any], ...]:
-    """Arrays that `fill_field` works in, for fields of at most so many cells."""
+    """Return work arrays of `fill_field` for fields of at most `size` cells."""
     lanes = kernels.LANES
     return (
         np.empty((largest + 1) * lanes, np.int32),
@@ -275,7 +275,7 @@ def _assembled(layout: Layout, filled: dict[str, NDArray[Any]]) -> Portals:
 
 
 def _tiled(index: IntArray) -> IntArray:
-    """The same with squares of 8 x 8 cells together."""
+    """Return the same with the cells of each square of 8 x 8 together."""
     rows, cols = index.shape
     padded = np.full((-(-rows // 8) * 8, -(-cols // 8) * 8), -1, dtype=np.int32)
     padded[:rows, :cols] = index

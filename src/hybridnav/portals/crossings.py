@@ -1,4 +1,4 @@
-"""Crossings: all legal moves between the fields of a partition, and what they are grouped by."""
+"""Crossings: all legal moves between the fields of a partition, grouped by portal."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Crossings(NamedTuple):
 
     @property
     def n_portals(self) -> int:
-        """Groups by portal."""
+        """Number of portals."""
         return int(self.portal.max(initial=-1)) + 1
 
     @property
@@ -81,7 +81,8 @@ def find_crossings(
 def _moves_between(
     moves: ByteArray, label: IntArray, cols: int
 ) -> tuple[LongArray, LongArray, BoolArray]:
-    """All legal moves between two fields: cell in the lower one, in the higher, if diagonal."""
+    """Return all legal moves between two fields: cell in the lower one, in the higher, if
+    diagonal."""
     found = []
     for direction in range(4):
         tail, head = moves_along(moves, cols, direction)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Tables(NamedTuple):
-    """What is known between sources and gates; S sources, G gates, R sides."""
+    """Costs between sources and gates; S sources, G gates, R sides."""
 
     distance: np.ndarray
     """uint32 (S, G), costs of shortest paths over gates without their last `shift` bits,
@@ -72,7 +72,8 @@ def build_tables(portals: Portals, options: PortalOptions = DEFAULT_OPTIONS) -> 
 def _tables(
     portals: Portals, source_at: IntArray, shift: int, at_once: int
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32], int]:
-    """The table from sources to gates, that between sides, and the greatest cost in the first."""
+    """Return the table from sources to gates, that between sides, and the greatest cost in the
+    first."""
     sources, field_of = portals.source_gate.astype(np.int64), portals.gate_field
     table = np.empty((len(sources), portals.n_gates), dtype=np.uint32)
     to_sides = np.empty((len(sources), portals.n_sides), dtype=np.uint32)
@@ -100,7 +101,8 @@ def _tables(
 def _between(
     portals: Portals, source_at: IntArray, to_sides: NDArray[np.uint32], how: tuple[int, int]
 ) -> NDArray[np.uint32]:
-    """Least costs from side to side, of ways that enter the second one's field over it."""
+    """Return the least costs from side to side, of ways that enter the second one's field over
+    it."""
     shift, at_once = how
     place, source, step = entries_of(portals, source_at, 0, len(portals.side_gates))
     begin = np.searchsorted(place, portals.side_gates_start)

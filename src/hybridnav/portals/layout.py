@@ -1,4 +1,4 @@
-"""Where everything about portals stands: the order of cells, gates and sides."""
+"""The layout of portals: the order of cells, gates and sides."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 def starts_of(sorted_keys: IntArray | LongArray, count: int) -> LongArray:
-    """Where each of the keys 0 to count - 1 begins in a sorted array, and its end."""
+    """Return where each of the keys 0 to count - 1 begins in a sorted array, and its end."""
     starts: LongArray = np.searchsorted(sorted_keys, np.arange(count + 1)).astype(np.int64)
     return starts
 
 
 def offsets_of(sizes: LongArray) -> LongArray:
-    """Where things of these sizes begin one after the other, and the end of the last."""
+    """Return where things of these sizes begin one after the other, and the end of the last."""
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
@@ -35,7 +35,7 @@ class Layout:
 
     @cached_property
     def n_fields(self) -> int:
-        """Fields."""
+        """Number of fields."""
         return int(self.label.max(initial=-1)) + 1
 
     @cached_property

@@ -1,4 +1,4 @@
-"""The numbers that portals are built with."""
+"""The numbers that determine the portals of a map."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class PortalOptions:
     ----------
     least_regions
         A region has at most so great a part of the cells that may be entered. Fewer, larger regions
-        have fewer border cells, and are searched cell by cell more often: where start and goal lie
-        in the same one.
+        have fewer border cells, but start and goal lie in the same one more often, which is then
+        searched cell by cell.
     spacing_cells
         Side of the lattice squares of portals where every border cell is a gate, in cells.
     all_gates_levels
-        Levels that are tried with a gate at every border cell, before fewer gates are: that of the
-        regions, then those below.
+        Number of levels to try with a gate at every border cell, before fewer gates: the regions,
+        then those below.
     sparse_spacings_cells
-        Sides of the lattice squares of portals and gates, in cells, which are tried in this order
-        where a gate at every border cell takes too much memory: open floors have long borders.
+        Sides of the lattice squares of portals and gates, in cells, to try in this order if a gate
+        at every border cell takes too much memory: open floors have long borders.
     most_bytes_per_cell, most_sparse_bytes_per_cell
         Memory that portals and tables may take for each cell that may be entered: with a gate at
         every border cell, and with fewer.
@@ -36,8 +36,8 @@ class PortalOptions:
     rows_at_once
         Rows of a table that are computed together: more take more memory meanwhile.
     dropped_bits
-        Bits that tables drop of every distance at least. 0 drops those alone that the longest path
-        has too many of.
+        Least number of bits that tables drop of every distance. With 0 they drop only as many as
+        the longest path needs.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""All that is built of a map before paths are found over its portals."""
+"""The structures that searches over portals need, built from a map."""
 
 from __future__ import annotations
 

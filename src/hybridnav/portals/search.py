@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 Cell = tuple[int, int]
 
 _SHORTEST = math.sqrt(2) * STRAIGHT / DIAGONAL
-"""A path is as much shorter than its integer cost says at most: DIAGONAL / STRAIGHT > sqrt 2."""
+"""Least ratio of a path's length to its integer cost, since DIAGONAL / STRAIGHT > sqrt 2."""
 
 
 @dataclass(frozen=True, eq=False)
 class PortalAnswer:
-    """A path over portals; None for its cells where there is none."""
+    """A path over portals; its cells are None if there is none."""
 
     cells: LongArray | None
     """int64 (n, 2)."""
@@ -69,7 +69,7 @@ class PortalAnswers:
 
 
 class PortalSearch:
-    """Paths over portals, and lower bounds on all paths.
+    """Search for paths over portals, with lower bounds on all paths.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class PortalSearch:
         return self._field_of
 
     def path(self, start: Cell, goal: Cell, *, epsilon: float = 0.0) -> PortalAnswer:
-        """A shortest path between two cells, and a lower bound on the length of any.
+        """Find a shortest path between two cells, and a lower bound on the length of any.
 
         Where every border cell is a gate, look-ups find it; elsewhere a search of cells goes on
         from the best way over gates.
@@ -147,7 +147,7 @@ class PortalSearch:
         return PortalAnswer(cells, points, length, bound, walked, expanded)
 
     def many(self, starts: LongArray, goals: LongArray, *, epsilon: float = 0.0) -> PortalAnswers:
-        """`path` for many pairs of cells, as far as look-ups answer them.
+        """Answer many pairs of cells as `path` does, where look-ups are enough.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class PortalSearch:
     def any_angle_bound(
         self, start: Cell, goal: Cell, positions: tuple[Position, Position]
     ) -> float:
-        """No any-angle path between two points is shorter, in cells.
+        """Return a lower bound in cells on all any-angle paths between two points.
 
         Parameters
         ----------
