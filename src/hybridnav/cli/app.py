@@ -94,7 +94,7 @@ def _options(version: VersionOption = False) -> None:
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command line and give its exit code; everything but results is a line on stderr.
+    """Run one command line and return its exit code; everything but results is a line on stderr.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The option `--blocked`: doors, rooms and files of what is closed."""
+"""The option `--blocked`: closed doors, rooms, and areas in files."""
 
 from __future__ import annotations
 

@@ -93,7 +93,8 @@ def _spinner(text: str) -> AbstractContextManager[object]:
 
 
 def read_preset(source: str) -> Preset:
-    """A preset by name or file: an unknown name is wrong usage, a bad file unreadable input."""
+    """Read a preset by name or file: an unknown name is wrong usage, a bad file unreadable
+    input."""
     try:
         return hn.load_preset(source)
     except hn.PresetNotFoundError as error:
@@ -113,8 +114,8 @@ def read_settings(
     smooth: str | None = None,
     map_file: Path | None = None,
 ) -> Preset:
-    """A preset with the settings of the command line, which win over it, and over a model in which
-    the map's pyramid is built already.
+    """Return a preset with the settings of the command line, which win over it, and over a model
+    that holds the map's pyramid.
 
     An error in a preset file is the file's; one in an override is the caller's.
     """
@@ -255,7 +256,7 @@ def islands_line(grid: hn.OccupancyGrid) -> list[str]:
 
 
 def islands_figures(grid: hn.OccupancyGrid) -> dict[str, Any]:
-    """What JSON holds on islands: null where they were not to be dropped."""
+    """Return the figures on islands for JSON: null unless the user drops them."""
     if grid.dropped is None:
         return {"dropped_islands": None}
     return {"dropped_islands": {"least_area_m2": grid.least_island_m2, **asdict(grid.dropped)}}
@@ -332,6 +333,6 @@ def refused_result(
 
 
 def timings(seconds: dict[str, float]) -> str:
-    """Seconds per stage on one line, and their sum."""
+    """Return the seconds per stage on one line, and their sum."""
     stages = ", ".join(f"{stage} {s:.3f}" for stage, s in seconds.items())
     return f"{sum(seconds.values()):.3f}: {stages}"

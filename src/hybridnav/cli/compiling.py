@@ -1,4 +1,4 @@
-"""The first start: a second process compiles what a plan will need, and the user is told."""
+"""The first start: a second process compiles the kernels of a plan, and the user is informed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("hybridnav.kernels")
 _PATIENCE_S = 2.0
-"""Seconds of compiling after which the user is told what takes so long."""
+"""Seconds of compiling after which a line informs the user."""
 SEARCHES = {"mesh": "shortest", "jumps": "octile", "none": "grid-astar", "max-distance": "paper"}
 """A preset for each kind of search that can be compiled without a pyramid."""
 _PACKAGES = Path(__file__).parents[2]
@@ -104,7 +104,8 @@ def processors() -> int:
 
 
 def _is_cold(job: str) -> bool:
-    """Whether neither the pyramid nor a search was compiled yet and what is compiled is kept."""
+    """Return whether neither the pyramid nor a search was compiled yet, and numba keeps what it
+    compiles."""
     from hybridnav.pyramid import decimation  # noqa: PLC0415 - loads numba
 
     if _is_kept(decimation.KERNEL):
@@ -114,7 +115,7 @@ def _is_cold(job: str) -> bool:
 
 
 def _is_kept(kernel: Any) -> bool:
-    """Whether a kernel need not be compiled, or is compiled anew at every start."""
+    """Return whether a kernel needs no compilation, or is compiled anew at every start."""
     stats = getattr(kernel, "stats", None)
     if stats is None or stats.cache_path is None:
         return True

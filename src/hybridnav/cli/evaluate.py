@@ -114,7 +114,9 @@ def evaluate(
     a counter-example was found or a method could not be made.
     """
     if all_pairs is not None and (scen is not None or pairs is not None):
-        raise UsageError("--all-pairs says which pairs: it does not go with --scen or --pairs")
+        raise UsageError(
+            "--all-pairs chooses the pairs: leave out --scen and --pairs, or --all-pairs"
+        )
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 

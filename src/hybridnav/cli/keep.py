@@ -80,7 +80,7 @@ class Source:
         return model, key if same else None
 
     def keep(self, planner: hn.HybridPlanner, key: str | None) -> None:
-        """Keep what a planner has prepared; where it cannot be written one line says so."""
+        """Keep the prepared structures of a planner, or report the failure in one line."""
         if key is None:
             return
         from hybridnav.io.models import kept  # noqa: PLC0415

@@ -140,7 +140,7 @@ def _checked_method(method: str) -> Segmentation:
 
 
 def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
-    """Rooms and doors as plain values; gaps are doors here."""
+    """Return rooms and doors as plain values; gaps are doors here."""
     return {
         "robot_radius_m": rooms.grid.robot_radius_m,
         "rooms": [
@@ -168,7 +168,8 @@ def _at(rooms: Rooms, name: str) -> list[float]:
 
 
 def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
-    """One line a room: its free area, the point that stands for it, the doors to its neighbours."""
+    """Return one line a room: its free area, the point that stands for it, the doors to its
+    neighbours."""
     doors: dict[str, list[str]] = {name: [] for name in rooms.names}
     for door in rooms.doors:
         for name, other in (door.rooms, door.rooms[::-1]):

@@ -108,7 +108,8 @@ def _describe_map(pyramid: hn.DualGraphPyramid) -> str:
 
 
 def _describe_levels(pyramid: hn.DualGraphPyramid, shown: hn.Level) -> str:
-    """A table of all levels; `factor` is how many times fewer vertices than one level down."""
+    """Return a table of all levels; `factor` is the number of vertices one level down divided by
+    that here."""
     lines = [f"{'level':>5} {'vertices':>12} {'arcs':>12} {'self-loops':>12} {'factor':>7}"]
     below, names = None, _names_of(pyramid)
     for index, size in enumerate(pyramid.stats.sizes):
@@ -132,7 +133,7 @@ def _names_of(pyramid: hn.DualGraphPyramid) -> dict[int, str]:
 
 
 def _describe_level(level: hn.Level) -> str:
-    """One line on a level; a simple graph would lose its parallel arcs: second doors."""
+    """Return one line on a level; a simple graph would lose its parallel arcs: second doors."""
     import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
 
     free = int(np.count_nonzero(level.classes == hn.CellClass.FREE))
