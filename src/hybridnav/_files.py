@@ -103,7 +103,7 @@ def remove_unfinished() -> None:
 
 
 def printable(path: str | os.PathLike[str]) -> str:
-    """Text of a path for a message: as it is, or escaped when it would break the line.
+    """Return the text of a path for a message, escaped if it would break the line.
 
     Parameters
     ----------
