@@ -38,7 +38,7 @@ def planners_of(
 ) -> list[hn.HybridPlanner]:
     """Return a planner for each of the choices.
 
-    Where corners may be cut, paths go where the places have no arcs (`OccupancyGrid` says so): what
+    Where corners may be cut, paths go where the places have no arcs (see `OccupancyGrid`): what
     the paper's rule cannot reach there is left out, and tested by itself.
     """
     choices = CHOICES[1:] if topology.grid.corner_cutting else CHOICES

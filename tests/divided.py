@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SIDE = min(MAX_SIDE, 20)
 KINDS = ("pyramid", "pieces", "pieces", "stairs", "grown", "grown", "one", "cells")
 SPACINGS = ((16, 4), (16, 4), (8, 2), (4, 4), (6, 3), (3, 1), (1, 1), (100, 100))
-"""Of portals where all border cells are gates, and of portals and gates elsewhere."""
+"""Spacing of portals if all border cells are gates, and of portals and gates otherwise."""
 GATES = ("all", "sparse")
 """All border cells are gates, or few of them."""
 
@@ -105,7 +105,7 @@ class Divided:
 
 
 def fields_of(starts: Any) -> Any:
-    """The field of each of what is sorted by field."""
+    """Return the field of each item, for items sorted by field."""
     return np.repeat(np.arange(len(starts) - 1), np.diff(starts))
 
 

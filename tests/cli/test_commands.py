@@ -1,4 +1,4 @@
-"""The command line: its answers, its exit codes, and what it says when it is used wrongly."""
+"""The command line: its answers, its exit codes, and its messages for wrong usage."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""`hybridnav evaluate` and `hybridnav compare`: what they leave, what they say, exit codes."""
+"""`hybridnav evaluate` and `hybridnav compare`: their files, their output, their exit codes."""
 
 import csv
 import json

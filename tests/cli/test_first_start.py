@@ -1,4 +1,4 @@
-"""The first start: who compiles what, what the user is told, and what an interrupt leaves."""
+"""The first start: who compiles what, the lines for the user, and what an interrupt leaves."""
 
 from __future__ import annotations
 

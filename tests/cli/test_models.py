@@ -114,7 +114,7 @@ def test_a_model_of_more_cells_than_allowed_names_the_option(cli, model):
 
 @pytest.fixture
 def kept(cli, tmp_path):
-    """Plan on a map and keep what was prepared; what is said of that, and the answer."""
+    """Plan on a map and keep the structures; return the messages and the answer."""
     for path in FIGURE.parent.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
     map_file, folder = tmp_path / FIGURE.name, tmp_path / "kept"

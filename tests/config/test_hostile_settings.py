@@ -1,4 +1,4 @@
-"""What a user may give by mistake or on purpose: refused in one line, before the work."""
+"""Wrong input by mistake or on purpose: refused in one line, before the work."""
 
 import json
 from pathlib import Path

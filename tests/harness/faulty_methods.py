@@ -33,7 +33,7 @@ FATAL_PAIR = "HYBRIDNAV_TEST_FATAL_PAIR"
 
 MERGE_DISTANCE_M = 4.0
 WARM_UP_SHAPE = (30, 40)
-"""Of the map on which every process warms up."""
+"""Shape of the map on which every process warms up."""
 
 
 class Sound(GridAstar):
@@ -104,13 +104,13 @@ class _Longer(Sound):
 
 
 class TooLong(_Longer):
-    """5 % too long, and said to be optimal."""
+    """A path 5 % too long that claims to be optimal."""
 
     claim = 1.0
 
 
 class HonestlyLong(_Longer):
-    """5 % too long or more, and said to be: no fault."""
+    """A path 5 % too long or more that claims no less: no fault."""
 
     claim = 3.0
 
@@ -232,7 +232,7 @@ class SoundLine(Sound):
         return Answer(None, line=self.line(points))
 
     def line(self, points: NDArray[np.float64]) -> Line:
-        """What is said of the path."""
+        """Return the path with its claims."""
         return Line(points, length_of(points), lower_bound_m=length_of(points[[0, -1]]))
 
 
@@ -244,7 +244,7 @@ class LineThroughWall(SoundLine):
 
 
 class LineSaidShort(SoundLine):
-    """A right path, said to be 1 % shorter than it is."""
+    """A right path that claims to be 1 % shorter than it is."""
 
     def line(self, points: NDArray[np.float64]) -> Line:
         return replace(super().line(points), length_m=0.99 * length_of(points))

@@ -48,7 +48,7 @@ def topology_of(grid, merge_distance_m=4.0, linkage="radius"):
 
 
 def said(fault):
-    """What a check says, nothing where it found nothing wrong."""
+    """Return the fault that a check found, an empty text for none."""
     return fault or ""
 
 

@@ -292,7 +292,7 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
         next(o for o in write_outputs(tmp_path / run).outcomes if o.label != "grid-astar")
         for run in ("cells", "lines")
     )
-    # Of two metrics the any-angle optimum is the shorter one: both losses are over it.
+    # With two metrics both losses are over the any-angle optimum, the shorter one.
     shorter = 100 * ((lines.lengths_m - cells.lengths_m) / lines.any_angle_optima_m).mean()
     assert row["difference, points"] == pytest.approx(shorter)
     assert shorter < -1

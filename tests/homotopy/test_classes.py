@@ -1,5 +1,5 @@
 """Words: every ordinary face reads the identity, every hole one generator, and paths have equal
-words exactly when rays from the holes say that one can be pushed into the other."""
+words exactly when rays from the holes show that one can be pushed into the other."""
 
 import itertools
 from typing import Any

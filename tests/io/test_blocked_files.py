@@ -1,4 +1,4 @@
-"""Files of what is closed, and the option that takes them beside doors and rooms."""
+"""Files of closed areas, and the option that takes them beside doors and rooms."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from hybridnav.grid import CellClass
 from hybridnav.io import load_map as load_inflated
 
 load_map = partial(load_inflated, robot_radius_m=0)
-"""Cell by cell what the file says."""
+"""Values of the file, cell by cell."""
 
 FREE, OCCUPIED, UNEXPLORED = CellClass.FREE, CellClass.OCCUPIED, CellClass.UNEXPLORED
 DEFAULTS = {

@@ -77,7 +77,7 @@ def check_level(level: LevelLike, base: Base) -> None:
 
 
 def check_shapes(level: LevelLike) -> None:
-    """Arrays have the lengths that the counts say."""
+    """Check that arrays have the lengths of the counts."""
     vertices, arcs = level.n_vertices, level.n_arcs
     assert level.cells.shape == (vertices, 2)
     assert level.classes.shape == (vertices,)

@@ -99,7 +99,7 @@ class Rays:
     def shortest_paths(
         self, start: tuple[int, int], goal: tuple[int, int], longest: float, most: int
     ) -> Any:
-        """Of every class up to a length its length and all shortest paths, None for too many."""
+        """Return length and all shortest paths of every class up to a length, None for too many."""
         left = self._lengths(goal)
         lengths: dict[Any, float] = {(start, ()): 0.0}
         before: Any = defaultdict(list)

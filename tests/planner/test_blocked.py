@@ -456,7 +456,7 @@ def test_a_corridor_is_not_cut_to_close_a_wide_opening_beside_it() -> None:
     (arc,) = pairs_of(topology)
     mask = mask_of(Blocked(arcs=[arc]), topology)
     assert mask.sum() == 5
-    # Of two ways to close five cells, the one that costs free cells least.
+    # Two choices close five cells: this one costs the fewest free cells.
     assert not mask[classes == CellClass.FREE].any()
     swapped = map_of(np.array([0, 2, 1], dtype=np.uint8)[classes], merge_distance_m=50.0)
     mask = mask_of(Blocked(arcs=[arc]), swapped)

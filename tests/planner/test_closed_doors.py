@@ -104,7 +104,7 @@ def moves_of(paths: Any, cols: int) -> set[frozenset[int]]:
 
 
 def forms_of(door: hn.Door) -> list[Any]:
-    """Every way to say that a door is shut."""
+    """Return every form in which a caller can close a door."""
     return [
         {"doors": [door.number]},
         {"doors": (np.int64(door.number),)},

@@ -1,4 +1,4 @@
-"""OMPL refinement: paths that the robot can drive, inside the corridor, in time, said honestly."""
+"""OMPL refinement: drivable paths inside the corridor, in time, reported honestly."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_states_and_paths_stay_in_the_corridor(planner: str, confine: str) -> No
     legs = itertools.pairwise(found.path.points)
     dense = np.concatenate([np.linspace(first, second, 50) for first, second in legs])
     sampled = np.array(found.search.states)
-    # Of the valid states that the search asked for, not only of the path's.
+    # This holds for all valid states of the search, not only for the path's.
     assert len(sampled) > 5
     for points in (sampled, dense):
         # A point on a side belongs to both its cells.

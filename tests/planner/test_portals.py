@@ -1,4 +1,4 @@
-"""The preset that plans over portals: legal, consistent, and as good as they say."""
+"""The preset that plans over portals: its paths are legal, consistent, and as good as claimed."""
 
 from __future__ import annotations
 

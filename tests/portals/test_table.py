@@ -45,7 +45,7 @@ def made(divided: Divided, gates: str, bits: int = 0) -> tuple[Portals, Any]:
 
 
 def stored(costs: Any, bits: int) -> Any:
-    """What a table says of costs, which may be infinite."""
+    """Return the entries of a table for costs, which may be infinite."""
     found = np.full(costs.shape, UNREACHED)
     reached = np.isfinite(costs)
     found[reached] = costs[reached].astype(np.int64) >> bits

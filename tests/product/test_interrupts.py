@@ -45,7 +45,7 @@ def grown() -> hn.TopologicalMap:
 
 
 def record(topology: hn.TopologicalMap) -> list[Any]:
-    """All that a pyramid is rebuilt from, and what its apex says."""
+    """Return all that a pyramid is rebuilt from, and the arrays of its apex."""
     level = topology.level
     arrays = (level.field_of, level.arcs, level.sigma, level.max_distance_m, level.through_m)
     return [array.tolist() for array in arrays] + [level.boundary(0).tolist()]

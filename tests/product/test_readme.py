@@ -36,7 +36,7 @@ _ENDS = re.compile(r"--start (\S+) --goal (\S+)")
 
 
 class Example(NamedTuple):
-    """Something a page runs, and what it says comes out; `...` stands for anything.
+    """Something a page runs, and the output that it shows; `...` stands for anything.
     For a file that a reader saves, its text and its name."""
 
     language: str

@@ -1,4 +1,4 @@
-"""Planners that threads share: four on one give the answers of one."""
+"""Planners that threads share: four on one return the answers of one."""
 
 from __future__ import annotations
 

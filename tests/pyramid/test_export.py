@@ -1,4 +1,4 @@
-"""Levels and their duals as networkx graphs: they say what the arrays say, also after JSON."""
+"""Levels and their duals as networkx graphs: they hold what the arrays hold, also after JSON."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ class Scenario:
         return moved
 
     def agrees(self, poses: Any, *, valid: bool) -> bool:
-        """Whether shapely says the same of the poses on a motion."""
+        """Return whether shapely agrees on the poses of a motion."""
         if valid:
             return not self.oracle.is_hit(poses, grown_m=-EXACT_M)
         return self.oracle.is_hit(poses, grown_m=NEAR_M)

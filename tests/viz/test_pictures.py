@@ -1,4 +1,4 @@
-"""Pictures look as they did. After a wanted change: `python -m tests.viz.pictures`, and look."""
+"""Pictures look as they did. After an intended change: `python -m tests.viz.pictures`, and look."""
 
 from __future__ import annotations
 
