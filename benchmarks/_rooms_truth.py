@@ -41,7 +41,7 @@ class Floor:
     rooms: hn.RoomLabels
     doors: list[TrueDoor]
     neighbours: set[frozenset[str]]
-    """Rooms that the data says one can go between, where it does."""
+    """Pairs of rooms with a way between them, if the data lists any."""
 
     @classmethod
     def read(cls, folder: Path) -> Floor:

@@ -100,8 +100,8 @@ def page(study: Study, *, pairs: int, budget_s: float | None) -> str:
 Thrun's three questions, asked of the presets `ompl-*` on {len(study.maps)} maps of
 [the study](study.md), up to {pairs} pairs a map, with a budget of {budget} a query. Beside them
 `{BESIDE}+line-of-sight`: the shortest path of the grid, shortened by line of sight.
-`python -m benchmarks.study --part ompl --data FOLDER -o DIR` makes this page anew. What the columns
-mean is said in [harness.md](harness.md).
+`python -m benchmarks.study --part ompl --data FOLDER -o DIR` makes this page anew. The page
+[harness.md](harness.md) describes the columns.
 
 All these paths are any-angle, and so is what their loss refers to: the shortest any-angle path,
 proved. The grid's optimum itself is {100 * longer:.1f} % longer than that. A path counts as a

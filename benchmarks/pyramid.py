@@ -4,8 +4,8 @@
 
 Each size runs in a process of its own, on one core, with the kernels loaded by a build of one
 office: the office tiled, its copies joined by doors, grid in memory to apex. The first build of the
-size gives the memory: the peak of the resident set above what it was before, with the grid loaded
-(Linux only). The second gives the time.
+size measures the memory: the growth of the resident set's peak, with the grid loaded (Linux only).
+The second measures the time.
 """
 
 from __future__ import annotations

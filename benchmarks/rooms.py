@@ -68,7 +68,7 @@ class DoorsMet:
     """True doors against found ones."""
 
     offsets_m: list[float]
-    """Of each true door that was found, how far its found door lies from its middle."""
+    """Distance of each found true door's middle from its found door."""
     n_met: int
     """Found doors that lie at a true one, or where the true rooms change all the same."""
     n_found: int
@@ -108,7 +108,7 @@ def _rooms_near(floor: Floor, point: FloatArray, middles: FloatArray) -> bool | 
 
 
 def segmentation_table(floors: list[Floor]) -> dict[tuple[str, str], hn.RoomLabels]:
-    """Print how every way does on every floor; gives what the methods found."""
+    """Print the results of every way on every floor; return what the methods found."""
     print("## Segmentation against the labels\n")
     print(
         f"Cells that are labelled and reachable with a radius of {RADIUS_M:g} m; doors whose two "
@@ -176,7 +176,7 @@ def draw(floor: Floor, found: dict[tuple[str, str], hn.RoomLabels], folder: Path
 
 
 def routes_table(floors: list[Floor]) -> bool:
-    """Print the routes between all pairs of rooms; gives whether every level agrees."""
+    """Print the routes between all pairs of rooms; return whether every level agrees."""
     print("\n## Routes between every ordered pair of rooms, true rooms\n")
     print(
         "The grid is the preset `grid-astar`, A* on the whole map, between the rooms' points "
@@ -213,11 +213,11 @@ class AllPairs:
     solved: int = 0
     solved_anywhere: int = 0
     by_component: int = 0
-    """Pairs of which the grid's search and connected free cells say different things."""
+    """Pairs for which the grid's search and connected free cells differ."""
     by_point: int = 0
-    """Pairs of points of which the grid, the planner and the places do not say the same."""
+    """Pairs of points for which the grid, the planner and the places differ."""
     by_set: int = 0
-    """Pairs of rooms of which the grid, the planner and the room level do not."""
+    """Pairs of rooms for which the grid, the planner and the room level differ."""
     longest: float = 0.0
     """By how much the planner's path between points exceeds the grid's at most."""
 
@@ -313,7 +313,7 @@ def _passage(room: str, other: str, doors: list[hn.Door]) -> Passage:
 
 
 def kind_of(floor: Floor, passage: Passage) -> str:
-    """What the data says of a passage between true rooms."""
+    """Return what the data holds on a passage between true rooms."""
     rooms = frozenset(passage.rooms)
     for true in floor.doors:
         offsets = [np.hypot(*(true.middle - door.position)) for door in passage.doors]

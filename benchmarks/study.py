@@ -139,8 +139,8 @@ def page(study: Study, pairs: int) -> str:
 Thrun's three questions, asked of every method on twelve ROS maps (robot radius 0.25 m, merge
 distance 4 m, sampled pairs) and twelve MovingAI maps (a point robot, merge distance 40 cells, pairs
 of their scenarios), up to {pairs} pairs a map. `python -m benchmarks.study --data FOLDER -o DIR`
-makes it anew: records, a report with the worst cases drawn, and this page. What the columns mean is
-said in [harness.md](harness.md).
+makes it anew: records, a report with the worst cases drawn, and this page. The page
+[harness.md](harness.md) describes the columns.
 
 [study-first.md](study-first.md) has the tables of the first study, 500 pairs a map, before there
 were routes over portals. Times are of single queries with cold caches; [portals.md](portals.md) has
