@@ -196,9 +196,7 @@ class Worker:
             self._running = _Running(self, starting.process, starting.connection)
 
 
-_NO_START = (
-    "the process of OMPL does not start; `python -c 'import ompl.geometric'` may show the reason"
-)
+_NO_START = "the process of OMPL does not start; `python -c 'import ompl.geometric'` may show why"
 
 
 class _Start(threading.Thread):
