@@ -37,8 +37,8 @@ def query_key(record: Record) -> QueryKey:
 class Outcome:
     """All that one method did on one map.
 
-    Arrays have one entry for each pair that the method was asked and the reference solved between
-    two different cells, in the reference's order; NaN where the method has no such figure.
+    Arrays have one entry for each pair of different cells that the method answered and the
+    reference solved, in the reference's order; NaN for a missing figure.
     """
 
     map_name: str
@@ -59,7 +59,7 @@ class Outcome:
 
     @cached_property
     def references(self) -> list[Record]:
-        """The reference's records of the pairs that arrays are about."""
+        """The reference's records of the pairs in the arrays."""
         asked = {query_key(record) for record in self.records}
         return [
             record
@@ -74,7 +74,7 @@ class Outcome:
 
     @cached_property
     def metric(self) -> str:
-        """That of its paths: "octile" or "any-angle"."""
+        """Metric of the method's paths: "octile" or "any-angle"."""
         return "any-angle" if any(map(is_line, (self.preparation, *self.records))) else "octile"
 
     @cached_property
@@ -90,13 +90,13 @@ class Outcome:
 
     @cached_property
     def _octile_optima_m(self) -> FloatArray:
-        """Those on the grid; NaN for any-angle paths, which have no loss over them."""
+        """Octile optima; NaN for any-angle paths, which have no loss over them."""
         lines = [bool(record and is_line(record)) for record in self._matched]
         return np.where(lines, math.nan, self.optima_m)
 
     @cached_property
     def best_m(self) -> FloatArray:
-        """Lengths that losses refer to."""
+        """Reference lengths of the losses."""
         if self.yardstick == "octile":
             return self._octile_optima_m
         if self.yardstick == "any-angle":
@@ -106,7 +106,7 @@ class Outcome:
 
     @cached_property
     def losses(self) -> FloatArray:
-        """Length over what losses refer to, minus one."""
+        """Lengths over their reference lengths, minus one."""
         return loss_of(self.lengths_m, self.best_m)
 
     @cached_property
@@ -116,12 +116,12 @@ class Outcome:
 
     @cached_property
     def any_angle_losses(self) -> FloatArray:
-        """Length over the any-angle optimum, minus one: of paths in any metric."""
+        """Lengths over the any-angle optimum, minus one, for paths in any metric."""
         return loss_of(self.lengths_m, self.any_angle_optima_m)
 
     @cached_property
     def solved_keys(self) -> set[MapQuery]:
-        """The pairs that it solved itself, without a fault."""
+        """The pairs that the method solved itself, without a fault."""
         solved = np.isfinite(self.lengths_m)
         return {(self.map_name, query_key(self.references[at])) for at in np.flatnonzero(solved)}
 
@@ -142,8 +142,8 @@ class Outcome:
 
     @cached_property
     def by_grid(self) -> float:
-        """How many paths are the grid's, because the method found none; NaN where a method has no
-        such way out."""
+        """Number of paths that are the grid's, because the method found none; NaN for a method
+        without such a fallback."""
         counted = [(record or {}).get("by_grid") for record in self._matched]
         return math.nan if all(one is None for one in counted) else float(self._by_grid.sum())
 
@@ -163,7 +163,7 @@ class Outcome:
 
     @cached_property
     def seconds(self) -> FloatArray:
-        """Wall-clock seconds of each query that it solved without a fault."""
+        """Wall-clock seconds of each query that the method solved without a fault."""
         return np.where(np.isfinite(self.lengths_m), self.figure("seconds"), math.nan)
 
     @cached_property
@@ -187,7 +187,7 @@ class Outcome:
 
     @property
     def preparation_seconds(self) -> float:
-        """Seconds from the loaded map to the first query; NaN where it failed."""
+        """Seconds from the loaded map to the first query; NaN if the preparation failed."""
         record = self.preparation
         return float(record.get("pyramid_seconds", math.nan)) + float(
             record.get("method_seconds", math.nan)
@@ -195,7 +195,7 @@ class Outcome:
 
     @cached_property
     def thrun_count(self) -> float:
-        """Thrun's count: nodes times mean steps of a plan; of a method without a topological
+        """Thrun's count: nodes times mean steps of a plan; for a method without a topological
         layer, cells times mean steps of a path."""
         steps = self.figure("plan_steps")
         if not np.isfinite(steps).any():
@@ -217,7 +217,7 @@ class Outcome:
 
     @property
     def checks(self) -> int:
-        """Answers that were judged."""
+        """Number of judged answers."""
         return sum(record["status"] in ANSWERED for record in self.records)
 
     @property
@@ -283,7 +283,7 @@ class Study:
 
     @property
     def checks(self) -> int:
-        """Answers that were judged."""
+        """Number of judged answers."""
         return sum(outcome.checks for outcome in self.outcomes)
 
     @property

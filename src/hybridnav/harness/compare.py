@@ -32,8 +32,8 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
         Folders of two runs. Where each has a single method beside the reference, those two are
         compared even under different names.
     metric
-        What losses refer to, see `load_study`. With "both", where the two methods have different
-        metrics, the shorter optimum of each pair: the any-angle one.
+        Reference of losses; see `load_study`. With "both", two methods of different metrics are
+        compared with the shorter optimum of each pair, the any-angle one.
 
     Returns
     -------

@@ -94,7 +94,7 @@ class Consistency:
         Returns
         -------
         list
-            What is wrong, and two cells that show it.
+            The faults, each with two cells that show it.
         """
         free = np.flatnonzero(self._free)
         region, piece, whole = self._region[free], self._piece[free], self._whole[free]
@@ -181,7 +181,7 @@ class Consistency:
     def check_walk(self, cells: LongArray) -> str | None:
         """Check that a metric path maps to a walk in the topological layer.
 
-        A diagonal between two regions passes one of its side cells, whichever gives a walk.
+        A diagonal between two regions may pass either of its side cells.
 
         Parameters
         ----------
@@ -226,7 +226,7 @@ class Consistency:
 
 
 def _components(links: LongArray, count: int) -> LongArray:
-    """Label of the connected component of each of some things, by the pairs that are linked."""
+    """Return the label of the connected component of each thing, by the linked pairs."""
     ones = np.ones(len(links), dtype=np.int8)
     graph = sparse.coo_array((ones, (links[:, 0], links[:, 1])), (count, count))
     return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)

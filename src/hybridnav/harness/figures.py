@@ -69,7 +69,7 @@ class Charts:
     def overall(
         self, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
     ) -> list[Chart]:
-        """Return those of all maps together, one for each metric."""
+        """Return the charts of all maps together, one for each metric."""
         title = "Speed against loss, all maps"
         groups = self._groups([*losses, *times_ms])
         return [self._speed(losses, times_ms, names, f"{title}{of}") for of, names in groups]
@@ -77,7 +77,7 @@ class Charts:
     def of_map(
         self, name: str, losses: Mapping[str, FloatArray], times_ms: Mapping[str, float]
     ) -> list[Chart]:
-        """Return those of one map, two for each metric."""
+        """Return the charts of one map, two for each metric."""
         charts = []
         for of, names in self._groups([*losses, *times_ms]):
             charts.append(self._losses(losses, names, f"Loss, {name}{of}"))

@@ -42,8 +42,8 @@ STATED_SLACK, STATED_SLACK_CELLS = 1e-5, 0.0051
 
 
 class Judge:
-    """Looks at answers on one map. Paths and plans are judged by code that the planners do not
-    share; only the best path inside a plan's regions is found by their grid search.
+    """Judge of the answers on one map. Code that the planners do not share judges paths and plans;
+    only the best path inside a plan's regions is found by their grid search.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ class Judge:
     prepared
         The method.
     reference
-        Whether this is the method whose lengths are the optimum: then they are checked against
-        other optima too, and any-angle lengths are noted.
+        Whether the lengths of this method are the optimum: then they are checked against other
+        optima too, and any-angle lengths are recorded.
     """
 
     def __init__(self, grid: OccupancyGrid, prepared: Prepared, *, reference: bool) -> None:
@@ -145,8 +145,8 @@ def _false_claims(line: Line, length_m: float) -> list[str]:
 
 
 class Oracles:
-    """What is known of pairs from elsewhere: the any-angle optimum, the octile optimum that a
-    scenario states, and on a sample both optima by independent code."""
+    """Other optima of pairs: the any-angle optimum, the octile optimum of a scenario, and on a
+    sample both optima by independent code."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
         self._grid = grid

@@ -56,7 +56,7 @@ ON_PLACES = frozenset({"simple-graph", "exact-overlay"})
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """What to build: a preset or a baseline, and the pyramid under it. Plain values, so that it
+    """A method to build: a preset or a baseline, and the pyramid under it. Plain values, so that it
     can go to another process."""
 
     name: str
@@ -165,7 +165,7 @@ class HybridMethod:
 
     @cached_property
     def memory_bytes(self) -> int:
-        """What planner, topological map and record hold, as the sum of their arrays."""
+        """Sum of the arrays of the planner, the topological map and the record, in bytes."""
         return _nbytes(self._planner, set())
 
     def solve(self, start: Cell, goal: Cell) -> Answer:
@@ -247,7 +247,7 @@ def _nbytes(thing: Any, seen: set[int]) -> int:
 
 @dataclass
 class Prepared:
-    """A method ready for one map, and what that took."""
+    """A method ready for one map, and the effort of its preparation."""
 
     method: Method
     topology: TopologicalMap | None

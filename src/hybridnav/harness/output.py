@@ -1,4 +1,4 @@
-"""What a run leaves beside its records: tables, the report, pictures of counter-examples."""
+"""Outputs of a run beside its records: tables, the report, pictures of counter-examples."""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
 
 
 def _path(record: Record, grid: OccupancyGrid) -> FloatArray:
-    """Return the points to draw of an answer: its path, or its ends where there is none."""
+    """Return the points to draw for an answer: its path, or its ends if it has none."""
     start, goal = record["start"], record["goal"]
     if record.get("points"):
         points = np.array(record["points"], dtype=np.float64)

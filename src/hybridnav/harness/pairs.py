@@ -33,7 +33,7 @@ MAX_SAMPLED = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """One query, and what is known of it beforehand."""
+    """One query, and its known optimum if there is one."""
 
     start: Cell
     goal: Cell
@@ -183,8 +183,8 @@ def lattice_pairs(grid: OccupancyGrid, step_m: float) -> list[Pair]:
 def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[Pair]:
     """Return the pairs of a MovingAI scenario file, with their optima as stated there.
 
-    On an inflated map, or where diagonals may cut corners, what is stated does not hold: there
-    pairs go without it, and those with an end that is not free are left out.
+    The stated optima do not hold on an inflated map, or if diagonals may cut corners: there pairs
+    have none, and pairs with an end that is not free are left out.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[P
 
 
 def evenly_spread(pairs: list[Pair], count: int) -> list[Pair]:
-    """Return so many pairs, spread evenly over a list; all where it has no more."""
+    """Return some pairs, spread evenly over a list; all if the list is shorter."""
     count = min(count, len(pairs))
     return [pairs[at * len(pairs) // count] for at in range(count)]
 

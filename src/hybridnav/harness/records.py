@@ -100,7 +100,7 @@ class RecordFile:
         self._stream.close()
 
     def append(self, records: Iterable[Record]) -> None:
-        """Write records that are not there yet; they are on disk when this returns."""
+        """Write records that are missing; they are on disk when this returns."""
         fresh = [record for record in records if record["id"] not in self.ids]
         lines = [json.dumps(record, allow_nan=False, separators=(",", ":")) for record in fresh]
         if not lines:

@@ -50,7 +50,7 @@ class WorstCase:
 
 @dataclass(frozen=True, eq=False)
 class MapSection:
-    """What the report holds about one map."""
+    """The report's section on one map."""
 
     name: str
     facts: list[tuple[str, str]] = field(default_factory=list)

@@ -47,7 +47,7 @@ _PAIRS_PER_TASK = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
-    """What a run evaluates; see `evaluate`.
+    """The maps, methods and pairs of a run; see `evaluate`.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     Parameters
     ----------
     settings
-        What to evaluate.
+        The maps, methods and pairs to evaluate.
     folder
         Created if it is missing; receives `records.jsonl` and `runs.jsonl`.
     progress

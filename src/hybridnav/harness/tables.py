@@ -78,11 +78,11 @@ def figures(
     Parameters
     ----------
     outcomes
-        The method's, one for each map.
+        Outcomes of the method, one for each map.
     references
-        The reference's on the same maps, in the same order.
+        Outcomes of the reference on the same maps, in the same order.
     common
-        The pairs over which losses of different methods are set side by side.
+        The pairs over which losses of different methods are compared.
 
     Returns
     -------

@@ -54,7 +54,7 @@ class Task:
 
     @cached_property
     def ids(self) -> tuple[str, ...]:
-        """Ids of the records that it yields: of the preparation, then of the pairs."""
+        """Ids of the task's records: of the preparation, then of the pairs."""
         of_pairs = (pair_id(self.map_sha, self.method, pair) for pair in self.pairs)
         return preparation_id(self.map_sha, self.method), *of_pairs
 
@@ -74,12 +74,12 @@ def run_task(task: Task) -> Iterator[Record]:
     Parameters
     ----------
     task
-        What to do.
+        The map, the method, and the pairs.
 
     Yields
     ------
     Record
-        The preparation's, then one for each pair; failures are records too.
+        The record of the preparation, then one for each pair; failures are records too.
     """
     grid = read_map(task.map)
     common = {

@@ -1,4 +1,4 @@
-"""Where tasks run: processes of this machine, or a dask.distributed cluster."""
+"""Execution of tasks: in processes of this machine, or on a dask.distributed cluster."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _serve(connection: Connection, turn: Any) -> None:
 
 
 class _Worker:
-    """A process, the task that it is at, and when it was last heard of."""
+    """A process, its task, and the time of its last message."""
 
     def __init__(self, context: multiprocessing.context.SpawnContext) -> None:
         self.connection, theirs = context.Pipe()
@@ -72,7 +72,7 @@ class _Worker:
             self.connection.send(task)
 
     def failed_at(self, task: Task) -> int:
-        """Index of the record that it did not get done; to be asked once it is stopped."""
+        """Return the index of the first missing record of a task, once the process is stopped."""
         turn = int(self._turn.value)
         # After the last one what fails is to send: it must not be tried for ever.
         return turn if turn < len(task.ids) else task.ids.index(self.missing[0])
@@ -93,13 +93,13 @@ def run_local(tasks: Sequence[Task], *, workers: int, timeout_s: float) -> Itera
     workers
         Processes.
     timeout_s
-        Longest silence of a process, seconds. Then, or when it dies, the query that it was at is
-        recorded as "timeout" or "lost", and another process goes on with the rest.
+        Longest silence of a process, seconds. After it, or when the process dies, its query is
+        recorded as "timeout" or "lost", and another process resumes the rest.
 
     Yields
     ------
     list of Record
-        As they come in.
+        Records in the order of arrival.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
     if index == 0 and status == "lost" and task.attempt + 1 < _ATTEMPTS:
         waiting.append(replace(task, attempt=task.attempt + 1))
         return []
-    if index == 0:  # it never gets ready: no other would
+    if index == 0:  # it never becomes ready, and no other would
         return [failed_record(task, at, status) for at in range(len(task.ids))]
     left = tuple(
         pair
@@ -175,7 +175,8 @@ def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
 
 
 def failed_record(task: Task, index: int, status: str) -> Record:
-    """Record of a query, or with index 0 of a preparation, whose process was lost or too slow."""
+    """Return the record of a query, or with index 0 of a preparation, whose process was lost or too
+    slow."""
     common: Record = {
         "id": task.ids[index],
         "type": "pair" if index else "preparation",
@@ -204,13 +205,13 @@ def run_on_cluster(tasks: Sequence[Task], *, address: str) -> Iterator[list[Reco
     tasks
         In any order.
     address
-        Of the scheduler, such as "tcp://10.0.0.1:8786". Its workers need this package and the map
-        files under the same paths.
+        Address of the scheduler, such as "tcp://10.0.0.1:8786". Its workers need this package and
+        the map files under the same paths.
 
     Yields
     ------
     list of Record
-        Those of one task, as tasks end.
+        Records of one task, when it ends.
 
     Raises
     ------
@@ -237,7 +238,7 @@ def run_on_cluster(tasks: Sequence[Task], *, address: str) -> Iterator[list[Reco
                 yield future.result()
             except distributed.KilledWorker:
                 suspects.append(task_of[future.key])
-        # dask blames all that waited for a worker that died: each again, and by itself.
+        # dask blames all tasks that waited for a dead worker: run each again, by itself.
         for task in suspects:
             try:
                 yield client.submit(_whole, task, pure=False).result()

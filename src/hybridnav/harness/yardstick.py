@@ -1,4 +1,4 @@
-"""What losses refer to: the metrics to choose from, and the any-angle optimum, proved."""
+"""The reference of losses: the metrics to choose from, and the any-angle optimum, proved."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ optimum, which any-angle paths have no loss over."""
 
 
 def check_yardstick(metric: str) -> None:
-    """Raise `InvalidValueError` where there is no such yardstick."""
+    """Raise `InvalidValueError` if there is no such yardstick."""
     if metric not in get_args(Yardstick):
         known = ", ".join(get_args(Yardstick))
         raise InvalidValueError(f"losses refer to one of {known}, got metric {metric!r}")
