@@ -42,8 +42,8 @@ class Component:
 class TopologicalMap:
     """The place level of a pyramid, seen as places and arcs with lasting ids.
 
-    Arrays are indexed by the dense indices of the level; `place_ids` and `arc_ids` are what
-    results, files and arguments name.
+    Arrays are indexed by the dense indices of the level; results, files and arguments name
+    `place_ids` and `arc_ids`.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class TopologicalMap:
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The map it was grown from."""
+        """The grid of the map."""
         return self.pyramid.grid
 
     @cached_property
@@ -91,12 +91,12 @@ class TopologicalMap:
 
     @property
     def n_places(self) -> int:
-        """Places, free and unexplored."""
+        """Number of places, free and unexplored."""
         return self.level.n_vertices
 
     @property
     def n_arcs(self) -> int:
-        """Arcs, self-loops included."""
+        """Number of arcs, self-loops included."""
         return self.level.n_arcs
 
     @property
@@ -127,13 +127,13 @@ class TopologicalMap:
 
     @cached_property
     def inclusion(self) -> Inclusion:
-        """Which places, obstacles and components lie inside which places."""
+        """The nesting of places, obstacles and components."""
         from hybridnav.topology.inclusion import Inclusion  # noqa: PLC0415 - loads scipy.sparse
 
         return Inclusion(self.level, self.pyramid.islands)
 
     def encloses(self, place: int, *, least_area_m2: float = 0.0) -> Enclosed:
-        """Find what a place encloses all by itself: what lies inside its self-loops, at any depth.
+        """Find the contents of a place's self-loops, at any depth: all that it alone encloses.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Merging pieces of free space to rooms: what is one convex space, and what is too small."""
+"""Merging of pieces of free space to rooms: convex pieces, and pieces that are too small."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Pieces:
     """Pieces of a label image, with their neighbours: how long each common border is, and how much
     of it is open.
 
-    How large a piece is, is its area of free cells. Shapes alone (solidity, breadth, the length of
-    borders) are those of pieces that reach half-way into the walls between them.
+    The size of a piece is its area of free cells. Its shape alone (solidity, breadth, the length of
+    borders) includes half of the walls between pieces.
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ class Pieces:
                 offer(min(u, other), max(u, other))
 
     def merge_small(self, least_m2: float) -> None:
-        """Give pieces of a smaller free area to the neighbour with the longest open border,
-        smallest first; those without a neighbour stay."""
+        """Merge pieces of a smaller free area into the neighbour with the longest open border, the
+        smallest first; pieces without a neighbour stay."""
         least = least_cells(least_m2, self._cell_m2)
         heap = [(int(self._free[piece]), piece) for piece in range(self._n) if self._is_root(piece)]
         heapq.heapify(heap)
@@ -128,7 +128,7 @@ class Pieces:
         return float((self._areas[u] + self._areas[v]) / hull_area)
 
     def _merge(self, u: int, v: int) -> None:
-        """Let u take v."""
+        """Merge v into u."""
         self._parent[v] = u
         self._version[u] += 1
         self._version[v] = -1

@@ -122,7 +122,7 @@ def walled_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> I
     grid
         The map; cells count as they were measured, whatever the robot's radius.
     least_m2
-        As of `wall_line_pieces`.
+        As in `wall_line_pieces`.
 
     Returns
     -------

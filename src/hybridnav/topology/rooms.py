@@ -63,12 +63,12 @@ class Rooms:
     """The rooms of a pyramid that was built with some.
 
     A room is one or more vertices of the room level: a class of cells each, and where obstacles cut
-    a room into parts, one for each part. What lies in no room is a vertex too, without a name.
+    a room into parts, one for each part. Cells in no room have vertices too, without a name.
 
     Parameters
     ----------
     pyramid
-        Built with rooms.
+        A pyramid that was built with rooms.
 
     Raises
     ------
@@ -116,7 +116,7 @@ class Rooms:
         return None if label == NO_ROOM else self.names[label]
 
     def vertices_of(self, name: str) -> LongArray:
-        """Free parts of a room, as vertices of the room level, the largest first.
+        """Return the free parts of a room, as vertices of the room level, the largest first.
 
         Raises
         ------
@@ -184,7 +184,7 @@ class Rooms:
         Raises
         ------
         InvalidValueError
-            When no door has it; the line names the numbers that there are.
+            When no door has it; the message lists the existing numbers.
         """
         found = self._door_of_number.get(number)
         if found is None:

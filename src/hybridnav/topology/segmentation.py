@@ -64,8 +64,8 @@ def find_rooms(
         are then merged in the same way, where their union is nearly convex and hardly walled.
     least_area_m2
         In square metres of free cells, positive, at most 1e9. Smaller pieces go to the neighbour
-        with the longest open border; what has none is no room. Neither is free space outside of
-        the building: round other free space that it cannot reach, along most of the map's border.
+        with the longest open border; without one they are no room. Free space outside the building
+        is no room either: it surrounds other free space, along most of the map's border.
 
     Returns
     -------
@@ -145,8 +145,8 @@ def _pieces(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntAr
 def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     """Return labels spread into walls, and through unexplored cells, but never out behind a wall.
 
-    A wall of one cell is all that parts two rooms on some maps: what is free and has no room, or is
-    unexplored, takes none through it.
+    On some maps only a wall of one cell separates two rooms: labels do not spread through it into
+    unexplored cells, or into free cells without a room.
     """
     reach = _WALL_REACH_M / grid.resolution_m
     wall = grid.measured == CellClass.OCCUPIED
@@ -162,10 +162,10 @@ def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
 def _outside(grid: OccupancyGrid) -> BoolArray:
     """Return the free cells outside the building, which belong to no room.
 
-    They are connected along sides, nothing bounds them outwards: they reach all four sides of the
-    map and fill at least half of its border. And free space that they cannot reach lies inside
-    them: at least a tenth of their own area. So a strip round a building whose image has a margin
-    is outside, and what lies round a race track; a hall that the map's border cuts off is not.
+    They are connected along sides, reach all four sides of the map, and fill at least half of its
+    border. They surround free space that they cannot reach, at least a tenth of their own area. So
+    the margin of a building's image is outside, and so is the ground round a race track, but not a
+    hall that the map's border cuts off.
     """
     free = grid.measured == CellClass.FREE
     part_of, n_parts = ndimage.label(free)
