@@ -90,7 +90,7 @@ VersionOption = Annotated[
 
 @app.callback()
 def _options(version: VersionOption = False) -> None:
-    """Take what comes before a command."""
+    """Parse the options before a command."""
 
 
 def run(arguments: list[str]) -> int:

@@ -27,7 +27,7 @@ BlockedOption = Annotated[
 
 @dataclass(frozen=True)
 class Closing:
-    """What a command line closes."""
+    """The closures of a command line."""
 
     given: tuple[str, ...] = ()
     """As it was given, printable."""
@@ -37,15 +37,15 @@ class Closing:
 
     @property
     def needs_rooms(self) -> bool:
-        """Whether it can be understood on a map with rooms alone."""
+        """Whether the closures make sense only on a map with rooms."""
         return bool(self.doors or self.rooms)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is closed as plain values for JSON: null where nothing is."""
+        """Return the closures as plain values for JSON: null for none."""
         return {"blocked": list(self.given) or None}
 
     def read(self, grid: hn.OccupancyGrid) -> hn.Blocked | None:
-        """Read the files, and put all together; None where nothing is closed."""
+        """Read the files and join all closures; return None for none."""
         if not self.given:
             return None
         # They load shapely.
@@ -59,7 +59,7 @@ class Closing:
 
 
 def told_closing(figures: dict[str, Any]) -> list[str]:
-    """Return the line of a summary about what is closed, if anything is."""
+    """Return the line of a summary about closures, if there are any."""
     closed = figures.get("blocked")
     return [f"blocked    {', '.join(closed)}"] if closed else []
 

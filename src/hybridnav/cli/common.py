@@ -1,4 +1,4 @@
-"""What several commands share: reading settings and maps, and talking to the user."""
+"""Shared parts of commands: reading settings and maps, and talking to the user."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def answer(text: str) -> None:
 
 @contextmanager
 def stage(text: str, seconds: dict[str, float], key: str) -> Iterator[None]:
-    """Time a stage, with a spinner on stderr while it runs where that is a terminal."""
+    """Time a stage, with a spinner on stderr if that is a terminal."""
     began = time.perf_counter()
     with _spinner(text) if sys.stderr.isatty() else nullcontext():
         yield
@@ -206,8 +206,8 @@ def load_numba() -> None:
 
 
 def load_model(path: Path, preset: Preset, seconds: dict[str, float], reading: Reading) -> hn.Model:
-    """Load a model or a map, inflated as a preset states, without the islands that were not asked
-    for."""
+    """Load a model or a map, inflated as a preset states, without the islands that the user
+    drops."""
     with stage(f"reading {path}", seconds, "load"):
         load_numba()
         model = hn.load(
@@ -234,19 +234,19 @@ def load_model(path: Path, preset: Preset, seconds: dict[str, float], reading: R
 
 
 def is_model_file(path: Path) -> bool:
-    """Return whether a path names a model, without loading what reads it."""
+    """Return whether a path names a model, without loading the modules that read it."""
     return path.suffix.lower() == MODEL_SUFFIX
 
 
 def extent_line(grid: hn.OccupancyGrid) -> str:
-    """Return the summary's line on where a map lies."""
+    """Return the summary's line on the extent of a map."""
     from hybridnav.grid.occupancy import extent  # noqa: PLC0415 - loads numpy
 
     return f"extent     {extent(grid)}"
 
 
 def islands_line(grid: hn.OccupancyGrid) -> list[str]:
-    """Return the summary's line on islands, none where they were not to be dropped."""
+    """Return the summary's line on islands, an empty text unless the user drops them."""
     dropped = grid.dropped
     if dropped is None:
         return []
@@ -263,7 +263,7 @@ def islands_figures(grid: hn.OccupancyGrid) -> dict[str, Any]:
 
 
 def check_room_to_be(grid: hn.OccupancyGrid, *, allow_unexplored: bool = False) -> None:
-    """Refuse a robot radius that leaves no cell of a map to be in."""
+    """Refuse a robot radius that leaves no cell of a map free."""
     was_free = (grid.measured == hn.CellClass.FREE).any()
     if was_free and not grid.enterable(allow_unexplored=allow_unexplored).any():
         raise UsageError(
@@ -308,8 +308,8 @@ def grow_topology(
 def outside(
     grid: hn.OccupancyGrid, stops: Sequence[str | tuple[float, ...]]
 ) -> hn.PlanStatus | None:
-    """Return the status that a planner would answer where a point lies outside the map, None where
-    none does; no planner is needed."""
+    """Return the status that a planner would return for points outside the map, None if both are on
+    it; no planner is needed."""
     for number, stop in enumerate(stops):
         if isinstance(stop, str):
             continue
@@ -322,7 +322,7 @@ def outside(
 def refused_result(
     status: hn.PlanStatus, settings: Preset, stops: Sequence[str | tuple[float, ...]]
 ) -> hn.PlanResult:
-    """Return the result that a planner would answer with a status; no planner is needed."""
+    """Return the result that a planner would return with a status; no planner is needed."""
     start, goal = (None if isinstance(stop, str) else tuple(stop) for stop in (stops[0], stops[-1]))
     record = {
         "preset": settings.name,

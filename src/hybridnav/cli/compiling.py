@@ -30,7 +30,7 @@ _FIRST = "compiling kernels, which a new installation does once; the next start 
 
 
 class _Teller(logging.Handler):
-    """Reports once that it is the compiler that takes so long.
+    """A handler that reports once that the compiler takes long.
 
     Not where nothing can be kept: `CacheWarning` states that every start takes as long there.
     """
@@ -49,7 +49,7 @@ class _Teller(logging.Handler):
 
 @contextmanager
 def told_of_compiling() -> Iterator[None]:
-    """Tell the user when kernels are compiled for seconds."""
+    """Inform the user when kernels are compiled for seconds."""
     teller, level = _Teller(), _LOG.level
     _LOG.addHandler(teller)
     _LOG.setLevel(logging.INFO)

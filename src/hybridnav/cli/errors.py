@@ -11,9 +11,9 @@ EXIT_UNREADABLE = 3
 
 
 class UsageError(HybridNavError):
-    """The command line itself asks for something that cannot be."""
+    """The command line itself asks for something impossible."""
 
 
 def exit_code(error: HybridNavError) -> int:
-    """Exit code of a command that ended in this error."""
+    """Return the exit code of a command that ended in this error."""
     return EXIT_UNREADABLE if isinstance(error, (MapError, PresetError)) else EXIT_USAGE

@@ -31,7 +31,7 @@ KeepInOption = Annotated[
 
 @dataclass(frozen=True)
 class Source:
-    """A map or a model, and where what is prepared on it is kept."""
+    """A map or a model, and the folder of the models prepared on it."""
 
     map_file: Path
     settings: hn.Preset
@@ -47,7 +47,7 @@ class Source:
         rooms_file: Path | None = None,
         needs_rooms: bool = False,
     ) -> tuple[hn.Model, str | None]:
-        """Load the model that is kept, else the map.
+        """Load the kept model, else the map.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class Source:
                 complain(f"using the model kept in {printable(kept.path_of(key, folder))}")
                 return model, None
         model = load_model(self.map_file, self.settings, seconds, self.reading)
-        # A map that is written to meanwhile must not be taken for the one before.
+        # A map that changes meanwhile must not pass for the one before.
         same = key == self._key(rooms_file, needs_rooms=needs_rooms)
         return model, key if same else None
 

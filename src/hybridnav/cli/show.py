@@ -1,4 +1,4 @@
-"""`hybridnav show`: what a map and its pyramid are made of."""
+"""`hybridnav show`: the parts of a map and of its pyramid."""
 
 from __future__ import annotations
 

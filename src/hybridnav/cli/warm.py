@@ -1,4 +1,4 @@
-"""Compile what first plans need: `python -m hybridnav.cli.warm`, in all processors."""
+"""Compile the kernels of first plans: `python -m hybridnav.cli.warm`, on all processors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ENDS = ((2, 2), (60, 60))
 
 
 def small_grid() -> hn.OccupancyGrid:
-    """Return a map that needs what buildings need: rooms, doors, posts, unexplored cells."""
+    """Return a map with the parts of buildings: rooms, doors, posts, unexplored cells."""
     side, room = 64, 16
     probability = np.zeros((side, side), np.float32)
     probability[::room] = probability[:, ::room] = 1.0
@@ -54,7 +54,8 @@ def compile_search(coarse: str) -> None:
 
 
 def compile_plan(preset: str) -> None:
-    """Compile all that a plan needs, by one on a small map; of no preset the pyramid alone."""
+    """Compile all kernels of a plan, by one on a small map; without a preset those of the pyramid
+    alone."""
     grid = small_grid()
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
     if preset in _PLANS:
@@ -68,7 +69,8 @@ def _end_with_parent() -> None:
 
 
 def compile_all() -> None:
-    """Compile what the first plans need, a process for each processor, with a bar on stderr."""
+    """Compile the kernels of the first plans, a process for each processor, with a bar on
+    stderr."""
     from rich.console import Console  # noqa: PLC0415 - on demand
     from rich.progress import Progress  # noqa: PLC0415
 
