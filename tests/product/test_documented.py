@@ -103,3 +103,27 @@ def test_public_functions_describe_parameters_and_result(
     assert _undescribed(doc, list(signature.parameters)) == [], name
     if signature.parameters and signature.return_annotation not in {"None", None}:
         assert re.search(r"^(Returns|Yields)\n-+$", doc, re.MULTILINE), name
+
+
+_NO_IMPERATIVE = {"A", "An", "The", "Whether", "What", "Which", "How", "Where", "This", "Of"}
+
+
+def test_functions_are_described_by_an_imperative() -> None:
+    """Properties are nouns; other functions do something."""
+    described = [
+        (name, (ast.get_docstring(node) or "").split(maxsplit=1)[:1])
+        for name, node in _nodes(ast.FunctionDef)
+        if not any("property" in ast.unparse(one) for one in node.decorator_list)
+    ]
+    assert [name for name, first in described if set(first) & _NO_IMPERATIVE] == []
+
+
+def test_no_sentence_begins_with_of() -> None:
+    texts = [
+        (path, node.value)
+        for path, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    begins = re.compile(r"(?:\A|[.:;] |\n\s*\n\s*)Of\s")
+    assert [(path, text) for path, text in texts if begins.search(text)] == []

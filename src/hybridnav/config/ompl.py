@@ -275,8 +275,8 @@ class OmplSettings(BaseModel):
 
 
 def _check_base(footprint: tuple[tuple[float, float], ...]) -> None:
-    """Refuse a footprint that the robot's base, the origin, lies outside of: it would be planned
-    for a body that drives beside its own path. The base may lie on the outline."""
+    """Refuse a footprint without the robot's base, the origin: the plan would be for a body that
+    drives beside its own path. The base may lie on the outline."""
     from shapely import Point, Polygon  # noqa: PLC0415 - half a second, rarely needed
 
     outline = Polygon(footprint)

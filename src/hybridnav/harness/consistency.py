@@ -37,8 +37,8 @@ class Consistency:
     region_of
         int32 (rows, cols), the region of each cell, -1 for none.
     topology
-        The topological map whose places the regions are, with its arcs; None takes as the edges
-        of the topological layer all pairs of regions that a legal move joins.
+        The topological map of the regions, with its arcs; with None the edges of the topological
+        layer are all pairs of regions that a legal move joins.
     """
 
     def __init__(
