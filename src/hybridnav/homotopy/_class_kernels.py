@@ -163,10 +163,8 @@ def _after(tree, letters, of_edge, word, cell, direction, cols):
         See `find_classes`.
     word
         Vertex of the tree.
-    cell, direction
-        Flat cell before the step, and its direction, 0 to 7.
-    cols
-        Columns of the grid.
+    cell, direction, cols
+        Flat cell before the step, its direction, 0 to 7, and the columns of the grid.
     """
     if direction & 1 == 0:
         return _times(tree, letters, word, _along(of_edge, cell, direction, cols))
@@ -285,25 +283,20 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, state
 
     Parameters
     ----------
-    moves
-        uint8 (n_cells,), the legal moves of each flat cell.
-    cols
-        Columns of the grid.
+    moves, cols
+        uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
     ends
         Flat cells of start and goal.
     left
-        The exact integer cost from each flat cell to the goal, -1 for no path: a
-        consistent estimate, so that each state is taken at its least cost among paths that do not
-        wind.
+        The exact integer cost from each flat cell to the goal, -1 for no path: a consistent
+        estimate, so that each state is taken at its least cost among paths that do not wind.
     of_edge
         int32 (2 n_cells,), the signed number of the word of each base edge: 2 c for the step from
         cell c to the east, 2 c + 1 to the north.
     letters
         `Letters`, the numbered words.
-    wanted
-        Number of classes.
-    apart
-        Cells within which a path that comes back to itself winds.
+    wanted, apart
+        Number of classes, and the cells within which a path that comes back to itself winds.
     states, tree
         `States` and `Tree` with room; filled in.
 

@@ -89,14 +89,11 @@ def moved(row, col, heading, d_row, d_col, turn, radius, share):
 
     Parameters
     ----------
-    row, col, heading
-        Where the motion starts: position and radians.
-    d_row, d_col, turn
-        The way along a straight line, in cells, and the radians by which the heading turns.
-    radius
-        Signed radius of the arc in cells, 0 for a straight line.
-    share
-        In [0, 1].
+    row, col, heading, share
+        Position and heading at the start, in radians; share in [0, 1].
+    d_row, d_col, turn, radius
+        The way along a straight line, in cells; the radians by which the heading turns; the signed
+        radius of the arc in cells, 0 for a straight line.
     """
     now = heading + share * turn
     if radius == 0.0:
@@ -135,10 +132,8 @@ def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
 
     Parameters
     ----------
-    columns
-        float64 (n, 2), lowest and highest column of each row; changed.
-    first, end
-        The rows of the map that `columns` holds.
+    columns, first, end
+        float64 (n, 2), lowest and highest column of the rows from `first` to `end`; changed.
     a_row, a_col, b_row, b_col, margin
         Positions of the edge's ends, and cells added all round.
     """
@@ -218,10 +213,8 @@ def rows_seen(rows, before, after, first, last, margin, moves, columns):
         Number of rows of the map, and cells added all round.
     before, after, first, last
         float64 (n, 2), positions in the two places; the polygon's corners are first to last - 1.
-    moves
-        `STAYS`, `SHIFTS` or `TURNS`.
-    columns
-        float64 (n, 2), from `room`; filled in.
+    moves, columns
+        `STAYS`, `SHIFTS` or `TURNS`; float64 (n, 2), from `room`, filled in.
     """
     low, high = np.inf, -np.inf
     for i in range(first, last):

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Refiner(Protocol):
-    """Turns a corridor into a path; the protocol of every refiner."""
+    """The protocol of refiners, which find a path in a corridor."""
 
     def refine(
         self, start: Cell, goal: Cell, corridor: Corridor | None

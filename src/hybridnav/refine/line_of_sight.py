@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @copies_alike
 class LineOfSight:
-    """Shortens cell paths of one grid to any-angle paths; holds one byte a cell.
+    """Shortener of cell paths of one grid to any-angle paths; it holds one byte a cell.
 
     The string start, centres of the inner cells, goal is pulled taut: a bend between two points in
     sight of it gives way to the convex hull of the corners of blocked cells inside the triangle of

@@ -100,14 +100,10 @@ def astar(
 
     Parameters
     ----------
-    moves
-        uint8 (n_cells,), the legal moves of each flat cell.
-    cols
-        Columns of the grid.
-    ends
-        Flat cells of start and goal.
-    limit
-        Integer cost that a path must stay below.
+    moves, cols
+        uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
+    ends, limit
+        Flat cells of start and goal, and the integer cost that a path must stay below.
     successors, detours
         Those of `grid_search.move_tables`.
     field_of
@@ -115,12 +111,10 @@ def astar(
         kernel is compiled for both).
     in_corridor
         bool by label, whether such a cell may be stood on.
-    records
-        uint32 (n_cells,).
+    records, waiting
+        uint32 (n_cells,), and the open list.
     generation
         Number of this search, below `GENERATIONS`.
-    waiting
-        The open list.
     """
     start, goal = ends
     stamp = np.int64(generation) << _GENERATION_SHIFT

@@ -28,7 +28,7 @@ class ArcWalk:
 
 @copies_alike
 class ArcSearch:
-    """Searches an undirected graph for the cheapest walks.
+    """Search of an undirected graph for the cheapest walks.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ _SAMPLES = 9
 
 
 class RoomWriter:
-    """Writes names and numbers so that none hides another.
+    """Writer of names and numbers, of which none hides another.
 
     Parameters
     ----------
