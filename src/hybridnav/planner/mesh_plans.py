@@ -169,14 +169,15 @@ class OverMesh:
         began = time.perf_counter()
         flat = None if query.closed is None else query.closed.flat
         found = self._refiner.search.search(*query.cells, blocked=flat)
-        seconds = {**plan.stats.seconds}
+        points = None
+        if found.cells is not None:
+            sight = self._open_sight if flat is None else self._sight(flat)
+            points = sight.shorten(found.cells, *query.points)
+        seconds = {**plan.stats.seconds, "line-of-sight": time.perf_counter() - began}
         expanded = plan.stats.expanded_intervals + found.expanded
         stats = PlanStats(expanded_intervals=expanded, seconds=seconds)
-        if found.cells is None:
+        if points is None:
             return CellPlan(None, stats=stats)
-        sight = self._open_sight if flat is None else self._sight(flat)
-        points = sight.shorten(found.cells, *query.points)
-        seconds["line-of-sight"] = time.perf_counter() - began
         length = polyline_length(points) / self._frame.resolution_m
         bound = min(plan.bound_cells, length)
         return CellPlan(found.cells, points, length_cells=length, bound_cells=bound, stats=stats)

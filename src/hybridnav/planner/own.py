@@ -74,19 +74,8 @@ def _class_of(name: str) -> Any:
 
 
 class CheckedRefiner:
-    """A refiner of the user's own; what it returns is checked before a result shows it.
-
-    Parameters
-    ----------
-    name
-        Its name in the preset.
-    own
-        The refiner.
-    grid
-        The map.
-    allow_unexplored
-        Whether unexplored cells may be entered.
-    """
+    """A refiner of the user's own, with its name; its answers are checked before a result shows
+    them."""
 
     def __init__(
         self, name: str, own: Refiner, grid: OccupancyGrid, *, allow_unexplored: bool
