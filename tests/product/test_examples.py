@@ -17,7 +17,7 @@ import hybridnav as hn
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "hybridnav"
 REFERENCE = ROOT / "docs" / "reference"
 _NAME = re.compile(r"^\.\. auto(?:class|function):: hybridnav\.([\w.]+)", re.MULTILINE)
