@@ -14,8 +14,7 @@ import hybridnav as hn
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.io.rooms_paint import without_slivers
 from hybridnav.viz import plot_rooms
-from tests.strategies import drawn, examples, occupancy_grid
-from tests.topology.test_room_level import labelled
+from tests.strategies import drawn, examples, labelled, occupancy_grid
 
 # A closet with a door of one cell beside a hall with a door of three and a pillar in the lab's.
 FLAT = drawn(
