@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage, sparse
 
+from hybridnav.grid.runs import in_runs
 from hybridnav.homotopy import _dead_end_kernels
 
 if TYPE_CHECKING:
@@ -86,9 +87,7 @@ def _short_runs(enterable: BoolArray, longest: int) -> tuple[LongArray, LongArra
     lengths = np.nonzero(steps == -1)[1] - begins
     short = lengths <= longest
     row, begins, lengths = row[short], begins[short], lengths[short]
-    run_of = np.repeat(np.arange(len(lengths)), lengths)
-    within = np.arange(len(run_of)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    return (row * cols + begins)[run_of] + within, run_of
+    return in_runs(row * cols + begins, lengths), np.repeat(np.arange(len(lengths)), lengths)
 
 
 def _neighbours(node_of: IntArray, n_nodes: int) -> sparse.csr_array:

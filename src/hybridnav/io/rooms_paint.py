@@ -9,6 +9,7 @@ from scipy import ndimage
 
 from hybridnav.errors import RoomsError
 from hybridnav.grid import NO_ROOM, CellClass
+from hybridnav.grid.runs import in_runs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -154,9 +155,7 @@ def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArr
     order = np.lexsort((col[inside], row[inside]))
     row, col = row[inside][order], col[inside][order].astype(np.int64)
     # Closed rings cross every line an even number of times.
-    starts, lengths = row[::2] * shape[1] + col[::2], col[1::2] - col[::2]
-    ends = np.cumsum(lengths)
-    return np.repeat(starts - ends + lengths, lengths) + np.arange(ends[-1] if len(ends) else 0)
+    return in_runs(row[::2] * shape[1] + col[::2], col[1::2] - col[::2])
 
 
 def _rows_crossed(ring: FloatArray) -> tuple[LongArray, LongArray]:
@@ -176,6 +175,6 @@ def _crossings(ring: FloatArray) -> tuple[LongArray, FloatArray]:
     first, last = _rows_crossed(ring)
     counts = last - first
     side = np.repeat(np.arange(len(ring)), counts)
-    row = np.arange(len(side)) - np.repeat(np.cumsum(counts) - counts, counts) + first[side]
+    row = in_runs(first, counts)
     (x, y), (to_x, to_y) = ring[side].T, np.roll(ring, -1, axis=0)[side].T
     return row, x + (row + 0.5 - y) / (to_y - y) * (to_x - x)

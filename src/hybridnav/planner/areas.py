@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.occupancy import extent
+from hybridnav.grid.runs import in_runs
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -180,8 +181,7 @@ def _rows_of(first: LongArray, last: LongArray, cols: int) -> LongArray:
     """Return the rows of rectangles of cells as runs of flat cells."""
     heights = last[:, 0] - first[:, 0]
     which = np.repeat(np.arange(len(first)), heights)
-    down = np.arange(len(which)) - (np.cumsum(heights) - heights)[which]
-    start = (first[which, 0] + down) * cols
+    start = in_runs(first[:, 0], heights) * cols
     return np.stack([start + first[which, 1], start + last[which, 1]], axis=1)
 
 

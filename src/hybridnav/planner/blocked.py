@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.runs import in_runs
 from hybridnav.planner.areas import checked_area, runs_of, shown
 from hybridnav.planner.boundaries import cells_on_boundaries
 from hybridnav.pyramid import LevelArc
@@ -329,7 +330,4 @@ def _cells_in_runs(runs: LongArray) -> LongArray:
     stop = np.maximum.accumulate(stop)
     begins = np.concatenate([[True], start[1:] > stop[:-1]])
     start, stop = start[begins], stop[np.concatenate([begins[1:], [True]])]
-    step: LongArray = np.ones(int((stop - start).sum()), dtype=np.int64)
-    step[0] = start[0]
-    step[np.cumsum(stop - start)[:-1]] = start[1:] - stop[:-1] + 1
-    return np.cumsum(step, out=step)
+    return in_runs(start, stop - start)
