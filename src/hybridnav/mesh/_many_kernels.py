@@ -43,17 +43,13 @@ def many_by_intervals(mesh, blocks, place, asked, work, bounds, effort, answers,
     tuple
         The query to resume, positions written, and `DONE`, `NO_ROOM` or `FULL`.
     """
-    cells, ends = asked
-    for k in range(begin, len(cells)):
-        where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
-        points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+    for k in range(begin, len(asked[0])):
+        where, points = _query_of(asked, k)
         status, way = query(mesh, blocks[0], blocks[1], place[1], where, points, work, effort)
-        if status == NO_ROOM:
-            return k, n, NO_ROOM
-        if not _kept(answers, k, n, way, bounds):
-            return k, n, FULL  # and found once more
+        if status == NO_ROOM or not _kept(answers, k, n, way, bounds):
+            return k, n, NO_ROOM if status == NO_ROOM else FULL  # and found once more
         n += len(way)
-    return len(cells), n, DONE
+    return len(asked[0]), n, DONE
 
 
 @guarded
@@ -68,18 +64,14 @@ def many_by_corners(mesh, graph, place, asked, work, bounds, effort, answers, be
     graph
         See `query_corners`.
     """
-    cells, ends = asked
-    for k in range(begin, len(cells)):
-        where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
-        points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+    for k in range(begin, len(asked[0])):
+        where, points = _query_of(asked, k)
         found = (place[0], place[1], where)
         status, way = query_corners(mesh, graph, found, points, work, effort)
-        if status == NO_ROOM:
-            return k, n, NO_ROOM
-        if not _kept(answers, k, n, way, bounds):
-            return k, n, FULL  # and found once more
+        if status == NO_ROOM or not _kept(answers, k, n, way, bounds):
+            return k, n, NO_ROOM if status == NO_ROOM else FULL  # and found once more
         n += len(way)
-    return len(cells), n, DONE
+    return len(asked[0]), n, DONE
 
 
 @guarded
@@ -94,18 +86,22 @@ def many_by_hierarchy(mesh, hierarchy, place, asked, work, bounds, effort, answe
     hierarchy
         See `query_hierarchy`.
     """
-    cells, ends = asked
-    for k in range(begin, len(cells)):
-        where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
-        points = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+    for k in range(begin, len(asked[0])):
+        where, points = _query_of(asked, k)
         found = (place[0], place[1], where)
         status, way = query_hierarchy(mesh, hierarchy, found, points, work, effort)
-        if status == NO_ROOM:
-            return k, n, NO_ROOM
-        if not _kept(answers, k, n, way, bounds):
-            return k, n, FULL  # and found once more
+        if status == NO_ROOM or not _kept(answers, k, n, way, bounds):
+            return k, n, NO_ROOM if status == NO_ROOM else FULL  # and found once more
         n += len(way)
-    return len(cells), n, DONE
+    return len(asked[0]), n, DONE
+
+
+@njit(cache=True, nogil=True)
+def _query_of(asked, k):
+    """Return the cells and the ends of one query, four numbers each, from those of all."""
+    cells, ends = asked
+    where = cells[k, 0], cells[k, 1], cells[k, 2], cells[k, 3]
+    return where, (ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3])
 
 
 @njit(cache=True, nogil=True)
