@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 
 
 @njit(cache=True, nogil=True)
@@ -22,6 +22,7 @@ def centres(cells, frame):
     return points
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def position_of(x, y, frame):
     """Return a point as (row, col) in grid units, that of `Frame.position_of` for near points.
