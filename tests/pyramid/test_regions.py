@@ -114,6 +114,21 @@ def test_up_to_the_places_the_levels_are_those_of_the_pyramid_below(
     assert pyramid.stats.sizes[: len(plain)] == plain.stats.sizes
 
 
+@given(scene=scenes(), linkage=st.sampled_from(LINKAGES))
+@SOME
+def test_the_darts_of_the_places_are_those_that_the_record_describes(
+    scene: Scene, linkage: Any
+) -> None:
+    pyramid = scene.pyramid(linkage)
+    made, level = pyramid[-1].darts, pyramid[-1]
+    again = type(level)(level.grid, pyramid.record, level.index, lambda: pyramid.islands).darts
+    for name in ("sigma", "origin", "protected", "base_edge"):
+        one, other = getattr(made, name), getattr(again, name)
+        np.testing.assert_array_equal(one, other)
+        assert (one.dtype, one.flags.writeable) == (other.dtype, other.flags.writeable)
+    assert made.n_vertices == again.n_vertices
+
+
 @given(made=grown())
 @SOME
 def test_regions_keep_their_size_and_could_not_grow(
@@ -242,6 +257,8 @@ def test_a_model_holds_a_pyramid_with_regions(tmp_path: Any) -> None:
     assert topology.level.index == again.place_level == pyramid.place_level
     assert again.region_cells == 40
     assert again.with_regions(40) is again
-    for level, other in zip(pyramid, again, strict=True):
-        np.testing.assert_array_equal(level.field_of, other.field_of)
-        np.testing.assert_array_equal(level.sigma, other.sigma)
+    for one, other in ((pyramid, again), (pyramid.with_regions(20), again.with_regions(20))):
+        for level, same in zip(one, other, strict=True):
+            np.testing.assert_array_equal(level.field_of, same.field_of)
+            np.testing.assert_array_equal(level.sigma, same.sigma)
+            np.testing.assert_array_equal(level.protected, same.protected)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.combinatorial import darts as dart_kernels
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _kernels
@@ -58,7 +59,7 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     seed: int,
     rooms: IntArray | None = None,
     resistance: Resistance | None = None,
-) -> tuple[Record, BuildStats]:
+) -> tuple[Record, BuildStats, CombinatorialMap]:
     """Contract stars level by level until no edge may be contracted.
 
     With rooms there are three rounds: below the limit and inside rooms, which makes the places;
@@ -79,6 +80,13 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
         int32, label of each cell's room, -1 for none; same shape.
     resistance
         The rule by which arcs resist above the places.
+
+    Returns
+    -------
+    Record, BuildStats
+        All levels, and their sizes.
+    CombinatorialMap
+        The darts of the places: from the record they take longer than a build.
     """
     kinds = classes if rooms is None else kinds_of(classes, rooms)
     began = time.perf_counter()
@@ -86,6 +94,7 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     run = _Decimation(start, seed, _LINKAGES[linkage], limit)
     run.stats.seconds["base"] = time.perf_counter() - began
     run.exhaust()
+    places = run.plane_map()
     if rooms is not None:
         run.lift_limit()
         run.exhaust()
@@ -96,7 +105,7 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
         run.steer(Resisting(resistance, run.field_of(), run.n_vertices))
         run.exhaust()
     run.finish()
-    return run.record, run.stats
+    return run.record, run.stats, places
 
 
 def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
@@ -175,6 +184,17 @@ class _Decimation:
     def n_vertices(self) -> int:
         """Vertices of the current level."""
         return len(self._vertices.cells)
+
+    def plane_map(self) -> CombinatorialMap:
+        """Return the current level as a plane map of its own."""
+        darts = self._darts
+        return CombinatorialMap(
+            sigma=darts.sigma.copy(),
+            origin=darts.origin.copy(),
+            protected=darts.protected.copy(),
+            base_edge=darts.base_edge.copy(),
+            n_vertices=self.n_vertices,
+        )
 
     def exhaust(self) -> None:
         """Contract until no edge may be contracted, and record the level reached."""

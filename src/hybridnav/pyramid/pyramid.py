@@ -133,7 +133,7 @@ class DualGraphPyramid:
             raise InvalidValueError(
                 f"a resistance goes without rooms and with the clearance of {grid.shape} cells"
             )
-        record, stats = decimate(
+        record, stats, darts = decimate(
             grid.classes,
             linkage=linkage,
             limit=limit,
@@ -141,7 +141,10 @@ class DualGraphPyramid:
             rooms=labels,
             resistance=resistance,
         )
-        return cls(grid, float(merge_distance_m), linkage, seed, stats, rooms, record)
+        pyramid = cls(grid, float(merge_distance_m), linkage, seed, stats, rooms, record)
+        # The level need not find them again: on large maps that takes longer than the build.
+        vars(pyramid[pyramid.place_level])["darts"] = darts
+        return pyramid
 
     def with_regions(self, most_cells: int) -> DualGraphPyramid:
         """Let contraction go on above the places: to regions, and from there to the apex.
