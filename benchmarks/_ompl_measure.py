@@ -104,7 +104,7 @@ class Bench:
     path
         The map's file.
     pairs, seed
-        As `sample_pairs` takes them; pairs without a way are left out.
+        As `sample_pairs` takes them; pairs without a path are left out.
     """
 
     def __init__(self, path: Path, *, pairs: int, seed: int) -> None:

@@ -75,7 +75,7 @@ def warm_up(presets: Presets) -> None:
         for preset in presets.values():
             planner = hn.HybridPlanner(topology, preset=preset)
             for pair in pairs:
-                planner.plan(*_ends(grid, pair))
+                planner.plan(*_endpoints(grid, pair))
 
 
 def measure(
@@ -121,7 +121,7 @@ def measure(
         "load": load,
         "places s": time.perf_counter() - began,
     }
-    planners, rows = _prepare(topology, presets, _ends(grid, queries[-1]))
+    planners, rows = _prepare(topology, presets, _endpoints(grid, queries[-1]))
     solved, answers, faults, core = _ask(planners, grid, queries, asked["seed"])
     peak_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     about |= {"core %": 100 * core, "peak GB": peak_gb}
@@ -153,7 +153,7 @@ def _pairs(path: Path, grid: hn.OccupancyGrid, asked: Mapping[str, int]) -> list
     return evenly_spread(stated, asked["asked"])
 
 
-def _ends(grid: hn.OccupancyGrid, pair: Pair) -> FloatArray:
+def _endpoints(grid: hn.OccupancyGrid, pair: Pair) -> FloatArray:
     return grid.frame.points_of(np.array([pair.start, pair.goal]))
 
 
@@ -167,7 +167,7 @@ def _kind(path: Path, grid: hn.OccupancyGrid) -> str:
 
 
 def _prepare(
-    topology: hn.TopologicalMap, presets: Presets, ends: FloatArray
+    topology: hn.TopologicalMap, presets: Presets, endpoints: FloatArray
 ) -> tuple[dict[str, hn.HybridPlanner], dict[str, Row]]:
     """Planners by name, and rows that hold what each adds to the topological map: seconds up to
     the first answer, and bytes."""
@@ -181,7 +181,7 @@ def _prepare(
         began = time.perf_counter()
         try:
             planner = hn.HybridPlanner(topology, preset=preset)
-            planner.plan(*ends)  # makes what is made on demand
+            planner.plan(*endpoints)  # makes what is made on demand
         except hn.InvalidValueError as error:
             row["error"] = str(error)
             continue
@@ -202,16 +202,16 @@ def _ask(
     rng = np.random.default_rng(seed)
     for pair in queries[:N_WARM]:
         for planner in planners.values():
-            planner.plan(*_ends(grid, pair))
+            planner.plan(*_endpoints(grid, pair))
     gc.disable()  # as timeit does
     wall, cpu = time.perf_counter(), time.process_time()
     for pair in queries:
-        ends = _ends(grid, pair)
+        endpoints = _endpoints(grid, pair)
         # Results wait until all have answered: to judge one would empty the caches for the next.
         results = {}
         for name in rng.permutation(list(planners)).tolist():
             began = time.perf_counter()
-            result = planners[name].plan(*ends)
+            result = planners[name].plan(*endpoints)
             results[name] = result, 1e6 * (time.perf_counter() - began)
         expected = results[YARDSTICK][0].status
         stated, found_m = pair.stated_optimum_cells, results[YARDSTICK][0].cost
@@ -239,7 +239,7 @@ def _ask(
 
 def _columns_of(result: hn.PlanResult, us: float) -> tuple[float, ...]:
     stats = result.stats
-    expanded = stats.expanded + stats.expanded_gates
+    expanded = stats.expanded + stats.expanded_border_cells
     return us, result.cost, result.lower_bound, expanded, result.metric == "any-angle"
 
 

@@ -147,7 +147,10 @@ def _by_mesh(free: BoolArray) -> tuple[object, Ask]:
 def _by_intervals(prepared: MeshSearch, queries: list[tuple[Cell, Cell]]) -> list[float]:
     """Lengths by the search of intervals: with a budget a search does not prepare itself."""
     plain = MeshSearch(prepared.mesh)
-    return [plain.path(ends, _centres(*ends), budget_s=math.inf).length_cells for ends in queries]
+    return [
+        plain.path(endpoints, _centres(*endpoints), budget_s=math.inf).length_cells
+        for endpoints in queries
+    ]
 
 
 def _centres(start: Cell, goal: Cell) -> tuple[tuple[float, float], tuple[float, float]]:

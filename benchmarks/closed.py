@@ -84,18 +84,18 @@ def on_path(path: hn.Path, rng: np.random.Generator) -> shapely.Polygon:
     return area
 
 
-def ask(planner: hn.HybridPlanner, ends: Any, closed: Any, times: Times) -> None:
+def ask(planner: hn.HybridPlanner, endpoints: Any, closed: Any, times: Times) -> None:
     """Measure one pair with something closed."""
-    opened, open_s = clocked(lambda: planner.plan(*ends))
+    opened, open_s = clocked(lambda: planner.plan(*endpoints))
     planner.closed(closed)
     forget(planner)
-    result, first_s = clocked(lambda: planner.plan(*ends, blocked=closed), 1)
+    result, first_s = clocked(lambda: planner.plan(*endpoints, blocked=closed), 1)
     if "blocked" in result.status or not opened.solved:
         return
     for _ in range(2):  # the least of three, each the first
         forget(planner)
-        first_s = min(first_s, clocked(lambda: planner.plan(*ends, blocked=closed), 1)[1])
-    _, later_s = clocked(lambda: planner.plan(*ends, blocked=closed))
+        first_s = min(first_s, clocked(lambda: planner.plan(*endpoints, blocked=closed), 1)[1])
+    _, later_s = clocked(lambda: planner.plan(*endpoints, blocked=closed))
     assert opened.path is not None  # noqa: S101
     if result.path is None or not np.array_equal(result.path.points, opened.path.points):
         times["first"].append((first_s / open_s, result.solved))
@@ -121,13 +121,13 @@ def measure(name: str, planner: hn.HybridPlanner, *, pairs: int, seed: int) -> N
         kind: {column: [] for column in COLUMNS} for kind in (*kinds, "rectangles")
     }
     for _ in range(pairs):
-        ends = grid.frame.points_of(rng.choice(cells, 2, replace=False))
+        endpoints = grid.frame.points_of(rng.choice(cells, 2, replace=False))
         for kind, every in kinds.items():
             for index in rng.permutation(len(every))[:CLOSED]:
-                ask(planner, ends, every[index], times[kind])
-        path = planner.plan(*ends).path
+                ask(planner, endpoints, every[index], times[kind])
+        path = planner.plan(*endpoints).path
         if path is not None and len(path.points) > 1:
-            ask(planner, ends, on_path(path, rng), times["rectangles"])
+            ask(planner, endpoints, on_path(path, rng), times["rectangles"])
     for kind, columns in times.items():
         line = [name, kind]
         for column in COLUMNS:

@@ -111,10 +111,10 @@ def measure(name: str, free: BoolArray, *, pairs: int, seed: int) -> bool:
     rows = []
     agree = True
     for (a, b), (c, d) in chosen:
-        ends = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
-        slow, slow_ms = clocked(partial(plain.path, *ends, budget_s=1e9))
-        fast, fast_ms = clocked(partial(prepared.path, *ends))
-        _, near_ms = clocked(partial(prepared.path, *ends, epsilon=0.01))
+        endpoints = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
+        slow, slow_ms = clocked(partial(plain.path, *endpoints, budget_s=1e9))
+        fast, fast_ms = clocked(partial(prepared.path, *endpoints))
+        _, near_ms = clocked(partial(prepared.path, *endpoints, epsilon=0.01))
         agree = agree and abs(slow.length_cells - fast.length_cells) < 1e-6
         rows.append((slow.expanded, fast.expanded, slow_ms, fast_ms, near_ms))
     n_free = int(free.sum())

@@ -25,12 +25,12 @@ from benchmarks._rooms_truth import FLOORS, RADIUS_M, Floor
 from hybridnav.grid.names import Segmentation
 from hybridnav.metrics import compare_rooms
 from hybridnav.route import MaxDistanceSearch, RoomSearch
-from hybridnav.topology.merging import Pieces
-from hybridnav.topology.pieces import (
-    contracted_pieces,
-    wall_line_pieces,
-    walled_pieces,
-    watershed_pieces,
+from hybridnav.topology.merging import Segments
+from hybridnav.topology.segments import (
+    contracted_segments,
+    wall_line_segments,
+    walled_segments,
+    watershed_segments,
 )
 from hybridnav.viz import plot_rooms
 
@@ -39,22 +39,22 @@ if TYPE_CHECKING:
     from hybridnav.metrics import RoomAgreement
 
 METHODS: tuple[Segmentation, ...] = get_args(Segmentation)
-PIECES = {
-    "wall lines alone": wall_line_pieces,
-    "walls": walled_pieces,
-    "watershed": watershed_pieces,
-    "contraction": contracted_pieces,
+SEGMENTS = {
+    "wall lines alone": wall_line_segments,
+    "walls": walled_segments,
+    "watershed": watershed_segments,
+    "contraction": contracted_segments,
 }
 LEAST_M2 = 1.0
 NEAR_M = 1.0
 """How far a found door may lie from a true one."""
 
 
-def only_pieces(floor: Floor, method: str) -> hn.RoomLabels:
-    """What a method cuts, before pieces are merged: only those below the least area are."""
-    pieces = Pieces(PIECES[method](floor.grid), floor.grid.resolution_m)
-    pieces.merge_small(LEAST_M2)
-    labels = pieces.label_of
+def only_segments(floor: Floor, method: str) -> hn.RoomLabels:
+    """What a method cuts, before segments are merged: only those below the least area are."""
+    segments = Segments(SEGMENTS[method](floor.grid), floor.grid.resolution_m)
+    segments.merge_small(LEAST_M2)
+    labels = segments.label_of
     return hn.RoomLabels(tuple(map(str, range(int(labels.max()) + 1))), labels)
 
 
@@ -117,14 +117,14 @@ def segmentation_table(floors: list[Floor]) -> dict[tuple[str, str], hn.RoomLabe
         "labelled it does not count.\n"
     )
     print(
-        "| floor | way | MCC | rooms found / true | precision | recall | doors | offset, m "
+        "| floor | method | MCC | rooms found / true | precision | recall | doors | offset, m "
         "| found doors right | s |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
     found: dict[tuple[str, str], hn.RoomLabels] = {}
     for floor in floors:
-        for way in PIECES:
-            _print_row(floor, f"{way}, not merged", only_pieces(floor, way), "")
+        for method in SEGMENTS:
+            _print_row(floor, f"{method}, not merged", only_segments(floor, method), "")
         for method in METHODS:
             began = time.perf_counter()
             rooms = found[floor.name, method] = hn.find_rooms(floor.grid, method=method)
@@ -132,13 +132,13 @@ def segmentation_table(floors: list[Floor]) -> dict[tuple[str, str], hn.RoomLabe
     return found
 
 
-def _print_row(floor: Floor, way: str, found: hn.RoomLabels, seconds: str) -> None:
+def _print_row(floor: Floor, method: str, found: hn.RoomLabels, seconds: str) -> None:
     score = agreement(floor, found)
     doors = doors_met(floor, floor.topology(found))
     offsets = doors.offsets_m
     total = len(floor.reachable_doors)
     print(
-        f"| {floor.name} | {way} | {score.mcc:.3f} | {score.n_found} / {len(score.true_labels)} "
+        f"| {floor.name} | {method} | {score.mcc:.3f} | {score.n_found} / {len(score.true_labels)} "
         f"| {score.precision.mean():.2f} | {score.recall.mean():.2f} "
         f"| {len(offsets)} / {total}, {len(offsets) / total:.0%} "
         f"| {np.mean(offsets) if offsets else np.nan:.2f} "
@@ -180,7 +180,7 @@ def routes_table(floors: list[Floor]) -> bool:
     print("\n## Routes between every ordered pair of rooms, true rooms\n")
     print(
         "The grid is the preset `grid-astar`, A* on the whole map, between the rooms' points "
-        "and between the ends that plans from anywhere to anywhere chose. Plans of `portals` "
+        "and between the endpoints that plans from anywhere to anywhere chose. Plans of `portals` "
         "must be solved exactly when it is, and the levels of places and rooms must agree; "
         "connected free cells, labelled by scipy, say the same of any two rooms.\n"
     )
@@ -238,8 +238,8 @@ def _all_pairs(floor: Floor, topology: hn.TopologicalMap) -> AllPairs:
         best, plan = on_grid.plan(a, b, at="point"), planner.plan(a, b, at="point")
         on_places = places.search(topology.place_at(cells[a]), topology.place_at(cells[b]))
         any_plan = planner.plan(a, b)
-        ends = (a, b) if any_plan.path is None else any_plan.path.points[[0, -1]]
-        somewhere = on_grid.plan(*ends)
+        endpoints = (a, b) if any_plan.path is None else any_plan.path.points[[0, -1]]
+        somewhere = on_grid.plan(*endpoints)
         joined = floor.components[cells[a]] == floor.components[cells[b]]
         found.by_component += (joined, bool(parts[i] & parts[j])) != (best.solved, somewhere.solved)
         found.by_point += not (best.solved == plan.solved == (on_places is not None))
@@ -281,7 +281,7 @@ KINDS = ("listed", "neighbours", "label line")
 
 @dataclass(frozen=True)
 class Passage:
-    """The way from one named room to the next, through one door, or two with a gap between."""
+    """The route from one named room to the next, through one door, or two with a gap between."""
 
     rooms: tuple[str, str]
     doors: tuple[hn.Door, ...]

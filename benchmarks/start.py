@@ -88,12 +88,12 @@ def far_apart(planner: hn.HybridPlanner) -> str:
     return json.dumps([points[order[0]].tolist(), points[order[-1]].tolist()])
 
 
-def first_answer(large: Path, ends: str, folder: Path, runs: int) -> tuple[float, float]:
+def first_answer(large: Path, endpoints: str, folder: Path, runs: int) -> tuple[float, float]:
     """Seconds to load a model, and from there to the first answer, each the least of some runs."""
     small = folder / "small.hnm"
     grid = hn.load_map(FIGURE, robot_radius_m=0.0)
     hn.save(prepared(grid), small)
-    command = [sys.executable, "-c", _FIRST, str(small), str(large), ends]
+    command = [sys.executable, "-c", _FIRST, str(small), str(large), endpoints]
     found = [
         json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
         for _ in range(runs)

@@ -33,27 +33,27 @@ ROUNDS = 5
 
 def per_second(
     planner: hn.HybridPlanner,
-    ends: list[tuple[FloatArray, FloatArray]],
+    endpoints: list[tuple[FloatArray, FloatArray]],
     n_threads: int,
     time_s: float,
     *,
     many: bool = False,
 ) -> float:
     """Queries answered per second by so many threads, each with all pairs in its own order."""
-    starts, goals = (np.array(side) for side in zip(*ends, strict=True))
+    starts, goals = (np.array(side) for side in zip(*endpoints, strict=True))
     counts = [0] * n_threads
     start = threading.Barrier(n_threads + 1)
 
     def work(number: int) -> None:
-        at = number * len(ends) // n_threads
+        at = number * len(endpoints) // n_threads
         start.wait()
         until = time.perf_counter() + time_s
         while time.perf_counter() < until:
             if many:
                 planner.plan_many(starts, goals)
             else:
-                planner.plan(*ends[at % len(ends)])
-            counts[number] += len(ends) if many else 1
+                planner.plan(*endpoints[at % len(endpoints)])
+            counts[number] += len(endpoints) if many else 1
             at += 1
 
     threads = [threading.Thread(target=work, args=(number,)) for number in range(n_threads)]
@@ -78,7 +78,7 @@ def main() -> None:
     )
     pairs = sample_pairs(topology.grid, 100, seed=0)
     frame = topology.grid.frame
-    ends = [(frame.points_of(pair.start), frame.points_of(pair.goal)) for pair in pairs]
+    endpoints = [(frame.points_of(pair.start), frame.points_of(pair.goal)) for pair in pairs]
     sys.stdout.write(f"{options.map.stem}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}\n")
     print("| preset | queries/s, one thread | two threads | ratio |")
     print("|---|---|---|---|")
@@ -86,11 +86,11 @@ def main() -> None:
         if preset.startswith("ompl-"):
             continue
         planner = hn.HybridPlanner(topology, preset=preset)
-        per_second(planner, ends, 2, options.seconds, many=options.many)
+        per_second(planner, endpoints, 2, options.seconds, many=options.many)
         # In turns, so that what else the machine does meets both.
         rates = [
             [
-                per_second(planner, ends, n_threads, options.seconds, many=options.many)
+                per_second(planner, endpoints, n_threads, options.seconds, many=options.many)
                 for n_threads in (1, 2)
             ]
             for _ in range(ROUNDS)

@@ -25,8 +25,16 @@ START, GOAL = (1.0, 13.2), (40.6, 19.4)
 def draw_route(file: Path) -> None:
     """Draw the picture of `make route`, with its command."""
     command = [sys.executable, "-m", "hybridnav", "plan", str(OFFICE)]
-    ends = (",".join(map(str, end)) for end in (START, GOAL))
-    command += ["--start", next(ends), "--goal", next(ends), "--compare", "--plot", str(file)]
+    endpoints = (",".join(map(str, end)) for end in (START, GOAL))
+    command += [
+        "--start",
+        next(endpoints),
+        "--goal",
+        next(endpoints),
+        "--compare",
+        "--plot",
+        str(file),
+    ]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own command
 
 

@@ -158,7 +158,7 @@ def portals_every(spacing_cells: int | None) -> PortalOptions:
     if spacing_cells is None:
         return PortalOptions()
     return PortalOptions(
-        all_gates_levels=0,
+        all_border_cells_levels=0,
         sparse_spacings_cells=(spacing_cells,),
         most_sparse_bytes_per_cell=math.inf,
     )

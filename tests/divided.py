@@ -124,12 +124,12 @@ def gate_graph(portals: Portals) -> Any:
     graph = sparse.coo_array((portals.exit_cost.astype(float), (tail, portals.exit_gate)), (n, n))
     starts = portals.gate_start.tolist()
     pairs = [itertools.product(range(a, b), repeat=2) for a, b in itertools.pairwise(starts)]
-    ends = np.array([*itertools.chain(*pairs)], dtype=np.int64).reshape(-1, 2).T
-    return (graph + sparse.coo_array((portals.clique.astype(float), (*ends,)), (n, n))).tocsr()
+    endpoints = np.array([*itertools.chain(*pairs)], dtype=np.int64).reshape(-1, 2).T
+    return (graph + sparse.coo_array((portals.clique.astype(float), (*endpoints,)), (n, n))).tocsr()
 
 
-def pieces_of(divided: Divided) -> Any:
-    """The connected pieces of the fields, as a partition."""
+def components_of(divided: Divided) -> Any:
+    """The connected components of the fields, as a partition."""
     _, piece = csgraph.connected_components(divided.inside, directed=False)
     return piece.reshape(divided.grid.shape).astype(np.int32)
 
@@ -167,7 +167,7 @@ def partitions(draw: st.DrawFn, side: int = SIDE) -> Divided:
     else:
         names = block_labels(classes.shape, rng) if kind == "pieces" else np.zeros_like(row)
     divided = Divided(grid, names.astype(np.int32), spacings, entered)
-    pieces = pieces_of(divided)
+    pieces = components_of(divided)
     # Cells that may not be entered may have a field or none, and numbers of fields have gaps.
     pieces[~divided.free & (rng.random(classes.shape) < 0.5)] = -1
     return replace(divided, field_of=rng.permutation(pieces.max(initial=0) + 1)[pieces] * 3)

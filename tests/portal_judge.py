@@ -55,7 +55,7 @@ class Judge:
     def of(cls, topology: TopologicalMap, gates: str = "all") -> Judge:
         """Route on the fields that the search itself chooses."""
         judge = cls.__new__(cls)
-        options = PortalOptions(all_gates_levels=0, least_bytes=0)
+        options = PortalOptions(all_border_cells_levels=0, least_bytes=0)
         chosen = {"options": options} if gates == "sparse" else {}
         built = shared_portals(topology, **chosen)
         judge._set(Divided(topology.grid, built.field_of), built)
@@ -75,8 +75,8 @@ class Judge:
         """Graph of the moves inside fields, and of those between gates."""
         portals, size = self.search.portals, self.divided.label.size
         tail = np.repeat(portals.gate_cell, np.diff(portals.exit_start))
-        ends = tail, portals.gate_cell[portals.exit_gate]
-        exits = sparse.coo_array((portals.exit_cost.astype(float), ends), shape=(size, size))
+        endpoints = tail, portals.gate_cell[portals.exit_gate]
+        exits = sparse.coo_array((portals.exit_cost.astype(float), endpoints), shape=(size, size))
         return (self.divided.inside + exits).tocsr()
 
     def flat(self, cell: Any) -> int:
@@ -88,7 +88,7 @@ class Judge:
         return self.search.path(tuple(start), tuple(goal), epsilon=epsilon)
 
     def judge(self, start: Any, goals: Any, rng: np.random.Generator) -> None:
-        """Judge ways from one cell to some others."""
+        """Judge paths from one cell to some others."""
         at = np.array([self.flat(start)])
         costs = costs_from(self.divided.moves, at)[0]
         for goal in goals:
@@ -100,7 +100,7 @@ class Judge:
                 self.judge_promise(answer, epsilon, (start, goal))
 
     def judge_answer(self, answer: PortalAnswer, start: Any, goal: Any, optimum: float) -> None:
-        """A legal path between the ends where there is one, its points, and its bound."""
+        """A legal path between the endpoints where there is one, its points, and its bound."""
         if math.isinf(optimum):
             assert answer.cells is None
             assert answer.points.shape == (0, 2)
@@ -120,17 +120,19 @@ class Judge:
         if cost_of(cells) > optimum:
             assert answer.lower_bound_cells < answer.length_cells
 
-    def judge_promise(self, answer: PortalAnswer, epsilon: float, ends: tuple[Any, Any]) -> None:
+    def judge_promise(
+        self, answer: PortalAnswer, epsilon: float, endpoints: tuple[Any, Any]
+    ) -> None:
         """What an answer promises of itself."""
         by_gates = self.search.is_exact and not self.is_rounded
-        share = self.label[tuple(ends[0])] == self.label[tuple(ends[1])]
+        share = self.label[tuple(endpoints[0])] == self.label[tuple(endpoints[1])]
         if by_gates and not share:
             assert answer.expanded == 0, "cells were searched for what gates know"
         assert answer.length_cells <= (1 + epsilon) * answer.lower_bound_cells * (1 + 1e-9)
         if epsilon == 0:
             assert answer.lower_bound_cells == answer.length_cells
 
-    def ends(self, rng: np.random.Generator, count: int) -> Any:
+    def endpoints(self, rng: np.random.Generator, count: int) -> Any:
         """Some starts, each with goals: any cells, itself, its field, beside it, over a border."""
         portals, cols = self.search.portals, self.divided.grid.shape[1]
         for _ in range(count):
@@ -146,7 +148,7 @@ class Judge:
             yield start.tolist(), [np.asarray(goal).tolist() for goal in goals]
 
     def run(self, seed: int, count: int = 4) -> None:
-        """Judge ways from some starts."""
+        """Judge paths from some starts."""
         rng = np.random.default_rng(seed)
-        for start, goals in self.ends(rng, count):
+        for start, goals in self.endpoints(rng, count):
             self.judge(start, goals, rng)

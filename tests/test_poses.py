@@ -116,7 +116,7 @@ def test_poses_on_curves(
     driven = gaps(poses) / np.sinc(turns / (2 * np.pi))
     assert driven.max(initial=0) <= spacing_m * (1 + 1e-6)
     assert driven.sum() == pytest.approx(path.length_m, rel=1e-6)
-    # Each step is tangent to the headings at both of its ends, ahead or backwards.
+    # Each step is tangent to the headings at both of its endpoints, ahead or backwards.
     steps = np.diff(poses[:, :2], axis=0)
     moves = gaps(poses) > 1e-6
     travel = np.arctan2(steps[:, 1], steps[:, 0]) + np.where(ahead[:-1] < 0, np.pi, 0)

@@ -27,7 +27,7 @@ def replace_file(path: Path, content: bytes | Iterable[bytes | memoryview]) -> N
     path
         The file; an existing one is replaced and keeps its mode, a link stays a link.
     content
-        The whole content, at once or in pieces.
+        The whole content, at once or in parts.
 
     Raises
     ------
@@ -50,8 +50,8 @@ def _write(path: Path, content: bytes | Iterable[bytes | memoryview]) -> None:
         path.write_bytes(content)
         return
     with path.open("wb") as file:
-        for piece in content:
-            file.write(piece)
+        for part in content:
+            file.write(part)
         if file.seekable():  # a pipe has no disc to reach
             file.flush()
             os.fsync(file.fileno())

@@ -85,7 +85,7 @@ class Motion:
         return np.append(travel, travel[-1]) if len(travel) else np.zeros(1)
 
     def bends(self) -> LongArray:
-        """Return the indices of points that even spacing must keep, with both ends, int64."""
+        """Return the indices of points that even spacing must keep, with both endpoints, int64."""
         lengths, turns = self.lengths_m, self._turns
         moves = lengths > 0
         rate = np.divide(turns, lengths, out=np.zeros_like(turns), where=moves)

@@ -196,7 +196,7 @@ class PlanStats:
     """Number of cells that the refiner expanded."""
     expanded_places: int = 0
     """Number of places that the coarse search expanded."""
-    expanded_gates: int = 0
+    expanded_border_cells: int = 0
     """Number of border cells that the search over portals expanded."""
     expanded_intervals: int = 0
     """Number of intervals that the search on the mesh expanded."""
@@ -348,7 +348,7 @@ class PlanResult:
             "steps": list(self.refinement.steps) if self.refinement else None,
             "expanded": self.stats.expanded,
             "expanded_places": self.stats.expanded_places,
-            "expanded_gates": self.stats.expanded_gates,
+            "expanded_border_cells": self.stats.expanded_border_cells,
             "expanded_intervals": self.stats.expanded_intervals,
             "corridor_cells": self.stats.corridor_cells,
             "seconds": {stage: round(s, 6) for stage, s in self.stats.seconds.items()},

@@ -21,7 +21,7 @@ from tests.strategies import class_grids, drawn, examples, occupancy_grid
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav.baselines import Answer
+    from hybridnav.baselines import MethodResult
 
 SIDES = st.sampled_from([2, 3, 5, 10, 64])
 
@@ -41,7 +41,7 @@ def clusters(shape: tuple[int, int], side: int) -> list[tuple[slice, slice]]:
     return [(slice(row, row + side), slice(col, col + side)) for row in rows for col in cols]
 
 
-def passed(method: HpaStar, answer: Answer) -> list[int]:
+def passed(method: HpaStar, answer: MethodResult) -> list[int]:
     """Regions that the cells of an answer pass."""
     assert method.region_of is not None
     assert answer.cells is not None
@@ -114,7 +114,7 @@ def test_edges_are_shortest_paths_inside_clusters_and_steps_between_them(
     cells = [divmod(int(cell), cols) for cell in graph.cells]
     enterable = classes == CellClass.FREE
     assert method.n_nodes == len(cells)
-    assert 2 * method.n_edges == len(graph.ends)
+    assert 2 * method.n_edges == len(graph.endpoints)
     for node, (row, col) in enumerate(cells):
         mine = (row // side, col // side)
         rows, columns = (slice(at * side, (at + 1) * side) for at in mine)
@@ -122,9 +122,9 @@ def test_edges_are_shortest_paths_inside_clusters_and_steps_between_them(
         inside[rows, columns] = True
         truth = distances(move_graph(enterable, inside), classes.shape, (row, col))
         edges = slice(int(graph.first[node]), int(graph.first[node + 1]))
-        ends, lengths = graph.ends[edges], length_in_cells(graph.costs[edges])
-        found = {int(end): float(x) for end, x in zip(ends, lengths, strict=True)}
-        assert len(found) == len(ends)
+        endpoints, lengths = graph.endpoints[edges], length_in_cells(graph.costs[edges])
+        found = {int(end): float(x) for end, x in zip(endpoints, lengths, strict=True)}
+        assert len(found) == len(endpoints)
         for other, cell in enumerate(cells):
             if (cell[0] // side, cell[1] // side) != mine:
                 steps = abs(cell[0] - row) + abs(cell[1] - col)

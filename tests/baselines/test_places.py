@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from hybridnav.baselines import Answer, Method
+    from hybridnav.baselines import Method, MethodResult
 
 Cell = tuple[int, int]
 METHODS: list[Callable[[hn.TopologicalMap], Method]] = [ExactOverlay, SimpleGraphPyramid]
@@ -75,12 +75,12 @@ def free_pairs(classes: Any, count: int, seed: int) -> list[tuple[Cell, Cell]]:
     return [((a, b), (c, d)) for (a, b), (c, d) in chosen.tolist()]
 
 
-def ends_match(answer: Answer, start: Cell, goal: Cell) -> bool:
+def endpoints_match(answer: MethodResult, start: Cell, goal: Cell) -> bool:
     cells = answer.cells
     return cells is not None and tuple(cells[0]) == start and tuple(cells[-1]) == goal
 
 
-def assert_plan_holds(method: Method, answer: Answer, start: Cell, goal: Cell) -> None:
+def assert_plan_holds(method: Method, answer: MethodResult, start: Cell, goal: Cell) -> None:
     """The plan goes from the start's place to the goal's, and the path stays inside it."""
     region_of = method.region_of
     assert region_of is not None
@@ -106,7 +106,7 @@ def test_the_overlay_is_as_short_as_the_grid_optimum(scene: Scene, seed: int) ->
         if np.isinf(optimum):
             assert answer.cells is None
             continue
-        assert ends_match(answer, start, goal)
+        assert endpoints_match(answer, start, goal)
         assert_legal(answer.cells, free)
         assert recounted(answer.cells) == pytest.approx(optimum, abs=1e-9)
         assert answer.bound == 1.0
@@ -194,7 +194,7 @@ def test_solvability_is_that_of_the_grid(
         assert (answer.cells is not None) == (component[start] == component[goal])
         assert answer.nodes == same.nodes
         if answer.cells is not None:
-            assert ends_match(answer, start, goal)
+            assert endpoints_match(answer, start, goal)
             assert_legal(answer.cells, free)
             assert_plan_holds(method, answer, start, goal)
             assert same.cells is not None

@@ -93,8 +93,8 @@ def test_a_broken_promise_is_counted_and_named(
 ) -> None:
     plan = hn.HybridPlanner.plan
 
-    def boast(planner: hn.HybridPlanner, *ends: Any) -> hn.PlanResult:
-        result = plan(planner, *ends)
+    def boast(planner: hn.HybridPlanner, *endpoints: Any) -> hn.PlanResult:
+        result = plan(planner, *endpoints)
         if planner.preset.name != "paper" or not result.solved:
             return result
         return replace(result, lower_bound=1.01 * result.cost)

@@ -129,18 +129,18 @@ def test_a_path_equal_to_its_bound_is_called_optimal(cli, rooms):
 def test_a_path_that_ends_short_of_the_goal_says_by_how_much():
     points = np.array([[1.0, 1.0], [1.5, 1.0]])
     path = hn.Path(np.zeros((2, 2), dtype=np.int64), points, 0.5)
-    ends = (1.0, 1.0), (1.5, 3.25, 0.5)
+    endpoints = (1.0, 1.0), (1.5, 3.25, 0.5)
     result = hn.PlanResult(
-        hn.PlanStatus.APPROXIMATE, "any-angle", path, start=ends[0], goal=ends[1]
+        hn.PlanStatus.APPROXIMATE, "any-angle", path, start=endpoints[0], goal=endpoints[1]
     )
     grid = hn.OccupancyGrid(np.zeros((4, 4), np.float32), hn.Frame(1.0))
-    text = summary(grid, ends, result.to_dict())
+    text = summary(grid, endpoints, result.to_dict())
     assert "status     approximate\n" in text
     assert "path       ends 2.25 m short of the goal after 0.50 m\n" in text
 
 
 @pytest.mark.parametrize(
-    ("ends", "status"),
+    ("endpoints", "status"),
     [
         ("-0.1,3.5 7.5,3.5", "start outside the map"),
         ("1.5,3.5 1e300,3.5", "goal outside the map"),
@@ -152,8 +152,10 @@ def test_a_path_that_ends_short_of_the_goal_says_by_how_much():
     ],
 )
 @pytest.mark.parametrize("preset", ["paper", "grid-astar"])
-def test_what_is_not_solved_exits_with_1_and_names_the_status(cli, rooms, preset, ends, status):
-    start, goal = ends.split()
+def test_what_is_not_solved_exits_with_1_and_names_the_status(
+    cli, rooms, preset, endpoints, status
+):
+    start, goal = endpoints.split()
     query = ("plan", rooms, "--start", start, "--goal", goal, "--preset", preset, "--compare")
     text = cli(*query)
     assert (text.code, text.err) == (1, "")
@@ -202,12 +204,12 @@ def test_points_of_a_tour_outside_the_map_are_told_at_once_too(cli, rooms, tmp_p
 
 def test_negative_coordinates_are_no_options(cli, draw):
     path = draw("...", "...", origin=[-3, -2, 0])
-    for ends in (
+    for endpoints in (
         ["--start", "-2.5,-1.5", "--goal", "-.5,-1.5"],
         ["--start=-2.5,-1.5", "--goal=-0.5,-1.5"],
         ["--goal", " -5e-1 , -1.5 ", "--start", "-2.5,-1.5"],
     ):
-        answer = cli("plan", path, *ends, "--json").answer
+        answer = cli("plan", path, *endpoints, "--json").answer
         assert answer["points"] == [[-2.5, -1.5], [-0.5, -1.5]]
 
 
@@ -248,15 +250,15 @@ def test_an_option_wins_over_set_and_set_over_the_preset(cli, rooms):
 
 @pytest.mark.parametrize("command", ["plan", "tour", "rooms"])
 def test_a_radius_that_leaves_no_free_cell_is_told_as_that(cli, rooms, command):
-    ends = {
+    endpoints = {
         "plan": ("--start", "1.5,3.5", "--goal", "7.5,3.5"),
         "tour": ("--from", "room-1", "--to", "7.5,3.5"),
         "rooms": (),
     }[command]
     name = "rooms" if command == "rooms" else "plan"
-    done = cli(name, rooms, *ends, "--robot-radius", 25)
+    done = cli(name, rooms, *endpoints, "--robot-radius", 25)
     assert done.refuses(2, "a robot radius of 25 m leaves no free cell on m", "--robot-radius")
-    assert cli(name, rooms, *ends, "--robot-radius", 0.5).code == 0
+    assert cli(name, rooms, *endpoints, "--robot-radius", 0.5).code == 0
 
 
 def test_an_infinite_merge_distance_still_gives_strict_json(cli, rooms):
@@ -355,8 +357,8 @@ def test_a_command_that_lacks_its_command_gets_help(cli, arguments):
 )
 @pytest.mark.parametrize("command", ["plan", "show"])
 def test_a_bad_map_is_one_line_and_exit_code_3(cli, draw, command, keys, words):
-    ends = ENDS if command == "plan" else ()
-    assert cli(command, draw("..", **keys), *ends).refuses(3, "m.yaml", *words)
+    endpoints = ENDS if command == "plan" else ()
+    assert cli(command, draw("..", **keys), *endpoints).refuses(3, "m.yaml", *words)
 
 
 def test_files_that_are_not_there_or_not_meant(cli, rooms, tmp_path):
@@ -492,8 +494,8 @@ def test_show_and_plan_bear_the_smallest_maps(cli, draw, lines):
 )
 def test_plot_draws_a_picture_beside_the_result(cli, rooms, tmp_path, name, magic):
     picture = tmp_path / name
-    ends = ("--start", "1.5,3.5", "--goal", "7.5,3.5")
-    done = cli("plan", rooms, *ends, "--compare", "--json", "--plot", picture)
+    endpoints = ("--start", "1.5,3.5", "--goal", "7.5,3.5")
+    done = cli("plan", rooms, *endpoints, "--compare", "--json", "--plot", picture)
     assert (done.code, done.err) == (0, "")
     assert done.answer["status"] == "solved"
     assert picture.read_bytes().startswith(magic)
@@ -532,17 +534,17 @@ def _check_png(path):
 @pytest.mark.parametrize("command", ["plan", "show"])
 def test_a_picture_that_cannot_be_is_refused_before_the_work(cli, tmp_path, command, name, word):
     (tmp_path / "folder.png").mkdir()
-    ends = ENDS if command == "plan" else ()
+    endpoints = ENDS if command == "plan" else ()
     # The map is not even looked for: that would be exit code 3.
-    done = cli(command, tmp_path / "gone.yaml", *ends, "--plot", tmp_path / name)
+    done = cli(command, tmp_path / "gone.yaml", *endpoints, "--plot", tmp_path / name)
     assert done.refuses(2, "--plot", word)
 
 
 def test_a_result_is_not_lost_with_its_picture(cli, rooms, tmp_path):
     picture = tmp_path / "a.png"
     picture.symlink_to("/dev/full")
-    ends = ("--start", "1.5,3.5", "--goal", "7.5,3.5")
-    done = cli("plan", rooms, *ends, "--json", "--plot", picture)
+    endpoints = ("--start", "1.5,3.5", "--goal", "7.5,3.5")
+    done = cli("plan", rooms, *endpoints, "--json", "--plot", picture)
     assert (done.code, done.answer["status"]) == (2, "solved")
     assert done.err.count("\n") == 1
     assert "a.png" in done.err

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hybridnav.cli import compiling
-from hybridnav.cli.compiling import told_of_compiling
+from hybridnav.cli.compiling import notice_of_compiling
 from hybridnav.config import load_preset
 
 OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
@@ -65,7 +65,7 @@ def wait_until(is_so, seconds: float = 60.0) -> None:
 
 
 def test_the_user_is_told_once_and_only_of_seconds(capsys: pytest.CaptureFixture[str]) -> None:
-    with told_of_compiling():
+    with notice_of_compiling():
         KERNELS.info("compiled", extra={"seconds": 1.5, "is_kept": True})
         assert capsys.readouterr().err == ""
         for _ in range(3):
@@ -80,7 +80,7 @@ def test_the_user_is_told_once_and_only_of_seconds(capsys: pytest.CaptureFixture
 def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    with told_of_compiling():
+    with notice_of_compiling():
         KERNELS.info("compiled", extra={"seconds": 9.0, "is_kept": False})
     assert capsys.readouterr().err == ""
 

@@ -125,8 +125,8 @@ def test_clearance_weighs_walls_and_is_never_less_than_the_length(yaw_rad: float
     assert cost(along) == pytest.approx(2.8 * (1 + 3 * 0.8), rel=1e-6)
     assert cost(far) == pytest.approx(2.8)
     rng = np.random.default_rng(1)
-    for ends in rng.uniform(0, 1, (20, 2, 2)):
-        line = grid.frame.points_of_grid(ends * grid.shape)
+    for endpoints in rng.uniform(0, 1, (20, 2, 2)):
+        line = grid.frame.points_of_grid(endpoints * grid.shape)
         assert cost(line) == pytest.approx(cost(line[::-1]))
         assert cost(line) >= np.hypot(*(line[1] - line[0])) * (1 - 1e-9)
 

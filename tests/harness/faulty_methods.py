@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.baselines import Answer, Line
+from hybridnav.baselines import AnyAngleResult, MethodResult
 from hybridnav.baselines.grid import GridAstar
 from hybridnav.config import Preset
 from hybridnav.grid import CellClass
@@ -61,7 +61,7 @@ class SoundPlaces(HybridMethod):
 class ThroughWall(Sound):
     """One cell of the path lies inside an obstacle, between two neighbours of that cell."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         if answer.cells is None:
             return answer
@@ -84,7 +84,7 @@ class CutsCorners(Sound):
         super().__init__(grid)
         self._search = GridSearch(self.free, corner_cutting=True)
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         return replace(super().solve(start, goal), bound=math.inf)
 
 
@@ -93,7 +93,7 @@ class _Longer(Sound):
 
     claim: float
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         cells = answer.cells
         if cells is None or len(cells) < 2:
@@ -118,7 +118,7 @@ class HonestlyLong(_Longer):
 class Jumps(Sound):
     """One step from start to goal: shorter than the optimum wherever a path must bend."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         return answer if answer.cells is None else replace(answer, cells=np.array([start, goal]))
 
@@ -126,7 +126,7 @@ class Jumps(Sound):
 class StopsShort(Sound):
     """The path ends a cell before the goal."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         return answer if answer.cells is None else replace(answer, cells=answer.cells[:-1])
 
@@ -134,24 +134,24 @@ class StopsShort(Sound):
 class LeavesTheMap(Sound):
     """The path goes to the far end of the world and back."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         far = (-(2**40), 2**40)
-        return Answer(np.array([start, far, goal]))
+        return MethodResult(np.array([start, far, goal]))
 
 
 class WalksThroughAll(Sound):
     """A path for every pair, across obstacles where need be."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         search = GridSearch(np.ones_like(self.free))
-        return Answer(search.search(start, goal).cells)
+        return MethodResult(search.search(start, goal).cells)
 
 
 class NoCells(Sound):
     """An answer that is no path at all."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:  # noqa: ARG002
-        return Answer(np.array([[0.5, math.nan]]))
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:  # noqa: ARG002
+        return MethodResult(np.array([[0.5, math.nan]]))
 
 
 # --- wrong plans and regions --------------------------------------------------------------------
@@ -160,17 +160,17 @@ class NoCells(Sound):
 class MissingDoor(SoundPlaces):
     """Two places beside each other are not known to be: no path from one to the other."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         assert self.region_of is not None
         if self.region_of[start] == self.region_of[goal]:
             return super().solve(start, goal)
-        return Answer(None)
+        return MethodResult(None)
 
 
 class SkipsRegions(SoundPlaces):
     """The plan names its first and last region only, the path is right."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         if answer.nodes is None or len(answer.nodes) < 3:
             return answer
@@ -180,7 +180,7 @@ class SkipsRegions(SoundPlaces):
 class Backwards(SoundPlaces):
     """The plan runs from the goal to the start."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         return replace(answer, nodes=answer.nodes and answer.nodes[::-1], arcs=None)
 
@@ -188,7 +188,7 @@ class Backwards(SoundPlaces):
 class UnknownRegions(SoundPlaces):
     """The plan names regions that there are not."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         if answer.nodes is None:
             return answer
@@ -223,44 +223,44 @@ class HomelessCells(Sound):
 class SoundLine(Sound):
     """A method without a fault, for the others to derive from: A* on the grid, pulled taut."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer = super().solve(start, goal)
         if answer.cells is None:
             return answer
-        ends = self.grid.frame.points_of([start, goal])
-        points = LineOfSight(self.grid).shorten(answer.cells, ends[0], ends[1])
-        return Answer(None, line=self.line(points))
+        endpoints = self.grid.frame.points_of([start, goal])
+        points = LineOfSight(self.grid).shorten(answer.cells, endpoints[0], endpoints[1])
+        return MethodResult(None, any_angle=self.line(points))
 
-    def line(self, points: NDArray[np.float64]) -> Line:
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
         """Return the path with its claims."""
-        return Line(points, length_of(points), lower_bound_m=length_of(points[[0, -1]]))
+        return AnyAngleResult(points, length_of(points), lower_bound_m=length_of(points[[0, -1]]))
 
 
 class LineThroughWall(SoundLine):
     """Straight from start to goal, whatever lies between."""
 
-    def line(self, points: NDArray[np.float64]) -> Line:
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
         return super().line(points[[0, -1]])
 
 
 class LineSaidShort(SoundLine):
     """A right path that claims to be 1 % shorter than it is."""
 
-    def line(self, points: NDArray[np.float64]) -> Line:
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
         return replace(super().line(points), length_m=0.99 * length_of(points))
 
 
 class LineBelowItsBound(SoundLine):
     """A right path, and the claim that none is as short."""
 
-    def line(self, points: NDArray[np.float64]) -> Line:
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
         return replace(super().line(points), lower_bound_m=1.01 * length_of(points))
 
 
 class LineBesideTheGoal(SoundLine):
     """The path ends a tenth of a cell beside the goal."""
 
-    def line(self, points: NDArray[np.float64]) -> Line:
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
         off = points.copy()
         off[-1] += 0.1 * self.grid.resolution_m
         return super().line(off)
@@ -269,7 +269,7 @@ class LineBesideTheGoal(SoundLine):
 class LineFromElsewhere(SoundLine):
     """The path starts a tenth of a cell beside the start."""
 
-    def line(self, points: NDArray[np.float64]) -> Line:
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
         off = points.copy()
         off[0] += 0.1 * self.grid.resolution_m
         return super().line(off)
@@ -278,58 +278,58 @@ class LineFromElsewhere(SoundLine):
 class LineSaidOptimal(SoundLine):
     """Along the centres of the cells of the grid's path, and the claim that none is shorter."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         cells = Sound.solve(self, start, goal).cells
         if cells is None:
-            return Answer(None)
+            return MethodResult(None)
         line = self.line(self.grid.frame.points_of(cells))
-        return Answer(None, line=replace(line, lower_bound_m=line.length_m))
+        return MethodResult(None, any_angle=replace(line, lower_bound_m=line.length_m))
 
 
 class LineForAll(SoundLine):
     """Straight from start to goal where there is no path too."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
-        return Answer(None, line=self.line(self.grid.frame.points_of([start, goal])))
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        return MethodResult(None, any_angle=self.line(self.grid.frame.points_of([start, goal])))
 
 
 class LineOfNothing(SoundLine):
     """Points that are no numbers, and a bound that is none."""
 
-    def line(self, points: NDArray[np.float64]) -> Line:
-        return Line(np.full_like(points, math.nan), math.nan, lower_bound_m=math.nan)
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
+        return AnyAngleResult(np.full_like(points, math.nan), math.nan, lower_bound_m=math.nan)
 
 
 class LineUnsaid(SoundLine):
     """A right path; of its length and of a bound nothing that can be checked."""
 
-    def line(self, points: NDArray[np.float64]) -> Line:
-        return Line(points, math.nan, lower_bound_m=math.nan)
+    def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
+        return AnyAngleResult(points, math.nan, lower_bound_m=math.nan)
 
 
 class LineOverHomelessCells(HomelessCells):
     """Any-angle paths over cells some of which are in no region."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         cells = super().solve(start, goal).cells
         if cells is None:
-            return Answer(None)
+            return MethodResult(None)
         points = self.grid.frame.points_of(cells)
-        return Answer(None, line=Line(points, length_of(points)))
+        return MethodResult(None, any_angle=AnyAngleResult(points, length_of(points)))
 
 
 class OwnGridOrNothing(SoundLine):
     """A third of the paths are its own, a third the grid's, and for a third it has no time."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         answer, turn = super().solve(start, goal), (start[0] + goal[0]) % 3
         cells = Sound.solve(self, start, goal).cells
-        if answer.line is None or cells is None:
+        if answer.any_angle is None or cells is None:
             return answer
         if turn == 0:
-            return Answer(None, gave_up="timeout")
-        line = answer.line if turn == 1 else self.line(self.grid.frame.points_of(cells))
-        return Answer(None, line=replace(line, by_grid=turn != 1))
+            return MethodResult(None, gave_up="timeout")
+        line = answer.any_angle if turn == 1 else self.line(self.grid.frame.points_of(cells))
+        return MethodResult(None, any_angle=replace(line, by_grid=turn != 1))
 
 
 def length_of(points: NDArray[np.float64]) -> float:
@@ -344,7 +344,7 @@ def length_of(points: NDArray[np.float64]) -> float:
 class Raises(Sound):
     """No answer for some pairs."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         if (start[0] + goal[0]) % 2 and self.free.shape != WARM_UP_SHAPE:
             raise RuntimeError("odd rows\nare beyond me")
         return super().solve(start, goal)
@@ -362,14 +362,14 @@ class CannotBeMade(Sound):
 class FailsAtOnce(Sound):
     """Fails already when it is warmed up."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         raise KeyError((start, goal))
 
 
 class Dies(Sound):
     """Takes its whole process along at one pair."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         if _is_fatal(start, goal):
             os._exit(3)
         return super().solve(start, goal)
@@ -378,7 +378,7 @@ class Dies(Sound):
 class Hangs(Sound):
     """Never comes back from one pair."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         if _is_fatal(start, goal):
             time.sleep(600)
         return super().solve(start, goal)
@@ -387,7 +387,7 @@ class Hangs(Sound):
 class Slow(Sound):
     """Takes ten milliseconds for each pair."""
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         time.sleep(0.01)
         return super().solve(start, goal)
 

@@ -209,22 +209,22 @@ def test_a_plan_out_of_order_is_found():
     nodes = HybridMethod(topology, Preset()).solve((2, 1), (2, 9)).nodes
     assert nodes is not None
     assert len(nodes) > 3
-    ends = (2, 1), (2, 9)
+    endpoints = (2, 1), (2, 9)
     assert "no metric path" in checks.check_plan(
-        *ends, (nodes[0], *nodes[-2:0:-1], nodes[-1]), None
+        *endpoints, (nodes[0], *nodes[-2:0:-1], nodes[-1]), None
     )
-    assert "no metric path" in said(checks.check_plan(*ends, (nodes[0], nodes[-1]), None))
-    assert "does not start and end" in said(checks.check_plan(*ends, nodes[::-1], None))
-    assert "does not start and end" in said(checks.check_plan(*ends, nodes[:-1], None))
+    assert "no metric path" in said(checks.check_plan(*endpoints, (nodes[0], nodes[-1]), None))
+    assert "does not start and end" in said(checks.check_plan(*endpoints, nodes[::-1], None))
+    assert "does not start and end" in said(checks.check_plan(*endpoints, nodes[:-1], None))
     # A region that there is not, of whose number and another's that of a pair could be made.
     count = int(topology.level.field_of.max()) + 1
     for unknown in (-1, count, *range(count + 1, 3 * count)):
         plan = (nodes[0], unknown, nodes[-1])
-        assert "which there is not" in said(checks.check_plan(*ends, plan, None))
+        assert "which there is not" in said(checks.check_plan(*endpoints, plan, None))
 
 
 def test_a_plan_through_the_wrong_piece_of_a_torn_region_is_found():
-    # Region 0 is both ends of a corridor, region 1 its middle.
+    # Region 0 is both endpoints of a corridor, region 1 its middle.
     grid = occupancy_grid(drawn("......."))
     region_of = np.array([[0, 0, 1, 1, 1, 0, 0]], dtype=np.int32)
     checks = Consistency(grid, region_of)

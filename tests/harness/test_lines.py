@@ -19,7 +19,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
 from hybridnav.harness.analysis import pairs_in_common, query_key
 from hybridnav.harness.compare import compare_runs
-from hybridnav.harness.contradictions import against
+from hybridnav.harness.contradictions import contradiction
 from hybridnav.harness.methods import preset_spec
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
@@ -186,14 +186,14 @@ def test_runs_are_compared_over_the_optimum_that_is_asked_for(folder):
 def test_a_line_below_the_optimum_is_a_contradiction():
     reference = {"status": "solved", "length_m": 11.0, "any_angle_m": 10.0}
     line = {"status": "solved", "metric": "any-angle", "length_m": 9.99, "lower_bound_m": 9.0}
-    assert against(line, reference) == (
+    assert contradiction(line, reference) == (
         "length 9.990000 m is below the any-angle optimum 10.000000 m"
     )
-    assert against({**line, "length_m": 10.0 - 1e-9}, reference) is None
-    assert against({**line, "length_m": 10.5, "lower_bound_m": 10.1}, reference) == (
+    assert contradiction({**line, "length_m": 10.0 - 1e-9}, reference) is None
+    assert contradiction({**line, "length_m": 10.5, "lower_bound_m": 10.1}, reference) == (
         "the lower bound 10.100000 m is above the any-angle optimum 10.000000 m"
     )
-    assert against(line, {"status": "solved", "length_m": 11.0}) is None
+    assert contradiction(line, {"status": "solved", "length_m": 11.0}) is None
 
 
 @pytest.mark.usefixtures("here")
@@ -202,7 +202,7 @@ def test_a_line_below_the_optimum_is_a_contradiction():
 )
 def test_a_yardstick_that_is_wrong_is_found_out(folder, tmp_path, monkeypatch, factor, words):
     right = AnyAngleOptimum.length_m
-    monkeypatch.setattr(AnyAngleOptimum, "length_m", lambda *ends: factor * right(*ends))
+    monkeypatch.setattr(AnyAngleOptimum, "length_m", lambda *endpoints: factor * right(*endpoints))
     only = RunSettings(maps=(str(folder.parent / "rooms.map"),), presets=(), pairs=5)
     evaluate(only, tmp_path)
     faults = [fault for _, _, fault in write_outputs(tmp_path).faults]

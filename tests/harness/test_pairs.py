@@ -28,8 +28,8 @@ OFFICE = office_world().grid(robot_radius_m=0)
 
 
 def lengths_m(grid, pairs):
-    ends = np.array([(pair.start, pair.goal) for pair in pairs], dtype=float)
-    return np.hypot(*(ends[:, 0] - ends[:, 1]).T) * grid.resolution_m
+    endpoints = np.array([(pair.start, pair.goal) for pair in pairs], dtype=float)
+    return np.hypot(*(endpoints[:, 0] - endpoints[:, 1]).T) * grid.resolution_m
 
 
 # --- the sampler --------------------------------------------------------------------------------

@@ -91,15 +91,15 @@ def test_cells_read_the_identity_round_every_full_block(classes, merge_distance_
 
 
 def tours(free, rng, count):
-    """Closed paths from one cell by random others, the shortest way from each to the next."""
+    """Closed paths from one cell by random others, the shortest path from each to the next."""
     label = np.cumsum(free).reshape(free.shape)
     search = GridSearch(free)
     start = tuple(rng.choice(np.argwhere(free)).tolist())
     for _ in range(count):
-        stops = [start, *(tuple(c) for c in rng.choice(np.argwhere(free), 3).tolist()), start]
+        waypoints = [start, *(tuple(c) for c in rng.choice(np.argwhere(free), 3).tolist()), start]
         legs = [
             search.search(a, b, field_of=label.astype(np.int32), in_corridor=inside).cells
-            for a, b in itertools.pairwise(stops)
+            for a, b in itertools.pairwise(waypoints)
             for inside in [keeping(rng, label, a, b)]
         ]
         found = [leg for leg in legs if leg is not None]
@@ -107,10 +107,10 @@ def tours(free, rng, count):
             yield np.concatenate([found[0], *(leg[1:] for leg in found[1:])])
 
 
-def keeping(rng, label, *ends):
-    """All cells but some, so that ways differ."""
+def keeping(rng, label, *endpoints):
+    """All cells but some, so that paths differ."""
     inside = rng.random(int(label.max()) + 1) < 0.9
-    inside[[label[end] for end in ends]] = True
+    inside[[label[end] for end in endpoints]] = True
     return inside
 
 

@@ -50,9 +50,11 @@ def test_what_is_taken_out_lies_behind_a_passage_from_start_and_goal(classes, re
     behind = set()
     for run in runs_of(free, reach + 1):
         rest = walks.subgraph(set(walks) - run)
-        ends = {end for end in (start, goal) if end in rest}
+        endpoints = {end for end in (start, goal) if end in rest}
         for part in nx.connected_components(rest):
-            if not ends & part and any(beside in run for cell in part for beside in walks[cell]):
+            if not endpoints & part and any(
+                beside in run for cell in part for beside in walks[cell]
+            ):
                 behind |= part
     taken = set(map(tuple, np.argwhere(free & ~left).tolist()))
     assert taken <= behind

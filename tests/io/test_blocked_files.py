@@ -262,15 +262,15 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
     opened = cli(*query, *NAMED, "--json").answer
     assert [leg["room"] for leg in opened["legs"]] == ["kitchen", "lab"]
     assert opened["blocked"] is None
-    ways = {}
+    lengths = {}
     for closed in (shut, tmp_path / "mask.png", tmp_path / "line.geojson"):
         answer = cli(*query, *NAMED, "--blocked", closed, "--json").answer
         assert answer["status"] == "solved"
         assert answer["blocked"] == [str(closed)]
         assert [leg["room"] for leg in answer["legs"]] == ["kitchen", "hall", "lab"]
         assert opened["length_m"] < answer["length_m"] == answer["lower_bound"]
-        ways[closed] = cli(*query, *POINTS, "--blocked", closed, "--json").answer["length_m"]
-    assert len(set(ways.values())) == 1
+        lengths[closed] = cli(*query, *POINTS, "--blocked", closed, "--json").answer["length_m"]
+    assert len(set(lengths.values())) == 1
     both = (*query, *NAMED, "--blocked", shut, "--blocked", "room:hall")
     done = cli(*both)
     assert done.code == 1
@@ -284,22 +284,22 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
     assert routes["alternatives"][0]["length_m"] == pytest.approx(octile.answer["length_m"])
 
 
-@pytest.mark.parametrize("ends", [POINTS, ("--from", "1.5,5.5", "--to", "7.5,5.5")])
+@pytest.mark.parametrize("endpoints", [POINTS, ("--from", "1.5,5.5", "--to", "7.5,5.5")])
 def test_json_has_the_same_keys_however_ends_are_given(
     cli: Any,
     query: Any,
     tmp_path: Any,
-    ends: Any,
+    endpoints: Any,
 ) -> None:
     closed = ("--blocked", tmp_path / "line.geojson")
-    far = [text.replace("7.5,5.5", "99,99") for text in ends]
+    far = [text.replace("7.5,5.5", "99,99") for text in endpoints]
     for rooms in ((), ("--rooms", tmp_path / "rooms.yaml")):
-        assert cli(*query, *ends, *rooms, "--json").answer["blocked"] is None
+        assert cli(*query, *endpoints, *rooms, "--json").answer["blocked"] is None
         done = cli(*query, *far, *rooms, *closed, "--json")
         assert done.answer["status"] == "goal outside the map"
         assert done.answer["blocked"] == [str(closed[1])]
         assert f"blocked    {closed[1]}\n" in cli(*query, *far, *rooms, *closed).out
-        seconds = cli(*query, *ends, *rooms, *closed, "--json").answer["seconds"]
+        seconds = cli(*query, *endpoints, *rooms, *closed, "--json").answer["seconds"]
         assert {"load", "pyramid", "prepare", "mesh", "shortest"} <= seconds.keys()
 
 
@@ -317,7 +317,7 @@ def test_a_comparison_closes_the_same_for_the_whole_grid(
     assert f"blocked    {tmp_path / 'mask.png'}\n" in told.out
 
 
-@pytest.mark.parametrize("ends", [NAMED, POINTS])
+@pytest.mark.parametrize("endpoints", [NAMED, POINTS])
 @pytest.mark.parametrize(
     ("closed", "code", "words"),
     [
@@ -336,13 +336,13 @@ def test_what_names_nothing_is_refused_by_the_command(  # noqa: PLR0913, PLR0917
     cli: Any,
     query: Any,
     tmp_path: Any,
-    ends: Any,
+    endpoints: Any,
     closed: str,
     code: int,
     words: list[str],
 ) -> None:
     closed = {"BAD": str(tmp_path / "bad.geojson"), "MAP": str(query[1])}.get(closed, closed)
-    assert cli(*query, *ends, "--blocked", closed).refuses(code, *words)
+    assert cli(*query, *endpoints, "--blocked", closed).refuses(code, *words)
 
 
 def test_a_comparison_knows_no_doors(cli: Any, query: Any) -> None:

@@ -25,7 +25,7 @@ from tests.strategies import Scene, examples, scenes
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from hybridnav.io.models.fields import Structure
+    from hybridnav.io.models.array_specs import Structure
 
 START, GOAL = (0.55, 0.55), (2.55, 2.85)
 PRESETS = [name for name in hn.preset_names() if not name.startswith("ompl")]
@@ -306,7 +306,7 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
 def test_a_description_names_every_attribute_of_its_class(
     structure: Structure, made: Any, others: tuple[str, ...]
 ) -> None:
-    described = {field.name for field in structure.fields} - {"field_of"}
+    described = {field.name for field in structure.arrays} - {"field_of"}
     if dataclasses.is_dataclass(made):
         attributes = {field.name for field in dataclasses.fields(made)}
     else:

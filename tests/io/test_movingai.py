@@ -157,9 +157,11 @@ def test_all_reference_maps_load_and_their_scenarios_stand_on_free_cells(data):
         scenarios = read_scenarios(path.with_suffix(".map.scen"))
         assert scenarios
         assert {(scenario.rows, scenario.cols) for scenario in scenarios} == {grid.shape}
-        ends = np.array([(scenario.start, scenario.goal) for scenario in scenarios])
-        assert (grid.classes[ends[..., 0], ends[..., 1]] == CellClass.FREE).all(), path.name
+        endpoints = np.array([(scenario.start, scenario.goal) for scenario in scenarios])
+        assert (grid.classes[endpoints[..., 0], endpoints[..., 1]] == CellClass.FREE).all(), (
+            path.name
+        )
         # No shortest path is shorter than the octile distance: rows and columns are not mixed up.
-        low, high = np.sort(abs(ends[:, 0] - ends[:, 1]), axis=1).T
+        low, high = np.sort(abs(endpoints[:, 0] - endpoints[:, 1]), axis=1).T
         optimum = np.array([scenario.optimum_cells for scenario in scenarios])
         assert (optimum > high + (2**0.5 - 1) * low - 0.006).all(), path.name

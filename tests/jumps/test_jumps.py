@@ -38,7 +38,7 @@ def searches(free: NDArray[np.bool_]) -> tuple[JumpSearch, JumpSearch]:
 
 
 def assert_shortest(
-    found: JumpPath, free: NDArray[np.bool_], ends: tuple[Cell, Cell], optimum: float
+    found: JumpPath, free: NDArray[np.bool_], endpoints: tuple[Cell, Cell], optimum: float
 ) -> None:
     """Assert that an answer is right, by the length of a shortest path."""
     if math.isinf(optimum):
@@ -47,7 +47,7 @@ def assert_shortest(
         return
     assert found.cells is not None
     assert_legal(found.cells, free)
-    assert (tuple(found.cells[0]), tuple(found.cells[-1])) == ends
+    assert (tuple(found.cells[0]), tuple(found.cells[-1])) == endpoints
     assert found.length_cells == recounted(found.cells)
     assert found.length_cells == pytest.approx(optimum, abs=1e-9)
 

@@ -34,7 +34,7 @@ def some_cells(free: NDArray[np.bool_], seed: int, number: int) -> list[Cell]:
 
 
 def scattered() -> NDArray[np.bool_]:
-    """A map with many ways round small obstacles."""
+    """A map with many paths round small obstacles."""
     free = np.random.default_rng(3).random((40, 40)) > 0.2
     free[0, 0] = free[-1, -1] = True
     return free
@@ -61,10 +61,10 @@ def interrupted(
             return
 
 
-def length_of(way: NDArray[Any] | None) -> float:
+def length_of(path: NDArray[Any] | None) -> float:
     """Length of a path, in cells."""
-    assert way is not None
-    return float(np.hypot(*np.diff(way, axis=0).T).sum())
+    assert path is not None
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 _ROUNDED = """

@@ -40,8 +40,8 @@ def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
     assume(left.any())
     wanted, searches = MeshSearch(build_mesh(left)), (MeshSearch(mesh), MeshSearch(mesh))
     searches[1].prepare()
-    ends = some_positions(left, seed)
-    for (first, start), (last, goal) in itertools.pairwise(ends):
+    endpoints = some_positions(left, seed)
+    for (first, start), (last, goal) in itertools.pairwise(endpoints):
         query = (first, last), (start, goal)
         length = wanted.path(*query).length_cells
         for search in searches:

@@ -48,7 +48,7 @@ def without(free: Any, closed: Any) -> Any:
 
 
 def queries(free: Any, seed: int) -> Iterator[tuple[Any, Any]]:
-    """Cells and positions of both ends, centres and degenerate ones."""
+    """Cells and positions of both endpoints, centres and degenerate ones."""
     for (first, start), (last, goal) in itertools.pairwise(some_positions(free, seed)):
         yield (first, last), (start, goal)
 

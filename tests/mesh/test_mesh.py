@@ -32,7 +32,7 @@ from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
     KINDS,
     assert_sides_agree,
-    ends_of_sides,
+    endpoints_of_sides,
     polygon,
     search_of,
     twice_the_area,
@@ -57,8 +57,8 @@ def test_sides_are_shared_by_two_polygons_or_are_walls(classes: Any) -> None:
     free = classes == CellClass.FREE
     mesh = build_mesh(free)
     assert_sides_agree(mesh)
-    ends = ends_of_sides(mesh)
-    walls = mesh.corners[mesh.begins[mesh.twins < 0]], mesh.corners[ends[mesh.twins < 0]]
+    endpoints = endpoints_of_sides(mesh)
+    walls = mesh.corners[mesh.begins[mesh.twins < 0]], mesh.corners[endpoints[mesh.twins < 0]]
     length = int(np.abs(walls[0] - walls[1]).sum())
     padded = np.pad(free, 1).astype(np.int8)
     assert length == sum(int(np.abs(np.diff(padded, axis=axis)).sum()) for axis in (0, 1))
@@ -93,9 +93,9 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
     assume(free.any())
     grid = occupancy_grid(classes)
     graph, mesh = VisibilityGraph(grid), build_mesh(free)
-    ends = some_positions(free, seed)
+    endpoints = some_positions(free, seed)
     for search, ((first, start), (last, goal)) in itertools.product(
-        searches(mesh), itertools.pairwise(ends)
+        searches(mesh), itertools.pairwise(endpoints)
     ):
         found = search.path((first, last), (start, goal))
         assert found.length_cells == pytest.approx(graph.between(start, goal).length_m)
@@ -125,7 +125,7 @@ def test_threads_may_share_a_search_while_it_prepares_itself(
 ) -> None:
     monkeypatch.setattr("hybridnav.mesh.search._WORTH", 0)
     free = np.random.default_rng(3).random((40, 40)) > 0.2
-    ends = [tuple(map(tuple, np.argwhere(free)[[k, -1 - k]].tolist())) for k in range(60)]
+    endpoints = [tuple(map(tuple, np.argwhere(free)[[k, -1 - k]].tolist())) for k in range(60)]
     alone, shared = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(free))
 
     def length(search: MeshSearch, cells: Any) -> float:
@@ -133,8 +133,8 @@ def test_threads_may_share_a_search_while_it_prepares_itself(
         return search.path(cells, centres).length_cells  # type: ignore[arg-type]
 
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(lambda cells: length(shared, cells), ends))
-    assert found == pytest.approx([length(alone, cells) for cells in ends])
+        found = list(pool.map(lambda cells: length(shared, cells), endpoints))
+    assert found == pytest.approx([length(alone, cells) for cells in endpoints])
     assert shared.graph is not None
 
 
@@ -146,8 +146,8 @@ def test_all_kinds_of_search_agree_on_a_building() -> None:
     assert isinstance(hierarchy.graph, CornerHierarchy)
     expanded = 0
     for (a, b), (c, d) in cells.tolist():
-        ends = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
-        found = [search.path(*ends) for search in (plain, landmarks, hierarchy)]
+        endpoints = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
+        found = [search.path(*endpoints) for search in (plain, landmarks, hierarchy)]
         assert found[1].length_cells == pytest.approx(found[0].length_cells, abs=1e-9)
         assert found[2].length_cells == pytest.approx(found[0].length_cells, abs=1e-9)
         assert found[2].lower_bound_cells == found[2].length_cells
@@ -162,8 +162,8 @@ def test_many_queries_get_the_answers_of_each_alone(kind: str) -> None:
     cells = np.argwhere(free)[np.random.default_rng(4).integers(int(free.sum()), size=(2, 300))]
     many = shortest_paths(search, (cells[0], cells[1]), (cells[0] + 0.5, cells[1] + 0.25))
     for query, (start, goal) in enumerate(zip(*cells.tolist(), strict=True)):
-        ends = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.25, goal[1] + 0.25)
-        alone = search.path((tuple(start), tuple(goal)), ends)
+        endpoints = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.25, goal[1] + 0.25)
+        alone = search.path((tuple(start), tuple(goal)), endpoints)
         assert many.length_cells[query] == alone.length_cells
         assert many.lower_bound_cells[query] == alone.lower_bound_cells
         found = many.positions[slice(*many.path_start[query : query + 2])]
@@ -203,11 +203,11 @@ def test_a_search_finds_room_for_its_nodes(monkeypatch: pytest.MonkeyPatch) -> N
     rng = np.random.default_rng(3)
     free = rng.random((40, 40)) > 0.2
     free[0, 0] = free[-1, -1] = True
-    ends = ((0, 0), (39, 39)), ((0.5, 0.5), (39.5, 39.5))
+    endpoints = ((0, 0), (39, 39)), ((0.5, 0.5), (39.5, 39.5))
     graph = VisibilityGraph(occupancy_grid(np.where(free, np.uint8(1), np.uint8(0))))
     expected = graph.shortest((0, 0), (39, 39)).length_m
     for search in searches(build_mesh(free)):
-        assert search.path(*ends).length_cells == pytest.approx(expected)
+        assert search.path(*endpoints).length_cells == pytest.approx(expected)
 
 
 @pytest.mark.skipif(not OPTIMA, reason="HYBRIDNAV_DATA is not set")

@@ -39,12 +39,15 @@ def cross(first: Any, second: Any) -> float:
 def test_every_interval_is_seen_from_its_root(classes: Any, seed: int) -> None:
     trace = traced(classes, seed)
     grid = occupancy_grid(classes)
-    for root, ends in zip(trace.roots, trace.intervals, strict=True):
-        length = np.hypot(*(ends[1] - ends[0]))
+    for root, endpoints in zip(trace.roots, trace.intervals, strict=True):
+        length = np.hypot(*(endpoints[1] - endpoints[0]))
         for share in (0.25, 0.5, 0.75):
-            point = ends[0] + share * (ends[1] - ends[0])
-            # The ends are rounded; on the line of a wall a point may lie in it by as much.
-            if length > 1e-6 and abs(cross(ends[1] - ends[0], root - ends[0])) > 1e-6 * length:
+            point = endpoints[0] + share * (endpoints[1] - endpoints[0])
+            # The endpoints are rounded; on the line of a wall a point may lie in it by as much.
+            if (
+                length > 1e-6
+                and abs(cross(endpoints[1] - endpoints[0], root - endpoints[0])) > 1e-6 * length
+            ):
                 assert not segment_faults(grid, grid.frame.points_of_grid([root, point]))
 
 
@@ -56,15 +59,15 @@ def test_costs_rise_from_interval_to_interval_by_the_way_between_roots(
     trace = traced(classes, seed)
     start = trace.parents < 0
     np.testing.assert_allclose(
-        trace.costs_cells[start], np.hypot(*(trace.roots[start] - trace.ends[0]).T)
+        trace.costs_cells[start], np.hypot(*(trace.roots[start] - trace.endpoints[0]).T)
     )
     assert (trace.parents < np.arange(len(trace.parents))).all()
     later = np.flatnonzero(~start)
     before = trace.parents[later]
-    way = np.hypot(*(trace.roots[later] - trace.roots[before]).T)
+    path = np.hypot(*(trace.roots[later] - trace.roots[before]).T)
     more = trace.costs_cells[later] - trace.costs_cells[before]
     # A wall on one line with the corner bends the way twice: then it is longer than straight.
-    assert (more >= way - 1e-9).all()
+    assert (more >= path - 1e-9).all()
     if trace.path.positions is not None and len(trace.parents):
         turn = trace.path.positions[-2]
         assert (trace.roots == turn).all(axis=1).any() or (
@@ -97,10 +100,10 @@ def test_a_trace_finds_room_for_its_intervals(monkeypatch: pytest.MonkeyPatch) -
     rng = np.random.default_rng(3)
     free = rng.random((40, 40)) > 0.2
     free[0, 0] = free[-1, -1] = True
-    mesh, ends = build_mesh(free), (((0, 0), (39, 39)), ((0.5, 0.5), (39.5, 39.5)))
-    wide = trace_search(mesh, *ends)
+    mesh, endpoints = build_mesh(free), (((0, 0), (39, 39)), ((0.5, 0.5), (39.5, 39.5)))
+    wide = trace_search(mesh, *endpoints)
     monkeypatch.setattr("hybridnav.mesh.search._ROOM", 4)
-    narrow = trace_search(mesh, *ends)
+    narrow = trace_search(mesh, *endpoints)
     np.testing.assert_array_equal(wide.intervals, narrow.intervals)
     assert len(wide.parents) >= wide.path.expanded > 4
-    assert wide.path.length_cells == MeshSearch(mesh).path(*ends).length_cells
+    assert wide.path.length_cells == MeshSearch(mesh).path(*endpoints).length_cells

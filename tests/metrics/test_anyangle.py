@@ -47,13 +47,13 @@ def brute_force(grid: OccupancyGrid, start: Cell, goal: Cell) -> float:
     such corners are left out, no shortest path bends there.
     """
     free = np.pad(grid.classes == CellClass.FREE, 1)
-    ends = [(row + 0.5, col + 0.5) for row, col in (start, goal)]
+    endpoints = [(row + 0.5, col + 0.5) for row, col in (start, goal)]
     corners = [
         (float(row), float(col))
         for row, col in np.ndindex(grid.shape[0] + 1, grid.shape[1] + 1)
         if free[row : row + 2, col : col + 2].any() and not _pinched(free, row, col)
     ]
-    nodes = [*ends, *corners]
+    nodes = [*endpoints, *corners]
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(range(len(nodes)))
     for i, one in enumerate(nodes):

@@ -248,9 +248,9 @@ def test_a_diagonal_between_two_blocked_cells_is_told_from_a_cut_corner() -> Non
 
 def test_unexplored_cells_are_free_only_when_allowed() -> None:
     grid, cells = occupancy_grid(ROOM), [(2, 3), (1, 3), (1, 4)]
-    ends: Any = {"start": (2, 3), "goal": (1, 4)}
-    assert not judge_path(grid, cells, **ends).ok
-    assert judge_path(grid, cells, allow_unexplored=True, **ends).ok
+    endpoints: Any = {"start": (2, 3), "goal": (1, 4)}
+    assert not judge_path(grid, cells, **endpoints).ok
+    assert judge_path(grid, cells, allow_unexplored=True, **endpoints).ok
     points = grid.frame.points_of(cells)
     assert segment_faults(grid, points)
     assert not segment_faults(grid, points, allow_unexplored=True)

@@ -91,9 +91,9 @@ def test_a_line_through_a_corner_steps_diagonally() -> None:
 def test_unexplored_cells_are_passed_only_when_allowed() -> None:
     grid = occupancy_grid(ROOM)
     points = grid.frame.points_of([(2, 3), (1, 3), (1, 4)])
-    ends: Any = {"start": (2, 3), "goal": (1, 4)}
-    assert not judge_line(grid, points, **ends).ok
-    assert judge_line(grid, points, **ends, allow_unexplored=True).ok
+    endpoints: Any = {"start": (2, 3), "goal": (1, 4)}
+    assert not judge_line(grid, points, **endpoints).ok
+    assert judge_line(grid, points, **endpoints, allow_unexplored=True).ok
     assert line_cells(grid, points, allow_unexplored=True).tolist() == [[2, 3], [1, 3], [1, 4]]
 
 

@@ -114,8 +114,8 @@ def check_arcs(level: LevelLike, found: Boundaries) -> None:
     """Arcs between different vertices are the boundaries, one to one."""
     pairs = level.base_pairs
     assert (np.abs(pairs[:, 0] - pairs[:, 1]).sum(axis=1) == 1).all()
-    ends = level.field_of[pairs[:, :, 0], pairs[:, :, 1]]
-    assert (ends == level.arcs).all()
+    endpoints = level.field_of[pairs[:, :, 0], pairs[:, :, 1]]
+    assert (endpoints == level.arcs).all()
     labels = [found.label_of[dart] for dart in crossing_darts(level)]
     assert sorted(labels) == list(range(found.n_boundaries))
 
@@ -164,8 +164,8 @@ def phi_walks(level: LevelLike) -> list[tuple[int, ...]]:
 def n_components(level: LevelLike) -> int:
     """Components of the graph of a level."""
     size = level.n_vertices
-    ends = (level.arcs[:, 0], level.arcs[:, 1])
-    graph = sparse.csr_array((np.ones(level.n_arcs), ends), shape=(size, size))
+    endpoints = (level.arcs[:, 0], level.arcs[:, 1])
+    graph = sparse.csr_array((np.ones(level.n_arcs), endpoints), shape=(size, size))
     return int(csgraph.connected_components(graph, directed=False)[0]) if size else 0
 
 
@@ -224,8 +224,8 @@ def check_attributes(level: MeasuredLevel, classes: AnyArray, *, resolution_m: f
     expected = np.array(level.through_m, dtype=float)
     lines = [np.asarray(level.boundary(arc)).reshape(-1, 2, 2) for arc in range(level.n_arcs)]
     pairs = np.concatenate([*lines, np.empty((0, 2, 2), int)])
-    ends = level.field_of[pairs[:, :, 0], pairs[:, :, 1]]
-    assert (ends == np.repeat(level.arcs, [len(line) for line in lines], axis=0)).all()
+    endpoints = level.field_of[pairs[:, :, 0], pairs[:, :, 1]]
+    assert (endpoints == np.repeat(level.arcs, [len(line) for line in lines], axis=0)).all()
     for arc, dart in enumerate(base_darts(level.base_pairs)):
         if dart not in found.label_of:
             continue
@@ -245,7 +245,7 @@ def check_step(lower: LevelLike, upper: LevelLike) -> AnyArray:
     assert upper.n_vertices < lower.n_vertices
     centre = lower.field_of[upper.cells[:, 0], upper.cells[:, 1]]
     assert (lower.cells[centre] == upper.cells).all()
-    adjacent = {frozenset(ends) for ends in lower.arcs.tolist()}
+    adjacent = {frozenset(endpoints) for endpoints in lower.arcs.tolist()}
     for son, window in enumerate(parent.tolist()):
         if son != centre[window]:
             assert frozenset((son, int(centre[window]))) in adjacent

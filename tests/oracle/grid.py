@@ -25,8 +25,8 @@ Cell = tuple[int, int]
 def move_graph(enterable: Bools, standable: Bools | None = None) -> Moves:
     """Graph of the legal moves: nodes are flat cells, weights 1 and sqrt 2.
 
-    A diagonal needs both side cells enterable, wherever they are; both its ends, and those of a
-    step along a side, must be standable (by default: enterable).
+    A diagonal needs both side cells enterable, wherever they are; both its endpoints, and those of
+    a step along a side, must be standable (by default: enterable).
     """
     stand = enterable if standable is None else enterable & standable
     flat = np.arange(enterable.size).reshape(enterable.shape)
@@ -68,7 +68,7 @@ def assert_legal(cells: Any, enterable: Bools, standable: Bools | None = None) -
     assert stand[path[:, 0], path[:, 1]].all(), "stands on a cell that may not be entered"
     step = np.abs(np.diff(path, axis=0))
     assert (step.max(axis=1) == 1).all() if len(step) else True, "consecutive cells do not touch"
-    # For a step along a side the two cells tested here are its own ends.
+    # For a step along a side the two cells tested here are its own endpoints.
     here, there = path[:-1], path[1:]
     assert enterable[here[:, 0], there[:, 1]].all(), "cuts a corner"
     assert enterable[there[:, 0], here[:, 1]].all(), "cuts a corner"

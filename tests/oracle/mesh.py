@@ -48,16 +48,16 @@ def twice_the_area(mesh: ConvexMesh) -> int:
     return twice
 
 
-def ends_of_sides(mesh: ConvexMesh) -> NDArray[Any]:
+def endpoints_of_sides(mesh: ConvexMesh) -> NDArray[Any]:
     """The corner at which each side ends."""
-    ends = np.roll(mesh.begins, -1)
-    ends[mesh.first[1:] - 1] = mesh.begins[mesh.first[:-1]]
-    return ends
+    endpoints = np.roll(mesh.begins, -1)
+    endpoints[mesh.first[1:] - 1] = mesh.begins[mesh.first[:-1]]
+    return endpoints
 
 
 def assert_sides_agree(mesh: ConvexMesh) -> None:
     """Hold that twins are each other's, and run the other way."""
     crossable = np.flatnonzero(mesh.twins >= 0)
     assert (mesh.twins[mesh.twins[crossable]] == crossable).all()
-    assert (mesh.begins[mesh.twins[crossable]] == ends_of_sides(mesh)[crossable]).all()
+    assert (mesh.begins[mesh.twins[crossable]] == endpoints_of_sides(mesh)[crossable]).all()
     assert (mesh.component[mesh.polygon_of[crossable]] >= 0).all()

@@ -162,9 +162,9 @@ def boundaries(field_of: AnyArray) -> Boundaries:
             elif present:
                 meetings.append((row, col))
     n_boundaries, label = csgraph.connected_components(_graph(links, n_cracks), directed=False)
-    ends = np.bincount(np.array(links, dtype=int).ravel(), minlength=n_cracks)
+    endpoints = np.bincount(np.array(links, dtype=int).ravel(), minlength=n_cracks)
     ring = np.ones(n_boundaries, dtype=bool)
-    ring[label[ends < 2]] = False
+    ring[label[endpoints < 2]] = False
     label_of: dict[Dart, int] = {}
     for (tail, head), boundary in zip(pairs.tolist(), label.tolist(), strict=True):
         dart = (tuple(tail), tuple(head))
@@ -178,13 +178,13 @@ def _differ(one: AnyArray, other: AnyArray) -> AnyArray:
 
 
 def _graph(links: list[list[int]], n_nodes: int) -> sparse.csr_array:
-    ends = np.array(links, dtype=int).reshape(-1, 2)
-    weights = np.ones(len(ends))
-    return sparse.csr_array((weights, (ends[:, 0], ends[:, 1])), shape=(n_nodes, n_nodes))
+    endpoints = np.array(links, dtype=int).reshape(-1, 2)
+    weights = np.ones(len(endpoints))
+    return sparse.csr_array((weights, (endpoints[:, 0], endpoints[:, 1])), shape=(n_nodes, n_nodes))
 
 
 def n_field_pieces(field_of: AnyArray) -> int:
-    """4-connected pieces that all fields have together; one each when all are connected."""
+    """4-connected components that all fields have together; one each when all are connected."""
     inside = field_of >= 0
     flat = np.arange(field_of.size).reshape(field_of.shape)
     links = []
@@ -298,11 +298,11 @@ def distances_in_fields(classes: AnyArray, field_of: AnyArray, cells: AnyArray) 
 
 def through_cells(found: Boundaries, from_survivor: AnyArray) -> AnyArray:
     """In-field length in cells, surviving cell to surviving cell, through each boundary."""
-    ends = found.pairs
+    endpoints = found.pairs
     lengths = (
-        from_survivor[ends[:, 0, 0], ends[:, 0, 1]]
+        from_survivor[endpoints[:, 0, 0], endpoints[:, 0, 1]]
         + 1
-        + from_survivor[ends[:, 1, 0], ends[:, 1, 1]]
+        + from_survivor[endpoints[:, 1, 0], endpoints[:, 1, 1]]
     )
     shortest = np.full(found.n_boundaries, np.inf)
     np.minimum.at(shortest, found.label, lengths)

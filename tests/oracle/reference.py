@@ -95,7 +95,7 @@ class PlaneMap:
         return self.sigma[alpha(dart)]
 
     def is_loop(self, dart: Dart) -> bool:
-        """Whether both ends of the dart's edge are one vertex."""
+        """Whether both endpoints of the dart's edge are one vertex."""
         return self.vertex[dart[0]] == self.vertex[dart[1]]
 
     def contractible(self) -> list[Dart]:
@@ -270,12 +270,12 @@ class PlaneMap:
         edges = sorted(dart for dart in self.sigma if dart < alpha(dart))
         darts = [half for dart in edges for half in (dart, alpha(dart))]
         number = {dart: index for index, dart in enumerate(darts)}
-        ends = [[dense[self.vertex[cell]] for cell in dart] for dart in edges]
+        endpoints = [[dense[self.vertex[cell]] for cell in dart] for dart in edges]
         return ReferenceLevel(
             field_of=field_of,
             cells=np.array(cells, dtype=int).reshape(-1, 2),
             classes=np.array([self.classes[cell] for cell in cells], dtype=np.uint8),
-            arcs=np.array(ends, dtype=np.int32).reshape(-1, 2),
+            arcs=np.array(endpoints, dtype=np.int32).reshape(-1, 2),
             base_pairs=np.array(edges, dtype=int).reshape(-1, 2, 2),
             sigma=np.array([number[self.sigma[dart]] for dart in darts], dtype=np.int32),
             protected=np.array(

@@ -1,5 +1,5 @@
-"""Alternatives: other doors and other sides of obstacles, not the same way by other cells, and not
-round and round."""
+"""Alternatives: other doors and other sides of obstacles, not the same route by other cells, and
+not round and round."""
 
 import gc
 import math
@@ -18,7 +18,7 @@ import hybridnav as hn
 from hybridnav.grid import CellClass
 from hybridnav.homotopy import AlternativeSearch, alternative_search
 from hybridnav.metrics import judge_path
-from hybridnav.route import Walks
+from hybridnav.route import RouteFinder
 from tests.oracle.rays import Rays
 from tests.planner.test_named_plans import map_file  # noqa: F401 - the fixture
 from tests.strategies import class_grids, drawn, occupancy_grid
@@ -81,18 +81,18 @@ def test_counts_out_of_range_are_refused(count):
 
 
 def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path():
-    ends = (1.5, 1.5), (12.5, 6.5)
+    endpoints = (1.5, 1.5), (12.5, 6.5)
     planner = planner_of(TWO_DOORS, "paper", merge_distance_m=6.0)
-    optimum = planner_of(TWO_DOORS).plan(*ends).cost
-    whole = hn.plan_alternatives(planner, *ends, 3)
+    optimum = planner_of(TWO_DOORS).plan(*endpoints).cost
+    whole = hn.plan_alternatives(planner, *endpoints, 3)
     assert whole.complete
     assert len(whole) == 2
     for room in (1, 20, 100):
-        found = hn.plan_alternatives(planner, *ends, 3, most_states=room)
+        found = hn.plan_alternatives(planner, *endpoints, 3, most_states=room)
         assert not found.complete
         assert found[0].path.length_m == pytest.approx(optimum)
         assert [other.word for other in found] == [other.word for other in whole][: len(found)]
-    assert hn.plan_alternatives(planner, *ends, 1, most_states=100).complete
+    assert hn.plan_alternatives(planner, *endpoints, 1, most_states=100).complete
 
 
 @pytest.mark.parametrize("most_states", [0, -1, 1 << 27])
@@ -158,18 +158,18 @@ def any_two(classes, seed):
     free = np.argwhere(classes == CellClass.FREE)
     if len(free) == 0:
         return None
-    ends = np.random.default_rng(seed).choice(free, 2).tolist()
-    return tuple(ends[0]), tuple(ends[1])
+    endpoints = np.random.default_rng(seed).choice(free, 2).tolist()
+    return tuple(endpoints[0]), tuple(endpoints[1])
 
 
 @given(classes=class_grids(20), seed=st.integers(0, 2**32 - 1))
 def test_alternatives_are_legal_paths_of_different_classes_the_optimum_first(classes, seed):
-    ends = any_two(classes, seed)
-    if ends is None:
+    endpoints = any_two(classes, seed)
+    if endpoints is None:
         return
     planner = planner_of(classes)
     grid = planner.topology.grid
-    points = grid.frame.points_of(ends)
+    points = grid.frame.points_of(endpoints)
     best = planner.plan(*points)
     found = hn.plan_alternatives(planner, points[0], points[1], 4, least_hole_m2=0.0)
     assert bool(found) == best.solved
@@ -181,7 +181,7 @@ def test_alternatives_are_legal_paths_of_different_classes_the_optimum_first(cla
     lengths = [other.path.length_m for other in found]
     assert lengths == pytest.approx(sorted(lengths))
     for other in found:
-        verdict = judge_path(grid, other.path.cells, start=ends[0], goal=ends[1])
+        verdict = judge_path(grid, other.path.cells, start=endpoints[0], goal=endpoints[1])
         assert verdict.faults == ()
         assert verdict.length_m == pytest.approx(other.path.length_m)
 
@@ -202,11 +202,13 @@ def test_no_shorter_class_that_does_not_wind_is_left_out(resolution_m, least_hol
     compared = wound = 0
     for _ in range(250):
         classes = crowded_map(rng)
-        ends: Any = any_two(classes, rng.integers(2**32))
-        if ends is None:
+        endpoints: Any = any_two(classes, rng.integers(2**32))
+        if endpoints is None:
             continue
         topology = topology_of(classes, 2.0 * resolution_m, resolution_m=resolution_m)
-        found = AlternativeSearch(topology, least_hole_m2=least_hole_m2).paths(ends[0], ends[1], 4)
+        found = AlternativeSearch(topology, least_hole_m2=least_hole_m2).paths(
+            endpoints[0], endpoints[1], 4
+        )
         rays = Rays(classes == CellClass.FREE, max(least_hole_m2 / resolution_m**2, 1))
         offered = {rays.word_of(path.cells): path for path in found.paths}
         assert found.complete
@@ -220,7 +222,7 @@ def test_no_shorter_class_that_does_not_wind_is_left_out(resolution_m, least_hol
         # Where fewer came than asked for, there is nothing more up to far longer.
         full = len(offered) == 4
         longest = found.paths[-1].length_cells - 1e-6 if full else shortest + 12
-        classes_there = rays.shortest_paths(ends[0], ends[1], longest, most=200)
+        classes_there = rays.shortest_paths(endpoints[0], endpoints[1], longest, most=200)
         for word, (length, paths) in classes_there.items():
             if word in offered:
                 assert offered[word].length_cells >= length - 1e-9
@@ -253,7 +255,7 @@ def test_grids_with_corner_cutting_have_walks_and_no_alternatives():
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.5))
     with pytest.raises(hn.InvalidValueError, match="corner cutting"):
         AlternativeSearch(topology)
-    walks = Walks(topology)
+    walks = RouteFinder(topology)
     free = np.argwhere(CORNERS == CellClass.FREE)
     planner = hn.HybridPlanner(topology, preset="portals")
     pinched = 0
@@ -273,7 +275,7 @@ def test_grids_with_corner_cutting_have_walks_and_no_alternatives():
 
 def test_walks_know_their_arcs_on_maps_of_one_column():
     topology = topology_of(np.ones((9, 1), np.uint8), 1.5)
-    places, arcs = Walks(topology).of(np.column_stack([np.arange(9), np.zeros(9, int)]))
+    places, arcs = RouteFinder(topology).of(np.column_stack([np.arange(9), np.zeros(9, int)]))
     assert len(places) == topology.n_places > 1
     for arc, tail, head in zip(arcs, places, places[1:], strict=False):
         assert set(topology.arcs[arc].tolist()) == {tail, head}
@@ -293,7 +295,7 @@ def test_the_command_line_lists_alternatives(cli, map_file):  # noqa: F811
     done = cli(*query, "--alternatives", "3")
     assert done.code == 0
     way = "by kitchen (door 1), hall (door 2), lab"
-    # From point to point: nearest cells lie in doorways, where there are no other ways.
+    # From point to point: nearest cells lie in doorways, where there are no other routes.
     assert f"route 1    7.41 m (octile), class -, {way}" in done.out
     assert "route 2" not in done.out
     nearest = cli(*query, "--alternatives", "3", "--at", "anywhere")
@@ -317,8 +319,8 @@ def two_doors_file(tmp_path):
 
 
 def test_the_command_line_leads_through_either_door(cli, two_doors_file):
-    ends = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
-    query = ("plan", two_doors_file, *ends, "--robot-radius", "0", "--alternatives", "3")
+    endpoints = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
+    query = ("plan", two_doors_file, *endpoints, "--robot-radius", "0", "--alternatives", "3")
     done = cli(*query)
     lines = [line for line in done.out.splitlines() if line.startswith("route ")]
     # Ten straight steps and one diagonal; and up to the other door and down again.
@@ -335,8 +337,8 @@ def test_the_command_line_leads_through_either_door(cli, two_doors_file):
 
 
 def test_the_command_line_tells_no_more_from_gave_up(cli, two_doors_file, monkeypatch):
-    ends = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
-    query = ("plan", two_doors_file, *ends, "--robot-radius", "0", "--alternatives", "3")
+    endpoints = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
+    query = ("plan", two_doors_file, *endpoints, "--robot-radius", "0", "--alternatives", "3")
     assert "gave up" not in cli(*query).out
     assert cli(*query, "--json").answer["alternatives_complete"] is True
     impatient = partial(hn.plan_alternatives, most_states=100)

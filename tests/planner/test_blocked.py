@@ -187,9 +187,9 @@ def test_a_line_closes_the_cells_it_passes_through(case: Case) -> None:
 @settings(PLAIN)
 def test_no_move_crosses_an_area_or_comes_nearer_than_the_radius(case: Case) -> None:
     tail, head = moves_of(case.closed())
-    ends = [case.frame.points_of(np.stack(divmod(cell, case.shape[1]), axis=1))
+    endpoints = [case.frame.points_of(np.stack(divmod(cell, case.shape[1]), axis=1))
             for cell in (tail, head)]  # fmt: skip
-    segments = shapely.linestrings(np.stack(ends, axis=1)) if len(tail) else np.empty(0)
+    segments = shapely.linestrings(np.stack(endpoints, axis=1)) if len(tail) else np.empty(0)
     slack_m = TOLERANCE * case.frame.resolution_m
     if case.radius_m:
         assert (shapely.distance(segments, case.area) > case.radius_m - slack_m).all()
@@ -340,8 +340,8 @@ def test_closing_all_arcs_round_some_places_cuts_them_off(scene: Any, data: Any)
     assume(pairs)
     inside = np.array(data.draw(st.lists(st.booleans(), min_size=topology.n_places,
                                          max_size=topology.n_places)))  # fmt: skip
-    ends = inside[topology.arcs]
-    cut = [arc for arc in pairs if ends[arc, 0] != ends[arc, 1]]
+    endpoints = inside[topology.arcs]
+    cut = [arc for arc in pairs if endpoints[arc, 0] != endpoints[arc, 1]]
     mask = mask_of(Blocked(arcs=cut), topology)
     label = components(topology.grid.enterable(allow_unexplored=True) & ~mask)
     kept = label > 0
@@ -355,17 +355,17 @@ def test_places_whose_arcs_are_all_closed_meet_at_points_at_most(scene: Any, dat
     topology = hn.TopologicalMap(scene.pyramid("radius"))
     pairs = pairs_of(topology)
     assume(pairs)
-    ends = set(topology.arcs[data.draw(st.sampled_from(sorted(pairs)))].tolist())
-    between = [arc for arc in pairs if set(topology.arcs[arc].tolist()) == ends]
+    endpoints = set(topology.arcs[data.draw(st.sampled_from(sorted(pairs)))].tolist())
+    between = [arc for arc in pairs if set(topology.arcs[arc].tolist()) == endpoints]
     mask = mask_of(Blocked(arcs=between), topology)
     field, cols = topology.level.field_of, topology.grid.shape[1]
     enterable = topology.grid.enterable(allow_unexplored=True) & ~mask
     for tail, head in zip(*moves_of(~enterable), strict=True):
         (row, col), (to_row, to_col) = divmod(int(tail), cols), divmod(int(head), cols)
-        if {field[row, col], field[to_row, to_col]} == ends:
+        if {field[row, col], field[to_row, to_col]} == endpoints:
             assert row != to_row
             assert col != to_col
-            assert not {field[row, to_col], field[to_row, col]} & ends
+            assert not {field[row, to_col], field[to_row, col]} & endpoints
 
 
 def cost_of(topology: hn.TopologicalMap, arc: int, others: list[Any], closed: Any) -> Any:

@@ -163,8 +163,8 @@ def test_bounds_hold_inside_fields_across_borders_and_where_fields_only_touch() 
     touching = {frozenset((int(field_of[a]), int(field_of[b]))) for a, b in kinds["touching"]}
     assert len(touching) == 8
     for one, other in map(sorted, touching):
-        ends = (np.argwhere(field_of == field).tolist() for field in (one, other))
-        kinds["touching"] += [((a, b), (c, d)) for (a, b), (c, d) in itertools.product(*ends)]
+        endpoints = (np.argwhere(field_of == field).tolist() for field in (one, other))
+        kinds["touching"] += [((a, b), (c, d)) for (a, b), (c, d) in itertools.product(*endpoints)]
     for pairs in kinds.values():
         check_pairs(planners, pairs[:: max(1, len(pairs) // 100)], by_scipy=True)
 

@@ -142,6 +142,6 @@ def test_bounds_hold_on_real_maps(data: Path, name: str) -> None:
     one = components(grid.enterable())
     labels = np.unique(one[one > 0])
     if len(labels) > 1:
-        ends = [tuple(np.argwhere(one == label)[0].tolist()) for label in labels[:2]]
+        endpoints = [tuple(np.argwhere(one == label)[0].tolist()) for label in labels[:2]]
         for planner in planners:
-            check_plan(planner, ends[0], ends[1], math.inf)
+            check_plan(planner, endpoints[0], endpoints[1], math.inf)

@@ -81,7 +81,7 @@ def crossings(topology: hn.TopologicalMap, door: hn.Door) -> set[frozenset[int]]
 
 def optimum(
     topology: hn.TopologicalMap,
-    ends: Any,
+    endpoints: Any,
     *,
     without: set[frozenset[int]] = frozenset(),  # type: ignore[assignment]
     removed: Any = None,
@@ -93,7 +93,7 @@ def optimum(
     low, high = np.sort(np.stack([graph.row, graph.col]).astype(np.int64), axis=0)
     shut = [min(pair) * grid.classes.size + max(pair) for pair in without]
     graph.data[np.isin(low * grid.classes.size + high, shut)] = np.inf
-    first, last = (grid.frame.cell_of(*end) for end in ends)
+    first, last = (grid.frame.cell_of(*end) for end in endpoints)
     return float(distances(graph.tocsr(), grid.shape, first)[last]) * grid.resolution_m
 
 
@@ -123,12 +123,12 @@ def test_a_shut_door_of_the_office_is_not_passed_and_the_others_are(
     opened = hn.plan_tour(office, names, at="point")
     passed = [leg.door for leg in opened.legs if leg.door is not None]
     assert len(passed) >= 3
-    ends = [topology.rooms.point_of(name) for name in names]
+    endpoints = [topology.rooms.point_of(name) for name in names]
     detours = 0
     for door in passed:
         shut = crossings(topology, door)
         assert moves_of([opened.results[0].path], cols) & shut
-        best = optimum(topology, ends, without=shut)
+        best = optimum(topology, endpoints, without=shut)
         for form in forms_of(door):
             tour = hn.plan_tour(office, names, at="point", blocked=form)
             assert tour.solved == (best < math.inf)
@@ -227,8 +227,8 @@ def test_many_answers_are_those_of_one_whatever_is_closed(
     area = shapely.LineString([(0.5, 4.3), (3.4, 4.3)])
     for closed in (door, {"rooms": ["hall"]}, area, {"doors": [1, 2], "polygons": [area]}, {}):
         batch = planner.plan_many(starts, goals, smooth=smooth, blocked=closed)
-        ends = zip(starts, goals, strict=True)
-        single = [planner.plan(*pair, smooth=smooth, blocked=closed) for pair in ends]
+        endpoints = zip(starts, goals, strict=True)
+        single = [planner.plan(*pair, smooth=smooth, blocked=closed) for pair in endpoints]
         assert batch.status.tolist() == [str(result.status) for result in single]
         assert batch.cost.tolist() == [result.cost for result in single]
         assert batch.lower_bound.tolist() == [result.lower_bound for result in single]
@@ -325,10 +325,10 @@ def test_no_plan_crosses_a_shut_door_wherever_rooms_are(
     planner = hn.HybridPlanner(topology, preset="portals")
     for door in rng.choice(np.array(doors, dtype=object), min(3, len(doors)), replace=False):
         shut = crossings(topology, door)
-        ends = grid.frame.points_of(rng.choice(free, 2))
-        result = planner.plan(*ends, blocked={"doors": [door.number]})
-        opened = planner.plan(*ends)
-        best = optimum(topology, ends, without=shut)
+        endpoints = grid.frame.points_of(rng.choice(free, 2))
+        result = planner.plan(*endpoints, blocked={"doors": [door.number]})
+        opened = planner.plan(*endpoints)
+        best = optimum(topology, endpoints, without=shut)
         closed = Blocked(doors=[door]).cells_of(topology)
         assert set(closed.tolist()) <= set().union(*shut)
         remaining = grid.enterable()
@@ -340,7 +340,9 @@ def test_no_plan_crosses_a_shut_door_wherever_rooms_are(
             assert not moves_of([result.path], grid.shape[1]) & shut
             assert best <= result.cost * (1 + 1e-9)
             assert opened.lower_bound <= result.cost * (1 + 1e-9)
-            assert result.lower_bound <= optimum(topology, ends, removed=~remaining) * (1 + 1e-9)
+            assert result.lower_bound <= optimum(topology, endpoints, removed=~remaining) * (
+                1 + 1e-9
+            )
 
 
 @given(topology=divided_maps())

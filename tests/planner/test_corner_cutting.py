@@ -83,8 +83,8 @@ def test_every_status_is_true(topology: hn.TopologicalMap, seed: int) -> None:
             enterable = grid.enterable(allow_unexplored=unexplored)
             part = joined(enterable)
             for start, goal in pairs(enterable, seed, 4):
-                ends = grid.frame.points_of(start), grid.frame.points_of(goal)
-                result = planner.plan(*ends)
+                endpoints = grid.frame.points_of(start), grid.frame.points_of(goal)
+                result = planner.plan(*endpoints)
                 assert result.solved == (part[tuple(start)] == part[tuple(goal)])
                 assert result.cost >= result.lower_bound - 1e-9
 

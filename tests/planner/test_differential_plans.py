@@ -88,8 +88,11 @@ def test_the_robot_heads_where_it_goes_through_the_office() -> None:
     grid = office_world().grid(robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     footprint = "footprint=[[0.5, 0.25], [0.5, -0.25], [-0.3, -0.25], [-0.3, 0.25]]"
-    for ends in (((1.0, 13.2, 0.0), (40.6, 19.4, 2.0)), ((10.6, 10.6, 1.57), (15.6, 10.3, -1.57))):
-        poses = poses_of(planner_of(topology, footprint).plan(*ends))
+    for endpoints in (
+        ((1.0, 13.2, 0.0), (40.6, 19.4, 2.0)),
+        ((10.6, 10.6, 1.57), (15.6, 10.3, -1.57)),
+    ):
+        poses = poses_of(planner_of(topology, footprint).plan(*endpoints))
         drives = [(a, b) for a, b in itertools.pairwise(poses) if (a[:2] != b[:2]).any()]
         travel = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in drives]
         off = [
@@ -101,7 +104,7 @@ def test_the_robot_heads_where_it_goes_through_the_office() -> None:
 
 
 def narrow() -> Any:
-    """Two rooms joined by a way of 0.8 m, and a dead end as wide in the second."""
+    """Two rooms joined by a passage of 0.8 m, and a dead end as wide in the second."""
     occupied = np.ones((160, 360), dtype=np.float32)
     occupied[10:150, 10:110] = occupied[10:150, 190:290] = 0
     occupied[72:88, 110:190] = occupied[100:116, 290:350] = 0
@@ -139,15 +142,15 @@ def test_where_time_is_short_the_grid_path_is_spelled_out_too(rooms: hn.Topologi
     result = made.plan((2.0, 3.0, 2.5), (6.0, 4.0, -1.0))
     poses = poses_of(result)
     assert len(poses) == 4
-    # No way for this robot along the grid's path: the answer is none, and not one that touches.
+    # No path for this robot along the grid's path: the answer is none, and not one that touches.
     blind = planner_of(rooms, "planner=BITstar", "budget_s=0.01", "confine=mask")
     assert blind.plan((2.0, 3.0, 0.5), (17.0, 9.0, 1.0)).path is None
 
 
 def test_equal_seeds_give_equal_paths_and_a_turn_alone_is_one(rooms: hn.TopologicalMap) -> None:
     made = planner_of(rooms, "iterations=3000", "budget_s=60")
-    ends = (2.0, 3.0, 0.5), (17.0, 9.0, 1.0)
-    np.testing.assert_array_equal(*(poses_of(made.plan(*ends)) for _ in range(2)))
+    endpoints = (2.0, 3.0, 0.5), (17.0, 9.0, 1.0)
+    np.testing.assert_array_equal(*(poses_of(made.plan(*endpoints)) for _ in range(2)))
     result = made.plan((3.0, 3.0, 0.5), (3.0, 3.0, -2.0))
     np.testing.assert_allclose(poses_of(result), [[3, 3, 0.5], [3, 3, -2.0]], atol=1e-9)
     assert (result.cost, result.lower_bound, result.gap) == (0.0, 0.0, 0.0)

@@ -1,4 +1,5 @@
-"""Plans between rooms with names, tours with stops, the way in words, and their command lines."""
+"""Plans between rooms with names, tours with waypoints, the route in words, and their command
+lines."""
 
 import itertools
 import math
@@ -13,7 +14,7 @@ import hybridnav as hn
 from hybridnav.config import load_preset
 from hybridnav.grid import RoomLabels
 from hybridnav.planner.itinerary import Guide
-from hybridnav.planner.named import stop_points
+from hybridnav.planner.named import points_of_waypoints
 from hybridnav.result import Path
 from hybridnav.route import RoomSearch
 from hybridnav.viz import plot_rooms, plot_tour
@@ -36,8 +37,8 @@ SIDE = 0.5
 NAMES = ("kitchen", "lab", "store", "hall")
 
 
-def stops_of(planner, stops):
-    return stop_points(planner.topology, planner.preset.planner, stops)
+def stops_of(planner, waypoints):
+    return points_of_waypoints(planner.topology, planner.preset.planner, waypoints)
 
 
 def labels():
@@ -159,8 +160,8 @@ def driving():
 
 
 def test_stops_have_headings_where_the_robot_has(driving):
-    stops: list[Any] = ["hall", "sink", (8.25, 0.75, 0.5), "lab"]
-    tour = hn.plan_tour(driving("space=se2"), stops)
+    waypoints: list[Any] = ["hall", "sink", (8.25, 0.75, 0.5), "lab"]
+    tour = hn.plan_tour(driving("space=se2"), waypoints)
     assert tour.solved
     yaws = [np.asarray(result.path.headings_rad) for result in tour.results if result.path]
     # From the hall's cell below the doorway up to the sink.
@@ -257,8 +258,8 @@ def test_the_picture_of_a_named_plan_shows_its_paths_stops_rooms_and_scale(plann
     for line, result in zip(paths, tour.results, strict=True):
         assert result.path is not None
         assert np.allclose(np.column_stack(line.get_data()), result.path.points)
-    ends = [np.column_stack(stop.get_data()) for stop in by_gid(ax, "stops")]
-    assert np.allclose(ends[0], [[0.75, 4.25], [5.75, 4.25]])
+    endpoints = [np.column_stack(waypoint.get_data()) for waypoint in by_gid(ax, "waypoints")]
+    assert np.allclose(endpoints[0], [[0.75, 4.25], [5.75, 4.25]])
     written = [by_gid(ax, f"room-{label}")[0] for label in range(len(NAMES))]
     assert [text.get_text() for text in written] == list(NAMES)
     for label, text in enumerate(written):
@@ -306,7 +307,7 @@ def test_plan_takes_names_from_the_file_beside_the_map(cli, map_file):
     done = cli("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
     assert done.code == 0
     assert "house, kitchen to lab" in done.out
-    assert "way        start in kitchen" in done.out
+    assert "words      start in kitchen" in done.out
     assert "and you are there" in done.out
     assert done.err == ""
 
@@ -317,7 +318,7 @@ def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):
         *("--at", "point", "--robot-radius", "0", "--plot", tmp_path / "tour.svg"),
     )
     assert done.answer["status"] == "solved"
-    assert done.answer["stops"] == ["sink", "lab", [1.25, 1.25]]
+    assert done.answer["waypoints"] == ["sink", "lab", [1.25, 1.25]]
     points = done.answer["points"]
     assert (points[0], points[-1]) == (done.answer["start"], done.answer["goal"])
     assert len(points) == len(done.answer["headings_rad"])
@@ -352,7 +353,7 @@ def test_plan_takes_stops_with_headings(cli, map_file):
         *("--preset", "ompl-rrtconnect", "--set", "planner.ompl.space=se2", "--json"),
     )
     assert done.answer["status"] == "solved"
-    assert done.answer["stops"] == ["kitchen", [8.25, 0.75, 1.5]]
+    assert done.answer["waypoints"] == ["kitchen", [8.25, 0.75, 1.5]]
 
 
 def test_plan_to_a_room_out_of_reach_exits_with_1(cli, map_file):

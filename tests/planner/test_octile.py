@@ -120,20 +120,20 @@ def test_threads_may_ask_the_first_query_at_once() -> None:
     topology = topology_of(office_world().grid(robot_radius_m=0.25))
     octile, whole = both(topology)
     pairs = [(pair.start, pair.goal) for pair in sample_pairs(topology.grid, 4, seed=0)]
-    ends = topology.grid.frame.points_of(np.array(pairs).reshape(-1, 2)).reshape(-1, 2, 2)
-    found: list[hn.PlanResult | None] = [None] * len(ends)
-    ready = threading.Barrier(len(ends))
+    endpoints = topology.grid.frame.points_of(np.array(pairs).reshape(-1, 2)).reshape(-1, 2, 2)
+    found: list[hn.PlanResult | None] = [None] * len(endpoints)
+    ready = threading.Barrier(len(endpoints))
 
     def ask(i: int) -> None:
         ready.wait()
-        found[i] = octile.plan(*ends[i])
+        found[i] = octile.plan(*endpoints[i])
 
-    threads = [threading.Thread(target=ask, args=(i,)) for i in range(len(ends))]
+    threads = [threading.Thread(target=ask, args=(i,)) for i in range(len(endpoints))]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    for result, (start, goal) in zip(found, ends, strict=True):
+    for result, (start, goal) in zip(found, endpoints, strict=True):
         assert result is not None
         assert_same(result, whole.plan(start, goal), topology.grid.enterable())
 
@@ -144,11 +144,11 @@ def assert_equal_on(path: Path, count: int) -> None:
         grid = hn.load_map(path, robot_radius_m=0.25)
     octile, whole = both(topology_of(grid))
     pairs = sample_pairs(grid, count, seed=0)
-    ends = [grid.frame.points_of([pair.start, pair.goal]) for pair in pairs]
-    expected = [whole.plan(*of) for of in ends]
-    for result, of in zip(expected, ends, strict=True):
+    endpoints = [grid.frame.points_of([pair.start, pair.goal]) for pair in pairs]
+    expected = [whole.plan(*of) for of in endpoints]
+    for result, of in zip(expected, endpoints, strict=True):
         assert_same(octile.plan(*of), result, grid.enterable())
-    starts, goals = np.swapaxes(np.array(ends), 0, 1)
+    starts, goals = np.swapaxes(np.array(endpoints), 0, 1)
     batch = octile.plan_many(starts, goals)
     assert batch.cost == pytest.approx([result.cost for result in expected], rel=1e-12)
     for i, start in enumerate(batch.path_start[:-1].tolist()):

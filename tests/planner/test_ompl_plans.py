@@ -94,10 +94,10 @@ def test_states_and_paths_stay_in_the_corridor(planner: str, confine: str) -> No
     preset = load_preset("ompl-rrtconnect", overrides=[f"planner.ompl={settings}"])
     made = hn.HybridPlanner(topology, preset=preset)
     inner: Any = made._ompl
-    ends = grid.frame.points_of(np.array([(3, 3), (56, 76)]))
+    endpoints = grid.frame.points_of(np.array([(3, 3), (56, 76)]))
     cells: Any = made._cells
     coarse = cells.plan(CellQuery.between(grid.frame, (3, 3), (56, 76)))
-    poses = tuple(np.append(end, 0.0) for end in ends)
+    poses = tuple(np.append(end, 0.0) for end in endpoints)
     found = inner.plan(coarse.cells, (poses[0], poses[1]), None, tells_search=True)
     assert found.refinement.steps[-1].startswith("corridor: solved")
     field_of = topology.level.field_of
@@ -310,8 +310,8 @@ def test_on_small_random_maps_paths_are_legal_and_not_below_the_optimum() -> Non
         exact = VisibilityGraph(grid)
         free = np.argwhere(grid.classes == hn.CellClass.FREE)
         for start, goal in rng.choice(free, (12, 2)).tolist():
-            ends = grid.frame.points_of(np.array([start, goal]))
-            result = made.plan(*ends)
+            endpoints = grid.frame.points_of(np.array([start, goal]))
+            result = made.plan(*endpoints)
             optimum = exact.shortest(tuple(start), tuple(goal)).length_m
             assert result.solved == math.isfinite(optimum)
             if result.path is not None:
@@ -374,7 +374,7 @@ def test_drawn_maps_without_a_way_have_no_path() -> None:
 
 
 def test_words_and_route_are_those_of_the_path_that_ompl_found() -> None:
-    """The coarse way takes the narrow door, which the robot cannot turn into."""
+    """The coarse route takes the narrow door, which the robot cannot turn into."""
     free = np.zeros((60, 122), dtype=np.bool_)
     free[2:58, 50:60] = free[2:58, 62:120] = True
     free[14:20, 60:62] = free[32:56, 60:62] = True

@@ -115,10 +115,10 @@ def test_an_any_angle_path_is_legal_and_its_bound_holds(scene: Scene, at_centres
     planners = [hn.HybridPlanner(topology, preset=preset) for preset in PRESETS]
     for start, goal in points_in(grid, np.random.default_rng(scene.seed), 3):
         cells = [grid.frame.cell_of(*point) for point in (start, goal)]
-        ends = grid.frame.points_of(cells) if at_centres else (start, goal)
+        endpoints = grid.frame.points_of(cells) if at_centres else (start, goal)
         optimum = graph.shortest(cells[0], cells[1]).length_m
         for planner in planners:
-            result = check_smooth(planner, *ends)
+            result = check_smooth(planner, *endpoints)
             assert result.solved == math.isfinite(optimum)
             if at_centres and result.solved:
                 assert result.lower_bound <= optimum + 1e-9
@@ -207,7 +207,9 @@ def test_many_answers_are_the_answers_one_by_one(
     same = np.repeat(pairs[:1, :1], 2, axis=1)
     starts, goals = np.concatenate([pairs, anywhere, same]).transpose(1, 0, 2)
     batch = planner.plan_many(starts, goals, smooth=smooth)
-    singles = [planner.plan(*ends, smooth=smooth) for ends in zip(starts, goals, strict=True)]
+    singles = [
+        planner.plan(*endpoints, smooth=smooth) for endpoints in zip(starts, goals, strict=True)
+    ]
     assert batch.status.tolist() == [str(single.status) for single in singles]
     assert len(set(batch.status.tolist())) >= 3
     assert batch.cost.tolist() == [single.cost for single in singles]
@@ -291,12 +293,12 @@ def random_blocked(topology: hn.TopologicalMap, rng: np.random.Generator) -> Blo
 
 
 def check_blocked(
-    planner: hn.HybridPlanner, ends: tuple[Any, Any], blocked: Any, optimum_m: float
+    planner: hn.HybridPlanner, endpoints: tuple[Any, Any], blocked: Any, optimum_m: float
 ) -> hn.PlanResult:
     """A plan round what is closed against the optimum of the grid without those cells."""
-    before = answer(planner.plan(*ends))
-    result = planner.plan(*ends, blocked=blocked)
-    assert answer(planner.plan(*ends)) == before
+    before = answer(planner.plan(*endpoints))
+    result = planner.plan(*endpoints, blocked=blocked)
+    assert answer(planner.plan(*endpoints)) == before
     epsilon = planner.preset.planner.epsilon
     if math.isinf(optimum_m):
         assert result.status is hn.PlanStatus.NO_PATH
@@ -448,8 +450,8 @@ def test_a_door_closed_by_a_polygon_sends_the_route_through_another(
     topology, grid = planner.topology, planner.topology.grid
     search, rerouted = GridSearch(grid.enterable()), 0
     for pair in sample_pairs(grid, 12, seed=2):
-        ends = grid.frame.points_of([pair.start, pair.goal])
-        before = planner.plan(*ends)
+        endpoints = grid.frame.points_of([pair.start, pair.goal])
+        before = planner.plan(*endpoints)
         if before.path is None:
             continue
         # A box of 40 cm round the middle of the path: some close a door, some only part of one.
@@ -458,7 +460,7 @@ def test_a_door_closed_by_a_polygon_sends_the_route_through_another(
         closed = Blocked(polygons=[box]).cells_of(topology)
         found = search.search(pair.start, pair.goal, blocked=closed).cells
         optimum = math.inf if found is None else recounted(found) * grid.resolution_m
-        result = check_blocked(planner, (ends[0], ends[1]), box, optimum)
+        result = check_blocked(planner, (endpoints[0], endpoints[1]), box, optimum)
         if result.path is not None:
             at = result.path.cells @ np.array([grid.shape[1], 1])
             assert not np.isin(at, closed).any()
@@ -478,12 +480,12 @@ def test_a_closed_arc_is_not_passed(
     frame = planner.topology.grid.frame
     detours = 0
     for pair in sample_pairs(planner.topology.grid, 8, seed=5, least_distance_m=8.0):
-        ends = frame.points_of([pair.start, pair.goal])
-        before = planner.plan(*ends)
+        endpoints = frame.points_of([pair.start, pair.goal])
+        before = planner.plan(*endpoints)
         if before.route is None or not before.route.arcs:
             continue
         arc = before.route.arcs[len(before.route.arcs) // 2]
-        result = planner.plan(*ends, blocked={"arcs": [arc]})
+        result = planner.plan(*endpoints, blocked={"arcs": [arc]})
         if result.route is not None:
             assert result.solved
             assert arc not in result.route.arcs
@@ -498,15 +500,15 @@ def test_what_is_closed_far_from_the_path_changes_nothing(
     planner = office_planners[preset]
     grid = planner.topology.grid
     for pair in sample_pairs(grid, 8, seed=11):
-        ends = grid.frame.points_of([pair.start, pair.goal])
-        before = planner.plan(*ends)
+        endpoints = grid.frame.points_of([pair.start, pair.goal])
+        before = planner.plan(*endpoints)
         if before.path is None:
             continue
         passed = shapely.MultiPoint(before.path.points)
         corners = grid.frame.points_of(np.argwhere(grid.enterable())[::997])
         far = corners[shapely.distance(passed, shapely.points(corners)) > 2]
         boxes = shapely.MultiPolygon([shapely.box(x, y, x + 0.1, y + 0.1) for x, y in far[::3]])
-        result = planner.plan(*ends, blocked=boxes)
+        result = planner.plan(*endpoints, blocked=boxes)
         assert answer(result) == answer(before)
         assert result.route == before.route
 
@@ -553,12 +555,12 @@ def test_what_cannot_be_closed_is_refused_in_one_line(preset: str, blocked: Any)
 @pytest.mark.parametrize(
     ("preset", "override", "message"),
     [
-        ("paper", "planner.epsilon=0.1", "epsilon needs refine: gates, or none"),
-        ("grid-astar", "planner.epsilon=0", "epsilon needs refine: gates, or none"),
-        ("paper", "planner.refine=gates", "coarse: max-distance goes with refine: grid-astar"),
-        ("grid-astar", "planner.refine=gates", "coarse: none goes with refine: grid-astar"),
+        ("paper", "planner.epsilon=0.1", "epsilon needs refine: none, or none"),
+        ("grid-astar", "planner.epsilon=0", "epsilon needs refine: none, or none"),
+        ("paper", "planner.refine=none", "coarse: max-distance goes with refine: grid-astar"),
+        ("grid-astar", "planner.refine=none", "coarse: none goes with refine: grid-astar"),
         ("portals", "planner.refine=stored-paths", "planner.refine: should be 'grid-astar', "),
-        ("octile", "planner.epsilon=0.1", "epsilon needs refine: gates, or none"),
+        ("octile", "planner.epsilon=0.1", "epsilon needs refine: none, or none"),
         ("octile", "planner.refine=grid-astar", "coarse: jumps goes with refine: none or ompl"),
         ("portals", "planner.coarse=none", "coarse: none goes with refine"),
         ("shortest", "planner.refine=grid-astar", "coarse: mesh goes with refine: none or ompl"),

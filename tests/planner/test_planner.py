@@ -242,15 +242,15 @@ def test_routes_paths_and_bounds_are_right_on_random_maps(
     rng = np.random.default_rng(seed)
     for _ in range(4):
         start, goal = map(tuple, rng.choice(np.argwhere(enterable), size=2).tolist())
-        ends = centre(grid, start), centre(grid, goal)
-        result = planner.plan(*ends)
+        endpoints = centre(grid, start), centre(grid, goal)
+        result = planner.plan(*endpoints)
         assert result.solved is bool(component[start] == component[goal])
         if not result.solved:
             assert result.status is hn.PlanStatus.NO_PATH
-            assert not wider.plan(*ends).solved
+            assert not wider.plan(*endpoints).solved
             continue
         optimum = distances(graph, grid.shape, start)[goal] * grid.resolution_m
-        wide = wider.plan(*ends)
+        wide = wider.plan(*endpoints)
         assert result.path is not None
         assert wide.path is not None
         assert result.route is not None
@@ -307,8 +307,8 @@ def test_of_two_doors_between_two_rooms_the_nearer_one_is_taken() -> None:
         assert level.max_distance_m[0] == level.max_distance_m[1]
         grid = topology.grid
         planner = hn.HybridPlanner(topology, preset=WITH_UNEXPLORED)
-        ends = centre(grid, (3, 0)), centre(grid, (3, 8))
-        for start, goal in (ends, ends[::-1]):
+        endpoints = centre(grid, (3, 0)), centre(grid, (3, 8))
+        for start, goal in (endpoints, endpoints[::-1]):
             route = planner.plan(start, goal).raise_for_status().route
             assert route is not None
             assert level.through_m[route.arcs[0]] == level.through_m.min()
@@ -365,12 +365,12 @@ def test_in_the_office_the_sealed_archive_is_not_reached(office: hn.TopologicalM
 
 
 def test_a_preset_is_a_name_a_file_or_an_object(tmp_path: Path) -> None:
-    topology, ends = map_of(SEALED, merge_distance_m=2.0), ((0.5, 2.5), (8.5, 2.5))
+    topology, endpoints = map_of(SEALED, merge_distance_m=2.0), ((0.5, 2.5), (8.5, 2.5))
     file = tmp_path / "mine.yaml"
     file.write_text("planner: {coarse: none}\n")
-    whole = hn.HybridPlanner(topology, preset="grid-astar").plan(*ends)
+    whole = hn.HybridPlanner(topology, preset="grid-astar").plan(*endpoints)
     for preset in (file, str(file), hn.load_preset(file)):
-        result = hn.HybridPlanner(topology, preset=preset).plan(*ends)
+        result = hn.HybridPlanner(topology, preset=preset).plan(*endpoints)
         assert result.settings["preset"] == "mine"
         assert result.cost == whole.cost
     assert hn.HybridPlanner(topology).preset.name == "shortest"

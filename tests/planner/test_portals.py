@@ -19,8 +19,8 @@ EPSILONS = (None, 0.01, 0.05)
 
 
 def planned(planner, start, goal):
-    ends = planner.topology.grid.frame.points_of(np.array([start, goal]))
-    return planner.plan(ends[0], ends[1])
+    endpoints = planner.topology.grid.frame.points_of(np.array([start, goal]))
+    return planner.plan(endpoints[0], endpoints[1])
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +47,9 @@ def pairs(office):
     return sample_pairs(office.grid, 120, seed=3)
 
 
-def check(result, topology, ends, optimum_cells, checks):
+def check(result, topology, endpoints, optimum_cells, checks):
     """A result against the grid's optimum, the judge and the definition of consistency."""
-    grid, (start, goal) = topology.grid, ends
+    grid, (start, goal) = topology.grid, endpoints
     if optimum_cells is None:
         assert result.status is hn.PlanStatus.NO_PATH
         assert result.route is None

@@ -61,13 +61,13 @@ def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn
     topology = mapped(classes, frame)
     graph, planner = VisibilityGraph(topology.grid), shortest(topology)
     for (first, start), (last, goal) in itertools.pairwise(some_positions(free, seed)):
-        ends = frame.points_of_grid([start, goal])
-        if (frame.cells_of(ends) != [first, last]).any():
+        endpoints = frame.points_of_grid([start, goal])
+        if (frame.cells_of(endpoints) != [first, last]).any():
             continue  # a point on a side belongs to the cell behind it
-        result = planner.plan(*ends)
+        result = planner.plan(*endpoints)
         assert_optimal(topology.grid, result, graph.between(start, goal).length_m)
         if result.path is not None:
-            np.testing.assert_array_equal(result.path.points[[0, -1]], ends)
+            np.testing.assert_array_equal(result.path.points[[0, -1]], endpoints)
             assert result.path.cells[[0, -1]].tolist() == [list(first), list(last)]
 
 
@@ -91,8 +91,8 @@ def test_paths_round_closed_cells_are_optimal(
         left[tuple(shut.T)] = hn.CellClass.OCCUPIED
         grid = occupancy_grid(left)
         graph, closed = VisibilityGraph(grid), planner.closed({"cells": shut})
-        ends = grid.frame.points_of(rng.choice(cells, 4))
-        for start, goal in itertools.pairwise(ends):
+        endpoints = grid.frame.points_of(rng.choice(cells, 4))
+        for start, goal in itertools.pairwise(endpoints):
             result = planner.plan(start, goal, blocked=closed)
             if "blocked" in result.status:
                 held = grid.frame.cells_of([start, goal])
@@ -116,17 +116,17 @@ def test_searches_round_what_was_closed_are_kept_for_the_next_query() -> None:
 
 def test_unexplored_cells_are_entered_where_that_is_allowed() -> None:
     topology = mapped(drawn(".?.", ".#."))
-    ends = (0.5, 0.5), (2.5, 0.5)
-    assert shortest(topology).plan(*ends).status is hn.PlanStatus.NO_PATH
+    endpoints = (0.5, 0.5), (2.5, 0.5)
+    assert shortest(topology).plan(*endpoints).status is hn.PlanStatus.NO_PATH
     allowed = shortest(topology, "planner.allow_unexplored=true")
-    assert allowed.plan(*ends).cost == pytest.approx(1 + 2 * math.hypot(0.5, 0.5))
-    assert allowed.plan((1.5, 1.5), ends[1]).solved
+    assert allowed.plan(*endpoints).cost == pytest.approx(1 + 2 * math.hypot(0.5, 0.5))
+    assert allowed.plan((1.5, 1.5), endpoints[1]).solved
     allowed.prepare()
     row = allowed.topology.grid.frame.cell_of(1.5, 1.5)[0]
     for column, status in ((1, hn.PlanStatus.NO_PATH), (0, hn.PlanStatus.START_BLOCKED)):
         closed = {"cells": [(row, column)], "polygons": []}
-        start = (0.5, 1.5) if column == 0 else ends[0]
-        assert allowed.plan(start, ends[1], blocked=closed).status is status
+        start = (0.5, 1.5) if column == 0 else endpoints[0]
+        assert allowed.plan(start, endpoints[1], blocked=closed).status is status
 
 
 def test_a_map_whose_corners_may_be_cut_is_refused() -> None:
@@ -148,8 +148,8 @@ def test_many_pairs_are_answered_as_one_by_one() -> None:
             planner.prepare()
         many = planner.plan_many(starts, goals, blocked=shut)
         assert (many.status == "solved").sum() > 100
-        for query, ends in enumerate(zip(starts, goals, strict=True)):
-            one = planner.plan(*ends, blocked=shut)
+        for query, endpoints in enumerate(zip(starts, goals, strict=True)):
+            one = planner.plan(*endpoints, blocked=shut)
             assert many.status[query] == one.status
             assert many.cost[query] == one.cost
             assert many.lower_bound[query] == one.lower_bound
@@ -178,8 +178,8 @@ def test_a_path_is_as_near_the_optimum_as_it_was_asked_to_be(
     exact, near = shortest(topology), shortest(topology, f"planner.epsilon={epsilon}")
     starts, goals = np.random.default_rng(seed).choice(cells, (2, 8)) + 0.5
     many = near.plan_many(starts[:, ::-1], goals[:, ::-1])
-    for query, ends in enumerate(zip(starts[:, ::-1], goals[:, ::-1], strict=True)):
-        optimum, found = exact.plan(*ends).cost, near.plan(*ends)
+    for query, endpoints in enumerate(zip(starts[:, ::-1], goals[:, ::-1], strict=True)):
+        optimum, found = exact.plan(*endpoints).cost, near.plan(*endpoints)
         assert many.cost[query] == found.cost
         assert many.lower_bound[query] == found.lower_bound
         assert found.solved == math.isfinite(optimum)
@@ -198,14 +198,14 @@ def test_a_query_whose_time_is_up_has_a_path_and_a_bound() -> None:
         if is_prepared:
             late.prepare()
         many = late.plan_many(starts, goals)
-        for query, ends in enumerate(zip(starts, goals, strict=True)):
-            optimum, found = exact.plan(*ends), late.plan(*ends)
+        for query, endpoints in enumerate(zip(starts, goals, strict=True)):
+            optimum, found = exact.plan(*endpoints), late.plan(*endpoints)
             assert many.status[query] == found.status == optimum.status
             if found.path is not None:
                 assert found.lower_bound <= optimum.cost * (1 + 1e-9)
                 assert optimum.cost <= found.cost * (1 + 1e-9)
                 assert not segment_faults(topology.grid, found.path.points)
-                assert found.lower_bound >= math.dist(*ends) * (1 - 1e-9)
+                assert found.lower_bound >= math.dist(*endpoints) * (1 - 1e-9)
     shut = {"cells": [(30, 30)]}
     assert late.plan((1.5, 30.5), (58.5, 30.5), blocked=shut).gap >= 0
 
@@ -255,7 +255,7 @@ def test_counts_name_what_was_expanded() -> None:
     topology = mapped(drawn(".....", ".###.", "....."))
     stats = shortest(topology).plan((0.5, 0.5), (4.5, 2.5)).stats
     assert stats.expanded_intervals > 0
-    assert stats.expanded == stats.expanded_gates == 0
+    assert stats.expanded == stats.expanded_border_cells == 0
     assert (
         hn.HybridPlanner(topology, preset="grid-astar")
         .plan((0.5, 0.5), (4.5, 2.5))

@@ -1,4 +1,4 @@
-"""What a tour is as JSON: the keys of a plan, for the whole way."""
+"""What a tour is as JSON: the keys of a plan, for the whole tour."""
 
 from __future__ import annotations
 
@@ -57,15 +57,15 @@ def test_a_tour_has_the_keys_of_a_plan_for_the_whole_way(preset: str, smooth: An
     assert walked == pytest.approx(tour.length_m, abs=1e-5)
     for part in parts:
         assert all(point in told["points"] for point in part["points"])
-    for counted in ("expanded", "expanded_gates", "expanded_intervals"):
+    for counted in ("expanded", "expanded_border_cells", "expanded_intervals"):
         assert told[counted] == sum(part[counted] for part in parts)
     assert told["settings"] == parts[0]["settings"]
     assert told["legs"][0]["room"] == "west"
     assert told["words"] == tour.in_words()
     assert len(told["places"]) == len(told["arcs"]) + 1
-    ends = [part["places"][0] for part in parts], parts[-1]["places"][-1]
-    assert told["places"][0] == ends[0][0]
-    assert told["places"][-1] == ends[1]
+    endpoints = [part["places"][0] for part in parts], parts[-1]["places"][-1]
+    assert told["places"][0] == endpoints[0][0]
+    assert told["places"][-1] == endpoints[1]
 
 
 def test_a_tour_that_is_not_solved_says_so_in_the_same_keys() -> None:
@@ -89,9 +89,9 @@ def test_a_plan_to_a_room_says_where_in_it() -> None:
 
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_a_stop_where_the_robot_is_has_no_heading_of_its_own(place: int) -> None:
-    stops = [(0.55, 0.15), (0.55, 1.95), (0.55, 3.5)]
-    twice = [*stops[: place + 1], *stops[place:]]
-    told, plain = (read(hn.plan_tour(planner(), way)) for way in (twice, stops))
+    waypoints = [(0.55, 0.15), (0.55, 1.95), (0.55, 3.5)]
+    twice = [*waypoints[: place + 1], *waypoints[place:]]
+    told, plain = (read(hn.plan_tour(planner(), path)) for path in (twice, waypoints))
     for key in ("points", "headings_rad"):
         assert told[key] == plain[key]
 

@@ -22,7 +22,7 @@ WRONG = [
     ("spacing_cells", 0),
     ("spacing_cells", 2.0),
     ("spacing_cells", True),
-    ("all_gates_levels", -1),
+    ("all_border_cells_levels", -1),
     ("sparse_spacings_cells", (16, 1)),
     ("sparse_spacings_cells", [16]),
     ("sparse_spacings_cells", 16),
@@ -87,7 +87,7 @@ def test_every_choice_of_options_finds_paths_as_short() -> None:
     usual = prepare_portals(topology)
     choices = [
         PortalOptions(spacing_cells=3, rows_at_once=7),
-        PortalOptions(all_gates_levels=0, sparse_spacings_cells=(8,)),
+        PortalOptions(all_border_cells_levels=0, sparse_spacings_cells=(8,)),
         PortalOptions(least_bytes=0, most_bytes_per_cell=0, most_sparse_bytes_per_cell=math.inf),
         PortalOptions(dropped_bits=4),
         PortalOptions(least_regions=3),

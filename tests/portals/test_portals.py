@@ -88,8 +88,8 @@ def test_every_move_between_gates_of_two_fields_is_an_exit(divided: Divided, gat
         assert np.array_equal(np.sort(portals.gate_cell), np.unique(tail))
     kept = np.isin(tail, portals.gate_cell) & np.isin(head, portals.gate_cell)
     expected = zip(tail[kept].tolist(), head[kept].tolist(), cost[kept].tolist(), strict=True)
-    ends = (part.tolist() for part in exits_of(portals))
-    found = zip(*ends, portals.exit_cost.tolist(), strict=True)
+    endpoints = (part.tolist() for part in exits_of(portals))
+    found = zip(*endpoints, portals.exit_cost.tolist(), strict=True)
     assert sorted(found) == sorted(expected)
     assert portals.n_fields == divided.n_fields
     assert len(np.unique(portals.gate_cell)) == portals.n_gates
@@ -107,10 +107,12 @@ def test_the_sides_of_a_field_are_those_of_its_portals(divided: Divided, gates: 
     expected: dict[tuple[int, ...], set[int]] = {}
     is_gate = np.isin(low, portals.gate_cell) & np.isin(high, portals.gate_cell)
     keys = group_of(divided, low, high, spacing).tolist()
-    for key, ends, leads in zip(keys, np.stack([low, high], axis=1).tolist(), is_gate, strict=True):
+    for key, endpoints, leads in zip(
+        keys, np.stack([low, high], axis=1).tolist(), is_gate, strict=True
+    ):
         for end in (0, 1):
             gates_of_side = expected.setdefault((key[end], end, *key), set())
-            gates_of_side |= {ends[end]} if leads else set()
+            gates_of_side |= {endpoints[end]} if leads else set()
     fields, starts = fields_of(portals.side_start), portals.side_gates_start
     found = []
     for side, field in enumerate(fields.tolist()):

@@ -13,13 +13,12 @@ from hypothesis import strategies as st
 
 from hybridnav.grid.worlds import figure1_world, office_world
 from hybridnav.portals import PortalSearch, prepare_portals
-from hybridnav.portals._path_kernels import FAR
-from hybridnav.portals._side_kernels import side_costs, ways_by_sides
+from hybridnav.portals._side_kernels import bounds_by_sides, side_costs
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import STRAIGHT
+from hybridnav.search.moves import FAR, STRAIGHT
 from hybridnav.topology import TopologicalMap
-from tests.divided import GATES, Divided, costs_from, partitions, pieces_of
+from tests.divided import GATES, Divided, components_of, costs_from, partitions
 from tests.portal_judge import EPSILONS, Judge, length_of
 from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid, scenes
 
@@ -54,13 +53,15 @@ def test_ways_by_two_sides_cost_at_least_what_bounds_say(
     search, rng = Judge(divided, bits=bits).search, np.random.default_rng(seed)
     cols = divided.grid.shape[1]
     starts, cells = search.portals.side_start, np.flatnonzero(divided.free)
-    for ends in rng.choice(cells, size=(6, 2)).tolist():
-        fields = divided.label[ends].tolist()
-        low = [side_costs(search.portals, cols, *pair) for pair in zip(fields, ends, strict=True)]
+    for endpoints in rng.choice(cells, size=(6, 2)).tolist():
+        fields = divided.label[endpoints].tolist()
+        low = [
+            side_costs(search.portals, cols, *pair) for pair in zip(fields, endpoints, strict=True)
+        ]
         first, last = starts[fields].tolist()
-        bounds = ways_by_sides(search.tables.between, search.tables.shift, first, last, *low)
+        bounds = bounds_by_sides(search.tables.between, search.tables.shift, first, last, *low)
         assert bounds.shape == (starts[fields[0] + 1] - first, starts[fields[1] + 1] - last)
-        inside = costs_from(divided.inside, np.array(ends))
+        inside = costs_from(divided.inside, np.array(endpoints))
         for (i, j), bound in np.ndenumerate(bounds):
             cost = cost_by_sides(divided, search.portals, (first + i, last + j), inside)
             assert bound <= cost
@@ -101,7 +102,7 @@ def test_many_answers_are_those_of_each_pair(
         share = judge.label[tuple(start)] == judge.label[tuple(goal)]
         if judge.search.is_exact and not (share or bits):
             assert found.is_done[k]
-        if not (share or bits):  # as short as a way over gates can be, within the part asked for
+        if not (share or bits):  # as short as a path over gates can be, within the part asked for
             over_gates = costs_from(judge.gate_moves, np.array([judge.flat(start)]))[0]
             best = over_gates[judge.flat(goal)]
             assert (found.length_cells[k] == math.inf) == (best == math.inf)
@@ -166,12 +167,12 @@ _LITTLE = {
 
 
 def divided_as(lines: tuple[str, ...], *, corner_cutting: bool) -> Divided:
-    """A map whose fields are the connected pieces of equal letters."""
+    """A map whose fields are the connected components of equal letters."""
     letters = np.array([[ord(letter) for letter in line] for line in reversed(lines)])
     grid = occupancy_grid((letters != ord("#")).astype(np.uint8))
     grid = replace(grid, corner_cutting=corner_cutting)
     divided = Divided(grid, letters.astype(np.int32), (4, 2))
-    return replace(divided, field_of=pieces_of(divided))
+    return replace(divided, field_of=components_of(divided))
 
 
 @pytest.mark.parametrize("gates", GATES)

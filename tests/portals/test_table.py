@@ -1,4 +1,4 @@
-"""The portal table against scipy's searches: sources to gates, sides to sides, ways down a row."""
+"""The portal table against scipy's searches: sources to gates, sides to sides, paths down a row."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from hybridnav.portals import PortalOptions, build_tables
 from hybridnav.portals._descent_kernels import descend
-from hybridnav.portals._path_kernels import FAR, UNREACHED
-from hybridnav.search.moves import STRAIGHT
+from hybridnav.portals._path_kernels import UNREACHED
+from hybridnav.search.moves import FAR, STRAIGHT
 from tests.divided import (
     GATES,
     Divided,
@@ -64,7 +64,7 @@ def moves_into(portals: Portals, gate: int) -> Any:
 
 def between_sides(portals: Portals, costs: Any) -> Any:
     """Least costs from any gate of a side to any of another that is entered there: a gate that is
-    the lower end of a move counts as entered, whatever the way to it."""
+    the lower end of a move counts as entered, whatever the path to it."""
     own = [gates_of_side(portals, side) for side in range(portals.n_sides)]
     lowest = [costs[gates].min(axis=0) for gates in own]
     from_side = np.array(lowest).reshape(portals.n_sides, portals.n_gates)
@@ -156,19 +156,19 @@ def test_ways_down_the_table_cost_what_it_says(
         lasts = [(-1, 0), *zip(others.tolist(), steps.tolist(), strict=True)]
         for gate in rng.choice(n, min(12, n), replace=False).tolist():
             last, step = lasts[rng.integers(len(lasts))]
-            way = descend(portals, tables, gate, source, last)
+            path = descend(portals, tables, gate, source, last)
             cost = costs[source, gate] + step
             if np.isinf(cost):
-                assert way[-1] >= FAR
+                assert path[-1] >= FAR
                 continue
-            found = cost_of_way(portals, gate, portals.source_gate[source], last, way)
+            found = cost_of_path(portals, gate, portals.source_gate[source], last, path)
             assert found == cost if bits == 0 else found >= cost
 
 
-def cost_of_way(portals: Portals, gate: int, goal: int, last: int, way: Any) -> int:
-    """What a way costs, after a look at each of its parts: its legs inside fields, and its moves
+def cost_of_path(portals: Portals, gate: int, goal: int, last: int, path: Any) -> int:
+    """What a path costs, after a look at each of its parts: its legs inside fields, and its moves
     between them."""
-    out, into, legs, over = way
+    out, into, legs, over = path
     field = fields_of(portals.gate_start)
     assert len(out) == len(into) == len(legs) - 1
     left, crossed = [*out.tolist()], 0
@@ -178,11 +178,11 @@ def cost_of_way(portals: Portals, gate: int, goal: int, last: int, way: Any) -> 
         crossed += int(steps[others == b][0])
     assert crossed == over
     begins = [gate, *into.tolist()]
-    ends = [*left, into[-1] if last >= 0 else goal]
+    endpoints = [*left, into[-1] if last >= 0 else goal]
     if last >= 0:
         assert into[-1] == last
         assert left[-1] == goal
-    for begin, end, leg in zip(begins, ends, legs.tolist(), strict=True):
+    for begin, end, leg in zip(begins, endpoints, legs.tolist(), strict=True):
         f = field[begin]
         assert f == field[end]
         row = portals.clique[portals.clique_start[f] : portals.clique_start[f + 1]]

@@ -233,8 +233,8 @@ def test_a_copied_search_finds_the_same_paths(scene: Scene) -> None:
         search = GridSearch(enterable, corner_cutting=corner_cutting)
         other = pickled(search)
         for goal in free[:: max(1, len(free) // 5)]:
-            ends = tuple(free[0].tolist()), tuple(goal.tolist())
-            one, two = search.search(*ends), other.search(*ends)
+            endpoints = tuple(free[0].tolist()), tuple(goal.tolist())
+            one, two = search.search(*endpoints), other.search(*endpoints)
             np.testing.assert_array_equal(one.cells, two.cells)
             assert one.expanded == two.expanded
 

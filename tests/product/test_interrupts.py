@@ -74,11 +74,11 @@ def test_a_query_that_is_interrupted_before_any_line_changes_no_other(preset: st
 @pytest.mark.parametrize("method", [HpaStar, WeightedAstar])
 def test_a_baseline_that_is_interrupted_answers_as_before(method: Any) -> None:
     planner = method(GRID)
-    ends = [tuple(cell) for cell in np.argwhere(GRID.enterable())[[0, -1]].tolist()]
-    expected = planner.solve(*ends)
-    for at in range(1, lines_of(lambda: planner.solve(*ends)) + 1):
-        assert struck(lambda: planner.solve(*ends), at)
-        answer = planner.solve(*ends)
+    endpoints = [tuple(cell) for cell in np.argwhere(GRID.enterable())[[0, -1]].tolist()]
+    expected = planner.solve(*endpoints)
+    for at in range(1, lines_of(lambda: planner.solve(*endpoints)) + 1):
+        assert struck(lambda: planner.solve(*endpoints), at)
+        answer = planner.solve(*endpoints)
         assert (answer.cells == expected.cells).all()
         assert (answer.bound, answer.expanded) == (expected.bound, expected.expanded)
 

@@ -39,15 +39,15 @@ def _python(*arguments, **options):
 
 
 @pytest.mark.parametrize(
-    ("ends", "code"),
+    ("endpoints", "code"),
     [
         (("0.5,1.5", "3.5,1.5"), 0),
         (("-0.5,1.5", "3.5,1.5"), 1),
         (("one,two", "3.5,1.5"), 2),
     ],
 )
-def test_exit_codes_of_the_program(ends, code):
-    start, goal = ends
+def test_exit_codes_of_the_program(endpoints, code):
+    start, goal = endpoints
     settings = ("--robot-radius", 0, "--set", "planner.allow_unexplored=true", "--json")
     done = _python("-m", "hybridnav", "plan", FIGURE, "--start", start, "--goal", goal, *settings)
     assert done.returncode == code
@@ -113,8 +113,8 @@ def test_a_plan_loads_nothing_of_other_presets(preset, others):
         f"    loaded = {unused} & sys.modules.keys()\n"
         "    assert not loaded, loaded\n"
     )
-    ends = ("--start", "1.0,13.2", "--goal", "40.6,19.4")
-    done = _python("-c", script, "plan", office, *ends, "--preset", preset)
+    endpoints = ("--start", "1.0,13.2", "--goal", "40.6,19.4")
+    done = _python("-c", script, "plan", office, *endpoints, "--preset", preset)
     assert "Traceback" not in done.stderr, done.stderr
     assert done.returncode == 0
 

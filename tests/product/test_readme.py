@@ -32,7 +32,7 @@ SAVED = ("python ", "yaml ")
 _BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\[[^\]]*\]\(([^)#]+)[^)]*\)")
 _IMAGE = re.compile(r"!\[[^\]]*\]\(([^)]+)\)")
-_ENDS = re.compile(r"--start (\S+) --goal (\S+)")
+_ENDPOINTS = re.compile(r"--start (\S+) --goal (\S+)")
 
 
 class Example(NamedTuple):
@@ -144,9 +144,11 @@ def test_every_guide_has_something_to_run() -> None:
 
 
 def test_readme_plans_the_route_that_make_draws() -> None:
-    recipe = _ENDS.findall((ROOT / "Makefile").read_text(encoding="utf-8"))
+    recipe = _ENDPOINTS.findall((ROOT / "Makefile").read_text(encoding="utf-8"))
     commands = [example.text for example in _examples_of("README.md")]
-    assert recipe[0] in [ends for command in commands for ends in _ENDS.findall(command)]
+    assert recipe[0] in [
+        endpoints for command in commands for endpoints in _ENDPOINTS.findall(command)
+    ]
 
 
 def test_the_reference_lists_every_preset_with_its_settings() -> None:

@@ -115,8 +115,8 @@ def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(preset: st
     settings = load_preset(preset, overrides=["planner.ompl.budget_s=0.15"])
     planner = hn.HybridPlanner(topology, preset=settings)
     closed = hn.Blocked(cells=np.argwhere(grid.enterable())[::500])
-    ends = grid.frame.points_of(np.argwhere(grid.enterable())[[0, 700, -1]])
-    queries = [(ends[0], ends[2], None), (ends[2], ends[1], closed)]
+    endpoints = grid.frame.points_of(np.argwhere(grid.enterable())[[0, 700, -1]])
+    queries = [(endpoints[0], endpoints[2], None), (endpoints[2], endpoints[1], closed)]
     jobs = [
         lambda start=start, goal=goal, blocked=blocked: planner.plan(start, goal, blocked=blocked)
         for start, goal, blocked in queries

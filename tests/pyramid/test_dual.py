@@ -109,9 +109,9 @@ def check_duality(level):
     assert bridges(level.arcs) == set(np.flatnonzero(dual.edges[:, 0] == dual.edges[:, 1]).tolist())
 
 
-def bridges(ends):
+def bridges(endpoints):
     """Edges of a multigraph whose loss would part what they join."""
-    pairs = [tuple(sorted(pair)) for pair in ends.tolist()]
+    pairs = [tuple(sorted(pair)) for pair in endpoints.tolist()]
     times = Counter(pairs)
     graph: nx.Graph[int] = nx.Graph(pair for pair in pairs if pair[0] != pair[1])
     found: Any = nx.bridges(graph)
@@ -201,10 +201,10 @@ def test_figure_1_has_an_obstacle_a_wall_and_the_ring_round_the_island(linkage):
     assert sorted(dual.kinds.tolist()) == [PLAIN, HOLE, OUTSIDE]
     order = np.argsort(dual.kinds)
     ring, obstacle, outside = order.tolist()
-    ends = [tuple(sorted(pair)) for pair in dual.edges[~level.is_self_loop].tolist()]
+    endpoints = [tuple(sorted(pair)) for pair in dual.edges[~level.is_self_loop].tolist()]
     doors = tuple(sorted((obstacle, outside)))
     # Both doors part the obstacle from the wall; the island's edge closes on itself.
-    assert sorted(ends) == sorted([doors, doors, (ring, ring)])
+    assert sorted(endpoints) == sorted([doors, doors, (ring, ring)])
     loop = dual.edges[level.is_self_loop].tolist()
     assert [sorted(pair) for pair in loop] in (
         [sorted((ring, outside))],

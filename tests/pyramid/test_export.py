@@ -57,8 +57,8 @@ def test_a_graph_says_what_the_level_says(scene, index):
         assert data["area_m2"] == pytest.approx(size * grid.resolution_m**2)
     edges = edges_by_key(graph)
     assert sorted(edges) == list(range(level.n_arcs))
-    for arc, (ends, data) in edges.items():
-        assert ends == frozenset(level.arcs[arc].tolist())
+    for arc, (endpoints, data) in edges.items():
+        assert endpoints == frozenset(level.arcs[arc].tolist())
         assert data["max_distance_m"] == level.max_distance_m[arc]
         assert data["through_m"] == level.through_m[arc]
         assert data["n_cracks"] == len(level.boundary(arc))
@@ -74,8 +74,8 @@ def test_a_dual_says_what_the_level_says(scene, index):
     assert kinds == [FaceKind(kind).name.lower() for kind in level.dual.kinds.tolist()]
     edges = edges_by_key(graph)
     assert sorted(edges) == list(range(level.n_arcs))
-    for arc, (ends, data) in edges.items():
-        assert ends == frozenset(level.dual.edges[arc].tolist())
+    for arc, (endpoints, data) in edges.items():
+        assert endpoints == frozenset(level.dual.edges[arc].tolist())
         assert data["vertices"] == level.arcs[arc].tolist()
         assert data["n_cracks"] == len(level.boundary(arc))
         length = data["n_cracks"] * level.grid.resolution_m

@@ -168,8 +168,8 @@ def test_ancestors_keep_the_shape_of_what_is_asked():
     assert pyramid.ancestor(table, level=0, to=-1).shape == table.shape
     assert pyramid.ancestor(3, level=0, to=-1).shape == ()
     assert pyramid.ancestor([], level=0, to=-1).shape == (0,)
-    ends = pyramid.ancestor(base.arcs, level=0, to=-1)
-    assert ends.tolist() == top.field_of[tuple(np.moveaxis(base.base_pairs, -1, 0))].tolist()
+    endpoints = pyramid.ancestor(base.arcs, level=0, to=-1)
+    assert endpoints.tolist() == top.field_of[tuple(np.moveaxis(base.base_pairs, -1, 0))].tolist()
 
 
 def test_levels_count_from_the_apex_too():

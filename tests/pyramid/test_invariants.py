@@ -87,8 +87,8 @@ def check_replay(levels, scene):
     plane = PlaneMap(scene.classes)
     for lower, upper in itertools.pairwise(levels):
         lost, choices = lost_edges(lower, upper)
-        ends = (replayed(plane, kernel, lost) for kernel in itertools.product(*choices))
-        fitting = [end for end in ends if end and end.sigma == sigma_of(upper)][:1]
+        endpoints = (replayed(plane, kernel, lost) for kernel in itertools.product(*choices))
+        fitting = [end for end in endpoints if end and end.sigma == sigma_of(upper)][:1]
         assert fitting, f"no kernels lead from level {lower.index} to the next"
         plane = fitting[0]
         assert {dart for dart, face in plane.face.items() if face not in plane.ordinary} == (

@@ -37,7 +37,7 @@ def test_what_is_left_and_what_is_dropped_make_up_the_level(scene, index):
     level = pyramid[min(index, len(pyramid) - 1)]
     simple, graph = level.to_simple_graph(), level.to_networkx()
     dropped = simple.dropped
-    counts = Counter(frozenset(ends) for ends in level.arcs.tolist())
+    counts = Counter(frozenset(endpoints) for endpoints in level.arcs.tolist())
     assert dropped.n_self_loops_dropped == nx.number_of_selfloops(graph)
     assert dropped.n_parallel_dropped == sum(n - 1 for p, n in counts.items() if len(p) == 2)
     assert dropped.n_edges == simple.graph.number_of_edges()
@@ -45,8 +45,8 @@ def test_what_is_left_and_what_is_dropped_make_up_the_level(scene, index):
     assert {frozenset(edge) for edge in simple.graph.edges} == {p for p in counts if len(p) == 2}
     assert dict(simple.graph.nodes(data=True)) == dict(graph.nodes(data=True))
     for group in dropped.parallel + dropped.self_loops:
-        ends = {tuple(sorted(level.arcs[arc].tolist())) for arc in group.arcs}
-        assert ends == {group.vertices}
+        endpoints = {tuple(sorted(level.arcs[arc].tolist())) for arc in group.arcs}
+        assert endpoints == {group.vertices}
         assert len(group.arcs) == counts[frozenset(group.vertices)]
     for low, high, data in simple.graph.edges(data=True):
         parallel = [graph.edges[low, high, arc] for arc in graph[low][high]]

@@ -110,7 +110,7 @@ def test_paths_are_spelled_out_as_turns_and_drives(yard: Yard, reverses: bool) -
             if may_go(visited[-1], pose):
                 visited.append(pose)
         poses = driven(yard.check, np.array(visited), reverses=reverses)
-        # Headings between the ends are left out, and no path is lost by that.
+        # Headings between the endpoints are left out, and no path is lost by that.
         assert len(poses)
         assert_turns_and_drives(poses, reverses=reverses)
         np.testing.assert_array_equal(poses[[0, -1], :2], np.array(visited)[[0, -1], :2])
@@ -217,9 +217,9 @@ def test_drives_that_make_no_sense_are_not_valid(wrong: float) -> None:
 def test_a_disc_turns_anywhere_and_drives_where_its_base_does() -> None:
     check = MotionCheck(posts((50, 50)))
     for x in (1.0, 2.5, 2.51, 4.0):
-        ends = (x, 1.0), (x, 4.0)
-        runs = check.motion_valid(*ends[0], *ends[1])
-        assert check.drive_valid(*ends[0], 1.0, *ends[1], -2.0) is runs
+        endpoints = (x, 1.0), (x, 4.0)
+        runs = check.motion_valid(*endpoints[0], *endpoints[1])
+        assert check.drive_valid(*endpoints[0], 1.0, *endpoints[1], -2.0) is runs
     assert check.spin(2.4, 2.4, 0.0, 3.0) == pytest.approx(3.0)
     assert math.isnan(check.spin(2.525, 2.525, 0.0, 3.0))
 

@@ -205,9 +205,9 @@ def test_known_paths(classes: Any, start: Any, goal: Any, inner: Any) -> None:
     grid = occupancy_grid(classes)
     cells = GridSearch(grid.enterable()).search(start, goal).cells
     assert cells is not None
-    ends = grid.frame.points_of([start, goal])
-    points = LineOfSight(grid).shorten(cells, *ends)
-    np.testing.assert_allclose(points, [ends[0], *inner, ends[1]], atol=1e-12)
+    endpoints = grid.frame.points_of([start, goal])
+    points = LineOfSight(grid).shorten(cells, *endpoints)
+    np.testing.assert_allclose(points, [endpoints[0], *inner, endpoints[1]], atol=1e-12)
 
 
 def test_ends_in_one_cell() -> None:
@@ -232,9 +232,9 @@ def test_point_outside_its_cell_is_refused() -> None:
 def test_unexplored_cells_are_walls_unless_allowed() -> None:
     grid = occupancy_grid(drawn(".....", ".???.", "....."))
     cells = np.array([(1, 0), (2, 1), (2, 2), (2, 3), (1, 4)])
-    ends = grid.frame.points_of(cells[[0, -1]])
-    assert len(LineOfSight(grid).shorten(cells, *ends)) == 4
-    assert len(LineOfSight(grid, allow_unexplored=True).shorten(cells, *ends)) == 2
+    endpoints = grid.frame.points_of(cells[[0, -1]])
+    assert len(LineOfSight(grid).shorten(cells, *endpoints)) == 4
+    assert len(LineOfSight(grid, allow_unexplored=True).shorten(cells, *endpoints)) == 2
 
 
 @given(class_grids(max_side=20), seeds, yaws)

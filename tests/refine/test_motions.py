@@ -31,11 +31,11 @@ def framed(classes: Any, yaw_rad: float = 0.0, *, corner_cutting: bool = False) 
 
 def segments_of(grid: OccupancyGrid, rng: np.random.Generator, n: int) -> list[Any]:
     """Segments anywhere on the map and a little beyond; many between corners and centres."""
-    ends = (1.2 * rng.random((n, 2, 2)) - 0.1) * grid.shape
-    ends[::2] = np.rint(2 * ends[::2]) / 2
-    ends[::3, 1] = ends[::3, 0] + rng.integers(-3, 4, (len(ends[::3]), 2))
-    ends[::6, 1, 0] = ends[::6, 0, 0]
-    return list(grid.frame.points_of_grid(ends))
+    endpoints = (1.2 * rng.random((n, 2, 2)) - 0.1) * grid.shape
+    endpoints[::2] = np.rint(2 * endpoints[::2]) / 2
+    endpoints[::3, 1] = endpoints[::3, 0] + rng.integers(-3, 4, (len(endpoints[::3]), 2))
+    endpoints[::6, 1, 0] = endpoints[::6, 0, 0]
+    return list(grid.frame.points_of_grid(endpoints))
 
 
 @given(class_grids(max_side=16), seeds, yaws)
@@ -80,11 +80,11 @@ def test_corridor_holds_what_stays_in_it_and_forbids_no_corner_between_free_cell
 def test_diagonal_leaves_the_corridor_at_a_corner_only_where_the_map_is_free() -> None:
     inside = np.eye(3, dtype=np.bool_)
     free = framed(drawn("...", "...", "..."))
-    ends = free.frame.points_of([[0, 0], [2, 2]]).ravel().tolist()
-    assert MotionCheck(free, inside=inside).motion_valid(*ends)
+    endpoints = free.frame.points_of([[0, 0], [2, 2]]).ravel().tolist()
+    assert MotionCheck(free, inside=inside).motion_valid(*endpoints)
     walled = drawn("##.", "#.#", ".##")
-    assert not MotionCheck(framed(walled), inside=inside).motion_valid(*ends)
-    assert MotionCheck(framed(walled, corner_cutting=True)).motion_valid(*ends)
+    assert not MotionCheck(framed(walled), inside=inside).motion_valid(*endpoints)
+    assert MotionCheck(framed(walled, corner_cutting=True)).motion_valid(*endpoints)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e300, -1e300])
@@ -234,7 +234,7 @@ def test_post_as_thin_as_a_cell_stops_every_motion_over_it() -> None:
     x, y = 2.525, 2.525
     assert not check.turn_valid(x - 1.5, y, 0.0, x + 1.5, y, 0.0)
     assert not check.turn_valid(x, y - 1.0, 0.0, x, y + 1.0, 0.0)
-    # Half a turn on the spot: free at both ends, the post on the way of the long side.
+    # Half a turn on the spot: free at both endpoints, the post on the way of the long side.
     assert not check.turn_valid(x, y - 0.7, 0.0, x, y - 0.7, math.pi)
     assert check.turn_valid(x, y - 1.0, 0.0, x, y - 1.0, math.pi)
     # A circle round (x, y - 1.2) whose upper half runs over the post.

@@ -257,24 +257,24 @@ def test_queries_of_two_threads_do_not_mix(planner: hn.HybridPlanner) -> None:
     other = (20.0, 5.0), (1.0, 13.2)
     found: list[tuple[Any, Any]] = []
 
-    def ask(ends: Any) -> None:
+    def ask(endpoints: Any) -> None:
         assert planner._ompl is not None
-        poses = tuple(np.append(end, 0.0) for end in ends)
-        cells = cells_of[ends]
+        poses = tuple(np.append(end, 0.0) for end in endpoints)
+        cells = cells_of[endpoints]
         for _ in range(4):
             plan = planner._ompl.plan(cells, (poses[0], poses[1]), None)
             assert plan.path is not None
-            found.append((ends, plan.path.points[[0, -1]].tolist()))
+            found.append((endpoints, plan.path.points[[0, -1]].tolist()))
 
-    cells_of = {ends: planner.plan(*ends).path.cells for ends in (ENDS, other)}  # type: ignore[union-attr]
-    threads = [threading.Thread(target=ask, args=(ends,)) for ends in (ENDS, other)]
+    cells_of = {endpoints: planner.plan(*endpoints).path.cells for endpoints in (ENDS, other)}  # type: ignore[union-attr]
+    threads = [threading.Thread(target=ask, args=(endpoints,)) for endpoints in (ENDS, other)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
     assert len(found) == 8
-    for ends, reached in found:
-        np.testing.assert_allclose(reached, ends, atol=1e-9)
+    for endpoints, reached in found:
+        np.testing.assert_allclose(reached, endpoints, atol=1e-9)
 
 
 def test_a_fork_has_a_worker_of_its_own_and_leaves_that_of_its_parent(

@@ -46,7 +46,7 @@ def random_cell(inside: Bools, rng: np.random.Generator) -> tuple[int, int]:
 def check_search(  # noqa: PLR0913 - the search's own parameters
     search: GridSearch,
     enterable: Bools,
-    ends: tuple[tuple[int, int], tuple[int, int]],
+    endpoints: tuple[tuple[int, int], tuple[int, int]],
     corridor: tuple[Labels, Bools] | None = None,
     *,
     corner_cutting: bool = False,
@@ -56,7 +56,7 @@ def check_search(  # noqa: PLR0913 - the search's own parameters
 
     `enterable` is the grid without the blocked cells.
     """
-    start, goal = ends
+    start, goal = endpoints
     field_of, in_corridor = corridor or (None, None)
     found = search.search(start, goal, field_of=field_of, in_corridor=in_corridor, blocked=blocked)
     standable = enterable.copy()
@@ -107,9 +107,9 @@ def test_in_a_corridor_it_finds_the_length_that_dijkstra_finds_there(
             continue
         inside = enterable & in_corridor[field_of]
         if inside.any():
-            ends = random_cell(inside, rng), random_cell(inside, rng)
-            check_search(search, enterable, ends, (field_of, in_corridor))
-            check_search(search, enterable, ends)
+            endpoints = random_cell(inside, rng), random_cell(inside, rng)
+            check_search(search, enterable, endpoints, (field_of, in_corridor))
+            check_search(search, enterable, endpoints)
 
 
 @given(seeds, st.sampled_from([0.0, 0.1, 0.25, 0.4]))
@@ -147,12 +147,12 @@ def test_of_two_paths_of_nearly_one_length_the_shorter_one_is_found() -> None:
     classes = drawn(
         "......", "......", ".##.#.", "...#..", "......", ".....#", ".#....", "....#.", "......"
     )
-    ends = np.zeros_like(classes)
-    ends[8, 3], ends[0, 1] = 1, 2
+    endpoints = np.zeros_like(classes)
+    endpoints[8, 3], endpoints[0, 1] = 1, 2
     for turn, flip in itertools.product(range(4), (1, -1)):
         enterable = np.ascontiguousarray(np.rot90(classes, turn)[::flip]) == CellClass.FREE
         first, last = (
-            np.argwhere(np.rot90(ends, turn)[::flip] == end)[0].tolist() for end in (1, 2)
+            np.argwhere(np.rot90(endpoints, turn)[::flip] == end)[0].tolist() for end in (1, 2)
         )
         search = GridSearch(enterable)
         check_search(search, enterable, (tuple(first), tuple(last)))
@@ -219,8 +219,8 @@ def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
     with search._works.lent() as work:
         work.waiting = np.empty(_kernels.BUCKETS, dtype=np.int32)
     for _ in range(4):
-        ends = random_cell(inside, rng), random_cell(inside, rng)
-        check_search(search, enterable, ends, corridor, corner_cutting=corner_cutting)
+        endpoints = random_cell(inside, rng), random_cell(inside, rng)
+        check_search(search, enterable, endpoints, corridor, corner_cutting=corner_cutting)
 
 
 @given(cases())
@@ -233,11 +233,15 @@ def test_only_paths_below_the_limit_are_found(
     search = GridSearch(enterable, corner_cutting=corner_cutting)
     field_of, in_corridor = corridor or (None, None)
     for _ in range(3):
-        ends = random_cell(inside, rng), random_cell(inside, rng)
-        optimum = check_search(search, enterable, ends, corridor, corner_cutting=corner_cutting)
+        endpoints = random_cell(inside, rng), random_cell(inside, rng)
+        optimum = check_search(
+            search, enterable, endpoints, corridor, corner_cutting=corner_cutting
+        )
         for limit in (0, 1, STRAIGHT, 10 * DIAGONAL, -1):
             cost = limit + (optimum or 0)
-            found = search.search(*ends, field_of=field_of, in_corridor=in_corridor, limit=cost)
+            found = search.search(
+                *endpoints, field_of=field_of, in_corridor=in_corridor, limit=cost
+            )
             if optimum is None or optimum >= cost:
                 assert found.cells is None
             else:
@@ -256,19 +260,19 @@ def test_blocked_cells_are_as_on_a_grid_without_them_and_only_for_one_search(
     search = GridSearch(enterable, corner_cutting=corner_cutting)
     field_of, in_corridor = corridor or (None, None)
     for _ in range(3):
-        # With repetitions, with cells that may not be entered anyway, at times with the ends.
+        # With repetitions, with cells that may not be entered anyway, at times with the endpoints.
         blocked = rng.integers(enterable.size, size=n_blocked)
         left = enterable.copy()
         left.flat[blocked] = False
-        ends = random_cell(inside, rng), random_cell(inside, rng)
+        endpoints = random_cell(inside, rng), random_cell(inside, rng)
         cost = check_search(
-            search, left, ends, corridor, corner_cutting=corner_cutting, blocked=blocked
+            search, left, endpoints, corridor, corner_cutting=corner_cutting, blocked=blocked
         )
         fresh = GridSearch(left, corner_cutting=corner_cutting)
-        if left[ends[0]] and left[ends[1]]:
-            found = fresh.search(*ends, field_of=field_of, in_corridor=in_corridor)
+        if left[endpoints[0]] and left[endpoints[1]]:
+            found = fresh.search(*endpoints, field_of=field_of, in_corridor=in_corridor)
             assert cost == (None if found.cells is None else cost_of(found.cells))
-        check_search(search, enterable, ends, corridor, corner_cutting=corner_cutting)
+        check_search(search, enterable, endpoints, corridor, corner_cutting=corner_cutting)
 
 
 @pytest.mark.parametrize("end", [(0, 0), (2, 3)])
@@ -431,7 +435,7 @@ def test_distances_inside_fields_are_those_that_dijkstra_finds(classes: Any, see
 
 
 def arcs_out(n: int, arcs: list[tuple[int, int]]) -> tuple[Any, Any, Any]:
-    """Arcs by the vertex that they leave, each from both its ends."""
+    """Arcs by the vertex that they leave, each from both its endpoints."""
     out: list[list[tuple[int, int]]] = [[] for _ in range(n)]
     for arc, (u, v) in enumerate(arcs):
         out[u].append((v, arc))

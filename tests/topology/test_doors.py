@@ -317,8 +317,10 @@ def test_list_picture_file_json_and_words_tell_the_same_doors(cli, map_file, tmp
     assert wide["doors"] == narrow["doors"]
     assert [door["number"] for door in wide["doors"]] == [1, 2]
     assert [room["area_m2"] for room in wide["rooms"]] == pytest.approx([2.79, 2.79, 2.7])
-    way = cli("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0", "--json")
-    for leg in way.answer["legs"]:
+    path = cli(
+        "plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0", "--json"
+    )
+    for leg in path.answer["legs"]:
         if leg["door"] is not None:
             (door,) = [door for door in wide["doors"] if door["number"] == leg["door"]]
             assert leg["door_m"] == pytest.approx(door["position_m"])
@@ -337,8 +339,8 @@ def test_a_room_that_does_not_fit_is_marked_in_the_list(cli, map_file):
     assert "rooms      2, 1 of them too small for 0.65 m" in done.out
     (line,) = [line for line in done.out.splitlines() if line.startswith("slit")]
     assert "no robot of 0.65 m fits" in line
-    way = cli("plan", *query, "--from", "kitchen", "--to", "slit")
-    assert way.refuses(2, "'slit'", "no free cell for this robot radius")
+    path = cli("plan", *query, "--from", "kitchen", "--to", "slit")
+    assert path.refuses(2, "'slit'", "no free cell for this robot radius")
 
 
 def test_no_listed_area_is_below_the_one_that_was_asked_for(cli, map_file):

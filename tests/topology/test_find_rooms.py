@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.grid import CellClass
 from hybridnav.metrics import compare_rooms
-from hybridnav.topology.merging import Pieces
-from hybridnav.topology.pieces import main_direction
+from hybridnav.topology.merging import Segments
 from hybridnav.topology.segmentation import divide_rooms
+from hybridnav.topology.segments import main_direction
 from tests.strategies import class_grids, occupancy_grid
 
 METHODS = ["walls", "watershed", "contraction"]
@@ -184,21 +184,21 @@ def test_the_main_direction_is_that_of_the_walls():
 def test_pieces_of_one_rectangle_merge_and_an_l_stays_apart():
     labels = np.full((20, 30), -1, dtype=np.int32)
     labels[0:10, 0:10], labels[0:10, 10:20], labels[10:20, 10:14] = 0, 1, 2
-    pieces = Pieces(labels, 1.0)
-    pieces.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
-    merged = pieces.label_of
+    segments = Segments(labels, 1.0)
+    segments.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
+    merged = segments.label_of
     assert merged[5, 5] == merged[5, 15] != merged[15, 12]
-    pieces.merge_small(50.0)
-    assert (pieces.label_of[labels >= 0] == 0).all()
+    segments.merge_small(50.0)
+    assert (segments.label_of[labels >= 0] == 0).all()
 
 
 def test_a_wall_between_two_pieces_keeps_them_apart():
     labels = np.full((20, 41), -1, dtype=np.int32)
     labels[:, :20], labels[:, 21:] = 0, 1
     labels[8:10, 20] = 0
-    pieces = Pieces(labels, 0.1)
-    pieces.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
-    assert pieces.label_of.max() == 1
+    segments = Segments(labels, 0.1)
+    segments.merge_convex(least_solidity=0.9, least_open=0.5, least_straight=0.9)
+    assert segments.label_of.max() == 1
 
 
 @given(

@@ -248,7 +248,7 @@ def test_figure_1_tells_meeting_twice_from_lying_inside(linkage):
     a, b, c = (topology.place_at(cell) for cell in ((5, 5), (5, 35), (14, 9)))
     assert sorted((a, b, c)) == [0, 1, 2]
     assert topology.classes[[a, b, c]].tolist() == [1, 2, 2]
-    arcs = sorted(tuple(sorted(ends)) for ends in topology.arcs.tolist())
+    arcs = sorted(tuple(sorted(endpoints)) for endpoints in topology.arcs.tolist())
     assert arcs == sorted([(a, a), *2 * [tuple(sorted((a, b)))], tuple(sorted((a, c)))])
     assert topology.encloses(a).places.tolist() == [c]
     assert [topology.encloses(a).obstacles.size, topology.encloses(a).components.size] == [0, 0]

@@ -90,8 +90,8 @@ def test_parallel_arcs_are_two_lines_round_what_parts_them(figure1):
     free = place_of(figure1, hn.CellClass.FREE, largest=True)
     outer = place_of(figure1, hn.CellClass.UNEXPLORED, largest=True)
     for line in (one, other):
-        ends = {tuple(np.round(end, 9)) for end in line[[0, -1]]}
-        assert ends == {tuple(np.round(figure1.positions[p], 9)) for p in (free, outer)}
+        endpoints = {tuple(np.round(end, 9)) for end in line[[0, -1]]}
+        assert endpoints == {tuple(np.round(figure1.positions[p], 9)) for p in (free, outer)}
     assert farthest_apart(one, other) > 0.3
     obstacle = (2.25, 1.55)
     assert Curve(np.concatenate([one, other[::-1]])).contains_point(obstacle)
@@ -195,8 +195,8 @@ def test_loops_enclose_what_inclusion_says(scene, index):
     for place in np.unique(lower.arcs[lower.is_self_loop, 0]).tolist():
         loops = Loops(Field(lower, place, WIDE))
         for loop in loops.enclosed:
-            ends = loops.curve(loop)[[0, -1]]
-            np.testing.assert_allclose(ends, lower.cells[[place, place]] + 0.5)
+            endpoints = loops.curve(loop)[[0, -1]]
+            np.testing.assert_allclose(endpoints, lower.cells[[place, place]] + 0.5)
 
 
 @SOME
@@ -204,10 +204,10 @@ def test_loops_enclose_what_inclusion_says(scene, index):
 def test_an_arc_joins_its_two_places_on_every_map(scene, index):
     level = level_of(scene, index)
     for arc in np.flatnonzero(~level.is_self_loop)[:20].tolist():
-        ends = level.arcs[arc].tolist()
-        one, other = (Field(level, end, WIDE) for end in ends)
+        endpoints = level.arcs[arc].tolist()
+        one, other = (Field(level, end, WIDE) for end in endpoints)
         curve = Arc(one, other, level.boundary(arc)).curve()
-        np.testing.assert_allclose(curve[[0, -1]], level.cells[ends] + 0.5)
+        np.testing.assert_allclose(curve[[0, -1]], level.cells[endpoints] + 0.5)
 
 
 @SOME

@@ -107,8 +107,8 @@ def test_neighbouring_places_have_different_colours_on_every_level(classes, inde
     pyramid = DualGraphPyramid.build(occupancy_grid(classes), merge_distance_m=3.0)
     level = pyramid[min(index, len(pyramid) - 1)]
     colours = Places(level).colours()
-    ends = level.arcs[~level.is_self_loop]
-    assert (colours[ends[:, 0]] != colours[ends[:, 1]]).any(axis=1).all()
+    endpoints = level.arcs[~level.is_self_loop]
+    assert (colours[endpoints[:, 0]] != colours[endpoints[:, 1]]).any(axis=1).all()
 
 
 def test_six_colours_do_for_a_wheel_with_a_thousand_spokes():
@@ -126,9 +126,9 @@ def test_two_doors_are_two_lines(figure1):
         np.sort(figure1.arcs[~figure1.level.is_self_loop], axis=1), axis=0, return_counts=True
     )
     assert counts.max() == 2
-    ends = figure1.positions[pairs[counts.argmax()]]
+    endpoints = figure1.positions[pairs[counts.argmax()]]
     drawn = _lines(plot_places(figure1), "arcs", "rim-arcs", "unexplored-arcs")
-    between = [line for line in drawn if np.isin(line[[0, -1]], ends).all()]
+    between = [line for line in drawn if np.isin(line[[0, -1]], endpoints).all()]
     assert len(between) == 2
     assert not np.allclose(between[0][1], between[1][1])
 
@@ -269,8 +269,8 @@ def test_neighbours_of_the_route_stand_out_where_they_are_in_the_corridor(rooms)
     preset = hn.load_preset("paper")
     wide = preset.planner.model_copy(update={"corridor": "neighbours"})
     result = _plan(rooms, START, (2.0, 1.0), preset.model_copy(update={"planner": wide}))
-    ends = rooms.arcs[np.isin(rooms.arcs, result.route.places).any(axis=1)]
-    beside = set(ends.ravel().tolist()) - set(result.route.places)
+    endpoints = rooms.arcs[np.isin(rooms.arcs, result.route.places).any(axis=1)]
+    beside = set(endpoints.ravel().tolist()) - set(result.route.places)
     strong = {_bytes(colour) for colour in style.PLACES}
     ax = plot_plan(rooms, result)
     assert beside
@@ -373,9 +373,9 @@ def test_the_scale_bar_is_as_long_as_it_says(yaw):
     bar, label = _find(ax, "scale-bar"), _find(ax, "scale-bar-label")
     length = float(label.get_text().removesuffix(" m"))
     assert np.ptp(bar.get_xdata()) == pytest.approx(length)
-    ends = bar.get_transform().transform(bar.get_xydata())
+    endpoints = bar.get_transform().transform(bar.get_xydata())
     metre = ax.transData.transform([[0, 0], [1, 0]])
-    assert np.ptp(ends[:, 0]) == pytest.approx(length * np.ptp(metre[:, 0]))
+    assert np.ptp(endpoints[:, 0]) == pytest.approx(length * np.ptp(metre[:, 0]))
     assert length <= 0.2 * np.ptp(ax.get_xlim())
 
 

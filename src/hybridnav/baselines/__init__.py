@@ -1,5 +1,5 @@
 """Topological and metric layers of other methods, behind one protocol."""
 
-from hybridnav.baselines.protocol import Answer, Line, Method
+from hybridnav.baselines.protocol import AnyAngleResult, Method, MethodResult
 
-__all__ = ["Answer", "Line", "Method"]
+__all__ = ["AnyAngleResult", "Method", "MethodResult"]

@@ -1,7 +1,7 @@
 """Kernels of HPA*: regions of clusters, transitions, distances in clusters, search, smoothing.
 
-A cluster is a square of `side` x `side` cells of the grid, cut off at its upper and right rim.
-Moves are legal on the whole grid; inside a cluster both cells of a move lie in it.
+A cluster is a square of `cluster_cells` x `cluster_cells` cells of the grid, cut off at its upper
+and right rim. Moves are legal on the whole grid; inside a cluster both cells of a move lie in it.
 """
 
 from __future__ import annotations
@@ -33,28 +33,32 @@ class AbstractGraph(NamedTuple):
     """int64 (n_clusters + 1,), first node of each cluster."""
     first: LongArray
     """int64 (n_nodes + 1,), first edge out of each node."""
-    ends: IntArray
+    endpoints: IntArray
     """int32 (n_edges,), node that each edge leads to."""
     costs: LongArray
     """int64 (n_edges,), integer cost of each edge."""
 
 
 @njit(cache=True, nogil=True)
-def cluster_at(cols, side, cell):
+def cluster_at(cols, cluster_cells, cell):
     """Return the index of the cluster of a flat cell."""
-    return cell // cols // side * ((cols + side - 1) // side) + cell % cols // side
+    return (
+        cell // cols // cluster_cells * ((cols + cluster_cells - 1) // cluster_cells)
+        + cell % cols // cluster_cells
+    )
 
 
 @njit(cache=True, nogil=True)
-def label_regions(enterable, moves, side):
-    """Return the region of each cell, a connected piece of a cluster; -1 for cells not to enter."""
+def label_regions(enterable, moves, cluster_cells):
+    """Return the region of each cell, a connected component of a cluster; -1 for cells not to
+    enter."""
     rows, cols = moves.shape
     region_of = np.full((rows, cols), np.int32(-1), np.int32)
-    stack = np.empty(side * side, np.int64)
+    stack = np.empty(cluster_cells * cluster_cells, np.int64)
     n_regions = 0
-    for row0 in range(0, rows, side):
-        for col0 in range(0, cols, side):
-            row1, col1 = min(row0 + side, rows), min(col0 + side, cols)
+    for row0 in range(0, rows, cluster_cells):
+        for col0 in range(0, cols, cluster_cells):
+            row1, col1 = min(row0 + cluster_cells, rows), min(col0 + cluster_cells, cols)
             for seed_row in range(row0, row1):
                 for seed_col in range(col0, col1):
                     if not enterable[seed_row, seed_col] or region_of[seed_row, seed_col] >= 0:
@@ -80,20 +84,22 @@ def label_regions(enterable, moves, side):
 
 
 @njit(cache=True, nogil=True)
-def transitions(enterable, side):
+def transitions(enterable, cluster_cells):
     """Return the flat cell pairs (n, 2) of the transitions between clusters that share a side.
 
     An entrance is a maximal run of facing pairs of cells that may be entered, along one side of
     one cluster.
     """
     rows, cols = enterable.shape
-    pairs = np.empty((2 * rows * (cols // side) + 2 * cols * (rows // side) + 1, 2), np.int64)
+    pairs = np.empty(
+        (2 * rows * (cols // cluster_cells) + 2 * cols * (rows // cluster_cells) + 1, 2), np.int64
+    )
     n_pairs = 0
     for upright in range(2):
         # `along` counts cells along the line between two rows of clusters, `across` across it.
         n_across, n_along = (cols, rows) if upright else (rows, cols)
         step_across, step_along = (1, cols) if upright else (cols, 1)
-        for across in range(side - 1, n_across - 1, side):
+        for across in range(cluster_cells - 1, n_across - 1, cluster_cells):
             run = 0
             for along in range(n_along):
                 cell = across * step_across + along * step_along
@@ -103,7 +109,7 @@ def transitions(enterable, side):
                     and enterable[facing // cols, facing % cols]
                 ):
                     run += 1
-                    ends_here = along + 1 == n_along or (along + 1) % side == 0
+                    ends_here = along + 1 == n_along or (along + 1) % cluster_cells == 0
                     beyond = cell + step_along
                     if not ends_here:
                         facing = beyond + step_across
@@ -127,7 +133,7 @@ def transitions(enterable, side):
 
 
 @njit(cache=True, nogil=True)
-def flood(moves, side, cell, distance, waiting):
+def flood(moves, cluster_cells, cell, distance, waiting):
     """Fill `distance` with the costs of paths from a cell inside its cluster; return the cells
     reached.
 
@@ -137,12 +143,15 @@ def flood(moves, side, cell, distance, waiting):
     improved at most once by each neighbour, so `waiting` needs 8 entries a cell.
     """
     rows, cols = moves.shape
-    row0, col0 = cell // cols // side * side, cell % cols // side * side
-    height, width = min(side, rows - row0), min(side, cols - col0)
+    row0, col0 = (
+        cell // cols // cluster_cells * cluster_cells,
+        cell % cols // cluster_cells * cluster_cells,
+    )
+    height, width = min(cluster_cells, rows - row0), min(cluster_cells, cols - col0)
     distance[:] = -1
     count = np.zeros(3, np.int64)
-    local = (cell // cols - row0) * side + cell % cols - col0
-    distance[local // side, local % side] = 0
+    local = (cell // cols - row0) * cluster_cells + cell % cols - col0
+    distance[local // cluster_cells, local % cluster_cells] = 0
     waiting[0, 0] = local
     count[0] = 1
     turn = 0
@@ -152,7 +161,7 @@ def flood(moves, side, cell, distance, waiting):
         while count[slot] > 0:
             count[slot] -= 1
             local = np.int64(waiting[slot, count[slot]])
-            row, col = local // side, local % side
+            row, col = local // cluster_cells, local % cluster_cells
             cost = distance[row, col]
             if cost // STRAIGHT != turn:
                 continue
@@ -171,21 +180,21 @@ def flood(moves, side, cell, distance, waiting):
                     reached += 1
                 distance[to_row, to_col] = new_cost
                 into = new_cost // STRAIGHT % 3
-                waiting[into, count[into]] = to_row * side + to_col
+                waiting[into, count[into]] = to_row * cluster_cells + to_col
                 count[into] += 1
         turn += 1
     return reached
 
 
 @njit(cache=True, nogil=True)
-def distance_in_cluster(distance, cols, side, cell):
+def distance_in_cluster(distance, cols, cluster_cells, cell):
     """Return the result of the last flood for a flat cell of the same cluster."""
-    return distance[cell // cols % side, cell % cols % side]
+    return distance[cell // cols % cluster_cells, cell % cols % cluster_cells]
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def intra_edges(moves, side, cells, cluster_first):
+def intra_edges(moves, cluster_cells, cells, cluster_first):
     """Return tails, heads and costs of the edges between nodes joined by a path in their
     cluster."""
     cols = moves.shape[1]
@@ -193,15 +202,15 @@ def intra_edges(moves, side, cells, cluster_first):
     room = np.sum(counts * (counts - 1))
     tails, heads = np.empty(room, np.int32), np.empty(room, np.int32)
     costs = np.empty(room, np.int64)
-    distance = np.empty((side, side), np.int64)
-    waiting = np.empty((3, 8 * side * side), np.int32)
+    distance = np.empty((cluster_cells, cluster_cells), np.int64)
+    waiting = np.empty((3, 8 * cluster_cells * cluster_cells), np.int32)
     n_edges = 0
     for cluster in range(counts.size):
         low, high = cluster_first[cluster], cluster_first[cluster + 1]
         for tail in range(low, high):
-            flood(moves, side, cells[tail], distance, waiting)
+            flood(moves, cluster_cells, cells[tail], distance, waiting)
             for head in range(low, high):
-                cost = distance_in_cluster(distance, cols, side, cells[head])
+                cost = distance_in_cluster(distance, cols, cluster_cells, cells[head])
                 if head != tail and cost >= 0:
                     tails[n_edges], heads[n_edges], costs[n_edges] = tail, head, cost
                     n_edges += 1
@@ -210,7 +219,7 @@ def intra_edges(moves, side, cells, cluster_first):
 
 @guarded
 @njit(cache=True, nogil=True)
-def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, generation):
+def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous, mark, generation):
     """Return the flat cells of the cheapest abstract path, and the nodes and cells expanded.
 
     The path includes start and goal, and is empty if there is none; cells are expanded to join
@@ -221,7 +230,7 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
     ----------
     moves
         uint8 (rows, cols), the legal moves of each cell.
-    side
+    cluster_cells
         Side of a cluster, in cells.
     graph
         `AbstractGraph`.
@@ -234,26 +243,31 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
     """
     cols = moves.shape[1]
     is_open, is_closed = 2 * generation, 2 * generation + 1
-    distance = np.empty((side, side), np.int64)
-    waiting = np.empty((3, 8 * side * side), np.int32)
-    start_cluster, goal_cluster = cluster_at(cols, side, start), cluster_at(cols, side, goal)
+    distance = np.empty((cluster_cells, cluster_cells), np.int64)
+    waiting = np.empty((3, 8 * cluster_cells * cluster_cells), np.int32)
+    start_cluster, goal_cluster = (
+        cluster_at(cols, cluster_cells, start),
+        cluster_at(cols, cluster_cells, goal),
+    )
     goal_row, goal_col = goal // cols, goal % cols
     goal_low, goal_high = graph.cluster_first[goal_cluster], graph.cluster_first[goal_cluster + 1]
     to_goal = np.empty(goal_high - goal_low, np.int64)
-    n_cells = flood(moves, side, goal, distance, waiting)
+    n_cells = flood(moves, cluster_cells, goal, distance, waiting)
     for node in range(goal_low, goal_high):
-        to_goal[node - goal_low] = distance_in_cluster(distance, cols, side, graph.cells[node])
+        to_goal[node - goal_low] = distance_in_cluster(
+            distance, cols, cluster_cells, graph.cells[node]
+        )
     least, last = _NONE, np.int64(-1)
     if start_cluster == goal_cluster:
-        direct = distance_in_cluster(distance, cols, side, start)
+        direct = distance_in_cluster(distance, cols, cluster_cells, start)
         if direct >= 0:
             least = direct
-    n_cells += flood(moves, side, start, distance, waiting)
+    n_cells += flood(moves, cluster_cells, start, distance, waiting)
     keys, items = np.empty(256, np.int64), np.empty(256, np.int32)
     size = expanded = 0
     for node in range(graph.cluster_first[start_cluster], graph.cluster_first[start_cluster + 1]):
         cell = graph.cells[node]
-        cost = distance_in_cluster(distance, cols, side, cell)
+        cost = distance_in_cluster(distance, cols, cluster_cells, cell)
         if cost < 0:
             continue
         cost_of[node], previous[node], mark[node] = cost, -1, is_open
@@ -280,7 +294,7 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
             if cost < least:
                 least, last = cost, node
         for i in range(graph.first[node], graph.first[node + 1]):
-            to, cost = graph.ends[i], cost_of[node] + graph.costs[i]
+            to, cost = graph.endpoints[i], cost_of[node] + graph.costs[i]
             if mark[to] >= is_open and cost_of[to] <= cost:
                 continue
             cell = graph.cells[to]
@@ -310,35 +324,38 @@ def abstract_search(moves, side, graph, start, goal, cost_of, previous, mark, ge
 
 @guarded
 @njit(cache=True, nogil=True)
-def refine(moves, side, passed):
+def refine(moves, cluster_cells, passed):
     """Return the flat cells of the path that refines an abstract one, and the cells expanded.
 
     Two cells in a row lie in one cluster, or face each other across the side of two.
     """
     cols = moves.shape[1]
-    distance = np.empty((side, side), np.int64)
-    waiting = np.empty((3, 8 * side * side), np.int32)
-    path = np.empty(max(1024, side * side), np.int64)
+    distance = np.empty((cluster_cells, cluster_cells), np.int64)
+    waiting = np.empty((3, 8 * cluster_cells * cluster_cells), np.int32)
+    path = np.empty(max(1024, cluster_cells * cluster_cells), np.int64)
     path[0] = passed[0]
     size = 1
     expanded = 0
     for i in range(passed.size - 1):
         cell, end = passed[i], passed[i + 1]
-        while size + side * side > path.size:
+        while size + cluster_cells * cluster_cells > path.size:
             path = grow(path)
-        if cluster_at(cols, side, cell) != cluster_at(cols, side, end):
+        if cluster_at(cols, cluster_cells, cell) != cluster_at(cols, cluster_cells, end):
             path[size] = end
             size += 1
             continue
-        expanded += flood(moves, side, end, distance, waiting)
-        row0, col0 = cell // cols // side * side, cell % cols // side * side
+        expanded += flood(moves, cluster_cells, end, distance, waiting)
+        row0, col0 = (
+            cell // cols // cluster_cells * cluster_cells,
+            cell % cols // cluster_cells * cluster_cells,
+        )
         row, col = cell // cols - row0, cell % cols - col0
         while distance[row, col] > 0:
             for k in range(8):
                 to_row, to_col = row + ROW_STEP[k], col + COL_STEP[k]
                 if not (moves[row0 + row, col0 + col] >> k & 1):
                     continue
-                if not (0 <= to_row < side and 0 <= to_col < side):
+                if not (0 <= to_row < cluster_cells and 0 <= to_col < cluster_cells):
                     continue
                 step = DIAGONAL if k & 1 else STRAIGHT
                 if distance[to_row, to_col] == distance[row, col] - step:
@@ -355,9 +372,9 @@ def smooth(moves, path, reach, position):
 
     From a cell of the path, lines of at most `reach` legal moves run in the eight directions, each
     up to the first cell of the path that it meets. The line that saves most replaces the path
-    between its ends, and its far end is next; if none saves, the next cell of the path is.
+    between its endpoints, and its far end is next; if none saves, the next cell of the path is.
     `position` (one entry a cell) is -1 throughout before and after. A straight line has the fewest
-    moves of all paths between its ends, so the path gets no more cells.
+    moves of all paths between its endpoints, so the path gets no more cells.
     """
     cols = moves.shape[1]
     n = path.size
@@ -375,7 +392,7 @@ def smooth(moves, path, reach, position):
     at = np.int64(position[path[0]])
     while at < n - 1:
         cell = path[at]
-        joins, way, length, saved = at + 1, -1, 0, 0
+        joins, heading, length, saved = at + 1, -1, 0, 0
         for k in range(8):
             row, col, steps = cell // cols, cell % cols, 0
             meets = np.int64(-1)
@@ -386,9 +403,9 @@ def smooth(moves, path, reach, position):
                 step = DIAGONAL if k & 1 else STRAIGHT
                 saving = cost_to[meets] - cost_to[at] - steps * step
                 if saving > saved:
-                    joins, way, length, saved = meets, k, steps, saving
+                    joins, heading, length, saved = meets, k, steps, saving
         for _ in range(length - 1):
-            cell += ROW_STEP[way] * cols + COL_STEP[way]
+            cell += ROW_STEP[heading] * cols + COL_STEP[heading]
             smoothed[size] = cell
             size += 1
         smoothed[size] = path[joins]

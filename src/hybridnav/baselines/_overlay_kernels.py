@@ -253,11 +253,11 @@ def distances_to_nodes(labels, moves, cols, boxes, node_cell, node_first, cell, 
     box = boxes[field]
     inner = inner_moves(labels, moves, cols, field, box)
     distance, closed, came, open_cells = room_for(inner.size)
-    ends = local_of(np.array([cell, other]), cols, box)
+    endpoints = local_of(np.array([cell, other]), cols, box)
     width = np.int64(box[3] - box[1] + 1)
-    distances_from(inner, width, ends[0], keep_table(), distance, closed, came, open_cells)
+    distances_from(inner, width, endpoints[0], keep_table(), distance, closed, came, open_cells)
     local = local_of(node_cell[node_first[field] : node_first[field + 1]], cols, box)
-    direct = distance[ends[1]] if labels[other] == field else _NONE
+    direct = distance[endpoints[1]] if labels[other] == field else _NONE
     return distance[local], direct, closed.sum()
 
 
@@ -334,7 +334,7 @@ def overlay_search(
     cross_first, cross_head, cross_cost
         The moves of `cross_edges`.
     start_field, goal_field
-        Fields of the two ends.
+        Fields of the two endpoints.
     start_distance, goal_distance
         Results of `distances_to_nodes`.
     goal

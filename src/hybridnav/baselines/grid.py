@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav.baselines import _weighted_kernels
-from hybridnav.baselines.protocol import Answer, Cell
+from hybridnav.baselines.protocol import Cell, MethodResult
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -46,13 +46,13 @@ class GridAstar:
         self.n_nodes, self.n_edges = _graph_size(enterable, moves)
         self.memory_bytes = self._search.memory_bytes
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Find a shortest path between two free cells; the bound is 1."""
         began = time.perf_counter()
         found = self._search.search(start, goal)
         seconds = {"refine": time.perf_counter() - began}
         bound = math.inf if found.cells is None else 1.0
-        return Answer(found.cells, bound=bound, expanded=found.expanded, seconds=seconds)
+        return MethodResult(found.cells, bound=bound, expanded=found.expanded, seconds=seconds)
 
 
 class GridDijkstra:
@@ -75,7 +75,7 @@ class GridDijkstra:
         with self._works.lent() as work:
             self.memory_bytes = array_bytes(work)
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Find a shortest path between two free cells; the bound is 1."""
         began = time.perf_counter()
         with self._works.lent() as work:
@@ -83,7 +83,7 @@ class GridDijkstra:
             cells = work.path(start, goal) if found else None
         seconds = {"refine": time.perf_counter() - began}
         bound = 1.0 if found else math.inf
-        return Answer(cells, bound=bound, expanded=expanded, seconds=seconds)
+        return MethodResult(cells, bound=bound, expanded=expanded, seconds=seconds)
 
 
 class WeightedAstar:
@@ -120,7 +120,7 @@ class WeightedAstar:
         with self._works.lent() as work:
             self.memory_bytes = array_bytes(work)
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Find a path between two free cells, with a proved bound on its excess over the
         shortest."""
         began = time.perf_counter()
@@ -131,7 +131,7 @@ class WeightedAstar:
             cells = work.path(start, goal) if lower >= 0 else None
         bound = math.inf if cells is None else self._bound(cells, lower)
         seconds = {"refine": time.perf_counter() - began}
-        return Answer(cells, bound=bound, expanded=expanded, seconds=seconds)
+        return MethodResult(cells, bound=bound, expanded=expanded, seconds=seconds)
 
     def _bound(self, cells: LongArray, lower: int) -> float:
         """Return the weight, or a lower bound that the search proved."""
@@ -191,5 +191,6 @@ def _workspaces(grid: OccupancyGrid) -> tuple[Pool[_Workspace], tuple[int, int]]
 
 
 def _graph_size(enterable: BoolArray, moves: ByteArray) -> tuple[int, int]:
-    """Return the number of enterable cells, and of moves between them, both ways counted once."""
+    """Return the number of enterable cells, and of moves between them, both directions counted
+    once."""
     return int(enterable.sum()), int(np.bitwise_count(moves).sum(dtype=np.int64)) // 2

@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.baselines import _hpa_kernels
 from hybridnav.baselines._hpa_kernels import AbstractGraph
-from hybridnav.baselines.protocol import CUT_CORNERS, Answer, Cell
+from hybridnav.baselines.protocol import CUT_CORNERS, Cell, MethodResult
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -35,9 +35,9 @@ class HpaStar:
     clusters, searches, refines each edge inside its cluster and replaces parts of the path by
     straight lines, no longer than the side of a cluster, as the authors' program does.
 
-    Regions are the connected pieces of the clusters. The path before smoothing stays inside the
-    regions of `Answer.nodes`, in that order; **the smoothed path may leave them**. Its length has
-    no proved bound. `n_nodes` and `n_edges` are those of the abstract graph.
+    Regions are the connected components of the clusters. The path before smoothing stays inside the
+    regions of `MethodResult.nodes`, in that order; **the smoothed path may leave them**. Its length
+    has no proved bound. `n_nodes` and `n_edges` are those of the abstract graph.
 
     Transitions lie between facing cells only. On a grid that allows cutting corners, paths that
     pass from cluster to cluster only between two occupied cells are therefore not found: there the
@@ -75,32 +75,34 @@ class HpaStar:
             raise InvalidValueError(f"lines must be at least 1 move long, got {line_cells}")
         self.name = _name(smooth=smooth, line_cells=line_cells)
         self._smooth = smooth
-        self._side = min(cluster_cells, max(2, *grid.shape))
+        self._cluster_cells = min(cluster_cells, max(2, *grid.shape))
         self._reach = cluster_cells if line_cells is None else line_cells
         enterable = grid.classes == CellClass.FREE
         self._corner_cutting = grid.corner_cutting
         self._moves: ByteArray = legal_moves(enterable, grid.corner_cutting)
-        self.region_of: IntArray = _hpa_kernels.label_regions(enterable, self._moves, self._side)
-        self._graph = _abstract_graph(enterable, self._moves, self._side)
+        self.region_of: IntArray = _hpa_kernels.label_regions(
+            enterable, self._moves, self._cluster_cells
+        )
+        self._graph = _abstract_graph(enterable, self._moves, self._cluster_cells)
         self.n_nodes = len(self._graph.cells)
-        self.n_edges = len(self._graph.ends) // 2
+        self.n_edges = len(self._graph.endpoints) // 2
         self._works = Pool(partial(_Work, self.n_nodes, enterable.size if smooth else 0))
         with self._works.lent() as work:
             own = sum(array.nbytes for array in (self.region_of, self._moves, *self._graph))
             self.memory_bytes = own + array_bytes(work)
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells."""
         with self._works.lent() as work:
             return self._solve(work, start, goal)
 
-    def _solve(self, work: _Work, start: Cell, goal: Cell) -> Answer:
+    def _solve(self, work: _Work, start: Cell, goal: Cell) -> MethodResult:
         began = time.perf_counter()
         work.turn += 1
         cols = self._moves.shape[1]
         passed, expanded_nodes, expanded = _hpa_kernels.abstract_search(
             self._moves,
-            self._side,
+            self._cluster_cells,
             self._graph,
             start[0] * cols + start[1],
             goal[0] * cols + goal[1],
@@ -111,7 +113,7 @@ class HpaStar:
         )
         seconds = {"coarse": time.perf_counter() - began, "refine": 0.0}
         if passed.size == 0:
-            return Answer(
+            return MethodResult(
                 None,
                 expanded=int(expanded),
                 expanded_nodes=int(expanded_nodes),
@@ -119,13 +121,13 @@ class HpaStar:
                 gave_up=CUT_CORNERS if self._corner_cutting else "",
             )
         began = time.perf_counter()
-        path, refined = _hpa_kernels.refine(self._moves, self._side, passed)
+        path, refined = _hpa_kernels.refine(self._moves, self._cluster_cells, passed)
         nodes = self._regions_along(path)
         if self._smooth:
             path = _hpa_kernels.smooth(self._moves, path, self._reach, work.position)
         cells = np.stack(divmod(path, cols), axis=1)
         seconds["refine"] = time.perf_counter() - began
-        return Answer(
+        return MethodResult(
             cells,
             nodes,
             plan_steps=passed.size - 1,
@@ -158,19 +160,19 @@ def _name(*, smooth: bool, line_cells: int | None) -> str:
     return "hpa-star" if line_cells is None else f"hpa-star-lines-{line_cells}"
 
 
-def _abstract_graph(enterable: BoolArray, moves: ByteArray, side: int) -> AbstractGraph:
+def _abstract_graph(enterable: BoolArray, moves: ByteArray, cluster_cells: int) -> AbstractGraph:
     rows, cols = enterable.shape
-    pairs = _hpa_kernels.transitions(enterable, side)
+    pairs = _hpa_kernels.transitions(enterable, cluster_cells)
     cells = np.unique(pairs)
-    order = np.argsort(_hpa_kernels.cluster_at(cols, side, cells), kind="stable")
+    order = np.argsort(_hpa_kernels.cluster_at(cols, cluster_cells, cells), kind="stable")
     node_at = np.empty(len(cells), dtype=np.int32)
     node_at[order] = np.arange(len(cells), dtype=np.int32)
     inter = node_at[np.searchsorted(cells, pairs)]
     cells = cells[order]
-    n_clusters = -(-rows // side) * -(-cols // side)
-    clusters = _hpa_kernels.cluster_at(cols, side, cells)
+    n_clusters = -(-rows // cluster_cells) * -(-cols // cluster_cells)
+    clusters = _hpa_kernels.cluster_at(cols, cluster_cells, cells)
     cluster_first = np.searchsorted(clusters, np.arange(n_clusters + 1))
-    tails, heads, costs = _hpa_kernels.intra_edges(moves, side, cells, cluster_first)
+    tails, heads, costs = _hpa_kernels.intra_edges(moves, cluster_cells, cells, cluster_first)
     tails = np.concatenate([tails, inter[:, 0], inter[:, 1]])
     heads = np.concatenate([heads, inter[:, 1], inter[:, 0]])
     costs = np.concatenate([costs, np.full(2 * len(inter), STRAIGHT, dtype=np.int64)])

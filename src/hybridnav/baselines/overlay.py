@@ -11,7 +11,7 @@ from scipy.sparse import csgraph
 
 from hybridnav._copies import copies_alike
 from hybridnav.baselines import _overlay_kernels as kernels
-from hybridnav.baselines.protocol import Answer
+from hybridnav.baselines.protocol import MethodResult
 from hybridnav.baselines.regions import array_bytes, free_fields, region_at
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -110,7 +110,7 @@ class ExactOverlay:
         labels: IntArray = csgraph.connected_components(joined, directed=False)[1]
         return labels
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Find a shortest path between two free cells; the bound is 1.
 
         The nodes are dense indices of the places on the path, None if it passes a corner between
@@ -123,7 +123,7 @@ class ExactOverlay:
         """
         first, last = region_at(self.region_of, start), region_at(self.region_of, goal)
         if self._component_of[first] != self._component_of[last]:
-            return Answer(None)
+            return MethodResult(None)
         began = time.perf_counter()
         flat_goal = goal[0] * self._cols + goal[1]
         flat_start = start[0] * self._cols + start[1]
@@ -148,7 +148,7 @@ class ExactOverlay:
         )
         searched = time.perf_counter()
         cells, expanded = self._unpacked(start, goal, nodes, by_cross)
-        return Answer(
+        return MethodResult(
             cells,
             nodes=self._passed(cells),
             plan_steps=len(nodes) + 1,
@@ -182,13 +182,13 @@ class ExactOverlay:
         """Return the cells of a path through some nodes, and the number of cells expanded inside
         fields."""
         rows, cols = np.divmod(self._node_cell[nodes], self._cols)
-        stops = [start, *zip(rows.tolist(), cols.tolist(), strict=True), goal]
+        passed = [start, *zip(rows.tolist(), cols.tolist(), strict=True), goal]
         crossed = [*by_cross.tolist(), False]
-        pieces, expanded = [np.array([start], dtype=np.int64)], 0
+        segments, expanded = [np.array([start], dtype=np.int64)], 0
         in_field = np.zeros(len(self._boxes), dtype=np.bool_)
-        for here, there, across in zip(stops[:-1], stops[1:], crossed, strict=True):
+        for here, there, across in zip(passed[:-1], passed[1:], crossed, strict=True):
             if across:
-                pieces.append(np.array([there], dtype=np.int64))
+                segments.append(np.array([there], dtype=np.int64))
                 continue
             field = self.region_of[here]
             in_field[field] = True
@@ -196,8 +196,8 @@ class ExactOverlay:
             in_field[field] = False
             expanded += leg.expanded
             if leg.cells is not None:
-                pieces.append(leg.cells[1:])
-        return np.concatenate(pieces), expanded
+                segments.append(leg.cells[1:])
+        return np.concatenate(segments), expanded
 
     def _passed(self, cells: LongArray) -> tuple[int, ...] | None:
         fields = self.region_of[*cells.T].astype(np.int64)

@@ -16,13 +16,13 @@ CUT_CORNERS = "moves past corners are not in its graph"
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class AnyAngleResult:
     """A path at any angle, with the claims of its method.
 
     Examples
     --------
-    >>> from hybridnav.baselines import Line
-    >>> line = Line(points=np.array([[0.5, 0.5], [2.5, 0.5]]), length_m=2.0)
+    >>> from hybridnav.baselines import AnyAngleResult
+    >>> line = AnyAngleResult(points=np.array([[0.5, 0.5], [2.5, 0.5]]), length_m=2.0)
     >>> line.lower_bound_m
     0.0
     """
@@ -40,19 +40,19 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class MethodResult:
     """A method's answer to one query.
 
     Examples
     --------
-    >>> from hybridnav.baselines import Answer
-    >>> Answer(cells=np.array([[0, 0], [0, 1]]), expanded=2).is_path
+    >>> from hybridnav.baselines import MethodResult
+    >>> MethodResult(cells=np.array([[0, 0], [0, 1]]), expanded=2).is_path
     True
     """
 
     cells: LongArray | None
     """int64 (n, 2), the path as (row, col) from start to goal, legal moves of the octile grid; None
-    if the method found none, or a `line`."""
+    if the method found none, or an `any_angle` one."""
     nodes: tuple[int, ...] | None = None
     """The topological plan: labels of `Method.region_of` in the order passed, the start's first;
     None if the method has no topological layer or made no plan. A plan without a path contradicts
@@ -72,7 +72,7 @@ class Answer:
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall-clock seconds by stage: `coarse` for the topological search, `refine` for the metric
     one; `first path` until the first path of a planner that improves its path."""
-    line: Line | None = None
+    any_angle: AnyAngleResult | None = None
     """The path, if it is not one of cells."""
     gave_up: str = ""
     """Reason for no path and no claim that none exists, such as "timeout"."""
@@ -80,7 +80,7 @@ class Answer:
     @property
     def is_path(self) -> bool:
         """Whether there is a path, of cells or at any angle."""
-        return self.cells is not None or self.line is not None
+        return self.cells is not None or self.any_angle is not None
 
 
 class Method(Protocol):
@@ -114,6 +114,6 @@ class Method(Protocol):
         """Bytes of all arrays of the method, beyond the map's own classes."""
         ...
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells."""
         ...

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
-from hybridnav.baselines.protocol import Answer
+from hybridnav.baselines.protocol import MethodResult
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.search.grid_search import GridSearch
@@ -45,7 +45,7 @@ class RegionPlanner:
         self._grid_search = GridSearch(region_of >= 0, corner_cutting=corner_cutting)
         self.memory_bytes = array_bytes(self, graph) + self._grid_search.memory_bytes
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells.
 
         Raises
@@ -59,7 +59,7 @@ class RegionPlanner:
         plan = self._graph.search(first, last)
         seconds = {"coarse": time.perf_counter() - began}
         if plan.vertices is None:
-            return Answer(None, expanded_nodes=plan.expanded, seconds=seconds)
+            return MethodResult(None, expanded_nodes=plan.expanded, seconds=seconds)
         began = time.perf_counter()
         in_corridor = np.zeros(self._graph.n_vertices, dtype=np.bool_)
         in_corridor[plan.vertices] = True
@@ -67,7 +67,7 @@ class RegionPlanner:
             start, goal, field_of=self._region_of, in_corridor=in_corridor
         )
         seconds["refine"] = time.perf_counter() - began
-        return Answer(
+        return MethodResult(
             found.cells,
             nodes=tuple(plan.vertices.tolist()),
             expanded=found.expanded,
@@ -141,8 +141,10 @@ def joined_regions(
         (np.s_[:-1, 1:], np.s_[1:, :-1], falling, (0.5, 0.5)),
     ):
         row, col = np.nonzero(legal & (region_of[tail] != region_of[head]))
-        ends = np.stack([region_of[tail][row, col], region_of[head][row, col]]).astype(np.int64)
-        keys.append(ends.min(axis=0) * n_regions + ends.max(axis=0))
+        endpoints = np.stack([region_of[tail][row, col], region_of[head][row, col]]).astype(
+            np.int64
+        )
+        keys.append(endpoints.min(axis=0) * n_regions + endpoints.max(axis=0))
         rows.append(row + offset[0])
         cols.append(col + offset[1])
     found, pair_of, count = np.unique(np.concatenate(keys), return_inverse=True, return_counts=True)

@@ -15,7 +15,7 @@ from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray
-    from hybridnav.baselines.protocol import Answer, Cell
+    from hybridnav.baselines.protocol import Cell, MethodResult
     from hybridnav.pyramid import Level
     from hybridnav.topology import TopologicalMap
 
@@ -53,7 +53,7 @@ class SimpleGraphPyramid:
         self._planner = RegionPlanner(self.region_of, graph, corner_cutting=self._corner_cutting)
         self.memory_bytes = self._planner.memory_bytes
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells; nodes are dense indices of places. See `RegionPlanner`."""
         answer = self._planner.solve(start, goal)
         if self._corner_cutting and not answer.is_path:
@@ -64,6 +64,6 @@ class SimpleGraphPyramid:
 def first_arcs(level: Level) -> LongArray:
     """Return the arcs that a simple graph keeps, the lowest index between each two vertices."""
     plain = np.flatnonzero(~level.is_self_loop)
-    ends = np.sort(level.arcs[plain], axis=1)
-    _, first = np.unique(ends, axis=0, return_index=True)
+    endpoints = np.sort(level.arcs[plain], axis=1)
+    _, first = np.unique(endpoints, axis=0, return_index=True)
     return np.sort(plain[first])

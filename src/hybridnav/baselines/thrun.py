@@ -16,7 +16,7 @@ from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.baselines.protocol import Answer, Cell
+    from hybridnav.baselines.protocol import Cell, MethodResult
     from hybridnav.grid import OccupancyGrid
 
 _AROUND = np.ones((3, 3), dtype=np.bool_)
@@ -93,7 +93,7 @@ class ThrunMap:
         self._planner = RegionPlanner(region_of, graph, corner_cutting=grid.corner_cutting)
         self.memory_bytes = self._planner.memory_bytes
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells. See `RegionPlanner`."""
         return self._planner.solve(start, goal)
 
@@ -117,13 +117,13 @@ def critical_points(free: BoolArray, epsilon_cells: int) -> tuple[LongArray, Lon
     clearance, basis = ndimage.distance_transform_edt(padded, return_indices=True)
     diagram = voronoi_diagram(padded, basis)
     cells = np.argwhere(diagram)
-    ends, cosine = basis_pairs(cells, basis)
-    cells, ends = cells[cosine <= _OPPOSITE], ends[cosine <= _OPPOSITE]
+    endpoints, cosine = basis_pairs(cells, basis)
+    cells, endpoints = cells[cosine <= _OPPOSITE], endpoints[cosine <= _OPPOSITE]
     rank = clearance[*cells.T]
     candidates = np.zeros_like(diagram)
     candidates[*cells[rank == least_nearby(cells, rank, diagram.shape, epsilon_cells)].T] = True
     chosen = middles_of_passages(candidates, np.where(diagram, clearance, 0.0))[*cells.T]
-    return cells[chosen] - 1, ends[chosen] - 1
+    return cells[chosen] - 1, endpoints[chosen] - 1
 
 
 def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
@@ -151,10 +151,10 @@ def voronoi_diagram(free: BoolArray, basis: IntArray) -> BoolArray:
         first, second = basis[:, *here], basis[:, *there]
         apart = first - second
         # The cell of the two that is nearer to the bisector of both basis points.
-        side = (apart * (first + second - place[:, *here] - place[:, *there])).sum(axis=0)
+        hand = (apart * (first + second - place[:, *here] - place[:, *there])).sum(axis=0)
         meet = (apart**2).sum(axis=0) > 1
-        axis[here] |= meet & (side >= 0)
-        axis[there] |= meet & (side <= 0)
+        axis[here] |= meet & (hand >= 0)
+        axis[there] |= meet & (hand <= 0)
     thin: BoolArray = np.asarray(
         morphology.skeletonize(axis & free),  # type: ignore[no-untyped-call]
         dtype=np.bool_,
@@ -199,20 +199,20 @@ def least_nearby(
 def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArray:
     """Return one cell of each 8-connected run of candidates in a passage, the nearest to its mean.
 
-    At least two ways along the diagram lead out of a passage without loss of clearance; a dead end,
-    the middle of a room and the foot of a branch have fewer. `clearance` is 0 off the diagram.
+    At least two paths along the diagram lead out of a passage without loss of clearance; a dead
+    end, the middle of a room and the foot of a branch have fewer. `clearance` is 0 off the diagram.
     """
     runs, n_runs = ndimage.label(candidates, structure=_AROUND)
     cells = np.argwhere(candidates)
     run = runs[candidates].astype(np.int64) - 1
     diagram = clearance > 0
     n_around = ndimage.convolve(diagram.astype(np.int8), _AROUND.astype(np.int8), mode="constant")
-    way_out = diagram & ~candidates & (n_around > 2)  # noqa: PLR2004 - no end: itself and one more
+    exits = diagram & ~candidates & (n_around > 2)  # noqa: PLR2004 - no end: itself and one more
     around = cells[:, None, :] + _STEPS
     rows, cols = around[..., 0], around[..., 1]
-    leads_out = way_out[rows, cols] & (clearance[rows, cols] >= clearance[candidates][:, None])
+    leads_out = exits[rows, cols] & (clearance[rows, cols] >= clearance[candidates][:, None])
     keys = (run[:, None] * candidates.size + rows * candidates.shape[1] + cols)[leads_out]
-    ways = np.bincount(np.unique(keys) // candidates.size, minlength=n_runs)
+    n_exits = np.bincount(np.unique(keys) // candidates.size, minlength=n_runs)
 
     size = np.bincount(run, minlength=n_runs)
     mean = np.stack([np.bincount(run, weights=w, minlength=n_runs) for w in cells.T], axis=1)
@@ -220,7 +220,7 @@ def middles_of_passages(candidates: BoolArray, clearance: FloatArray) -> BoolArr
     order = np.lexsort((squared, run))
     nearest = cells[order[np.searchsorted(run[order], np.arange(n_runs))]]
     chosen = np.zeros_like(candidates)
-    chosen[*nearest[ways >= 2].T] = True  # noqa: PLR2004 - in and out
+    chosen[*nearest[n_exits >= 2].T] = True  # noqa: PLR2004 - in and out
     return chosen
 
 

@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 import hybridnav as hn
 from hybridnav.cli.common import answer, complain
-from hybridnav.cli.compiling import told_of_compiling
+from hybridnav.cli.compiling import notice_of_compiling
 from hybridnav.cli.errors import EXIT_SOLVED, EXIT_UNREADABLE, EXIT_USAGE, exit_code
 from hybridnav.errors import HybridNavError
 
@@ -107,7 +107,7 @@ def run(arguments: list[str]) -> int:
         0 solved, 1 not solved, 2 wrong usage, 3 unreadable input.
     """
     command = typer.main.get_command(app)
-    with warnings.catch_warnings(), told_of_compiling():
+    with warnings.catch_warnings(), notice_of_compiling():
         warnings.showwarning = _show_warning
         try:
             code = command.main(arguments, prog_name="hybridnav", standalone_mode=False)

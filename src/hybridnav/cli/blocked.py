@@ -58,7 +58,7 @@ class Closing:
         return closed
 
 
-def told_closing(figures: dict[str, Any]) -> list[str]:
+def closing_lines(figures: dict[str, Any]) -> list[str]:
     """Return the line of a summary about closures, if there are any."""
     closed = figures.get("blocked")
     return [f"blocked    {', '.join(closed)}"] if closed else []

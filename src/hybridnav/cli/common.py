@@ -279,12 +279,12 @@ def grow_topology(
     *,
     rooms_file: Path | None = None,
     find_rooms: bool = False,
-    stops: Sequence[str | tuple[float, ...]] = (),
+    waypoints: Sequence[str | tuple[float, ...]] = (),
     closing: Closing | None = None,
 ) -> hn.TopologicalMap:
     """Build the pyramid of a map with the settings of a preset, unless the model has it, and the
-    rooms of a file, of the model or, if asked for, those that are found. Refuse names of stops and
-    closed rooms that these lack before, and numbers of closed doors after."""
+    rooms of a file, of the model or, if asked for, those that are found. Refuse names of waypoints
+    and closed rooms that these lack before, and numbers of closed doors after."""
     grid, rooms = model.grid, model.rooms
     if rooms_file is not None:
         with stage(f"reading {rooms_file}", seconds, "rooms"):
@@ -293,9 +293,9 @@ def grow_topology(
         with stage("finding rooms", seconds, "rooms"):
             rooms = hn.find_rooms(grid)
     if rooms is not None:
-        from hybridnav.planner.named import check_stops  # noqa: PLC0415 - loads numba
+        from hybridnav.planner.named import check_waypoints  # noqa: PLC0415 - loads numba
 
-        check_stops(rooms, grid, stops)
+        check_waypoints(rooms, grid, waypoints)
         for name in closing.rooms if closing is not None else ():
             rooms.index(name)
     with stage("building the pyramid", seconds, "pyramid"):
@@ -306,24 +306,27 @@ def grow_topology(
 
 
 def outside(
-    grid: hn.OccupancyGrid, stops: Sequence[str | tuple[float, ...]]
+    grid: hn.OccupancyGrid, waypoints: Sequence[str | tuple[float, ...]]
 ) -> hn.PlanStatus | None:
     """Return the status that a planner would return for points outside the map, None if both are on
     it; no planner is needed."""
-    for number, stop in enumerate(stops):
-        if isinstance(stop, str):
+    for number, waypoint in enumerate(waypoints):
+        if isinstance(waypoint, str):
             continue
-        row, col = grid.frame.cells_of(stop[:2]).tolist()
+        row, col = grid.frame.cells_of(waypoint[:2]).tolist()
         if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
             return hn.PlanStatus.GOAL_OUTSIDE if number else hn.PlanStatus.START_OUTSIDE
     return None
 
 
 def refused_result(
-    status: hn.PlanStatus, settings: Preset, stops: Sequence[str | tuple[float, ...]]
+    status: hn.PlanStatus, settings: Preset, waypoints: Sequence[str | tuple[float, ...]]
 ) -> hn.PlanResult:
     """Return the result that a planner would return with a status; no planner is needed."""
-    start, goal = (None if isinstance(stop, str) else tuple(stop) for stop in (stops[0], stops[-1]))
+    start, goal = (
+        None if isinstance(waypoint, str) else tuple(waypoint)
+        for waypoint in (waypoints[0], waypoints[-1])
+    )
     record = {
         "preset": settings.name,
         "planner": settings.planner.model_dump(),

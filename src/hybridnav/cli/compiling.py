@@ -48,7 +48,7 @@ class _Teller(logging.Handler):
 
 
 @contextmanager
-def told_of_compiling() -> Iterator[None]:
+def notice_of_compiling() -> Iterator[None]:
     """Inform the user when kernels are compiled for seconds."""
     teller, level = _Teller(), _LOG.level
     _LOG.addHandler(teller)

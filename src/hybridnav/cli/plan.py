@@ -31,7 +31,7 @@ from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 
 if TYPE_CHECKING:
-    from hybridnav.cli.rendering import Stop
+    from hybridnav.cli.rendering import Waypoint
     from hybridnav.planner.named import At
 
 Point = tuple[float, ...]
@@ -62,7 +62,9 @@ ToOption = Annotated[
 ]
 ViaOption = Annotated[
     list[str] | None,
-    typer.Option("--via", metavar="ROOM|X,Y", help="Stop there on the way; may be repeated."),
+    typer.Option(
+        "--via", metavar="ROOM|X,Y", help="Waypoint between start and goal; may be repeated."
+    ),
 ]
 AtOption = Annotated[
     str | None,
@@ -143,7 +145,7 @@ def plan(
         raise UsageError(f"--alternatives needs a preset without OMPL, not {settings.name}")
     request = Request(
         source=Source(map_file, settings, reading, keep, keep_in),
-        stops=[first, *map(_parsed_stop, via or ()), last],
+        waypoints=[first, *map(_parsed_stop, via or ()), last],
         closing=closing,
         rooms_file=rooms_file,
         at=where,
@@ -159,7 +161,7 @@ def plan(
         raise typer.Exit(EXIT_NOT_SOLVED)
 
 
-def _one_of(option: str, point: Any, other: str, text: str | None) -> Stop:
+def _one_of(option: str, point: Any, other: str, text: str | None) -> Waypoint:
     """Return the start or the goal, from the one of its two options that was used."""
     if (point is None) == (text is None):
         what = "missing option" if point is None else "only one is taken, of"
@@ -167,7 +169,7 @@ def _one_of(option: str, point: Any, other: str, text: str | None) -> Stop:
     return _parsed_stop(text) if text is not None else point
 
 
-def _parsed_stop(text: str) -> Stop:
+def _parsed_stop(text: str) -> Waypoint:
     """Return a point if the text is two numbers, or three with a heading, else a name."""
     point = read_point(text)
     if point is None:

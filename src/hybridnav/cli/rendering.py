@@ -8,39 +8,39 @@ from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
 from hybridnav._files import printable
-from hybridnav.cli.blocked import told_closing
+from hybridnav.cli.blocked import closing_lines
 from hybridnav.cli.common import answer, extent_line, islands_line, timings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-Stop = str | tuple[float, ...]
+Waypoint = str | tuple[float, ...]
 """A name, or `(x, y)` or `(x, y, yaw)` in metres and radians, map frame."""
 _OPTIMAL = 1e-9
 """Gap of a path that equals its bound, lengths being sums of rounded numbers."""
 
 
 def respond(
-    grid: hn.OccupancyGrid, stops: Sequence[Stop], figures: dict[str, Any], *, as_json: bool
+    grid: hn.OccupancyGrid, waypoints: Sequence[Waypoint], figures: dict[str, Any], *, as_json: bool
 ) -> None:
     """Print the figures of an answer on stdout, as one JSON object or as lines for a person."""
     whole = json.dumps(figures, allow_nan=False) + "\n" if as_json else None
-    answer(whole or summary(grid, stops, figures))
+    answer(whole or summary(grid, waypoints, figures))
 
 
 def draw(
     path: Path,
     topology: hn.TopologicalMap,
     outcome: hn.PlanResult | hn.Tour | hn.Alternatives,
-    stops: Sequence[Stop],
+    waypoints: Sequence[Waypoint],
     optimum_m: float | None,
 ) -> None:
     """Save the picture of a plan between two points, of a tour, or of alternatives."""
     from hybridnav import viz  # noqa: PLC0415 - loads matplotlib
 
     if isinstance(outcome, hn.PlanResult):
-        start, goal = (stop[:2] for stop in stops)
+        start, goal = (waypoint[:2] for waypoint in waypoints)
         ax = viz.plot_plan(topology, outcome, start=start, goal=goal, optimum_m=optimum_m)
     elif isinstance(outcome, hn.Tour):
         ax = viz.plot_tour(topology, outcome)
@@ -49,31 +49,31 @@ def draw(
     viz.save_figure(ax, path)
 
 
-def query_of(stops: Sequence[Stop]) -> str:
+def query_of(waypoints: Sequence[Waypoint]) -> str:
     """Describe a query: its start, what lies between, its goal."""
     *before, last = (
-        stop if isinstance(stop, str) else f"({', '.join(f'{n:.10g}' for n in stop)})"
-        for stop in stops
+        waypoint if isinstance(waypoint, str) else f"({', '.join(f'{n:.10g}' for n in waypoint)})"
+        for waypoint in waypoints
     )
     return f"{' via '.join(before)} to {last}"
 
 
-def summary(grid: hn.OccupancyGrid, stops: Sequence[Stop], figures: dict[str, Any]) -> str:
+def summary(grid: hn.OccupancyGrid, waypoints: Sequence[Waypoint], figures: dict[str, Any]) -> str:
     """Return the lines that describe an answer to a person.
 
     Parameters
     ----------
     grid
         The map.
-    stops
+    waypoints
         What was asked for.
     figures
         Those of a plan or, with `words`, of a tour, and of what was asked for beside it.
     """
     radius = f"robot radius {grid.robot_radius_m:g} m"
     lines = [
-        f"query      {printable(grid.name)}, {query_of(stops)}, {radius}",
-        *told_closing(figures),
+        f"query      {printable(grid.name)}, {query_of(waypoints)}, {radius}",
+        *closing_lines(figures),
         f"status     {figures['status']}",
         *islands_line(grid),
     ]
@@ -89,12 +89,12 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
     lines = []
     if figures["length_m"] is not None and figures["lower_bound"] is None:
         short_m = math.dist(figures["points"][-1], figures["goal"][:2])
-        told = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"
-        lines.append(f"path       {told}")
+        stated = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"
+        lines.append(f"path       {stated}")
     elif figures["length_m"] is not None:
         lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
-        bound, told = _rounded_bound(figures["lower_bound"], figures["gap"])
-        lines.append(f"bound      {bound} m, the path is {told}")
+        bound, stated = _rounded_bound(figures["lower_bound"], figures["gap"])
+        lines.append(f"bound      {bound} m, the path is {stated}")
     if figures["steps"] is not None:
         lines.append(f"steps      {'; '.join(figures['steps'])}")
     if figures["places"] is not None:
@@ -102,8 +102,8 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
             ids = figures[key]
             lines.append(f"{key:<10} {len(ids)}: {' '.join(map(str, ids))}".rstrip(": "))
     expanded = [
-        f"{n:,} {what}"
-        for what in ("cells", "places", "gates", "intervals")
+        f"{n:,} {what.replace('_', ' ')}"
+        for what in ("cells", "places", "border_cells", "intervals")
         if (n := figures["expanded" if what == "cells" else f"expanded_{what}"])
     ]
     if expanded:
@@ -133,7 +133,7 @@ def _tour_lines(figures: dict[str, Any]) -> list[str]:
     """Describe a tour: its length and bound, the rooms and doors, the alternatives."""
     lines = _measured(figures) if figures["length_m"] is not None else []
     for number, line in enumerate(figures["words"]):
-        lines.append(f"{'' if number else 'way':<10} {line}")
+        lines.append(f"{'' if number else 'words':<10} {line}")
     for number, other in enumerate(figures.get("alternatives", ()), start=1):
         word = " ".join(f"{letter:+d}" for letter in other["word"]) or "-"
         rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
@@ -154,9 +154,12 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     bound, gap = figures["lower_bound"], 0.0
     if bound > 0:
         gap = figures["cost"] / bound - 1
-    least, told = _rounded_bound(bound, gap)
+    least, stated = _rounded_bound(bound, gap)
     unit = "m " if figures["cost"] == length_m else ""
-    return [*lines, f"bound      {least} {unit}({metric}), this way is {told} between its stops"]
+    return [
+        *lines,
+        f"bound      {least} {unit}({metric}), this path is {stated} between its waypoints",
+    ]
 
 
 def _rounded_bound(bound: float, gap: float) -> tuple[str, str]:

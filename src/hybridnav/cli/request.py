@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from hybridnav.cli.blocked import Closing
     from hybridnav.cli.keep import Source
-    from hybridnav.cli.rendering import Stop
+    from hybridnav.cli.rendering import Waypoint
     from hybridnav.planner.named import At
 
 _GRID_SEARCH = {
@@ -41,7 +41,7 @@ class Request:
     """What a command line asks for: a plan between two points, or a tour described in rooms."""
 
     source: Source
-    stops: list[Stop]
+    waypoints: list[Waypoint]
     """The start, what lies between, the goal."""
     closing: Closing
     rooms_file: Path | None
@@ -55,8 +55,11 @@ class Request:
     @property
     def is_tour(self) -> bool:
         """Whether rooms are needed, for the plan itself or to describe it."""
-        names_rooms = any(isinstance(stop, str) for stop in self.stops) or self.closing.needs_rooms
-        has_more = len(self.stops) > 2 or self.alternatives > 1  # noqa: PLR2004 - start and goal
+        names_rooms = (
+            any(isinstance(waypoint, str) for waypoint in self.waypoints)
+            or self.closing.needs_rooms
+        )
+        has_more = len(self.waypoints) > 2 or self.alternatives > 1  # noqa: PLR2004 - start and goal
         return names_rooms or has_more or self.rooms_file is not None
 
     def run(self) -> bool:
@@ -67,9 +70,9 @@ class Request:
         grid = model.grid
         check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
         closed = self.closing.read(grid)
-        status = outside(grid, self.stops) if self.plot is None else None
+        status = outside(grid, self.waypoints) if self.plot is None else None
         if status is not None:
-            refused = refused_result(status, settings, self.stops)
+            refused = refused_result(status, settings, self.waypoints)
             outcome = hn.Tour((refused,), ()) if self.is_tour else refused
             self._respond(grid, outcome, self._beside_refusal(refused), seconds)
             return False
@@ -87,7 +90,7 @@ class Request:
         self._respond(grid, outcome, beside, seconds)
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
-            draw(self.plot, topology, found or outcome, self.stops, optimum_m)
+            draw(self.plot, topology, found or outcome, self.waypoints, optimum_m)
         return outcome.solved
 
     def _rooms_file(self) -> Path | None:
@@ -114,7 +117,7 @@ class Request:
                 seconds,
                 rooms_file=rooms_file,
                 find_rooms=self.is_tour,
-                stops=self.stops,
+                waypoints=self.waypoints,
                 closing=self.closing,
             )
             compiled()
@@ -126,8 +129,8 @@ class Request:
         spent: dict[str, float] = {}
         with stage("planning", spent, "plan"):
             if not self.is_tour:  # the result has the seconds of its stages
-                return planner.plan(*self.stops, blocked=closed)
-            tour = hn.plan_tour(planner, self.stops, at=self.at, blocked=closed)
+                return planner.plan(*self.waypoints, blocked=closed)
+            tour = hn.plan_tour(planner, self.waypoints, at=self.at, blocked=closed)
         counted = sum(sum(result.stats.seconds.values()) for result in tour.results)
         seconds["plan"] = round(max(spent["plan"] - counted, 0.0), 6)  # what no stage counts
         return tour
@@ -135,14 +138,14 @@ class Request:
     def _alternatives(
         self, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: dict[str, float]
     ) -> hn.Alternatives | None:
-        """Find routes of different classes between the two stops, if asked for."""
+        """Find routes of different classes between the two waypoints, if asked for."""
         if self.alternatives == 1:
             return None
         with stage("finding alternatives", seconds, "alternatives"):
             return hn.plan_alternatives(
                 planner,
-                self.stops[0],
-                self.stops[-1],
+                self.waypoints[0],
+                self.waypoints[-1],
                 self.alternatives,
                 least_hole_m2=self.least_hole_m2,
                 at=self.at,
@@ -155,7 +158,7 @@ class Request:
         settings = self.source.settings
         whole = settings.planner.model_copy(update=_GRID_SEARCH)
         preset = settings.model_copy(update={"name": "grid-astar", "planner": whole})
-        start, goal = (stop[:2] for stop in self.stops)
+        start, goal = (waypoint[:2] for waypoint in self.waypoints)
         return hn.HybridPlanner(topology, preset=preset).plan(start, goal, blocked=closed)
 
     def _beside_refusal(self, refused: hn.PlanResult) -> dict[str, Any]:
@@ -174,12 +177,20 @@ class Request:
         figures = outcome.to_dict() | {"map": str(self.source.map_file)}
         islands, closed = islands_figures(grid), self.closing.to_dict()
         if self.is_tour:
-            stops = [stop if isinstance(stop, str) else list(stop) for stop in self.stops]
-            figures |= {"stops": stops, "query": query_of(self.stops)} | closed | beside | islands
+            waypoints = [
+                waypoint if isinstance(waypoint, str) else list(waypoint)
+                for waypoint in self.waypoints
+            ]
+            figures |= (
+                {"waypoints": waypoints, "query": query_of(self.waypoints)}
+                | closed
+                | beside
+                | islands
+            )
         else:
             figures |= islands | closed | beside
         figures["seconds"] = seconds | figures["seconds"]
-        respond(grid, self.stops, figures, as_json=self.as_json)
+        respond(grid, self.waypoints, figures, as_json=self.as_json)
 
 
 def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[str, Any]:

@@ -108,7 +108,7 @@ def rooms(
         elif labels is None:
             labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
     # Loads numba, which help and wrong usage can do without.
-    from hybridnav.topology.rooms import room_areas_m2  # noqa: PLC0415
+    from hybridnav.topology.room_level import room_areas_m2  # noqa: PLC0415
 
     areas_m2 = room_areas_m2(labels, grid)
     if out is not None:
@@ -186,8 +186,12 @@ def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
         rooms.names, areas_m2.tolist(), rooms.fits.tolist(), strict=True
     ):
         point = "({:.2f}, {:.2f})".format(*_at(rooms, name))
-        told = ([] if fits else [f"no robot of {rooms.grid.robot_radius_m:g} m fits"]) + doors[name]
-        lines.append(f"{name:<{width}} {area_m2:>9.2f} m²  {point:<16} {', '.join(told)}".rstrip())
+        stated = ([] if fits else [f"no robot of {rooms.grid.robot_radius_m:g} m fits"]) + doors[
+            name
+        ]
+        lines.append(
+            f"{name:<{width}} {area_m2:>9.2f} m²  {point:<16} {', '.join(stated)}".rstrip()
+        )
     return "\n".join(lines)
 
 

@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 _PLANS = ("shortest", "grid-astar", "octile", "paper")
 """Presets whose whole plans set-up compiles, what their searches have in common first."""
-_ENDS = ((2, 2), (60, 60))
+_ENDPOINTS = ((2, 2), (60, 60))
 
 
 def small_grid() -> hn.OccupancyGrid:
     """Return a map with the parts of buildings: rooms, doors, posts, unexplored cells."""
-    side, room = 64, 16
-    probability = np.zeros((side, side), np.float32)
+    size, room = 64, 16
+    probability = np.zeros((size, size), np.float32)
     probability[::room] = probability[:, ::room] = 1.0
-    for door in range(room // 2, side, room):
+    for door in range(room // 2, size, room):
         probability[room::room, door - 1 : door + 2] = 0.0
         probability[door - 1 : door + 2, room::room] = 0.0
     probability[20:23, 20:23] = 1.0
@@ -43,12 +43,12 @@ def compile_search(coarse: str) -> None:
     from hybridnav.refine import GridRefiner  # noqa: PLC0415
 
     grid, settings = small_grid(), hn.load_preset(SEARCHES[coarse]).planner
-    refiner, query = GridRefiner(grid), CellQuery.between(grid.frame, *_ENDS)
+    refiner, query = GridRefiner(grid), CellQuery.between(grid.frame, *_ENDPOINTS)
     if coarse == "mesh":
         OverMesh(grid, refiner, settings).plan(query)
     elif coarse == "jumps":
         graph = build_jump_graph(grid.enterable())
-        JumpSearch(contract_graph(graph)).path(*_ENDS)  # as on maps of buildings
+        JumpSearch(contract_graph(graph)).path(*_ENDPOINTS)  # as on maps of buildings
     else:
         WholeMap(refiner).plan(query)
 
@@ -59,8 +59,8 @@ def compile_plan(preset: str) -> None:
     grid = small_grid()
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
     if preset in _PLANS:
-        ends = grid.frame.points_of(np.array(_ENDS))
-        hn.HybridPlanner(topology, preset=preset).plan(*ends).to_dict()
+        endpoints = grid.frame.points_of(np.array(_ENDPOINTS))
+        hn.HybridPlanner(topology, preset=preset).plan(*endpoints).to_dict()
 
 
 def _end_with_parent() -> None:

@@ -274,11 +274,11 @@ def compact_darts(darts, state, new_edge, level, edge_end):
             continue
         f = new_edge[e]
         base_edge[f >> 1] = base_edge[e]
-        for side in range(2):
-            d = 2 * e + side
+        for half in range(2):
+            d = 2 * e + half
             following = np.uint32(sigma[d])
-            sigma[f + side] = new_edge[following >> one] + np.int32(following & one)
-            origin[f + side] = origin[d]
-            sweep[f + side] = sweep[d]
-            protected[f + side] = protected[d]
+            sigma[f + half] = new_edge[following >> one] + np.int32(following & one)
+            origin[f + half] = origin[d]
+            sweep[f + half] = sweep[d]
+            protected[f + half] = protected[d]
     return n_edges

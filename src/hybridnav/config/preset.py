@@ -40,14 +40,14 @@ DEFAULT_ROBOT_RADIUS_M = 0.25
 
 _REFINED_BY = {
     "max-distance": "grid-astar",
-    "portals": "gates",
+    "portals": "none",
     "mesh": "none",
     "jumps": "none",
     "none": "grid-astar",
 }
 """What refines each coarse search; OMPL refines them all."""
 
-_REFINERS = ("grid-astar", "gates", "ompl", "none")
+_REFINERS = ("grid-astar", "ompl", "none")
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 
 _MAX_SHOWN = 80
@@ -65,6 +65,8 @@ def _known_refiner(refine: str) -> str:
     """Refuse what is neither a refiner of the package nor written like the name of a class."""
     if refine in _REFINERS or _OWN.fullmatch(refine):
         return refine
+    if refine == "gates":
+        raise PydanticCustomError("renamed", "gates is now called none: write refine: none")
     known = ", ".join(map(repr, _REFINERS))
     raise PydanticCustomError(
         "refiner", f"input should be {known} or a class of your own, module:Class"
@@ -115,18 +117,18 @@ class PlannerSettings(_Section):
     polygons of free space. `jumps`: the corner cells at which shortest paths of cells turn. `none`:
     the cells of the whole map. All but the first derive the route from the path."""
     corridor: Literal["route", "neighbours"] = "route"
-    """Fields in which `grid-astar` and `ompl` begin: those of the coarse way, or also their
-    neighbours. It has no effect with `gates` and `coarse: none`."""
+    """Fields in which `grid-astar` and `ompl` begin: those of the coarse route, or also their
+    neighbours. It has no effect with `coarse: portals` and `coarse: none`."""
     refine: Annotated[str, AfterValidator(_known_refiner)] = "grid-astar"
-    """Search for the path. `grid-astar`: cell by cell in the corridor. `gates`: over portals, with
-    exact costs between the border cells of the fields. `ompl`: by a sampling-based planner. `none`:
-    the coarse search, on the mesh or the corner cells, has found it. In place of `grid-astar`,
-    `module:Class` names a refiner of your own, which is imported when a planner is made."""
+    """Search for the path. `grid-astar`: cell by cell in the corridor. `ompl`: by a sampling-based
+    planner. `none`: the coarse search has found it, over portals, on the mesh or the corner cells.
+    In place of `grid-astar`, `module:Class` names a refiner of your own, which is imported when a
+    planner is made."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, a section of its own; otherwise null."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
-    """With `gates`, and on the mesh: the search ends once no path can be shorter by more than this
-    part; null or 0 for the optimum."""
+    """With `refine: none`, over portals and on the mesh: the search ends once no path can be
+    shorter by more than this part; null or 0 for the optimum."""
     budget_s: Annotated[_Float, Field(ge=0)] | None = None
     """On the mesh: seconds after which a query returns the best path so far, with its proved bound;
     null for no limit. Until the planner is prepared, such queries shorten a path of cells by line
@@ -168,10 +170,8 @@ class PlannerSettings(_Section):
             )
         if self.budget_s is not None and (self.coarse, self.refine) != ("mesh", "none"):
             raise PydanticCustomError("mesh_needed", "budget_s needs coarse: mesh, refine: none")
-        if self.epsilon is not None and self.refine != "gates" and self.coarse != "mesh":
-            raise PydanticCustomError(
-                "bounds_needed", "epsilon needs refine: gates, or none on the mesh"
-            )
+        if self.epsilon is not None and self.coarse not in {"portals", "mesh"}:
+            raise PydanticCustomError("bounds_needed", "epsilon needs coarse: portals or mesh")
         return self
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from hybridnav._jit import guarded, njit
 
 _SLIVER_CELLS = 1e-9
-"""Shorter pieces of a line are rounding: the line passes the corner of a cell."""
+"""Shorter segments of a line are rounding: the line passes the corner of a cell."""
 
 
 @njit(cache=True, nogil=True)
@@ -39,9 +39,9 @@ def _free_cell_at(free, row, col):
 
 
 @njit(cache=True, nogil=True)
-def _next_cut(start, way, line):
+def _next_cut(start, reach, line):
     """Return the share of a segment at which it meets a line of the lattice; 2 if it does not."""
-    return 2.0 if way == 0.0 else (line - start) / way
+    return 2.0 if reach == 0.0 else (line - start) / reach
 
 
 @guarded

@@ -31,7 +31,7 @@ _LINK_WALL_CELLS = 2
 def figure1_world() -> World:
     """Return two regions that meet twice, and a third inside one: the map of the paper's Fig. 1.
 
-    The free region A fills the left, the unexplored region B the right of a walled field of 40 x
+    The free region A fills the left, the unexplored region B the right of a walled area of 40 x
     30 cells. An obstacle lies across the line between them, so that A and B meet along two
     separate boundaries, above and below it; the unexplored island C lies inside A. There is no
     noise. With a robot radius of 0, a merge distance that spans the map and any linkage, the

@@ -50,7 +50,7 @@ def glimpse(
     view
         Position of the scanner.
     jambs
-        The ends of the gap, the right one as seen from the scanner first.
+        The endpoints of the gap, the right one as seen from the scanner first.
     reach_m
         Reach of the longest beam; the shortest reaches seven tenths of it.
     rng
@@ -83,10 +83,10 @@ def shadow(
 
 def wobble(cells: ByteArray, rng: np.random.Generator) -> ByteArray:
     """Displace patches by one cell: the ragged edges of walls and unexplored ground."""
-    for side, share in _WOBBLES:
+    for size, share in _WOBBLES:
         for axis in (0, 1):
             for step in (-1, 1):
-                displaced = _patches(cells.shape, side, rng) < share
+                displaced = _patches(cells.shape, size, rng) < share
                 cells = np.where(displaced, np.roll(cells, step, axis=axis), cells)
     return cells
 
@@ -126,10 +126,10 @@ def grown(mask: BoolArray, steps: int) -> BoolArray:
     return mask
 
 
-def _patches(shape: tuple[int, ...], side: int, rng: np.random.Generator) -> FloatArray:
+def _patches(shape: tuple[int, ...], size: int, rng: np.random.Generator) -> FloatArray:
     rows, cols = shape
-    coarse = rng.random((rows // side + 1, cols // side + 1))
-    return coarse.repeat(side, axis=0)[:rows].repeat(side, axis=1)[:, :cols]
+    coarse = rng.random((rows // size + 1, cols // size + 1))
+    return coarse.repeat(size, axis=0)[:rows].repeat(size, axis=1)[:, :cols]
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

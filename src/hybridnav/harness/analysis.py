@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.contradictions import ANSWERED, LINE_SLACK, SLACK, against, is_line
+from hybridnav.harness.contradictions import (
+    ANSWERED,
+    ANY_ANGLE_SLACK,
+    SLACK,
+    contradiction,
+    is_any_angle,
+)
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.paths import path_steps
 from hybridnav.harness.records import read_records
@@ -75,7 +81,9 @@ class Outcome:
     @cached_property
     def metric(self) -> str:
         """Metric of the method's paths: "octile" or "any-angle"."""
-        return "any-angle" if any(map(is_line, (self.preparation, *self.records))) else "octile"
+        return (
+            "any-angle" if any(map(is_any_angle, (self.preparation, *self.records))) else "octile"
+        )
 
     @cached_property
     def optima_m(self) -> FloatArray:
@@ -84,14 +92,15 @@ class Outcome:
 
     @cached_property
     def any_angle_optima_m(self) -> FloatArray:
-        """Lengths of the any-angle optimum between the same ends; NaN if paths may cut corners."""
+        """Lengths of the any-angle optimum between the same endpoints; NaN if paths may cut
+        corners."""
         known = [record.get("any_angle_m", math.nan) for record in self.references]
         return np.array(known, dtype=float)
 
     @cached_property
     def _octile_optima_m(self) -> FloatArray:
         """Octile optima; NaN for any-angle paths, which have no loss over them."""
-        lines = [bool(record and is_line(record)) for record in self._matched]
+        lines = [bool(record and is_any_angle(record)) for record in self._matched]
         return np.where(lines, math.nan, self.optima_m)
 
     @cached_property
@@ -210,7 +219,7 @@ class Outcome:
         for record in self.records:
             found += [(record, fault) for fault in record.get("faults", ())]
             reference = self.optimum.get(query_key(record))
-            wrong = None if reference is None else against(record, reference)
+            wrong = None if reference is None else contradiction(record, reference)
             if wrong:
                 found.append((record, wrong))
         return found
@@ -230,7 +239,7 @@ def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:
     """Return lengths over the best ones, minus one. Values that are below zero by rounding alone
     become zero."""
     loss = lengths / best - 1
-    rounded: FloatArray = np.where((loss <= SLACK) & (loss >= -LINE_SLACK), 0.0, loss)
+    rounded: FloatArray = np.where((loss <= SLACK) & (loss >= -ANY_ANGLE_SLACK), 0.0, loss)
     return rounded
 
 

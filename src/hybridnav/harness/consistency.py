@@ -52,7 +52,7 @@ class Consistency:
         moves = self._legal_moves(corner_cutting=grid.corner_cutting)
         region = self._region[moves]
         same = (region[:, 0] == region[:, 1]) & (region[:, 0] >= 0)
-        self._piece = _components(moves[same], grid.classes.size)
+        self._component = _components(moves[same], grid.classes.size)
         self._whole = _components(moves, grid.classes.size)
         if topology is None:
             crossings = moves[~same & (region >= 0).all(axis=1)]
@@ -60,9 +60,9 @@ class Consistency:
         else:
             crossings, arcs = self._arc_crossings(topology)
         keys = self._keys(self._region[crossings])
-        pieces = np.sort(self._piece[crossings], axis=1)
-        _, one = np.unique(np.column_stack([keys, arcs, pieces]), axis=0, return_index=True)
-        # One crossing for each arc and pair of pieces, sorted by pair of regions, then arc.
+        components = np.sort(self._component[crossings], axis=1)
+        _, one = np.unique(np.column_stack([keys, arcs, components]), axis=0, return_index=True)
+        # One crossing for each arc and pair of components, sorted by pair of regions, then arc.
         self._arc, self._crossings, crossing_keys = arcs[one], crossings[one], keys[one]
         self._key = crossing_keys
         self._links = np.unique(crossing_keys)
@@ -79,7 +79,7 @@ class Consistency:
         """Return all moves between free cells, each in one direction, as flat cells (n, 2)."""
         masks = legal_moves(self._free, corner_cutting).ravel()
         along = [moves_along(masks, self._cols, direction) for direction in (0, 2, 1, 3)]
-        return np.concatenate([np.stack(ends, axis=1) for ends in along])
+        return np.concatenate([np.stack(endpoints, axis=1) for endpoints in along])
 
     def _keys(self, regions: IntArray) -> LongArray:
         """Return one number for each unordered pair of regions."""
@@ -97,7 +97,7 @@ class Consistency:
             The faults, each with two cells that show it.
         """
         free = np.flatnonzero(self._free)
-        region, piece, whole = self._region[free], self._piece[free], self._whole[free]
+        region, component, whole = self._region[free], self._component[free], self._whole[free]
         homeless = np.flatnonzero(region < 0)
         if homeless.size:
             shown = self._cells(free[homeless[0]], free[homeless[-1]])
@@ -105,13 +105,13 @@ class Consistency:
         faults = []
         first = np.zeros(self._count, dtype=np.int64)
         first[region[::-1]] = np.arange(len(free))[::-1]
-        torn = np.flatnonzero(piece[first[region]] != piece)
+        torn = np.flatnonzero(component[first[region]] != component)
         if torn.size:
             name = region[torn[0]]
             shown = self._cells(free[first[name]], free[torn[0]])
             faults.append((f"region {name}, and maybe others, is not connected", shown))
-        ends = np.stack(divmod(self._links, self._count), axis=1)
-        joined = _components(ends, self._count)[region]
+        endpoints = np.stack(divmod(self._links, self._count), axis=1)
+        joined = _components(endpoints, self._count)[region]
         for one, other, text in (
             (whole, joined, "moves join two cells, regions do not"),
             (joined, whole, "regions join two cells, moves do not"),
@@ -153,21 +153,21 @@ class Consistency:
         first, last = start[0] * self._cols + start[1], goal[0] * self._cols + goal[1]
         if self._region[first] != nodes[0] or self._region[last] != nodes[-1]:
             return "the plan does not start and end in the regions of start and goal"
-        reached = {int(self._piece[first])}
+        reached = {int(self._component[first])}
         for step, (here, there) in enumerate(itertools.pairwise(nodes)):
             reached = self._cross(reached, here, there, None if arcs is None else arcs[step])
             if not reached:
                 return f"no metric path inside regions {here} and {there}, step {step} of the plan"
-        if int(self._piece[last]) not in reached:
+        if int(self._component[last]) not in reached:
             return f"the goal cannot be reached inside its region {nodes[-1]}"
         return None
 
     def _cross(self, reached: set[int], here: int, there: int, arc: int | None) -> set[int]:
-        """Return the pieces of a region that a crossing from the reached pieces of another leads
-        to."""
+        """Return the components of a region that a crossing from the reached components of another
+        leads to."""
         key = min(here, there) * self._count + max(here, there)
         rows = slice(*np.searchsorted(self._key, [key, key + 1]))
-        crossings, piece = self._crossings[rows], self._piece
+        crossings, component = self._crossings[rows], self._component
         if arc is not None:
             crossings = crossings[self._arc[rows] == arc]
         # A crossing is stored in one direction only.
@@ -175,7 +175,9 @@ class Consistency:
         tails = np.where(turned, crossings[:, 1], crossings[:, 0])
         heads = np.where(turned, crossings[:, 0], crossings[:, 1])
         return {
-            int(piece[b]) for a, b in zip(tails, heads, strict=True) if int(piece[a]) in reached
+            int(component[b])
+            for a, b in zip(tails, heads, strict=True)
+            if int(component[a]) in reached
         }
 
     def check_walk(self, cells: LongArray) -> str | None:
@@ -199,13 +201,16 @@ class Consistency:
             return "the path leaves the regions"
         pairs = np.stack([region[:-1], region[1:]], axis=1)
         for step in np.flatnonzero(~self._linked(pairs)):
-            sides = np.array(
+            side_cells = np.array(
                 [[cells[step, 0], cells[step + 1, 1]], [cells[step + 1, 0], cells[step, 1]]]
             )
-            inside = self._free[sides[:, 0], sides[:, 1]]
-            via = self._region[sides @ [self._cols, 1]][inside]
-            ends = np.broadcast_to(pairs[step], (len(via), 2))
-            there = np.stack([ends[:, 0], via], axis=1), np.stack([via, ends[:, 1]], axis=1)
+            inside = self._free[side_cells[:, 0], side_cells[:, 1]]
+            via = self._region[side_cells @ [self._cols, 1]][inside]
+            endpoints = np.broadcast_to(pairs[step], (len(via), 2))
+            there = (
+                np.stack([endpoints[:, 0], via], axis=1),
+                np.stack([via, endpoints[:, 1]], axis=1),
+            )
             if not (self._linked(there[0]) & self._linked(there[1])).any():
                 a, b = pairs[step]
                 row, col = cells[step]

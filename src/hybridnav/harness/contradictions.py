@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 SLACK = 1e-9
 """Relative difference of lengths that is rounding."""
 
-LINE_SLACK = 1e-6
+ANY_ANGLE_SLACK = 1e-6
 """That of any-angle lengths: the judge of segments rounds points to 2^-24 of a cell, so a path may
 cut each corner by as much."""
 
@@ -18,12 +18,12 @@ ANSWERED = ("solved", "no path")
 """Statuses of records that hold an answer."""
 
 
-def is_line(record: Record) -> bool:
+def is_any_angle(record: Record) -> bool:
     """Return whether a record holds an any-angle path, which is compared with such paths only."""
     return bool(record.get("metric") == "any-angle")
 
 
-def against(record: Record, reference: Record) -> str | None:
+def contradiction(record: Record, reference: Record) -> str | None:
     """Return the contradiction of an answer by the optima, None if there is none.
 
     Parameters
@@ -42,12 +42,12 @@ def against(record: Record, reference: Record) -> str | None:
         return f"solvability: {record['status']}, but on the whole grid: {reference['status']}"
     if record.get("length_m") is None or reference.get("length_m") is None:
         return None
-    if is_line(record):
-        return _against_line(record, reference.get("any_angle_m"))
-    return _against_cells(record, reference)
+    if is_any_angle(record):
+        return _any_angle_contradiction(record, reference.get("any_angle_m"))
+    return _cells_contradiction(record, reference)
 
 
-def _against_cells(record: Record, reference: Record) -> str | None:
+def _cells_contradiction(record: Record, reference: Record) -> str | None:
     length, optimum = record["length_m"], reference["length_m"]
     if length < optimum * (1 - SLACK):
         return f"length {length:.6f} m is below the optimum {optimum:.6f} m"
@@ -57,13 +57,13 @@ def _against_cells(record: Record, reference: Record) -> str | None:
     return None
 
 
-def _against_line(record: Record, optimum: float | None) -> str | None:
+def _any_angle_contradiction(record: Record, optimum: float | None) -> str | None:
     if optimum is None:  # corners may be cut
         return None
     length = record["length_m"]
-    if length < optimum * (1 - LINE_SLACK):
+    if length < optimum * (1 - ANY_ANGLE_SLACK):
         return f"length {length:.6f} m is below the any-angle optimum {optimum:.6f} m"
     bound = record.get("lower_bound_m")
-    if bound is not None and bound > optimum * (1 + LINE_SLACK):
+    if bound is not None and bound > optimum * (1 + ANY_ANGLE_SLACK):
         return f"the lower bound {bound:.6f} m is above the any-angle optimum {optimum:.6f} m"
     return None

@@ -20,7 +20,7 @@ from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
-    from hybridnav.baselines import Answer, Line
+    from hybridnav.baselines import AnyAngleResult, MethodResult
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
@@ -72,7 +72,7 @@ class Judge:
             self._search = GridSearch(free, corner_cutting=grid.corner_cutting)
             self._regions = np.zeros(int(self._region_of.max(initial=-1)) + 1, dtype=np.bool_)
 
-    def faults(self, pair: Pair, answer: Answer) -> tuple[float | None, list[str]]:
+    def faults(self, pair: Pair, answer: MethodResult) -> tuple[float | None, list[str]]:
         """Return the length of the path, counted anew, and all faults of the answer."""
         length_m, faults = self._judged_path(pair, answer)
         checks = self._consistency
@@ -90,9 +90,9 @@ class Judge:
             faults += [wrong] if wrong else []
         return length_m, faults
 
-    def _judged_path(self, pair: Pair, answer: Answer) -> tuple[float | None, list[str]]:
-        if answer.line is not None:
-            line = answer.line
+    def _judged_path(self, pair: Pair, answer: MethodResult) -> tuple[float | None, list[str]]:
+        if answer.any_angle is not None:
+            line = answer.any_angle
             verdict = judge_line(self._grid, line.points, start=pair.start, goal=pair.goal)
             return verdict.length_m, [*verdict.faults, *_false_claims(line, verdict.length_m)]
         if answer.cells is None:
@@ -100,21 +100,21 @@ class Judge:
         verdict = judge_path(self._grid, answer.cells, start=pair.start, goal=pair.goal)
         return verdict.length_m, [*verdict.faults]
 
-    def _cells_of(self, answer: Answer) -> LongArray:
-        if answer.line is not None:
-            return line_cells(self._grid, answer.line.points)
+    def _cells_of(self, answer: MethodResult) -> LongArray:
+        if answer.any_angle is not None:
+            return line_cells(self._grid, answer.any_angle.points)
         assert answer.cells is not None  # noqa: S101 - the caller has looked
         return answer.cells
 
     def oracles(
-        self, answer: Answer, pair: Pair, length_m: float | None
+        self, answer: MethodResult, pair: Pair, length_m: float | None
     ) -> tuple[Record, list[str]]:
         """Return the other optima of a pair, and their contradictions by the reference's answer."""
         if self._oracles is None:
             return {}, []
         return self._oracles.ask(answer, pair, length_m)
 
-    def plan_optimum_m(self, pair: Pair, answer: Answer) -> float | None:
+    def plan_optimum_m(self, pair: Pair, answer: MethodResult) -> float | None:
         """Return the length of the best path inside the regions of the plan; None without plan or
         path."""
         if answer.nodes is None or self._search is None:
@@ -129,7 +129,7 @@ class Judge:
         return path_length_in_cells(found.cells) * self._grid.resolution_m
 
 
-def _false_claims(line: Line, length_m: float) -> list[str]:
+def _false_claims(line: AnyAngleResult, length_m: float) -> list[str]:
     """Return the false statements of a method about a path.
 
     The comparisons are negated so that they fail for NaN too.
@@ -163,7 +163,9 @@ class Oracles:
             return VisibilityGraph(self._grid, max_corners=VISIBILITY_CORNERS)
         return None
 
-    def ask(self, answer: Answer, pair: Pair, length_m: float | None) -> tuple[Record, list[str]]:
+    def ask(
+        self, answer: MethodResult, pair: Pair, length_m: float | None
+    ) -> tuple[Record, list[str]]:
         """Return fields of the record, and faults."""
         known: Record = {}
         faults = []

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines import Answer, Line
+from hybridnav.baselines import AnyAngleResult, MethodResult
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -67,11 +67,12 @@ class MethodSpec:
 
     @property
     def metric(self) -> Metric:
-        """Metric of its paths; octile for baselines, even for those whose answers have a `line`."""
+        """Metric of its paths; octile for baselines, even for those whose answers have an
+        `any_angle` path."""
         planner = (self.preset or {}).get("planner", {})
         settings = ("refine", "ompl"), ("smooth", LINE_OF_SIGHT), ("coarse", "mesh")
-        is_line = any(planner.get(key) == value for key, value in settings)
-        return "any-angle" if is_line else "octile"
+        is_any_angle = any(planner.get(key) == value for key, value in settings)
+        return "any-angle" if is_any_angle else "octile"
 
     @cached_property
     def digest(self) -> str:
@@ -168,17 +169,17 @@ class HybridMethod:
         """Sum of the arrays of the planner, the topological map and the record, in bytes."""
         return _nbytes(self._planner, set())
 
-    def solve(self, start: Cell, goal: Cell) -> Answer:
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells."""
-        ends = self._frame.points_of(np.array([start, goal]))
-        result = self._planner.plan(ends[0], ends[1])
+        endpoints = self._frame.points_of(np.array([start, goal]))
+        result = self._planner.plan(endpoints[0], endpoints[1])
         route, stats = result.route, result.stats
         path = result.path if result.solved else None
         line = _line(result)
         arc_ids = self.topology.arc_ids
-        return Answer(
+        return MethodResult(
             None if path is None or line is not None else path.cells,
-            line=line,
+            any_angle=line,
             gave_up=str(result.status) if result.status in _GAVE_UP else "",
             nodes=None if route is None else _dense(self.topology.place_ids, route.places),
             arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
@@ -196,12 +197,12 @@ class HybridMethod:
 _GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
 
 
-def _line(result: PlanResult) -> Line | None:
+def _line(result: PlanResult) -> AnyAngleResult | None:
     """Return the path of a solved query if it is an any-angle path."""
     if result.metric != "any-angle" or result.path is None or not result.solved:
         return None
     how = result.refinement
-    return Line(
+    return AnyAngleResult(
         result.path.points,
         result.path.length_m,
         lower_bound_m=result.lower_bound,

@@ -248,7 +248,7 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
 
 
 def _path(record: Record, grid: OccupancyGrid) -> FloatArray:
-    """Return the points to draw for an answer: its path, or its ends if it has none."""
+    """Return the points to draw for an answer: its path, or its endpoints if it has none."""
     start, goal = record["start"], record["goal"]
     if record.get("points"):
         points = np.array(record["points"], dtype=np.float64)

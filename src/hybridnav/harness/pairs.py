@@ -199,11 +199,11 @@ def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[P
                 f"the scenarios are for a map of {scenario.rows} x {scenario.cols} cells, "
                 f"{grid.name} has {grid.shape[0]} x {grid.shape[1]}"
             )
-        ends = scenario.start, scenario.goal
+        endpoints = scenario.start, scenario.goal
         if as_stated:
-            pairs.append(Pair(*ends, "scenario", scenario.optimum_cells))
-        elif all(grid.classes[end] == CellClass.FREE for end in ends):
-            pairs.append(Pair(*ends, "scenario"))
+            pairs.append(Pair(*endpoints, "scenario", scenario.optimum_cells))
+        elif all(grid.classes[end] == CellClass.FREE for end in endpoints):
+            pairs.append(Pair(*endpoints, "scenario"))
     return list(dict.fromkeys(pairs))
 
 

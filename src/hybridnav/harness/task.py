@@ -23,7 +23,7 @@ from hybridnav.io import load_map
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav.baselines import Answer, Line
+    from hybridnav.baselines import AnyAngleResult, MethodResult
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
@@ -195,7 +195,7 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
         return {"status": "error", "error": reason, "faults": [f"no answer to judge: {reason}"]}
 
 
-def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
+def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> Record:
     length_m, faults = judge.faults(pair, answer)
     known: Record = {}
     if not faults:
@@ -208,7 +208,7 @@ def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
         "plan_steps": _plan_steps(answer),
         "plan_optimum_m": None if faults else judge.plan_optimum_m(pair, answer),
         "path": None if answer.cells is None else encode_path(answer.cells),
-        **({} if answer.line is None else _of_line(answer.line)),
+        **({} if answer.any_angle is None else _of_line(answer.any_angle)),
         "expanded": int(answer.expanded),
         "expanded_nodes": int(answer.expanded_nodes),
         "seconds": seconds,
@@ -218,7 +218,7 @@ def _judged(answer: Answer, judge: Judge, pair: Pair, seconds: float) -> Record:
     }
 
 
-def _of_line(line: Line) -> Record:
+def _of_line(line: AnyAngleResult) -> Record:
     """Return the fields that the record of an any-angle path has beside those of a path of
     cells."""
     return {
@@ -229,7 +229,7 @@ def _of_line(line: Line) -> Record:
     }
 
 
-def _plan_steps(answer: Answer) -> int | None:
+def _plan_steps(answer: MethodResult) -> int | None:
     """Return the steps of the plan in the topological layer, None if there is no plan."""
     if answer.plan_steps is not None:
         return int(answer.plan_steps)

@@ -87,7 +87,7 @@ class States(NamedTuple):
     def of_room(cls, room: int) -> States:
         """Return room for some states."""
         kinds = {"cost": np.int64, "status": np.uint8}
-        return cls(*(np.empty(room, kinds.get(field, np.int32)) for field in cls._fields))
+        return cls(*(np.empty(room, kinds.get(name, np.int32)) for name in cls._fields))
 
 
 @njit(cache=True, nogil=True)
@@ -278,14 +278,14 @@ def _pop(heap, n):
 
 @guarded
 @njit(cache=True, nogil=True)
-def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, states, tree):
+def find_classes(moves, cols, endpoints, left, of_edge, letters, wanted, apart, states, tree):
     """Find shortest paths of the first classes that do not wind, and why there are no more.
 
     Parameters
     ----------
     moves, cols
         uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
-    ends
+    endpoints
         Flat cells of start and goal.
     left
         The exact integer cost from each flat cell to the goal, -1 for no path: a consistent
@@ -305,7 +305,7 @@ def find_classes(moves, cols, ends, left, of_edge, letters, wanted, apart, state
     tuple
         The states at the goal in the order of cost; `FOUND`, `EXHAUSTED` or `LIMITED`.
     """
-    start, goal = ends
+    start, goal = endpoints
     head = np.full(moves.size, np.int32(-1), np.int32)
     room = states.cell.size
     heap = np.empty(2 * room, np.int64)

@@ -32,8 +32,8 @@ def spread_words(enterable, removed, word_of):
             ):
                 continue
             at = row * cols + col
-            for side in range(4):
-                unknown[at] += removed[_side(at, side, cols)]
+            for quarter in range(4):
+                unknown[at] += removed[_edge_of_block(at, quarter, cols)]
             if unknown[at] == 1:
                 ready[n_ready] = at
                 n_ready += 1
@@ -47,9 +47,9 @@ def spread_words(enterable, removed, word_of):
         if unknown[at] != 1:
             continue
         solved = 0
-        while not open_edge[_side(at, solved, cols)]:
+        while not open_edge[_edge_of_block(at, solved, cols)]:
             solved += 1
-        edge = _side(at, solved, cols)
+        edge = _edge_of_block(at, solved, cols)
         # Round the block counter-clockwise, from the solved side's end back to its beginning.
         first = _along(word_of, at, solved + 1 & 3, cols)
         second = _along(word_of, at, solved + 2 & 3, cols)
@@ -77,31 +77,31 @@ def spread_words(enterable, removed, word_of):
 
 
 @njit(cache=True, nogil=True)
-def _side(at, side, cols):
+def _edge_of_block(at, quarter, cols):
     """Return the base edge on the south, east, north or west side of a block."""
-    if side == 0:
+    if quarter == 0:
         return 2 * at
-    if side == 1:
+    if quarter == 1:
         return 2 * (at + 1) + 1
-    if side == 2:
+    if quarter == 2:
         return 2 * (at + cols)
     return 2 * at + 1
 
 
 @njit(cache=True, nogil=True)
-def _along(word_of, at, side, cols):
+def _along(word_of, at, quarter, cols):
     """Return the word of a side, read counter-clockwise round the block."""
-    word = np.int64(word_of[_side(at, side, cols)])
-    return word if side < 2 else -word
+    word = np.int64(word_of[_edge_of_block(at, quarter, cols)])
+    return word if quarter < 2 else -word
 
 
 @njit(cache=True, nogil=True)
-def _beyond(at, side, cols):
+def _beyond(at, quarter, cols):
     """Return the block on the other side of a side, -1 below the first row."""
-    if side == 0:
+    if quarter == 0:
         return at - cols
-    if side == 1:
+    if quarter == 1:
         return at + 1
-    if side == 2:
+    if quarter == 2:
         return at + cols
     return at - 1

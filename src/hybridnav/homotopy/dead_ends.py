@@ -21,7 +21,7 @@ class DeadEnds:
 
     A *passage* is a run of cells along a row or a column from one blocked cell to the next. A path
     enters and leaves the part behind it through the passage alone, at two cells that see each other
-    along it. If the loop between the two can be drawn together, the way along the passage is
+    along it. If the loop between the two can be drawn together, the path along the passage is
     shorter and of the same class. Otherwise the path winds if the passage is at most as wide as
     `reach`. So no shortest path of a class that does not wind goes there.
 

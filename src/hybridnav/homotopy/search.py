@@ -94,14 +94,14 @@ def alternative_search(
 
 
 class AlternativeSearch:
-    """Search over pairs of a cell and the word of the way to it.
+    """Search over pairs of a cell and the word of the path to it.
 
-    A* over pairs of a cell and a reduced word, with the exact length of the way that is left as the
-    estimate. A path *winds* when it returns after it has circled a hole: it stands on a cell that
-    it has passed, or sees one along a row or a column, and the loop between the two cannot be drawn
-    together. It sees as far as the side of a square hole of the least area, but at least one cell,
-    at most 1 m, and at most half the shortest path. Paths that wind are not pursued: turns round a
-    pillar, and ways through a door, round a table and out again.
+    A* over pairs of a cell and a reduced word, with the exact length of the path that is left as
+    the estimate. A path *winds* when it returns after it has circled a hole: it stands on a cell
+    that it has passed, or sees one along a row or a column, and the loop between the two cannot be
+    drawn together. It sees as far as the side of a square hole of the least area, but at least one
+    cell, at most 1 m, and at most half the shortest path. Paths that wind are not pursued: turns
+    round a pillar, and paths through a door, round a table and out again.
 
     A class without a winding shortest path is found, with a shortest path, before any longer class.
     A class with some winding shortest path is found with another path, or not at all; a class whose

@@ -7,7 +7,7 @@ from .movingai import (
     load_movingai_map as load_movingai_map,
     read_scenarios as read_scenarios,
 )
-from .rooms import load_rooms as load_rooms
+from .rooms_in import load_rooms as load_rooms
 from .rooms_out import save_rooms as save_rooms
 from .ros import load_ros_map as load_ros_map
 

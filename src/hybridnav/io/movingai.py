@@ -121,16 +121,16 @@ def load_movingai_map(
 
 def _read_header(stream: BinaryIO, where: str) -> tuple[int, int, int]:
     """Return the rows, the columns and the number of the line `map`."""
-    fields: dict[bytes, bytes] = {}
+    header: dict[bytes, bytes] = {}
     for number in range(1, _MAX_HEADER_LINES + 1):
         words = stream.readline(_MAX_LINE).split()
         if words == [b"map"]:
-            if fields.get(b"type") != b"octile":
+            if header.get(b"type") != b"octile":
                 raise MapError(f"{where}: the header lacks 'type octile'")
-            rows, cols = (_extent(fields, key, where) for key in (b"height", b"width"))
+            rows, cols = (_extent(header, key, where) for key in (b"height", b"width"))
             return rows, cols, number
         if len(words) == 2:  # noqa: PLR2004
-            fields[words[0]] = words[1]
+            header[words[0]] = words[1]
         elif words:
             break
     raise MapError(
@@ -138,8 +138,8 @@ def _read_header(stream: BinaryIO, where: str) -> tuple[int, int, int]:
     )
 
 
-def _extent(fields: dict[bytes, bytes], key: bytes, where: str) -> int:
-    text = fields.get(key, b"")
+def _extent(header: dict[bytes, bytes], key: bytes, where: str) -> int:
+    text = header.get(key, b"")
     if not (text.isdigit() and len(text) <= 9 and int(text) > 0):  # noqa: PLR2004
         raise MapError(
             f"{where}: the header must state a positive {key.decode()}, "

@@ -14,7 +14,7 @@ _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 """Samples of a pixel, by the header's colour type."""
 _ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2))
 """First column, first row and their steps, of each pass but the last of an interlaced image."""
-_PIECE = 2**20
+_BLOCK = 2**20
 """Bytes that are read, or inflated, at a time."""
 
 
@@ -69,19 +69,19 @@ def _chunk_head(stream: BinaryIO) -> tuple[bytes, int]:
 
 
 def _chunk(stream: BinaryIO, name: bytes, size: int, pixels: _Pixels | None) -> bytes:
-    """Read a chunk piece by piece and check its sum; return the last piece."""
-    checksum, left, piece = zlib.crc32(name), size, b""
+    """Read a chunk block by block and check its sum; return the last block."""
+    checksum, left, block = zlib.crc32(name), size, b""
     while left > 0:
-        piece = stream.read(min(left, _PIECE))
-        if not piece:
+        block = stream.read(min(left, _BLOCK))
+        if not block:
             raise DamagedPngError(f"truncated within a chunk {name.decode()}")
-        checksum = zlib.crc32(piece, checksum)
-        left -= len(piece)
+        checksum = zlib.crc32(block, checksum)
+        left -= len(block)
         if pixels is not None:
-            pixels.inflate(piece)
+            pixels.inflate(block)
     if stream.read(4) != struct.pack(">I", checksum):
         raise DamagedPngError(f"a chunk {name.decode()} does not match its checksum")
-    return piece
+    return block
 
 
 class _Pixels:
@@ -103,18 +103,18 @@ class _Pixels:
         )
         self._stream = zlib.decompressobj()
 
-    def inflate(self, piece: bytes) -> None:
+    def inflate(self, block: bytes) -> None:
         """Take the next bytes of the compressed data."""
         try:
-            inflated = _PIECE
+            inflated = _BLOCK
             # Output may be pending although all input is consumed, if the last output filled the
-            # piece.
-            while (piece or inflated == _PIECE) and not self._stream.eof:
-                inflated = len(self._stream.decompress(piece, _PIECE))
+            # block.
+            while (block or inflated == _BLOCK) and not self._stream.eof:
+                inflated = len(self._stream.decompress(block, _BLOCK))
                 self._left -= inflated
                 if self._left < 0:
                     raise DamagedPngError("holds more pixel data than the image has pixels")
-                piece = self._stream.unconsumed_tail
+                block = self._stream.unconsumed_tail
         except zlib.error as failure:
             raise DamagedPngError(f"the pixel data is damaged: {failure}") from None
 

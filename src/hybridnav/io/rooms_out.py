@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from hybridnav._files import printable, replace_file
 from hybridnav.errors import RoomsError
-from hybridnav.io.rooms import LIMITS, check_points, check_rooms, in_cells
+from hybridnav.io.rooms_in import LIMITS, check_points, check_rooms, in_cells
 from hybridnav.io.rooms_paint import painted, without_slivers
 
 if TYPE_CHECKING:

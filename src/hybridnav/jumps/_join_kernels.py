@@ -37,10 +37,10 @@ def join(tables, cell, found):
     index, ahead, order, width = tables
     here = number_of(index, cell)
     n_found = 0
-    for side in range(0, 8, 2):
-        seen = np.int64(ahead[here, side])
+    for straight in range(0, 8, 2):
+        seen = np.int64(ahead[here, straight])
         if seen > 0:
-            found[n_found] = order[corner_at(index, cell + seen * step_of(side, width))]
+            found[n_found] = order[corner_at(index, cell + seen * step_of(straight, width))]
             n_found += 1
     # The four diagonals take turns, so that the processor fetches their data at the same time: `at`
     # is the position of each, -1 at its end; `limits` how far along its right and left side corner
@@ -67,8 +67,8 @@ def join(tables, cell, found):
                 along = k - 1 + 2 * i & 7
                 seen = np.int64(ahead[there, along])
                 if 0 < seen < limits[k, i]:
-                    side = at[k] + seen * step_of(along, width)
-                    found[n_found] = order[corner_at(index, side)]
+                    straight = at[k] + seen * step_of(along, width)
+                    found[n_found] = order[corner_at(index, straight)]
                     n_found += 1
                 limits[k, i] = min(limits[k, i], _limit(seen))
     return n_found
@@ -101,17 +101,17 @@ def is_direct(tables, cell, goal):
     width = tables[3]
     rows, cols = goal // width - cell // width, goal % width - cell % width
     diagonal = min(abs(rows), abs(cols))
-    side = max(abs(rows), abs(cols)) - diagonal
+    straight = max(abs(rows), abs(cols)) - diagonal
     at = cell
     if diagonal > 0:
         k = (1 if cols > 0 else 3) if rows > 0 else (7 if cols > 0 else 5)
         if not _is_free(tables, at, k, diagonal):
             return False
         at += diagonal * step_of(k, width)
-    if side > 0:
+    if straight > 0:
         along_col, along_row = (2 if rows > 0 else 6), (0 if cols > 0 else 4)
         k = along_col if abs(rows) > abs(cols) else along_row
-        return _is_free(tables, at, k, side)
+        return _is_free(tables, at, k, straight)
     return True
 
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from hybridnav._jit import njit
 
-FAR = np.int64(1) << 62
-"""Cost above that of any path."""
 COLUMN_BITS = 24
 KIND_BITS = 4
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.jumps._leg_kernels import FAR, row_col_kind
+from hybridnav.jumps._leg_kernels import row_col_kind
 from hybridnav.jumps._search_kernels import FROM_START, shortest
 from hybridnav.search.contraction import corners_between
+from hybridnav.search.moves import FAR
 
 
 @njit(cache=True, nogil=True)
@@ -17,7 +18,7 @@ def _step(rows, cols):
 
 
 @njit(cache=True, nogil=True)
-def _walk(cells, n_cells, rows, cols, is_side_first):
+def _walk(cells, n_cells, rows, cols, is_straight_first):
     """Append the cells of a leg, by its offsets from the cell before.
 
     Return their number and the moves of the leg along a side and along a diagonal.
@@ -26,7 +27,7 @@ def _walk(cells, n_cells, rows, cols, is_side_first):
     straight = max(abs(rows), abs(cols)) - diagonal
     row, col = cells[n_cells - 1, 0], cells[n_cells - 1, 1]
     for part in range(2):
-        if (part == 0) == is_side_first:
+        if (part == 0) == is_straight_first:
             is_tall = abs(rows) > abs(cols)
             row_step, col_step = _step(rows if is_tall else 0, 0 if is_tall else cols)
             count = straight
@@ -42,12 +43,12 @@ def _walk(cells, n_cells, rows, cols, is_side_first):
 
 
 @njit(cache=True, nogil=True)
-def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
+def _cells_of(graph, endpoints, meeting, nodes, origin, cells, n_cells):
     """Append the cells of a path to `cells`.
 
     Parameters
     ----------
-    graph, ends, meeting
+    graph, endpoints, meeting
         See `shortest`.
     nodes
         int32 (m,), the corner cells on the path.
@@ -63,19 +64,19 @@ def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
         sides and along diagonals.
     """
     (_, _, _, width), places = graph[:2]
-    row, col = ends[0] // width, ends[0] % width
-    cells = _with_room(cells, n_cells, 1 + _moves(places, width, ends, nodes))
+    row, col = endpoints[0] // width, endpoints[0] % width
+    cells = _with_room(cells, n_cells, 1 + _moves(places, width, endpoints, nodes))
     cells[n_cells, 0], cells[n_cells, 1] = row + origin[0], col + origin[1]
     n_cells += 1
     n_straight = n_diagonal = np.int64(0)
     for i in range(nodes.size + 1):
-        to_row, to_col = ends[1] // width, ends[1] % width
+        to_row, to_col = endpoints[1] // width, endpoints[1] % width
         if i < nodes.size:
             to_row, to_col, _ = row_col_kind(places[nodes[i]])
         rows, cols = to_row - row, to_col - col
         # The last leg is free in the order of the goal.
-        is_side_first = i == nodes.size and meeting != FROM_START
-        n_cells, straight, diagonal = _walk(cells, n_cells, rows, cols, is_side_first)
+        is_straight_first = i == nodes.size and meeting != FROM_START
+        n_cells, straight, diagonal = _walk(cells, n_cells, rows, cols, is_straight_first)
         n_straight += straight
         n_diagonal += diagonal
         row, col = to_row, to_col
@@ -83,12 +84,12 @@ def _cells_of(graph, ends, meeting, nodes, origin, cells, n_cells):
 
 
 @njit(cache=True, nogil=True)
-def _moves(places, width, ends, nodes):
+def _moves(places, width, endpoints, nodes):
     """Count the moves of a path."""
-    row, col = ends[0] // width, ends[0] % width
+    row, col = endpoints[0] // width, endpoints[0] % width
     count = np.int64(0)
     for i in range(nodes.size + 1):
-        to_row, to_col = ends[1] // width, ends[1] % width
+        to_row, to_col = endpoints[1] // width, endpoints[1] % width
         if i < nodes.size:
             to_row, to_col, _ = row_col_kind(places[nodes[i]])
         count += max(abs(to_row - row), abs(to_col - col))
@@ -109,7 +110,7 @@ def _with_room(cells, n_cells, more):
 
 @guarded
 @njit(cache=True, nogil=True)
-def paths(graph, middles, origin, ends, work):
+def paths(graph, middles, origin, endpoints, work):
     """Find shortest paths between pairs of cells.
 
     Parameters
@@ -121,7 +122,7 @@ def paths(graph, middles, origin, ends, work):
         graph that is not contracted.
     origin
         Row and column of the framed grid's first cell.
-    ends
+    endpoints
         int64 (k, 4), row and column of the start, then of the goal; free cells.
     work
         See `shortest`.
@@ -135,15 +136,15 @@ def paths(graph, middles, origin, ends, work):
     """
     width, first = graph[0][3], graph[4][0]
     records, _, touched, _ = work
-    n = ends.shape[0]
+    n = endpoints.shape[0]
     begin = np.zeros(n + 1, np.int64)
     counts = np.full((n, 3), np.int64(-1))
     cells = np.empty((0, 2), np.int64)
     n_cells = np.int64(0)
     for i in range(n):
         pair = (
-            (ends[i, 0] - origin[0]) * width + ends[i, 1] - origin[1],
-            (ends[i, 2] - origin[0]) * width + ends[i, 3] - origin[1],
+            (endpoints[i, 0] - origin[0]) * width + endpoints[i, 1] - origin[1],
+            (endpoints[i, 2] - origin[0]) * width + endpoints[i, 3] - origin[1],
         )
         cost, meeting, counts[i, 2], n_touched = shortest(graph, pair, middles.size > 0, work)
         if cost < FAR:

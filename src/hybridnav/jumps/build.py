@@ -82,7 +82,7 @@ class JumpGraph:
     @property
     def memory_bytes(self) -> int:
         """Bytes of its arrays."""
-        arrays = (getattr(self, field.name) for field in fields(self))
+        arrays = (getattr(self, part.name) for part in fields(self))
         return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.jumps import _query_kernels as kernels
-from hybridnav.jumps._leg_kernels import FAR, legs_that_follow
+from hybridnav.jumps._leg_kernels import legs_that_follow
+from hybridnav.search.moves import FAR
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
@@ -107,14 +108,14 @@ class JumpSearch:
 
     def many(self, starts: LongArray, goals: LongArray) -> JumpPaths:
         """Find shortest paths between many pairs of free cells, int64 (n, 2) each, on all cores."""
-        ends = np.ascontiguousarray(np.hstack([starts, goals]).reshape(-1, 4), dtype=np.int64)
+        endpoints = np.ascontiguousarray(np.hstack([starts, goals]).reshape(-1, 4), dtype=np.int64)
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-        n_parts = max(1, min(cores or 1, len(ends) // _LEAST))
+        n_parts = max(1, min(cores or 1, len(endpoints) // _LEAST))
         if n_parts == 1:
-            found = [self._paths(ends)]
+            found = [self._paths(endpoints)]
         else:
             with ThreadPoolExecutor(n_parts) as pool:
-                found = list(pool.map(self._paths, np.array_split(ends, n_parts)))
+                found = list(pool.map(self._paths, np.array_split(endpoints, n_parts)))
         counts = np.concatenate([part[2] for part in found])
         length = counts[:, 0] + counts[:, 1] * math.sqrt(2.0)
         length[counts[:, 0] < 0] = np.inf
@@ -123,10 +124,10 @@ class JumpSearch:
         cells = np.concatenate([part[1] for part in found])
         return JumpPaths(length, path_start, cells, counts[:, 2])
 
-    def _paths(self, ends: LongArray) -> tuple[Any, Any, Any]:
+    def _paths(self, endpoints: LongArray) -> tuple[Any, Any, Any]:
         """Return the offsets of the paths, their cells, and the moves and expansions of each."""
         with self._works.lent() as work:
             found: tuple[Any, Any, Any] = kernels.paths(
-                self._arrays, self.graph.middles, self.graph.origin, ends, work.arrays
+                self._arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
             )
         return found

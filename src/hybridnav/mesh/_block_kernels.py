@@ -1,7 +1,7 @@
 """Kernels of blocks: parts of a mesh that no single polygon disconnects.
 
-A shortest path passes no convex polygon twice, so it stays in the blocks between its ends: a part
-of the map behind a single polygon is entered only towards an end.
+A shortest path passes no convex polygon twice, so it stays in the blocks between its endpoints: a
+part of the map behind a single polygon is entered only towards an end.
 """
 
 from __future__ import annotations

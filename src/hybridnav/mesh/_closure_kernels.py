@@ -1,8 +1,8 @@
 """Kernels of closed cells: whether a segment of free space meets them, and their new corners.
 
-Points are x = column, y = row in grid units, as for the search of intervals: the ends of a query
-are rounded so that every side test is exact (see `turn_of`). Floats choose the candidate cells,
-with a margin; side tests alone decide whether a segment meets a cell.
+Points are x = column, y = row in grid units, as for the search of intervals: the endpoints of a
+query are rounded so that every side test is exact (see `turn_of`). Floats choose the candidate
+cells, with a margin; side tests alone decide whether a segment meets a cell.
 """
 
 from __future__ import annotations
@@ -131,9 +131,9 @@ def _meets_cell(closure, polygon_at, segment, row, col):
     least = most = 0
     for k in range(4):
         x, y = col + (k & 1), row + (k >> 1)
-        side = turn_of(ax, ay, bx, by, float(x), float(y))
-        least, most = min(least, side), max(most, side)
-        if side == 0 and (x - ax) * (x - bx) + (y - ay) * (y - by) < 0.0:
+        hand = turn_of(ax, ay, bx, by, float(x), float(y))
+        least, most = min(least, hand), max(most, hand)
+        if hand == 0 and (x - ax) * (x - bx) + (y - ay) * (y - by) < 0.0:
             # Through a corner of the cell: the cell beyond that corner must be free.
             if is_shut(closure, polygon_at, row + 2 * (k >> 1) - 1, col + 2 * (k & 1) - 1):
                 return True
@@ -185,7 +185,7 @@ def crosses(closure, polygon_at, ax, ay, bx, by):
     closure, polygon_at
         See `closure_of`.
     ax, ay, bx, by
-        The segment. Its ends are not tested: a path that goes on in another direction must be
+        The segment. Its endpoints are not tested: a path that goes on in another direction must be
         tested there.
     """
     box, starts, cols = closure
@@ -225,7 +225,7 @@ def is_clear(closure, polygon_at, ax, ay, bx, by):
 
 @guarded
 @njit(cache=True, nogil=True)
-def way_crosses(closure, polygon_at, way):
+def path_crosses(closure, polygon_at, path):
     """Return whether a shortest path of free space is, or may be, illegal with cells closed.
 
     An end at a corner of a closed cell counts, because the cell of the end decides.
@@ -234,29 +234,29 @@ def way_crosses(closure, polygon_at, way):
     ----------
     closure, polygon_at
         See `closure_of`.
-    way
+    path
         float64 (n, 2), (row, col) in grid units: the start, the corners at which it turns, the
         goal.
     """
-    for k in range(len(way)):
-        y, x = way[k]
+    for k in range(len(path)):
+        y, x = path[k]
         if y == math.floor(y) and x == math.floor(x) and is_at_closed(closure, x, y):
             return True
-        if k and crosses(closure, polygon_at, way[k - 1, 1], way[k - 1, 0], x, y):
+        if k and crosses(closure, polygon_at, path[k - 1, 1], path[k - 1, 0], x, y):
             return True
     return False
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def ways_cross(closure, polygon_at, positions, starts):
-    """Return which of many paths cross closed cells, bool (n,); see `way_crosses`.
+def paths_cross(closure, polygon_at, positions, starts):
+    """Return which of many paths cross closed cells, bool (n,); see `path_crosses`.
 
     Path k is `positions[starts[k]:starts[k + 1]]`.
     """
     found = np.empty(len(starts) - 1, np.bool_)
     for k in range(len(found)):
-        found[k] = way_crosses(closure, polygon_at, positions[starts[k] : starts[k + 1]])
+        found[k] = path_crosses(closure, polygon_at, positions[starts[k] : starts[k + 1]])
     return found
 
 

@@ -158,7 +158,7 @@ def walls_of_closed(free, closed, points):
     for cell in closed:
         row, col = cell // cols, cell % cols
         for side in range(4):
-            # The other cell of the side, and the two ends of the side.
+            # The other cell of the side, and the two endpoints of the side.
             down = row - 1 if side == 0 else row + 1 if side == 1 else row
             across = col - 1 if side == 2 else col + 1 if side == 3 else col
             if not (0 <= down < rows and 0 <= across < cols and free[down, across]):
@@ -198,7 +198,7 @@ def rim_of(sides, is_touched, touched):
 
 @guarded
 @njit(cache=True, nogil=True)
-def pieces_of_rim(sides, rim, point_of, points, wide):
+def segments_of_rim(sides, rim, point_of, points, wide):
     """Return the sides of a rim, divided at vertices, int64 (w, 2), indices of `points`.
 
     Parameters
@@ -215,7 +215,7 @@ def pieces_of_rim(sides, rim, point_of, points, wide):
         Lattice points in a row.
     """
     first, begins, twins, polygon_of = sides
-    pieces = np.empty((len(rim) + 2 * len(points), 2), np.int64)
+    segments = np.empty((len(rim) + 2 * len(points), 2), np.int64)
     n = 0
     for slot in rim:
         polygon = polygon_of[slot]
@@ -223,7 +223,7 @@ def pieces_of_rim(sides, rim, point_of, points, wide):
         at, end = point_of[begins[slot]], point_of[begins[after]]
         here = np.searchsorted(points, at)
         if twins[slot] >= 0:
-            pieces[n, 0], pieces[n, 1] = here, np.searchsorted(points, end)
+            segments[n, 0], segments[n, 1] = here, np.searchsorted(points, end)
             n += 1
             continue
         step = wide if abs(end - at) >= wide else 1
@@ -233,10 +233,10 @@ def pieces_of_rim(sides, rim, point_of, points, wide):
             at += step
             there = np.searchsorted(points, at)
             if there < len(points) and points[there] == at:
-                pieces[n, 0], pieces[n, 1] = here, there
+                segments[n, 0], segments[n, 1] = here, there
                 n += 1
                 here = there
-    return pieces[:n].copy()
+    return segments[:n].copy()
 
 
 @guarded

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.mesh._closure_kernels import crosses, is_at_closed, is_clear
-from hybridnav.mesh._end_kernels import polygons_with
+from hybridnav.mesh._endpoint_kernels import polygons_with
 from hybridnav.mesh._view_kernels import distance, lobe_of, see_from_point, touches
 from hybridnav.search.exact import turn_of
 
@@ -36,17 +36,17 @@ def still_there(mesh, graph, closure, x, y, corner):
 def is_in_sight(mesh, closure, polygon_at, polygon, segment):
     """Return whether a segment from a point in a polygon is legal with cells closed."""
     ax, ay, bx, by = segment
-    cx, cy, _, first, begins, stops, twins, polygon_of = mesh
+    cx, cy, _, first, begins, finishes, twins, polygon_of = mesh
     while True:
         leaves = -1
         for slot in range(first[polygon], first[polygon + 1]):
-            u, w = begins[slot], stops[slot]
+            u, w = begins[slot], finishes[slot]
             if turn_of(ax, ay, bx, by, cx[u], cy[u]) < 0 < turn_of(ax, ay, bx, by, cx[w], cy[w]):
                 leaves = slot
         if leaves < 0:
             # Through a corner of the mesh, or along a side: the cells decide.
             return is_clear(closure, polygon_at, ax, ay, bx, by)
-        u, w = begins[leaves], stops[leaves]
+        u, w = begins[leaves], finishes[leaves]
         if turn_of(cx[u], cy[u], cx[w], cy[w], bx, by) >= 0:
             return not crosses(closure, polygon_at, ax, ay, bx, by)
         if twins[leaves] < 0:
@@ -167,11 +167,11 @@ def groups_of_closure(points, table, made, edges, most):
         for head in edges[1][edges[0][i] : edges[0][i + 1]]:
             if head >= n:
                 continue
-            way = distance(xs[i], ys[i], cx[head], cy[head])
+            leg = distance(xs[i], ys[i], cx[head], cy[head])
             for mark in range(table.shape[1]):
                 if table[head, mark] < np.inf:
-                    reach[0, i, mark] = min(reach[0, i, mark], table[head, mark] + way)
-                    reach[1, i, mark] = max(reach[1, i, mark], table[head, mark] - way)
+                    reach[0, i, mark] = min(reach[0, i, mark], table[head, mark] + leg)
+                    reach[1, i, mark] = max(reach[1, i, mark], table[head, mark] - leg)
     count = min(k, most)
     group = np.zeros(k, np.int64)
     circles = np.zeros((count, 3))

@@ -13,7 +13,7 @@ from hybridnav._jit import guarded, njit
 from hybridnav.mesh._closure_kernels import crosses, is_at_closed, is_at_shut, is_beside
 from hybridnav.mesh._detour_bound_kernels import bounds_of_goal, estimate, left_behind
 from hybridnav.mesh._detour_kernels import is_in_sight, still_there
-from hybridnav.mesh._end_kernels import APART, polygons_of_ends
+from hybridnav.mesh._endpoint_kernels import APART, polygons_of_endpoints
 from hybridnav.mesh._heap_kernels import pop, push
 from hybridnav.mesh._polyanya_kernels import (
     BEGUN,
@@ -23,12 +23,12 @@ from hybridnav.mesh._polyanya_kernels import (
     LAST,
     LOWER,
     MARKED,
-    NO_ROOM,
     PAUSED,
     SIZE,
     STARTS,
     TOUCHED,
     UPPER,
+    WORK_FULL,
     N,
     put_corner,
 )
@@ -47,12 +47,12 @@ _FLOOD = 64
 
 @guarded
 @njit(cache=True, nogil=True)
-def query_round(mesh, graph, detour, where, ends, work, effort):
+def query_round(mesh, graph, detour, where, endpoints, work, effort):
     """Find a shortest path between two points round closed cells, or resume the search.
 
     Parameters
     ----------
-    mesh, graph, where, ends, work, effort
+    mesh, graph, where, endpoints, work, effort
         See `query_corners`; the arrays of corners have room for those of closed cells.
     detour
         Results of `closure_of`, `corners_of_closure`, `edges_of_closure`, `groups_of_closure`.
@@ -65,7 +65,7 @@ def query_round(mesh, graph, detour, where, ends, work, effort):
     _, _, room, corners, _, _, counts, bounds = work
     costs, _, came, to_goal, touched = corners
     upper, factor, limit = effort
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     n, made = len(mesh[0]), detour[1]
     none = np.empty((0, 2))
     if not counts[BEGUN]:
@@ -75,14 +75,14 @@ def query_round(mesh, graph, detour, where, ends, work, effort):
         closure, polygon_at = detour[0], where[1]
         if is_at_shut(closure, polygon_at, sx, sy) or is_at_shut(closure, polygon_at, tx, ty):
             return UNSURE, none
-        status = _begin(mesh, graph, detour, where, ends, work)
+        status = _begin(mesh, graph, detour, where, endpoints, work)
         if status == DONE and bounds[UPPER] < np.inf:
-            return DONE, _way((mesh[0], mesh[1], made), ends, came, -1)
+            return DONE, _path_through((mesh[0], mesh[1], made), endpoints, came, -1)
         if status != PAUSED:
             return status, none
     status = DONE
     if limit >= 0:
-        status = _advance(mesh, graph, detour, where[1], ends, work, (factor, limit))
+        status = _advance(mesh, graph, detour, where[1], endpoints, work, (factor, limit))
     if status != DONE:
         return status, none
     for corner in room[2][: counts[MARKED]]:
@@ -93,11 +93,11 @@ def query_round(mesh, graph, detour, where, ends, work, effort):
     counts[BEGUN] = 0
     if counts[LAST] < 0:
         return DONE, none
-    return DONE, _way((mesh[0], mesh[1], made), ends, came, counts[LAST])
+    return DONE, _path_through((mesh[0], mesh[1], made), endpoints, came, counts[LAST])
 
 
 @njit(cache=True, nogil=True)
-def _begin(mesh, graph, detour, where, ends, work):
+def _begin(mesh, graph, detour, where, endpoints, work):
     """Mark the corners that see the goal, and list those that the start sees.
 
     Return `PAUSED` if a search is needed.
@@ -105,10 +105,10 @@ def _begin(mesh, graph, detour, where, ends, work):
     closure, (xs, ys, kinds, _) = detour[0], detour[1]
     starts, goals, room, corners, heap, _, counts, bounds = work
     component, polygon_at, cells = where
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     cx, cy, n, to_goal = mesh[0], mesh[1], len(mesh[0]), corners[3]
-    how, n_starts, n_goals = polygons_of_ends(
-        mesh, component, polygon_at, cells, ends, starts, goals
+    how, n_starts, n_goals = polygons_of_endpoints(
+        mesh, component, polygon_at, cells, endpoints, starts, goals
     )
     if how == APART:
         bounds[:] = np.inf
@@ -121,10 +121,10 @@ def _begin(mesh, graph, detour, where, ends, work):
     seen = room[2]
     n_seen, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, room, 0)
     if n_seen < 0:
-        return NO_ROOM
+        return WORK_FULL
     n_all, _ = see_from_point(mesh, sx, sy, starts[:n_starts], nowhere, room, n_seen)
     if n_all < 0 or n_all + len(xs) > min(len(seen), len(heap[0])):
-        return NO_ROOM
+        return WORK_FULL
     n_marked = 0
     for corner in seen[:n_seen]:
         head = corner
@@ -153,14 +153,14 @@ def _begin(mesh, graph, detour, where, ends, work):
 
 
 @njit(cache=True, nogil=True)
-def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
+def _advance(mesh, graph, detour, polygon_at, endpoints, work, effort):
     """Search until the answer is good enough or enough corners are expanded; see `advance`.
 
     All is in one function, because a call with all arrays takes as long as an expansion.
 
     Parameters
     ----------
-    mesh, graph, detour, ends, work, effort
+    mesh, graph, detour, endpoints, work, effort
         See `query_round`.
     polygon_at
         int32 (rows, cols), from `where`.
@@ -173,14 +173,14 @@ def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
     heap, counts, bounds = work[4], work[6], work[7]
     keys, values = heap
     factor, limit = effort
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     box, seen = closure[0], work[2][2]
     left = left_behind(made, groups, to_goal[: n + len(xs)], work[5], tx, ty)
     marks = (table, work[5], groups[1], groups[3], left)
     size, n_touched, upper = counts[SIZE], counts[TOUCHED], bounds[UPPER]
     status = DONE
     while size or counts[BEGUN] == _LISTED:
-        here, lobe, side, cost_before = -1, -1, 0.0, 0.0
+        here, lobe, hand, cost_before = -1, -1, 0.0, 0.0
         px, py, x, y = sx, sy, sx, sy
         near, far = seen[counts[STARTS] : counts[GOALS]], seen[:0]
         if counts[BEGUN] != _LISTED:
@@ -208,13 +208,13 @@ def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
                 lobe = lobe_of(kind, x - px, y - py)
                 near, far = far, heads_made[first_made[here - n] : first_made[here - n + 1]]
             if size + len(near) + len(far) > len(keys):
-                status = NO_ROOM
+                status = WORK_FULL
                 break
             if counts[EXPANDED] >= limit:
                 status = PAUSED
                 break
             # The blocked cell lies on the left of the path here, or on the right.
-            side = (x - px) * (1.0 if kind & 2 else -1.0) - (y - py) * (1.0 if kind & 1 else -1.0)
+            hand = (x - px) * (1.0 if kind & 2 else -1.0) - (y - py) * (1.0 if kind & 1 else -1.0)
             size = pop(heap, size)
             counts[EXPANDED] += 1
         counts[BEGUN] = _BEGUN
@@ -232,7 +232,7 @@ def _advance(mesh, graph, detour, polygon_at, ends, work, effort):
             else:
                 wx, wy = xs[head - n], ys[head - n]
             cost = cost_before + distance(x, y, wx, wy)
-            if cost >= costs[head] or turn_of(px, py, x, y, wx, wy) * side < 0.0:
+            if cost >= costs[head] or turn_of(px, py, x, y, wx, wy) * hand < 0.0:
                 continue
             if (here >= n or head >= n) and lobe >= 0 and lobe_of(kind, wx - x, wy - y) != lobe:
                 continue
@@ -335,20 +335,20 @@ def _wait(is_seen, waiting, size, corner):
 
 
 @njit(cache=True, nogil=True)
-def _way(points, ends, came, corner):
-    """Return the path through a corner, see `way_to`; -1 for a path of one segment."""
+def _path_through(points, endpoints, came, corner):
+    """Return the path through a corner, see `path_to`; -1 for a path of one segment."""
     cx, cy, (xs, ys, _, _) = points
     at, room = corner, 2
     while at >= 0:
         at, room = came[at], room + 1
-    way = np.empty((room, 2))
+    path = np.empty((room, 2))
     n = room - 1
-    way[n, 0], way[n, 1] = ends[3], ends[2]
+    path[n, 0], path[n, 1] = endpoints[3], endpoints[2]
     at = corner
     while at >= 0:
         new = at - len(cx)
         x, y = (cx[at], cy[at]) if new < 0 else (xs[new], ys[new])
-        n = put_corner(way, n, x, y)
+        n = put_corner(path, n, x, y)
         at = came[at]
-    n = put_corner(way, n, ends[0], ends[1])
-    return way[n:].copy()
+    n = put_corner(path, n, endpoints[0], endpoints[1])
+    return path[n:].copy()

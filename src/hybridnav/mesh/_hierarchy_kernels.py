@@ -37,7 +37,7 @@ def class_of(kind, dx, dy):
 
 
 @njit(cache=True, nogil=True)
-def ways_that_follow():
+def classes_that_follow():
     """Return the classes that may follow each class at a corner on a shortest path.
 
     See `contract`. A path goes from one quadrant beside the blocked cell to the other, and does not

@@ -1,8 +1,8 @@
 """Kernels of the search of the hierarchy of corners: shortest any-angle paths.
 
 R. Geisberger, P. Sanders, D. Schultes, D. Delling: Contraction hierarchies, 2008. A* runs from both
-ends, up to corners contracted later. A corner that both sides reach completes a path, and entries
-that are not better by their straight distance are pruned.
+ends, up to corners contracted later. A corner that both directions reach completes a path, and
+entries that are not better by their straight distance are pruned.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.mesh._end_kernels import look_from_ends
+from hybridnav.mesh._endpoint_kernels import look_from_endpoints
 from hybridnav.mesh._hierarchy_kernels import UNITS, class_of, cost_of
 from hybridnav.mesh._polyanya_kernels import (
     BEGUN,
@@ -19,38 +19,36 @@ from hybridnav.mesh._polyanya_kernels import (
     LAST,
     LOWER,
     MARKED,
-    NO_ROOM,
     PAUSED,
     SIZE,
     TOUCHED,
     UPPER,
+    WORK_FULL,
     put_corner,
 )
 from hybridnav.mesh._view_kernels import distance
 from hybridnav.search.arrays import pop, push
 from hybridnav.search.contraction import NO_ARC, corners_between
-
-FAR = np.int64(1) << 62
-"""Cost above that of any path."""
+from hybridnav.search.moves import FAR
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def query_hierarchy(mesh, hierarchy, where, ends, work, effort):
+def query_hierarchy(mesh, hierarchy, where, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
     Parameters
     ----------
-    mesh, ends
+    mesh, endpoints
         See `successors`.
     hierarchy
-        Results of `contract` and `ways_that_follow`.
+        Results of `contract` and `classes_that_follow`.
     where
-        See `look_from_ends`.
+        See `look_from_endpoints`.
     work
-        Arrays of one query: room for the polygons of the ends; room of `see_from_point`; records of
-        corners, int64 (n, 4), costs from the start and from the goal (`FAR`), and the tail and arc
-        by which each was reached; corners touched; two heaps; counts and bounds.
+        Arrays of one query: room for the polygons of the endpoints; room of `see_from_point`;
+        records of corners, int64 (n, 4), costs from the start and from the goal (`FAR`), and the
+        tail and arc by which each was reached; corners touched; two heaps; counts and bounds.
     effort
         See `query`.
 
@@ -61,70 +59,74 @@ def query_hierarchy(mesh, hierarchy, where, ends, work, effort):
     """
     starts, goals, room, records, touched, heaps, counts, bounds = work
     upper, factor, limit = effort
-    way = np.empty((0, 2))
+    path = np.empty((0, 2))
     if not counts[BEGUN]:
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
-        status, n, n_all = look_from_ends(mesh, where, ends, (starts, goals, room), bounds)
+        status, n, n_all = look_from_endpoints(
+            mesh, where, endpoints, (starts, goals, room), bounds
+        )
         if n_all > len(heaps[0]):
-            status = NO_ROOM
-        if status == NO_ROOM:
-            return NO_ROOM, way
+            status = WORK_FULL
+        if status == WORK_FULL:
+            return WORK_FULL, path
         if status == DONE:
-            return DONE, way if bounds[UPPER] == np.inf else _way(mesh, ends, touched[:0])
-        counts[SIZE] = _seed(mesh, ends, room[2][n:n_all], 0, work)
-        counts[MARKED] = _seed(mesh, ends, room[2][:n], 1, work)
+            return DONE, path if bounds[UPPER] == np.inf else _path_through(
+                mesh, endpoints, touched[:0]
+            )
+        counts[SIZE] = _seed(mesh, endpoints, room[2][n:n_all], 0, work)
+        counts[MARKED] = _seed(mesh, endpoints, room[2][:n], 1, work)
         counts[BEGUN] = 1
     if limit >= 0:
-        status = _advance(mesh, hierarchy, ends, work, factor, limit)
+        status = _advance(mesh, hierarchy, endpoints, work, factor, limit)
         if status != DONE:
-            return status, way
+            return status, path
     if counts[LAST] >= 0:
         first, _, middles, _ = hierarchy
         nodes = corners_between((first, middles), counts[LAST], records)
-        way = _way(mesh, ends, nodes)
+        path = _path_through(mesh, endpoints, nodes)
         is_proved = bounds[LOWER] >= bounds[UPPER]
         bounds[UPPER] = 0.0
-        for k in range(len(way) - 1):
-            bounds[UPPER] += distance(way[k, 0], way[k, 1], way[k + 1, 0], way[k + 1, 1])
+        for k in range(len(path) - 1):
+            bounds[UPPER] += distance(path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1])
         if is_proved:
             bounds[LOWER] = bounds[UPPER]
     for corner in touched[: counts[TOUCHED]]:
         records[corner, 0] = records[corner, 1] = FAR
     counts[BEGUN] = 0
-    return DONE, way
+    return DONE, path
 
 
 @njit(cache=True, nogil=True)
-def _seed(mesh, ends, seen, side, work):
+def _seed(mesh, endpoints, seen, direction, work):
     """Reach the corners that an end sees, on its side, and return the number queued."""
     cx, cy = mesh[0], mesh[1]
     _, _, _, records, touched, heaps, counts, _ = work
-    sx, sy, tx, ty = ends
-    x, y, to_x, to_y = (tx, ty, sx, sy) if side else (sx, sy, tx, ty)
+    sx, sy, tx, ty = endpoints
+    x, y, to_x, to_y = (tx, ty, sx, sy) if direction else (sx, sy, tx, ty)
     size = 0
     for corner in seen:
-        if records[corner, side] < FAR:
+        if records[corner, direction] < FAR:
             continue
-        if records[corner, 1 - side] == FAR:
+        if records[corner, 1 - direction] == FAR:
             touched[counts[TOUCHED]] = corner
             counts[TOUCHED] += 1
         cost = cost_of(x, y, cx[corner], cy[corner])
-        records[corner, side], records[corner, 2 + side] = cost, NO_ARC
+        records[corner, direction], records[corner, 2 + direction] = cost, NO_ARC
         left = cost_of(cx[corner], cy[corner], to_x, to_y)
-        push(heaps[side], size, cost + left, np.int64(corner))
+        push(heaps[direction], size, cost + left, np.int64(corner))
         size += 1
     return size
 
 
 @njit(cache=True, nogil=True)
-def _advance(mesh, hierarchy, ends, work, factor, limit):
+def _advance(mesh, hierarchy, endpoints, work, factor, limit):
     """Search until the answer is good enough or enough corners are expanded; see `advance`."""
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, arcs, _, follow = hierarchy
     _, _, _, records, touched, heaps, counts, bounds = work
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     to_start, to_goal, n_touched = counts[SIZE], counts[MARKED], counts[TOUCHED]
     best = FAR if bounds[UPPER] * UNITS >= FAR else np.int64(bounds[UPPER] * UNITS)
     if counts[LAST] >= 0:
@@ -136,26 +138,26 @@ def _advance(mesh, hierarchy, ends, work, factor, limit):
         least = min(low_start, low_goal)
         if least == FAR or least * factor >= best:
             break
-        side = 0 if low_start <= low_goal else 1
-        heap, size = heaps[side], (to_goal if side else to_start)
+        direction = 0 if low_start <= low_goal else 1
+        heap, size = heaps[direction], (to_goal if direction else to_start)
         node = heap[0, 1]
         low, high = first[node], first[node + 1]
         if size + high - low > len(heap):
-            status = NO_ROOM
+            status = WORK_FULL
             break
         if counts[EXPANDED] >= limit:
             status = PAUSED
             break
         pop(heap, size)
         size -= 1
-        x, y, cost = cx[node], cy[node], records[node, side]
-        from_x, from_y, to_x, to_y = (tx, ty, sx, sy) if side else (sx, sy, tx, ty)
+        x, y, cost = cx[node], cy[node], records[node, direction]
+        from_x, from_y, to_x, to_y = (tx, ty, sx, sy) if direction else (sx, sy, tx, ty)
         if least == cost + cost_of(x, y, to_x, to_y):
             counts[EXPANDED] += 1
-            if cost + records[node, 1 - side] < best:
-                best = cost + records[node, 1 - side]
+            if cost + records[node, 1 - direction] < best:
+                best = cost + records[node, 1 - direction]
                 counts[LAST] = node
-            by, may_follow = records[node, 2 + side], np.int64(-1)
+            by, may_follow = records[node, 2 + direction], np.int64(-1)
             if by != NO_ARC:
                 may_follow = follow[kinds[node], arcs[by & 0xFFFFFFFF, 1] & 63]
             elif from_x != x or from_y != y:
@@ -163,19 +165,19 @@ def _advance(mesh, hierarchy, ends, work, factor, limit):
             for arc in range(low, high):
                 packed, further = arcs[arc, 1], cost + arcs[arc, 0]
                 other = packed >> 12
-                known = records[other, side]
+                known = records[other, direction]
                 if may_follow >> (packed >> 6 & 63) & 1 == 0 or known <= further:
                     continue
                 estimate = further + cost_of(cx[other], cy[other], to_x, to_y)
                 if estimate >= best:
                     continue
-                if known == FAR and records[other, 1 - side] == FAR:
+                if known == FAR and records[other, 1 - direction] == FAR:
                     touched[n_touched] = other
                     n_touched += 1
-                records[other, side], records[other, 2 + side] = further, node << 32 | arc
+                records[other, direction], records[other, 2 + direction] = further, node << 32 | arc
                 push(heap, size, estimate, other)
                 size += 1
-        if side:
+        if direction:
             to_goal = size
         else:
             to_start = size
@@ -188,13 +190,13 @@ def _advance(mesh, hierarchy, ends, work, factor, limit):
 
 
 @njit(cache=True, nogil=True)
-def _way(mesh, ends, nodes):
-    """Return the path through some corners, see `way_to`."""
-    sx, sy, tx, ty = ends
+def _path_through(mesh, endpoints, nodes):
+    """Return the path through some corners, see `path_to`."""
+    sx, sy, tx, ty = endpoints
     n = len(nodes) + 1
-    way = np.empty((n + 1, 2))
-    way[n, 0], way[n, 1] = ty, tx
+    path = np.empty((n + 1, 2))
+    path[n, 0], path[n, 1] = ty, tx
     for k in range(len(nodes) - 1, -1, -1):
-        n = put_corner(way, n, mesh[0][nodes[k]], mesh[1][nodes[k]])
-    n = put_corner(way, n, sx, sy)
-    return way[n:].copy()
+        n = put_corner(path, n, mesh[0][nodes[k]], mesh[1][nodes[k]])
+    n = put_corner(path, n, sx, sy)
+    return path[n:].copy()

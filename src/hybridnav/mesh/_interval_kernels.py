@@ -1,9 +1,9 @@
 """Kernels of intervals: the part of a side seen from a root, and the intervals behind it.
 
-Points are x = column, y = row in grid units: corners are whole numbers, the two ends of a query are
-rounded to 2^-24 of a cell, so that every side test is exact (see `turn_of`). An interval on a side
-is never computed: it is the part of the side between two rays from its root. A ray is the root and
-a corner that limits the view, or the mirror image of a root in a corner.
+Points are x = column, y = row in grid units: corners are whole numbers, the two endpoints of a
+query are rounded to 2^-24 of a cell, so that every side test is exact (see `turn_of`). An interval
+on a side is never computed: it is the part of the side between two rays from its root. A ray is the
+root and a corner that limits the view, or the mirror image of a root in a corner.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ _CX, _CY, _KINDS, _FIRST, _BEGINS, _STOPS, _TWINS, _POLYGON_OF = 0, 1, 2, 3, 4, 
 
 
 @njit(cache=True, nogil=True)
-def turns(kind, dx, dy, side):
-    """Return whether a path may bend round a corner to a side, 1 for the left.
+def turns(kind, dx, dy, hand):
+    """Return whether a path may bend round a corner to a hand, 1 for the left.
 
     The path arrives in the direction (dx, dy); the one blocked cell of the corner must lie on that
-    side.
+    hand.
     """
     if kind >= 4:
         return False
     ex = 1.0 if kind & 1 else -1.0
     ey = 1.0 if kind & 2 else -1.0
-    return dx * ey * side >= 0.0 and -dy * ex * side >= 0.0
+    return dx * ey * hand >= 0.0 and -dy * ex * hand >= 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -89,10 +89,10 @@ def estimate(x, y, lx, ly, rx, ry, tx, ty):
 
 
 @njit(cache=True, nogil=True)
-def estimate_of(mesh, ends, whole, real, node):
+def estimate_of(mesh, endpoints, whole, real, node):
     """Return the estimate of the rest of a path from a node's root."""
     cx, cy = mesh[_CX], mesh[_CY]
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     slot, root, marks = whole[node, SLOT], whole[node, ROOT], whole[node, ENDS]
     x, y = (sx, sy) if root < 0 else (cx[root], cy[root])
     a, b = mesh[_BEGINS][slot], mesh[_STOPS][slot]
@@ -138,7 +138,7 @@ def _put_goal(nodes, n, root, parent, length):
 
 @njit(cache=True, nogil=True)
 def along(mesh, x, y, u, w):
-    """Return the end of a side nearer to a point on its line, and the side to which a path bends
+    """Return the end of a side nearer to a point on its line, and the hand to which a path bends
     there.
 
     A path that continues behind the side bends to the right at its right end.
@@ -150,16 +150,16 @@ def along(mesh, x, y, u, w):
 
 
 @njit(cache=True, nogil=True)
-def successors(mesh, blocks, ends, is_goal, nodes, node, n):
+def successors(mesh, blocks, endpoints, is_goal, nodes, node, n):
     """Write the successors of a node and return the number of nodes.
 
     Parameters
     ----------
     mesh
-        float64 x and y of corners, uint8 kinds, int32 first, begins, stops, twins, polygon_of.
+        float64 x and y of corners, uint8 kinds, int32 first, begins, finishes, twins, polygon_of.
     blocks
         int32 block of each slot, and bool whether the search may enter each block.
-    ends
+    endpoints
         sx, sy, tx, ty.
     is_goal
         Whether the goal is in the polygon behind the node's side.
@@ -168,18 +168,18 @@ def successors(mesh, blocks, ends, is_goal, nodes, node, n):
     node, n
         Number of the node, and of all nodes.
     """
-    cx, cy, kinds, first, begins, stops, twins, polygon_of = mesh
+    cx, cy, kinds, first, begins, finishes, twins, polygon_of = mesh
     block_of, is_open = blocks
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     whole, real = nodes
     entry, root, marks = whole[node, SLOT], whole[node, ROOT], whole[node, ENDS]
     g = real[node, G]
     x, y = (sx, sy) if root < 0 else (cx[root], cy[root])
     polygon = polygon_of[entry]
     low, high = first[polygon], first[polygon + 1]
-    a, b = begins[entry], stops[entry]
+    a, b = begins[entry], finishes[entry]
     if root in (a, b):
-        return _all_seen(mesh, blocks, ends, is_goal, nodes, node, n)
+        return _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n)
     lx, ly, rx, ry = real[node, _LX], real[node, _LY], real[node, _RX], real[node, _RY]
     turns_right = marks & _RIGHT and turns(kinds[b], cx[b] - x, cy[b] - y, -1)
     turns_left = marks & _LEFT and turns(kinds[a], cx[a] - x, cy[a] - y, 1)
@@ -197,7 +197,7 @@ def successors(mesh, blocks, ends, is_goal, nodes, node, n):
     slot = entry
     for _ in range(high - low - 1):
         slot = low if slot + 1 == high else slot + 1
-        u, w, twin = begins[slot], stops[slot], twins[slot]
+        u, w, twin = begins[slot], finishes[slot], twins[slot]
         ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
         right_w = turn_of(x, y, rx, ry, wx, wy)
         left_w = turn_of(x, y, lx, ly, wx, wy)
@@ -236,7 +236,7 @@ def successors(mesh, blocks, ends, is_goal, nodes, node, n):
 
 
 @njit(cache=True, nogil=True)
-def _hidden(mesh, corner, near, far, is_cut, side):
+def _hidden(mesh, corner, near, far, is_cut, hand):
     """Return how a path bends round a corner to a side behind it, with the end `near` closer to the
     wall.
 
@@ -253,25 +253,25 @@ def _hidden(mesh, corner, near, far, is_cut, side):
     ):
         # Behind a wall on one line with it: two bends at once.
         dx, dy = cx[near] - cx[corner], cy[near] - cy[corner]
-        if not turns(mesh[_KINDS][near], dx, dy, side):
+        if not turns(mesh[_KINDS][near], dx, dy, hand):
             return -1, 0.0, 0
         return near, math.hypot(dx, dy), -1 - corner
     return corner, 0.0, WHOLE_SIDE
 
 
 @njit(cache=True, nogil=True)
-def _all_seen(mesh, blocks, ends, is_goal, nodes, node, n):
+def _all_seen(mesh, blocks, endpoints, is_goal, nodes, node, n):
     """Write the successors of a node whose root is an end of its side, so that it sees all of the
     polygon.
 
     Parameters
     ----------
-    mesh, blocks, ends, is_goal, nodes, node, n
+    mesh, blocks, endpoints, is_goal, nodes, node, n
         See `successors`.
     """
-    cx, cy, kinds, first, begins, stops, twins, polygon_of = mesh
+    cx, cy, kinds, first, begins, finishes, twins, polygon_of = mesh
     block_of, is_open = blocks
-    _, _, tx, ty = ends
+    _, _, tx, ty = endpoints
     whole, real = nodes
     entry, root, g = whole[node, SLOT], whole[node, ROOT], real[node, G]
     x, y = cx[root], cy[root]
@@ -282,12 +282,12 @@ def _all_seen(mesh, blocks, ends, is_goal, nodes, node, n):
         twin = twins[slot]
         if slot == entry or twin < 0 or not is_open[block_of[slot]]:
             continue
-        u, w = begins[slot], stops[slot]
+        u, w = begins[slot], finishes[slot]
         ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
         by, cost = root, g
         if root not in (u, w) and turn_of(x, y, ux, uy, wx, wy) == 0:
-            by, side = along(mesh, x, y, u, w)
-            if not turns(kinds[by], cx[by] - x, cy[by] - y, side):
+            by, hand = along(mesh, x, y, u, w)
+            if not turns(kinds[by], cx[by] - x, cy[by] - y, hand):
                 continue
             cost += math.hypot(cx[by] - x, cy[by] - y)
         n = put(nodes, n, twin, by, node, WHOLE_SIDE, cost, wx, wy, ux, uy)

@@ -27,7 +27,7 @@ from hybridnav.mesh._interval_kernels import (
 )
 from hybridnav.search.exact import turn_of
 
-DONE, PAUSED, NO_ROOM = 0, 1, 2
+DONE, PAUSED, WORK_FULL = 0, 1, 2
 """Status of a run of the search: the answer is good enough; the limit of expansions is reached;
 there are more nodes than room."""
 
@@ -44,12 +44,12 @@ _SAME = 1e-9
 
 
 @njit(cache=True, nogil=True)
-def seed(mesh, blocks, ends, starts, work):
+def seed(mesh, blocks, endpoints, starts, work):
     """Write the first nodes of a search, the sides of the start's polygons.
 
     Parameters
     ----------
-    mesh, blocks, ends
+    mesh, blocks, endpoints
         See `successors`.
     starts
         int32 polygons that contain the start.
@@ -60,29 +60,29 @@ def seed(mesh, blocks, ends, starts, work):
     Returns
     -------
     int
-        `DONE` or `NO_ROOM`.
+        `DONE` or `WORK_FULL`.
     """
-    cx, cy, kinds, first, begins, stops, twins, _ = mesh
+    cx, cy, kinds, first, begins, finishes, twins, _ = mesh
     block_of, is_open = blocks
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     whole, real, keys, values, _, _, counts, bounds = work
     n = size = 0
     for polygon in starts:
         if n + first[polygon + 1] - first[polygon] > len(whole):
-            return NO_ROOM
+            return WORK_FULL
         for slot in range(first[polygon], first[polygon + 1]):
             if twins[slot] < 0 or not is_open[block_of[slot]]:
                 continue
-            u, w = begins[slot], stops[slot]
+            u, w = begins[slot], finishes[slot]
             ux, uy, wx, wy = cx[u], cy[u], cx[w], cy[w]
             root, g, x, y = -1, 0.0, sx, sy
             if turn_of(sx, sy, ux, uy, wx, wy) == 0:
                 # The start lies on the side, or on its line.
                 if (ux - sx) * (wx - sx) <= 0.0 and (uy - sy) * (wy - sy) <= 0.0:
                     continue
-                root, side = along(mesh, sx, sy, u, w)
+                root, hand = along(mesh, sx, sy, u, w)
                 x, y = cx[root], cy[root]
-                if not turns(kinds[root], x - sx, y - sy, side):
+                if not turns(kinds[root], x - sx, y - sy, hand):
                     continue
                 g = math.hypot(x - sx, y - sy)
             key = g + estimate(x, y, wx, wy, ux, uy, tx, ty)
@@ -95,7 +95,7 @@ def seed(mesh, blocks, ends, starts, work):
 
 
 @njit(cache=True, nogil=True)
-def advance(mesh, blocks, ends, goals, work, factor, limit):
+def advance(mesh, blocks, endpoints, goals, work, factor, limit):
     """Search until the answer is good enough or enough nodes are expanded.
 
     Nodes persist in `work`: the next call resumes a search that was paused or had no room. At the
@@ -104,7 +104,7 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
 
     Parameters
     ----------
-    mesh, blocks, ends
+    mesh, blocks, endpoints
         See `successors`.
     goals
         int32 polygons that contain the goal.
@@ -118,7 +118,7 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
     Returns
     -------
     int
-        `DONE`, `PAUSED` or `NO_ROOM`.
+        `DONE`, `PAUSED` or `WORK_FULL`.
     """
     first, polygon_of = mesh[3], mesh[7]
     whole, real, keys, values, best, _, counts, bounds = work
@@ -142,20 +142,20 @@ def advance(mesh, blocks, ends, goals, work, factor, limit):
             # At most three successors for each side, and the goal.
             if counts[N] + 3 * (first[polygon + 1] - first[polygon]) + 1 > len(whole):
                 size = push(heap, size, key, top)
-                status = NO_ROOM
+                status = WORK_FULL
                 break
             is_goal = False
             for goal in goals:
                 is_goal = is_goal or goal == polygon
             made = counts[N]
-            n = successors(mesh, blocks, ends, is_goal, (whole, real), top, made)
+            n = successors(mesh, blocks, endpoints, is_goal, (whole, real), top, made)
             counts[EXPANDED] += 1
             top = _keep(work, made, n)
             if top >= 0:
                 continue
             for new in range(made, counts[N]):
                 if whole[new, SLOT] >= 0:
-                    estimated = real[new, G] + estimate_of(mesh, ends, whole, real, new)
+                    estimated = real[new, G] + estimate_of(mesh, endpoints, whole, real, new)
                     if estimated < bounds[UPPER]:
                         size = push(heap, size, max(key, estimated), new)
     counts[SIZE] = size
@@ -204,14 +204,14 @@ def _keep(work, made, n):
 
 
 @njit(cache=True, nogil=True)
-def way_to(mesh, ends, whole, node):
+def path_to(mesh, endpoints, whole, node):
     """Return the path to a node, float64 (n, 2) as (row, col).
 
     It holds the start, the corners at which it turns, and the goal.
 
     Parameters
     ----------
-    mesh, ends
+    mesh, endpoints
         See `successors`.
     whole
         Nodes, see `seed`.
@@ -219,35 +219,35 @@ def way_to(mesh, ends, whole, node):
         The last node of the path, -1 if the path is one segment.
     """
     cx, cy = mesh[0], mesh[1]
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     at, room = node, 2
     while at >= 0:
         at, room = whole[at, PARENT], room + 2
-    way = np.empty((room, 2))
+    path = np.empty((room, 2))
     n = room - 1
-    way[n, 0], way[n, 1] = ty, tx
+    path[n, 0], path[n, 1] = ty, tx
     at, last = node, -1
     while at >= 0:
         root, marks, parent = whole[at, ROOT], whole[at, ENDS], whole[at, PARENT]
         if root >= 0 and root != last:
-            n = put_corner(way, n, cx[root], cy[root])
+            n = put_corner(path, n, cx[root], cy[root])
         if marks < 0 and root != whole[parent, ROOT]:
             root = -1 - marks
-            n = put_corner(way, n, cx[root], cy[root])
+            n = put_corner(path, n, cx[root], cy[root])
         at, last = parent, root
-    n = put_corner(way, n, sx, sy)
-    return way[n:].copy()
+    n = put_corner(path, n, sx, sy)
+    return path[n:].copy()
 
 
 @njit(cache=True, nogil=True)
-def put_corner(way, n, x, y):
+def put_corner(path, n, x, y):
     """Write a point of a path before index n, and return its index.
 
     It replaces the next point if the path does not turn there.
     """
-    if n + 1 < len(way):
-        (by, bx), (cy, cx) = way[n], way[n + 1]
+    if n + 1 < len(path):
+        (by, bx), (cy, cx) = path[n], path[n + 1]
         if turn_of(x, y, bx, by, cx, cy) == 0:
             n += 1
-    way[n - 1, 0], way[n - 1, 1] = y, x
+    path[n - 1, 0], path[n - 1, 1] = y, x
     return n - 1

@@ -1,4 +1,4 @@
-"""Kernels of one query on a mesh: the polygons of its ends, the search, and its clean-up."""
+"""Kernels of one query on a mesh: the polygons of its endpoints, the search, and its clean-up."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.mesh._block_kernels import open_blocks
-from hybridnav.mesh._end_kernels import APART, MET, polygons_of_ends
+from hybridnav.mesh._endpoint_kernels import APART, MET, polygons_of_endpoints
 from hybridnav.mesh._polyanya_kernels import (
     BEGUN,
     DONE,
@@ -20,8 +20,8 @@ from hybridnav.mesh._polyanya_kernels import (
     TOUCHED,
     UPPER,
     advance,
+    path_to,
     seed,
-    way_to,
 )
 
 _OPENED, _SEEDED = 1, 2
@@ -30,12 +30,12 @@ _OPENED, _SEEDED = 1, 2
 
 @guarded
 @njit(cache=True, nogil=True)
-def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
+def query(mesh, blocks, tree, polygon_at, cells, endpoints, work, effort):
     """Find a shortest path between two points, or resume the search.
 
     Parameters
     ----------
-    mesh, ends
+    mesh, endpoints
         See `successors`.
     blocks
         int32 (s,), the block of each slot.
@@ -46,8 +46,8 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
     cells
         Row and column of the start's cell, then of the goal's; free ones.
     work
-        Arrays of one query: room for the polygons of the ends, blocks that may be entered, those
-        marked, and the work of `seed`.
+        Arrays of one query: room for the polygons of the endpoints, blocks that may be entered,
+        those marked, and the work of `seed`.
     effort
         Length of the best path known before, and `factor` and `limit` of `advance`; a limit below
         zero ends the query.
@@ -55,7 +55,7 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
     Returns
     -------
     tuple
-        `DONE`, `PAUSED` or `NO_ROOM`; when done the path, float64 (n, 2) as (row, col), without
+        `DONE`, `PAUSED` or `WORK_FULL`; when done the path, float64 (n, 2) as (row, col), without
         rows if the search found no path better than its initial bound.
     """
     block_head, block_up, component, depth = tree
@@ -67,15 +67,15 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
         counts[:] = 0
         counts[LAST] = -1
         bounds[UPPER], bounds[LOWER] = upper, 0.0
-        how, counts[STARTS], counts[GOALS] = polygons_of_ends(
-            mesh, component, polygon_at, cells, ends, starts, goals
+        how, counts[STARTS], counts[GOALS] = polygons_of_endpoints(
+            mesh, component, polygon_at, cells, endpoints, starts, goals
         )
         if how == APART:
             bounds[:] = np.inf
             return DONE, none
         if how == MET:
-            bounds[:] = math.hypot(ends[2] - ends[0], ends[3] - ends[1])
-            return DONE, way_to(mesh, ends, nodes[0], -1)
+            bounds[:] = math.hypot(endpoints[2] - endpoints[0], endpoints[3] - endpoints[1])
+            return DONE, path_to(mesh, endpoints, nodes[0], -1)
         n = 0
         for start in starts[: counts[STARTS]]:
             for goal in goals[: counts[GOALS]]:
@@ -85,11 +85,11 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
     entered = (blocks, is_open)
     status = DONE
     if counts[BEGUN] == _OPENED:
-        status = seed(mesh, entered, ends, starts[: counts[STARTS]], nodes)
+        status = seed(mesh, entered, endpoints, starts[: counts[STARTS]], nodes)
         if status == DONE:
             counts[BEGUN] = _SEEDED
     if status == DONE and limit >= 0:
-        status = advance(mesh, entered, ends, goals[: counts[GOALS]], nodes, factor, limit)
+        status = advance(mesh, entered, endpoints, goals[: counts[GOALS]], nodes, factor, limit)
     if status != DONE:
         return status, none
     best, touched = nodes[4], nodes[5]
@@ -100,4 +100,4 @@ def query(mesh, blocks, tree, polygon_at, cells, ends, work, effort):
     counts[BEGUN] = 0
     if counts[LAST] < 0:
         return DONE, none
-    return DONE, way_to(mesh, ends, nodes[0], counts[LAST])
+    return DONE, path_to(mesh, endpoints, nodes[0], counts[LAST])

@@ -69,7 +69,7 @@ def _pend(room, n, slot, marks, lx, ly, rx, ry):
     n
         Number of intervals before.
     slot, marks
-        Slot of the interval's side, and marks of its ends.
+        Slot of the interval's side, and marks of its endpoints.
     lx, ly, rx, ry
         Points on the left and right ray, in cells.
     """
@@ -104,7 +104,7 @@ def see_from_point(mesh, x, y, starts, target, room, found):
     tuple
         Number of corners afterwards, -1 if the room is too small; whether the other point is seen.
     """
-    cx, cy, kinds, first, begins, stops, twins, _ = mesh
+    cx, cy, kinds, first, begins, finishes, twins, _ = mesh
     seen = room[2]
     n = 0
     for polygon in starts:
@@ -112,7 +112,7 @@ def see_from_point(mesh, x, y, starts, target, room, found):
         if found + high - low > len(seen) or n + high - low > len(room[0]):
             return -1, False
         for slot in range(low, high):
-            u, w = begins[slot], stops[slot]
+            u, w = begins[slot], finishes[slot]
             if touches(kinds[u], cx[u] - x, cy[u] - y):
                 seen[found] = u
                 found += 1
@@ -178,16 +178,16 @@ def _see_round(mesh, x, y, quadrant, sides, room, n, found):
     n
         Number of pending intervals.
     """
-    cx, cy, kinds, first, _, stops, twins, polygon_of = mesh
+    cx, cy, kinds, first, _, finishes, twins, polygon_of = mesh
     rx, ry, lx, ly = quadrant
     # The corners beside the point; the far one is the near one of the next polygon.
     slot, far, is_last = sides
-    near = stops[slot]
+    near = finishes[slot]
     low, high = first[polygon_of[slot]], first[polygon_of[slot] + 1]
     ux, uy, u = x, y, -1
     right_u, is_u = 0, False
     for _ in range(high - low - 1):
-        w = stops[slot]
+        w = finishes[slot]
         wx, wy = cx[w], cy[w]
         right_w, left_w = turn_of(x, y, rx, ry, wx, wy), turn_of(x, y, lx, ly, wx, wy)
         is_w = right_w >= 0 and left_w <= 0
@@ -235,7 +235,7 @@ def _spread(mesh, x, y, target, room, n, found):
     n
         Number of pending intervals.
     """
-    cx, cy, kinds, first, _, stops, twins, polygon_of = mesh
+    cx, cy, kinds, first, _, finishes, twins, polygon_of = mesh
     whole, real, seen = room
     tx, ty, goals = target
     is_target_seen = False
@@ -256,7 +256,7 @@ def _spread(mesh, x, y, target, room, n, found):
         slot = entry
         for left_over in range(high - low - 2, -1, -1):
             slot = low if slot + 1 == high else slot + 1
-            w = stops[slot]
+            w = finishes[slot]
             wx, wy = cx[w], cy[w]
             bends_w = kinds[w] < _BENDING
             right_w = turn_of(x, y, rx, ry, wx, wy)

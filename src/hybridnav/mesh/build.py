@@ -59,11 +59,11 @@ class ConvexMesh:
     """int32 (p,), blocks between each polygon and the first one of its component."""
 
     @property
-    def stops(self) -> IntArray:
+    def finishes(self) -> IntArray:
         """int32 (s,), the corner at which each side ends."""
-        stops: IntArray = np.roll(self.begins, -1)
-        stops[self.first[1:] - 1] = self.begins[self.first[:-1]]
-        return stops
+        finishes: IntArray = np.roll(self.begins, -1)
+        finishes[self.first[1:] - 1] = self.begins[self.first[:-1]]
+        return finishes
 
     @property
     def is_convex(self) -> BoolArray:

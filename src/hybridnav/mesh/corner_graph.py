@@ -26,7 +26,7 @@ _MOST_EDGES = 200
 @copies_alike
 @dataclass(frozen=True, eq=False)
 class CornerGraph:
-    """Corners that see each other, with segments at both of whose ends a path may bend.
+    """Corners that see each other, with segments at both of whose endpoints a path may bend.
 
     A shortest path bends at such corners alone, and every segment of it between two of them is an
     edge, or several on one line.

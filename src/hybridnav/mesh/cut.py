@@ -116,7 +116,7 @@ def _polygons_in(
     sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
     wide = free.shape[1] + 1
     around = mesh.corners @ np.array([wide, 1], dtype=np.int64)
-    rim = kernels.pieces_of_rim(sides, hole.rim, around, vertices.points, wide)
+    rim = kernels.segments_of_rim(sides, hole.rim, around, vertices.points, wide)
     walls = np.concatenate([rim, kernels.walls_of_closed(free, closed, vertices.points)])
     local = vertices.corners[vertices.number_of]
     triangles, neighbours = triangulate(local, walls)
@@ -164,7 +164,7 @@ def _joined(
     keys = begins[rim] * n + begins[after[rim]]
     # The slot on the far side of a door runs the other way.
     beyond = mesh.twins[doors]
-    wanted = mesh.stops[beyond] * n + mesh.begins[beyond]
+    wanted = mesh.finishes[beyond] * n + mesh.begins[beyond]
     order = np.argsort(keys)
     place = np.searchsorted(keys, wanted, sorter=order)
     return beyond, rim[order[place]].astype(np.int64)

@@ -10,7 +10,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.mesh import _closure_kernels as closures
 from hybridnav.mesh import _detour_kernels as kernels
 from hybridnav.mesh._detour_search_kernels import UNSURE, query_round
-from hybridnav.mesh._polyanya_kernels import DONE, EXPANDED, NO_ROOM
+from hybridnav.mesh._polyanya_kernels import DONE, EXPANDED, WORK_FULL
 from hybridnav.mesh.cut import cut_mesh
 from hybridnav.mesh.search import (
     MOST_MADE,
@@ -84,12 +84,12 @@ class DetourSearch:
         if path.positions is None:
             return False
         at = self._search.mesh.polygon_at
-        return bool(closures.way_crosses(self._closure, at, path.positions))
+        return bool(closures.path_crosses(self._closure, at, path.positions))
 
     def are_met_by(self, paths: MeshPaths) -> BoolArray:
         """Return which of many shortest paths meet the closed cells, bool (n,); see `is_met_by`."""
         at = self._search.mesh.polygon_at
-        met: BoolArray = closures.ways_cross(self._closure, at, paths.positions, paths.path_start)
+        met: BoolArray = closures.paths_cross(self._closure, at, paths.positions, paths.path_start)
         return met
 
     def path(
@@ -136,19 +136,19 @@ class DetourSearch:
         if len(self._detour[1][0]) > MOST_MADE:
             return None
         limit = NO_LIMIT if math.isinf(until) else SLICE
-        ends = tuple(round_into(*end) for end in zip(cells, positions, strict=True))
-        points = ends[0][1], ends[0][0], ends[1][1], ends[1][0]
+        endpoints = tuple(round_into(*end) for end in zip(cells, positions, strict=True))
+        points = endpoints[0][1], endpoints[0][0], endpoints[1][1], endpoints[1][0]
         mesh, edges = search.mesh, graph.arrays
         where = mesh.component, mesh.polygon_at, (*cells[0], *cells[1])
         with works.lent() as work:
             while True:
-                status, way = query_round(
+                status, path = query_round(
                     *(search.arrays, edges, self._detour, where, points, work.arrays),
                     (math.inf, factor, limit),
                 )
                 if status in (DONE, UNSURE):
                     break
-                if status == NO_ROOM:
+                if status == WORK_FULL:
                     work.make_room()
                 else:
                     limit = -1 if perf_counter() >= until else limit + SLICE
@@ -157,7 +157,7 @@ class DetourSearch:
         if status == UNSURE:
             return None
         bound = length if bound >= length else bound * SURE
-        return MeshPath(way if len(way) else None, length, bound, expanded)
+        return MeshPath(path if len(path) else None, length, bound, expanded)
 
 
 def _detour_of(search: MeshSearch, graph: CornerGraph, closure: Any) -> tuple[Any, ...]:

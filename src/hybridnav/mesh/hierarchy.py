@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
-from hybridnav.mesh._hierarchy_kernels import arcs_of, ways_that_follow
+from hybridnav.mesh._hierarchy_kernels import arcs_of, classes_that_follow
 from hybridnav.search.contraction import contract
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def contract_corners(
     if _LOOKED_AN_EDGE * len(edges[1]) > most:
         return None
     first, arcs = arcs_of(arrays, *edges)
-    follow = ways_that_follow()
+    follow = classes_that_follow()
     found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most))
     if len(arcs) and not len(found[1]):
         return None

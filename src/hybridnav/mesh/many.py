@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.mesh._many_kernels import (
-    FULL,
+    ANSWERS_FULL,
     many_by_corners,
     many_by_hierarchy,
     many_by_intervals,
 )
-from hybridnav.mesh._polyanya_kernels import NO_ROOM
+from hybridnav.mesh._polyanya_kernels import WORK_FULL
 from hybridnav.mesh.hierarchy import CornerHierarchy
 from hybridnav.mesh.search import NO_LIMIT, SURE, rounded_into
 
@@ -81,14 +81,16 @@ def shortest_paths(
     array([3., 2.])
     """
     where = np.concatenate(cells, axis=1)
-    ends = np.concatenate([rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1)
-    ends = np.ascontiguousarray(ends[:, [1, 0, 3, 2]])
+    endpoints = np.concatenate(
+        [rounded_into(*of) for of in zip(cells, positions, strict=True)], axis=1
+    )
+    endpoints = np.ascontiguousarray(endpoints[:, [1, 0, 3, 2]])
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     n_parts = max(1, min(cores or 1, len(where) // _LEAST))
     parts = np.array_split(np.arange(len(where)), n_parts)
 
     def answer(part: LongArray) -> MeshPaths:
-        return _one_by_one(search, where[part], ends[part], epsilon)
+        return _one_by_one(search, where[part], endpoints[part], epsilon)
 
     if len(where) >= _MANY:
         search.prepare()
@@ -107,7 +109,7 @@ def shortest_paths(
 
 
 def _one_by_one(
-    search: MeshSearch, where: LongArray, ends: FloatArray, epsilon: float
+    search: MeshSearch, where: LongArray, endpoints: FloatArray, epsilon: float
 ) -> MeshPaths:
     """Return the answers of one thread; arrays are doubled until they are large enough."""
     count = len(where)
@@ -116,7 +118,7 @@ def _one_by_one(
     positions = np.empty((_ROOM * max(count, 4), 2))
     effort = math.inf, 1.0 + epsilon, NO_LIMIT
     mesh, graph = search.mesh, search.graph
-    place, asked = (mesh.component, mesh.polygon_at), (where, ends)
+    place, asked = (mesh.component, mesh.polygon_at), (where, endpoints)
     at = n = 0
     with (search.works if graph is None else search.corner_works).lent() as work:
         while at < count:
@@ -129,9 +131,9 @@ def _one_by_one(
                 is_contracted = isinstance(graph, CornerHierarchy)
                 answer = many_by_hierarchy if is_contracted else many_by_corners
                 at, n, short = answer(search.arrays, graph.arrays, *rest, *found)
-            if short == NO_ROOM:
+            if short == WORK_FULL:
                 work.make_room()
-            elif short == FULL:
+            elif short == ANSWERS_FULL:
                 positions = np.concatenate([positions, np.empty_like(positions)])
     bound = np.where(bound >= length, length, bound * SURE)
     return MeshPaths(length, bound, starts, positions[:n])

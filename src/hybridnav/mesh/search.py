@@ -15,10 +15,11 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.mesh import _polyanya_kernels as polyanya
 from hybridnav.mesh._corner_search_kernels import query_corners
-from hybridnav.mesh._hierarchy_search_kernels import FAR, query_hierarchy
+from hybridnav.mesh._hierarchy_search_kernels import query_hierarchy
 from hybridnav.mesh._query_kernels import query
 from hybridnav.mesh.corner_graph import add_landmarks, find_edges
 from hybridnav.mesh.hierarchy import CornerHierarchy, contract_corners
+from hybridnav.search.moves import FAR
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class _Work:
     """Work arrays of one query, of any kind."""
 
     def __init__(self, mesh: ConvexMesh) -> None:
-        self.ends = np.empty(mesh.n_polygons, np.int32), np.empty(mesh.n_polygons, np.int32)
+        self.endpoints = np.empty(mesh.n_polygons, np.int32), np.empty(mesh.n_polygons, np.int32)
         self.counts = np.zeros(polyanya.N_COUNTS, dtype=np.int64)
         self.bounds = np.zeros(2)
         self.heap = np.empty(_ROOM), np.empty(_ROOM, np.int32)
@@ -97,7 +98,7 @@ class _IntervalWork(_Work):
     def arrays(self) -> tuple[object, ...]:
         """The arrays in the order of `query`."""
         nodes = *self.nodes, *self.heap, *self.corners, self.counts, self.bounds
-        return *self.ends, *self.opened, nodes
+        return *self.endpoints, *self.opened, nodes
 
 
 class _CornerWork(_Work):
@@ -119,7 +120,7 @@ class _CornerWork(_Work):
     def arrays(self) -> tuple[object, ...]:
         """The arrays in the order of `query_corners`."""
         tail = self.goal_bounds, self.counts, self.bounds
-        return *self.ends, self.views, self.corners, self.heap, *tail
+        return *self.endpoints, self.views, self.corners, self.heap, *tail
 
 
 class _HierarchyWork(_Work):
@@ -139,7 +140,7 @@ class _HierarchyWork(_Work):
     def arrays(self) -> tuple[object, ...]:
         """The arrays in the order of `query_hierarchy`."""
         tail = self.heaps, self.counts, self.bounds
-        return *self.ends, self.views, self.records, self.touched, *tail
+        return *self.endpoints, self.views, self.records, self.touched, *tail
 
 
 @copies_alike
@@ -172,7 +173,7 @@ class MeshSearch:
     def __init__(self, mesh: ConvexMesh) -> None:
         self.mesh = mesh
         rows, cols = np.ascontiguousarray(mesh.corners.T, dtype=np.float64)
-        sides = mesh.begins, mesh.stops, mesh.twins, mesh.polygon_of
+        sides = mesh.begins, mesh.finishes, mesh.twins, mesh.polygon_of
         self.arrays = cols, rows, mesh.kinds, mesh.first, *sides
         self.tree = mesh.block_head, mesh.block_up, mesh.component, mesh.depth
         self.works: Pool[Any] = Pool(partial(_IntervalWork, mesh))
@@ -286,21 +287,21 @@ class MeshSearch:
         until = math.inf if budget_s is None else perf_counter() + budget_s
         if budget_s is None and self.expanded >= max(_WORTH, len(self.mesh.corners)):
             self.prepare()
-        ends = tuple(round_into(*end) for end in zip(cells, positions, strict=True))
+        endpoints = tuple(round_into(*end) for end in zip(cells, positions, strict=True))
         upper = math.inf
         if known is not None:
-            known = np.concatenate([ends[:1], known[1:-1], ends[1:]])
+            known = np.concatenate([endpoints[:1], known[1:-1], endpoints[1:]])
             upper = float(np.hypot(*np.diff(known, axis=0).T).sum())
-        points = ends[0][1], ends[0][0], ends[1][1], ends[1][0]
+        points = endpoints[0][1], endpoints[0][0], endpoints[1][1], endpoints[1][0]
         graph = self.graph
         with (self.works if graph is None else self.corner_works).lent() as work:
-            way = self._run(graph, (*cells[0], *cells[1]), points, work, (upper, epsilon, until))
+            path = self._run(graph, (*cells[0], *cells[1]), points, work, (upper, epsilon, until))
             length, bound = work.bounds.tolist()
             bound = length if bound >= length else bound * SURE
             expanded = int(work.counts[polyanya.EXPANDED])
         if graph is None:
             self.expanded += expanded
-        return MeshPath(way if len(way) else known, length, bound, expanded)
+        return MeshPath(path if len(path) else known, length, bound, expanded)
 
     def _run(
         self,
@@ -323,10 +324,10 @@ class MeshSearch:
                 answer = query_hierarchy if isinstance(graph, CornerHierarchy) else query_corners
                 place = self.mesh.component, at, where
                 found = answer(self.arrays, graph.arrays, place, points, work.arrays, left)
-            status, way = found
+            status, path = found
             if status == polyanya.DONE:
-                return cast("FloatArray", way)
-            if status == polyanya.NO_ROOM:
+                return cast("FloatArray", path)
+            if status == polyanya.WORK_FULL:
                 work.make_room()
             elif perf_counter() >= until:
                 limit = -1

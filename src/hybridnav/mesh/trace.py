@@ -30,7 +30,7 @@ class SearchTrace:
     """The mesh."""
     path: MeshPath
     """The path that was found."""
-    ends: FloatArray
+    endpoints: FloatArray
     """float64 (2, 2), (row, col) of start and goal in grid units."""
     intervals: FloatArray
     """float64 (n, 2, 2), (row, col) of the left and the right end of each interval, as seen from
@@ -71,7 +71,7 @@ def trace_search(
     >>> len(trace.intervals), round(trace.path.length_cells, 3)
     (2, 2.414)
     """
-    ends = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
+    endpoints = np.array([round_into(*end) for end in zip(cells, positions, strict=True)])
     path, whole, real = _nodes(mesh, cells, positions)
     slots, roots, parents, marks = whole.T
     # Nodes for the goal itself have no side.
@@ -79,11 +79,11 @@ def trace_search(
     number = np.append(np.cumsum(kept) - 1, -1)
     sides = _sides(mesh, slots[kept])
     at = mesh.corners[roots[kept]].astype(np.float64)
-    at[roots[kept] < 0] = ends[0]
+    at[roots[kept] < 0] = endpoints[0]
     return SearchTrace(
         mesh,
         path,
-        ends,
+        endpoints,
         _seen(sides, at, marks[kept], real[kept]),
         at,
         real[kept, G],
@@ -107,8 +107,8 @@ def _nodes(
 def _sides(mesh: ConvexMesh, slots: IntArray) -> FloatArray:
     """Return the corners of sides, float64 (n, 2, 2), the left one in the direction of passage
     first."""
-    ends = np.stack([mesh.begins, mesh.stops], axis=1)[slots]
-    pairs: FloatArray = mesh.corners[ends].astype(np.float64)
+    endpoints = np.stack([mesh.begins, mesh.finishes], axis=1)[slots]
+    pairs: FloatArray = mesh.corners[endpoints].astype(np.float64)
     return pairs
 
 
@@ -120,9 +120,9 @@ def _seen(sides: FloatArray, roots: FloatArray, marks: IntArray, real: FloatArra
     at_side = (sides == roots[:, None]).all(axis=2).any(axis=1)
     for end, bit, ray in ((0, _LEFT, real[:, 2:0:-1]), (1, _RIGHT, real[:, 4:2:-1])):
         cut = (marks >= 0) & (marks & bit == 0) & ~at_side
-        way = (ray - roots)[cut]
+        direction = (ray - roots)[cut]
         side, start = along[cut], off[cut]
-        share = _cross(start, way) / _cross(way, side)
+        share = _cross(start, direction) / _cross(direction, side)
         intervals[cut, end] = sides[cut, 0] + share.clip(0, 1)[:, None] * side
     return intervals
 

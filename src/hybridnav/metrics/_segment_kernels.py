@@ -81,7 +81,7 @@ def _level_code(classes, free_of, fixed, low, high, along_row):
 
 @njit(cache=True, nogil=True)
 def segment_code(classes, free_of, row0, col0, row1, col1):
-    """Return the code of a segment's first fault, 0 for none; its ends count as touched only.
+    """Return the code of a segment's first fault, 0 for none; its endpoints count as touched only.
 
     The walk visits the cells whose interior the segment enters (J. Amanatides, A. Woo: A fast voxel
     traversal algorithm for ray tracing, 1987) with exact comparisons of the crossings.
@@ -114,7 +114,7 @@ def segment_code(classes, free_of, row0, col0, row1, col1):
         to_line = row + 1 - row0 if up else row0 - row
         order = compare_products(col + 1 - col0, height, to_line, width)
         if order == 0:
-            # Through a corner: never through one of the ends, since a cell is still to come.
+            # Through a corner: never through one of the endpoints, since a cell is still to come.
             if not free_of[classes[row, col + 1]] and not free_of[classes[row + turn, col]]:
                 return BETWEEN
             row += turn

@@ -131,16 +131,16 @@ class VisibilityGraph:
             a corner at which two free cells meet alone.
         """
         classes = self._grid.classes
-        ends = np.array([start, goal])
+        endpoints = np.array([start, goal])
         if start == goal:
-            return self._path(ends[:1])
+            return self._path(endpoints[:1])
         if kernels.segment_code(classes, self._free_of, *start, *goal) == kernels.CLEAR:
-            return self._path(ends)
+            return self._path(endpoints)
         from_start, to_goal = (
             kernels.visible_from(classes, self._free_of, *end, self.corners, self._slopes)
             for end in (start, goal)
         )
-        offset = self.corners - ends[1]
+        offset = self.corners - endpoints[1]
         chain = kernels.cheapest_corners(
             self._offsets,
             self._heads,
@@ -151,7 +151,7 @@ class VisibilityGraph:
         )
         if not len(chain):
             return AnyAnglePath(None, math.inf)
-        return self._path(np.concatenate([ends[:1], self.corners[chain], ends[1:]]))
+        return self._path(np.concatenate([endpoints[:1], self.corners[chain], endpoints[1:]]))
 
     def _path(self, positions: FloatArray) -> AnyAnglePath:
         steps = np.diff(positions, axis=0)

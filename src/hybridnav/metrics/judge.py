@@ -109,7 +109,7 @@ def judge_path(
     )
     return Verdict(
         (
-            *_wrong_ends(path, start, goal),
+            *_wrong_endpoints(path, start, goal),
             *_about_cells(path, ~inside, "outside the map"),
             *_about_cells(path, inside & ~free, "not free"),
             *_about_steps(path, ~near, "does not go to a neighbour"),
@@ -166,10 +166,10 @@ def segment_faults(
     free_of = free_classes(allow_unexplored=allow_unexplored)
     codes = kernels.segment_codes(grid.classes, free_of, positions)
     crossed = kernels.crossed_joints(grid.classes, free_of, positions)
-    ends = np.stack([xy[: len(codes)], xy[-len(codes) :]], axis=1)
+    endpoints = np.stack([xy[: len(codes)], xy[-len(codes) :]], axis=1)
     faults = []
     for i in np.flatnonzero(codes).tolist():
-        start, end = ends[i]
+        start, end = endpoints[i]
         what = _WORDS[int(codes[i])]
         faults.append((i, 1, f"the segment from {_at(start)} to {_at(end)} m {what}"))
     bends = np.flatnonzero(crossed).tolist()
@@ -228,7 +228,7 @@ def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
     return rounded
 
 
-def _wrong_ends(path: LongArray, start: Cell, goal: Cell) -> list[str]:
+def _wrong_endpoints(path: LongArray, start: Cell, goal: Cell) -> list[str]:
     return [
         f"the {which} cell is {_cell(cell)}, not {_cell(wanted)}"
         for which, cell, wanted in (("first", path[0], start), ("last", path[-1], goal))

@@ -70,7 +70,7 @@ def judge_line(
     xy = checked_points(points)
     steps = np.diff(xy, axis=0)
     crossed = segment_faults(grid, xy, allow_unexplored=allow_unexplored)
-    faults = _wrong_ends(grid, xy, start, goal)
+    faults = _wrong_endpoints(grid, xy, start, goal)
     faults += [f"{crossed[0]}{more(len(crossed))}"] if crossed else []
     return Verdict(tuple(faults), math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist()))
 
@@ -117,9 +117,9 @@ def line_cells(
     return cells_of_line(free, positions)
 
 
-def _wrong_ends(grid: OccupancyGrid, xy: FloatArray, start: Cell, goal: Cell) -> list[str]:
-    ends = grid_positions(grid.frame, xy[[0, -1]])
-    off = np.abs(ends - (np.array([start, goal]) + 0.5)).max(axis=1) > _NEAR_CELLS
+def _wrong_endpoints(grid: OccupancyGrid, xy: FloatArray, start: Cell, goal: Cell) -> list[str]:
+    endpoints = grid_positions(grid.frame, xy[[0, -1]])
+    off = np.abs(endpoints - (np.array([start, goal]) + 0.5)).max(axis=1) > _NEAR_CELLS
     return [
         f"the {which} point ({point[0]:.3f}, {point[1]:.3f}) m is not the centre of cell "
         f"({int(cell[0])}, {int(cell[1])})"

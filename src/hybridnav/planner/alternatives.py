@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, overload
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.homotopy.search import MOST_STATES, alternative_search
-from hybridnav.planner.named import At, check_names, stop_points
+from hybridnav.planner.named import At, check_names, points_of_waypoints
 from hybridnav.result import Path
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.moves import path_length_in_cells
@@ -154,13 +154,13 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
         )
     check_names(planner.topology, [start, goal])
     closed = planner.closed(blocked)
-    ends = stop_points(
+    endpoints = points_of_waypoints(
         planner.topology, planner.preset.planner, [start, goal], at=at, closed=closed
     )
     topology = planner.topology
     allowed = planner.preset.planner.allow_unexplored
     search = alternative_search(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)
-    result = planner.plan(*ends, smooth="none", blocked=closed)
+    result = planner.plan(*endpoints, smooth="none", blocked=closed)
     own = result.path
     if own is None:
         return Alternatives((), complete=True)

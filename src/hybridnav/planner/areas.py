@@ -135,8 +135,8 @@ def _runs_near(part: BaseGeometry, shape: tuple[int, int], radius_cells: float) 
     thin = radius_cells == 0 and shapely.is_empty(shapely.buffer(part, -2 * _SLACK_CELLS))
     slack = np.array([-_SLACK_CELLS if thin else _SLACK_CELLS, -_SLACK_CELLS])
     runs = [np.empty((0, 2), dtype=np.int64)]
-    side = int((high - low).max()) if (high > low).all() else 0
-    stack = [(low[None], 1 << (side - 1).bit_length())] if side else []
+    extent = int((high - low).max()) if (high > low).all() else 0
+    stack = [(low[None], 1 << (extent - 1).bit_length())] if extent else []
     while stack:
         first, size = stack.pop()
         last = np.minimum(first + size, high)

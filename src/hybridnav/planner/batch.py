@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def plan_many(
     grid: OccupancyGrid,
     at_once: CellPlanner | None,
-    ends: tuple[FloatArray, FloatArray],
+    endpoints: tuple[FloatArray, FloatArray],
     closed: ClosedCells | None,
     alone: Callable[[FloatArray, FloatArray], PlanResult],
 ) -> PlanBatch:
@@ -35,14 +35,14 @@ def plan_many(
         The map.
     at_once
         Planner for many queries at once; None leaves all to `alone`.
-    ends
+    endpoints
         Starts and goals, float64 (n, 2) each, or poses (n, 3).
     closed
         Closed cells; None for none.
     alone
-        Plans one of the remaining queries, between two of the `ends`.
+        Plans one of the remaining queries, between two of the `endpoints`.
     """
-    starts, goals = ends
+    starts, goals = endpoints
     n = len(starts)
     status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
     cost, bound = np.full(n, np.inf), np.full(n, np.inf)
@@ -86,7 +86,7 @@ def plan_many(
 
 def _met(
     closed: ClosedCells,
-    ends: tuple[LongArray, LongArray],
+    endpoints: tuple[LongArray, LongArray],
     grid: OccupancyGrid,
     found: CellPlans | None,
 ) -> BoolArray:
@@ -95,7 +95,7 @@ def _met(
     Only paths of cells are given; None for others.
     """
     across = np.array([grid.shape[1], 1])
-    met: BoolArray = closed.holds(ends[0] @ across) | closed.holds(ends[1] @ across)
+    met: BoolArray = closed.holds(endpoints[0] @ across) | closed.holds(endpoints[1] @ across)
     if found is None:
         return met
     for k in np.flatnonzero(found.is_done & ~met).tolist():

@@ -186,7 +186,7 @@ class Blocked:
 
 Closable = Blocked | Door | BaseGeometry | Mapping[str, Any]
 """Types that a planner accepts as `blocked`: a `Blocked`, one door, one area, or a mapping from the
-names of the fields of a `Blocked`."""
+names of the attributes of a `Blocked`."""
 
 
 def as_blocked(value: Closable) -> Blocked:
@@ -195,7 +195,8 @@ def as_blocked(value: Closable) -> Blocked:
     Parameters
     ----------
     value
-        A `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its fields.
+        A `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its
+        attributes.
 
     Raises
     ------
@@ -228,13 +229,13 @@ def _door_on(rooms: Rooms, door: int | Door) -> Door:
     own = rooms.door(door.number)
     if (own.rooms, own.position) != (door.rooms, door.position):  # its arcs depend on the robot
         raise InvalidValueError(
-            f"door {door.number} is one of another map, between {_sides(door)} and not "
-            f"{_sides(own)}: give a door of this map, or its number"
+            f"door {door.number} is one of another map, between {_rooms_of(door)} and not "
+            f"{_rooms_of(own)}: give a door of this map, or its number"
         )
     return own
 
 
-def _sides(door: Door) -> str:
+def _rooms_of(door: Door) -> str:
     x, y = door.position
     one, other = (name or "unnamed space" for name in door.rooms)
     return f"{one} and {other} at ({x:.2f}, {y:.2f})"

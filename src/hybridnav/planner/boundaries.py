@@ -49,17 +49,17 @@ def cells_on_boundaries(level: Level, arcs: LongArray) -> list[LongArray]:
     for arc in arcs.tolist():
         pairs = level.boundary(arc) @ np.array([cols, 1])
         if grid.corner_cutting:
-            # A diagonal past the end of a boundary needs no cell but its own two ends.
+            # A diagonal past the end of a boundary needs no cell but its own two endpoints.
             closed.append(np.unique(pairs))
             continue
-        ends = level.arcs[arc]
-        beside = np.isin(level.arcs, ends).any(axis=1) & ~level.is_self_loop
+        endpoints = level.arcs[arc]
+        beside = np.isin(level.arcs, endpoints).any(axis=1) & ~level.is_self_loop
         beside[arcs] = False
         others = [
             level.boundary(other) @ np.array([cols, 1]) for other in np.flatnonzero(beside).tolist()
         ]
         choices = _choices(pairs, others)
-        fields = [_Field(level, vertex) for vertex in ends.tolist()]
+        fields = [_Field(level, vertex) for vertex in endpoints.tolist()]
         costs = [_cost_of(fields, choice, others) for choice in choices]
         closed.append(choices[costs.index(min(costs))])
     return closed
@@ -74,7 +74,7 @@ def _choices(pairs: LongArray, others: list[LongArray]) -> list[LongArray]:
     share = np.bincount(place[pairs.size :], weights=shares, minlength=len(known))
     heavier = np.subtract(*share[place[: pairs.size].reshape(pairs.shape)].T) > 0
     spared = np.where(heavier, pairs[:, 1], pairs[:, 0])
-    return [np.unique(side) for side in (pairs[:, 0], pairs[:, 1], spared)]
+    return [np.unique(cells) for cells in (pairs[:, 0], pairs[:, 1], spared)]
 
 
 class _Field:
@@ -100,8 +100,8 @@ class _Field:
         inside = (rows >= 0) & (rows < shape[0]) & (cols >= 0) & (cols < shape[1])
         is_open = self._cells.copy()
         is_open[rows[inside], cols[inside]] = False
-        pieces, _ = ndimage.label(is_open)
-        return self._size - int(np.bincount(pieces.ravel())[1:].max(initial=0))
+        components, _ = ndimage.label(is_open)
+        return self._size - int(np.bincount(components.ravel())[1:].max(initial=0))
 
 
 def _cost_of(

@@ -256,7 +256,9 @@ class OverPortals:
             length_cells=found.length_cells,
             bound_cells=found.lower_bound_cells,
             stats=PlanStats(
-                expanded=found.expanded, expanded_gates=found.expanded_gates, seconds=seconds
+                expanded=found.expanded,
+                expanded_border_cells=found.expanded_border_cells,
+                seconds=seconds,
             ),
         )
         return round_closed(plan, query, self._refiner)

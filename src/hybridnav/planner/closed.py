@@ -50,8 +50,8 @@ class ClosedCells:
         cols = grid.shape[1]
         flat = cells[:, 0] * cols + cells[:, 1]
         if not grid.corner_cutting:
-            sides = cells[:-1, 0] * cols + cells[1:, 1], cells[1:, 0] * cols + cells[:-1, 1]
-            flat = np.concatenate([flat, *sides])
+            side_cells = cells[:-1, 0] * cols + cells[1:, 1], cells[1:, 0] * cols + cells[:-1, 1]
+            flat = np.concatenate([flat, *side_cells])
         return bool(self.holds(flat).any())
 
     def refusal(self, cells: tuple[Cell, Cell], shape: tuple[int, int]) -> PlanStatus | None:

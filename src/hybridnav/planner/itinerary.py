@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.route import Walks
+from hybridnav.route import RouteFinder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +38,7 @@ class Leg:
     or from unexplored cells)."""
     turn: str = ""
     """`"left"` or `"right"` behind the door, empty for straight on."""
-    stop: str | None = None
+    waypoint: str | None = None
     """Stop at the end of the leg: its name or its coordinates."""
 
     def to_dict(self) -> dict[str, Any]:
@@ -50,7 +50,7 @@ class Leg:
             "door_width_m": None if self.door is None else self.door.width_m,
             "door_m": None if self.door is None else list(self.door.position),
             "turn": self.turn,
-            "stop": self.stop,
+            "waypoint": self.waypoint,
         }
 
 
@@ -65,9 +65,9 @@ class Guide:
 
     def __init__(self, rooms: Rooms) -> None:
         self._rooms = rooms
-        self._walks = Walks(rooms)
+        self._route_finder = RouteFinder(rooms)
 
-    def legs(self, path: Path, *, stop: str | None = None) -> list[Leg]:
+    def legs(self, path: Path, *, waypoint: str | None = None) -> list[Leg]:
         """Divide a path into its legs.
 
         Parameters
@@ -75,7 +75,7 @@ class Guide:
         path
             A cell path, or an any-angle one, whose length is divided in the proportions of its cell
             path.
-        stop
+        waypoint
             Stop at the end of the path.
 
         Returns
@@ -84,7 +84,7 @@ class Guide:
             At least one leg; the lengths sum to that of the path.
         """
         rooms, cells = self._rooms, path.cells
-        vertices, arcs, steps = self._walks.crossings(cells)
+        vertices, arcs, steps = self._route_finder.crossings(cells)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
         scale = path.length_m / along[-1] if along[-1] > 0 else 0.0
         labels = rooms.label_of_vertex[vertices].tolist()
@@ -105,7 +105,7 @@ class Guide:
             )
             begun = ended
         last = float((along[-1] - begun) * scale)
-        return _without_grazes([*legs, Leg(rooms.name_of(labels[-1]), last, stop=stop)])
+        return _without_grazes([*legs, Leg(rooms.name_of(labels[-1]), last, waypoint=waypoint)])
 
     def _turn(self, cells: LongArray, along: FloatArray, step: int) -> str:
         """Return the side to which a path bends at a step, over a few metres."""
@@ -152,11 +152,11 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
     for leg, following in zip(legs, [*legs[1:], None], strict=True):
         length_m, carried_m = carried_m + leg.length_m, 0.0
         metres = f"{length_m:.1f} m"
-        if leg.stop is not None and leg.stop == leg.room and length_m < _SLIVER_M:
+        if leg.waypoint is not None and leg.waypoint == leg.room and length_m < _SLIVER_M:
             lines[-1] += ", and you are there"
-        elif leg.stop is not None:
-            place = f" in {leg.room}" if leg.room not in {None, leg.stop} else ""
-            lines.append(f"{metres} to {leg.stop}{place}")
+        elif leg.waypoint is not None:
+            place = f" in {leg.room}" if leg.room not in {None, leg.waypoint} else ""
+            lines.append(f"{metres} to {leg.waypoint}{place}")
         elif following is None:
             lines.append(f"{metres} to the goal in {leg.room or NOWHERE}")
         elif _is_sliver(following):
@@ -174,4 +174,4 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
 
 def _is_sliver(leg: Leg) -> bool:
     """Return whether a leg is too short to mention, as across a gap between two outlines."""
-    return leg.room is None and leg.stop is None and leg.length_m < _SLIVER_M
+    return leg.room is None and leg.waypoint is None and leg.length_m < _SLIVER_M

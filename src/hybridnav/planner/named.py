@@ -1,4 +1,4 @@
-"""Stops with names: their cells, and the best positions of stops in rooms."""
+"""Waypoints with names: their cells, and the best positions of waypoints in rooms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
 from hybridnav.grid.names import did_you_mean
 from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.stops import cheapest_stops
+from hybridnav.search.waypoints import cheapest_waypoints
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,18 +31,18 @@ At = Literal["anywhere", "point"]
 
 _ROUNDING_CELLS = 1e-6
 _FACING_M = 1.0
-"""Length of path that determines the heading of a robot at a stop with a name."""
+"""Length of path that determines the heading of a robot at a waypoint with a name."""
 
 
-def stop_points(
+def points_of_waypoints(
     topology: TopologicalMap,
     settings: PlannerSettings,
-    stops: Sequence[ArrayLike | str],
+    waypoints: Sequence[ArrayLike | str],
     *,
     at: At = "anywhere",
     closed: ClosedCells | None = None,
 ) -> list[ArrayLike]:
-    """Return a point for each stop, so that the path through all of them is shortest.
+    """Return a point for each waypoint, so that the path through all of them is shortest.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def stop_points(
     settings
         Settings of the planner, which determine the cells that may be entered, and whether points
         have headings.
-    stops
+    waypoints
         Two or more points `(x, y)` in metres, names of rooms or of named points that passed
         `check_names`. With OMPL in a space with headings, points are `(x, y, yaw)`, radians.
     at
@@ -63,10 +63,10 @@ def stop_points(
     -------
     list
         Points `(x, y)` in metres, map frame; given points are unchanged. If no path visits all
-        stops, or a point cannot be entered, rooms are represented by their points, and so is a room
-        without a cell at whose centre the robot's footprint fits with any heading. In a space with
-        headings, a name becomes `(x, y, yaw)` and faces along the shortest path of cells that
-        leads to it; the first stop faces along the path that leaves it.
+        waypoints, or a point cannot be entered, rooms are represented by their points, and so is a
+        room without a cell at whose centre the robot's footprint fits with any heading. In a space
+        with headings, a name becomes `(x, y, yaw)` and faces along the shortest path of cells that
+        leads to it; the first waypoint faces along the path that leaves it.
 
     Raises
     ------
@@ -79,26 +79,28 @@ def stop_points(
     if closed is not None:
         enterable = enterable.copy()
         enterable.ravel()[closed.flat] = False
-    fixed: list[Any] = [_point_of(topology, stop, at) for stop in stops]
-    points = _chosen(topology, enterable, stops, fixed, _radius_m(settings))
+    fixed: list[Any] = [_point_of(topology, waypoint, at) for waypoint in waypoints]
+    points = _chosen(topology, enterable, waypoints, fixed, _radius_m(settings))
     if settings.ompl is not None and settings.ompl.has_heading:
-        return _facing_the_way(topology, enterable, stops, points)
+        return _facing_along_paths(topology, enterable, waypoints, points)
     return points
 
 
-def check_names(topology: TopologicalMap, stops: Sequence[ArrayLike | str]) -> None:
-    """Refuse stops with unusable names, before anything is computed for the others.
+def check_names(topology: TopologicalMap, waypoints: Sequence[ArrayLike | str]) -> None:
+    """Refuse waypoints with unusable names, before anything is computed for the others.
 
     Raises
     ------
     InvalidValueError
         When a name is not known, a room has no free cell, or the map has no rooms.
     """
-    if any(isinstance(stop, str) for stop in stops):
-        check_stops(topology.rooms.labels, topology.grid, stops)
+    if any(isinstance(waypoint, str) for waypoint in waypoints):
+        check_waypoints(topology.rooms.labels, topology.grid, waypoints)
 
 
-def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLike | str]) -> None:
+def check_waypoints(
+    rooms: RoomLabels, grid: OccupancyGrid, waypoints: Sequence[ArrayLike | str]
+) -> None:
     """Refuse unknown names, and rooms that the robot does not fit in.
 
     Parameters
@@ -107,25 +109,28 @@ def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLik
         The rooms, read or found; no pyramid is needed.
     grid
         The map, inflated by the robot's radius.
-    stops
+    waypoints
         Points, and names of rooms or of named points.
 
     Raises
     ------
     InvalidValueError
-        When a stop is refused; the message has the name and the nearest known ones.
+        When a waypoint is refused; the message has the name and the nearest known ones.
     """
-    for stop in stops:
-        if not isinstance(stop, str) or (stop in rooms.points and stop not in rooms.names):
+    for waypoint in waypoints:
+        if not isinstance(waypoint, str) or (
+            waypoint in rooms.points and waypoint not in rooms.names
+        ):
             continue
-        if stop not in rooms.names:
+        if waypoint not in rooms.names:
             known = (*rooms.names, *rooms.points)
             raise InvalidValueError(
-                f"no room or point is called {stop!r:.90}{did_you_mean(stop, known)}"
+                f"no room or point is called {waypoint!r:.90}{did_you_mean(waypoint, known)}"
             )
-        if not (grid.classes[rooms.label_of == rooms.index(stop)] == CellClass.FREE).any():
+        if not (grid.classes[rooms.label_of == rooms.index(waypoint)] == CellClass.FREE).any():
             raise InvalidValueError(
-                f"room {stop!r} has no free cell for this robot radius, {grid.robot_radius_m:g} m: "
+                f"room {waypoint!r} has no free cell for this robot radius, "
+                f"{grid.robot_radius_m:g} m: "
                 "choose a smaller one, or another room"
             )
 
@@ -133,7 +138,7 @@ def check_stops(rooms: RoomLabels, grid: OccupancyGrid, stops: Sequence[ArrayLik
 def _chosen(
     topology: TopologicalMap,
     enterable: BoolArray,
-    stops: Sequence[ArrayLike | str],
+    waypoints: Sequence[ArrayLike | str],
     fixed: list[Any],
     radius_m: float,
 ) -> list[Any]:
@@ -142,25 +147,27 @@ def _chosen(
         return fixed
     grid = topology.grid
     rooms = {
-        stop: _where_it_fits(grid, _cells_in_room(topology, enterable, stop), radius_m)
-        for stop, point in zip(stops, fixed, strict=True)
-        if point is None and isinstance(stop, str)
+        waypoint: _where_it_fits(grid, _cells_in_room(topology, enterable, waypoint), radius_m)
+        for waypoint, point in zip(waypoints, fixed, strict=True)
+        if point is None and isinstance(waypoint, str)
     }
     fixed = [
-        topology.rooms.point_of(str(stop)) if point is None and not len(rooms[str(stop)]) else point
-        for stop, point in zip(stops, fixed, strict=True)
+        topology.rooms.point_of(str(waypoint))
+        if point is None and not len(rooms[str(waypoint)])
+        else point
+        for waypoint, point in zip(waypoints, fixed, strict=True)
     ]
     sets = [
-        rooms[str(stop)] if point is None else _cell_at(topology, enterable, point)
-        for stop, point in zip(stops, fixed, strict=True)
+        rooms[str(waypoint)] if point is None else _cell_at(topology, enterable, point)
+        for waypoint, point in zip(waypoints, fixed, strict=True)
     ]
     found = None
     if all(map(len, sets)):
-        found = cheapest_stops(enterable, sets, corner_cutting=grid.corner_cutting)
+        found = cheapest_waypoints(enterable, sets, corner_cutting=grid.corner_cutting)
     if found is None:
         return [
-            topology.rooms.point_of(str(stop)) if point is None else point
-            for stop, point in zip(stops, fixed, strict=True)
+            topology.rooms.point_of(str(waypoint)) if point is None else point
+            for waypoint, point in zip(waypoints, fixed, strict=True)
         ]
     centres = grid.frame.points_of(np.stack(np.divmod(found, grid.shape[1]), axis=1))
     return [
@@ -168,29 +175,29 @@ def _chosen(
     ]
 
 
-def _facing_the_way(
+def _facing_along_paths(
     topology: TopologicalMap,
     enterable: BoolArray,
-    stops: Sequence[ArrayLike | str],
+    waypoints: Sequence[ArrayLike | str],
     points: list[Any],
 ) -> list[Any]:
-    """Return the points, with headings along a shortest path of cells for stops with names."""
+    """Return the points, with headings along a shortest path of cells for waypoints with names."""
     grid = topology.grid
     search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
     cells = [_cell_at(topology, enterable, point) for point in points]
     arriving = [math.nan]
     leaving = []
     for first, last in itertools.pairwise(cells):
-        way = None
+        path = None
         if len(first) and len(last):
-            ends = (divmod(int(cell[0]), grid.shape[1]) for cell in (first, last))
-            way = search.search(*ends).cells
-        leaving.append(math.nan if way is None else _heading(grid, way[: _steps(grid) + 1]))
-        arriving.append(math.nan if way is None else _heading(grid, way[-_steps(grid) - 1 :]))
+            endpoints = (divmod(int(cell[0]), grid.shape[1]) for cell in (first, last))
+            path = search.search(*endpoints).cells
+        leaving.append(math.nan if path is None else _heading(grid, path[: _steps(grid) + 1]))
+        arriving.append(math.nan if path is None else _heading(grid, path[-_steps(grid) - 1 :]))
     leaving.append(math.nan)
     posed = list(points)
-    for number, stop in enumerate(stops):
-        if isinstance(stop, str):
+    for number, waypoint in enumerate(waypoints):
+        if isinstance(waypoint, str):
             known = [yaw for yaw in (arriving[number], leaving[number]) if math.isfinite(yaw)]
             posed[number] = (*np.asarray(points[number]).tolist(), known[0] if known else 0.0)
     return posed
@@ -200,21 +207,21 @@ def _steps(grid: OccupancyGrid) -> int:
     return max(1, round(_FACING_M / grid.resolution_m))
 
 
-def _heading(grid: OccupancyGrid, way: LongArray) -> float:
-    """Return the direction of a piece of a path in the map frame; NaN if it has no length."""
-    points = grid.frame.points_of(way[[0, -1]])
+def _heading(grid: OccupancyGrid, path: LongArray) -> float:
+    """Return the direction of a segment of a path in the map frame; NaN if it has no length."""
+    points = grid.frame.points_of(path[[0, -1]])
     x, y = (points[1] - points[0]).tolist()
-    return math.atan2(y, x) if len(way) > 1 else math.nan
+    return math.atan2(y, x) if len(path) > 1 else math.nan
 
 
-def _point_of(topology: TopologicalMap, stop: ArrayLike | str, at: At) -> ArrayLike | None:
-    """Return the point of a stop by itself; None for anywhere in a room."""
-    if not isinstance(stop, str):
-        return stop
+def _point_of(topology: TopologicalMap, waypoint: ArrayLike | str, at: At) -> ArrayLike | None:
+    """Return the point of a waypoint by itself; None for anywhere in a room."""
+    if not isinstance(waypoint, str):
+        return waypoint
     rooms = topology.rooms
-    if stop not in rooms.names:
-        return rooms.labels.points[stop]
-    return rooms.point_of(stop) if at == "point" else None
+    if waypoint not in rooms.names:
+        return rooms.labels.points[waypoint]
+    return rooms.point_of(waypoint) if at == "point" else None
 
 
 def _cells_in_room(topology: TopologicalMap, enterable: BoolArray, name: str) -> LongArray:

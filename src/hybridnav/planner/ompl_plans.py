@@ -108,7 +108,7 @@ class OmplPlanner:
     def plan(
         self,
         cells: LongArray,
-        ends: tuple[FloatArray, FloatArray],
+        endpoints: tuple[FloatArray, FloatArray],
         closed: LongArray | None,
         *,
         spent_s: float = 0.0,
@@ -120,7 +120,7 @@ class OmplPlanner:
         ----------
         cells
             int64 (n, 2), a legal path from the cell of the start to that of the goal.
-        ends
+        endpoints
             Start and goal, float64 (3,): metres and radians, map frame.
         closed
             int64 (m,), flat cells that may not be entered; None for none.
@@ -129,15 +129,15 @@ class OmplPlanner:
         tells_search
             Whether to return the states and trees of the search too.
         """
-        refused = self._refused(ends)
+        refused = self._refused(endpoints)
         if refused is not None:
             nothing = Refinement((), by_grid=False, trace=(), iterations=0)
             return OmplPlan(refused, self._metric, None, None, math.inf, nothing)
         with self._one_at_a_time:
             self._worker.ensure()
             query = Query(
-                start=ends[0],
-                goal=ends[1],
+                start=endpoints[0],
+                goal=endpoints[1],
                 cells=cells,
                 deadline_s=time.monotonic() + max(self.ompl.budget_s - spent_s, 0.0),
                 corridors=self._corridors(cells),
@@ -147,14 +147,14 @@ class OmplPlanner:
             self._worker.send(query)
             # Made while the worker plans, so that a path exists when its time is up.
             is_late = self._worker.is_late()
-            by_line = self._by_line_of_sight(cells, ends, closed) if is_late else None
+            by_line = self._by_line_of_sight(cells, endpoints, closed) if is_late else None
             reply = self._worker.reply()
         steps, by_grid = list(reply.steps), False
         path = self._path(cells, reply) if len(reply.points) else None
         status = PlanStatus(reply.outcome)
         if status is not PlanStatus.SOLVED:
             if not is_late:
-                by_line = self._by_line_of_sight(cells, ends, closed)
+                by_line = self._by_line_of_sight(cells, endpoints, closed)
             steps.append(f"grid path by line of sight: {'no' if by_line is None else 'solved'}")
             if by_line is not None:
                 path, status, by_grid = by_line, PlanStatus.SOLVED, True
@@ -163,7 +163,7 @@ class OmplPlanner:
             self._metric,
             path,
             self._weighted_cost(path) if status is PlanStatus.SOLVED else None,
-            self._bound(reply, path, ends),
+            self._bound(reply, path, endpoints),
             Refinement(tuple(steps), by_grid, reply.trace, reply.iterations),
             reply.search,
         )
@@ -173,12 +173,12 @@ class OmplPlanner:
         with self._one_at_a_time:
             self._worker.close()
 
-    def _refused(self, ends: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
-        """Return the status of a query if the footprint does not fit at one of its ends."""
+    def _refused(self, endpoints: tuple[FloatArray, FloatArray]) -> PlanStatus | None:
+        """Return the status of a query if the footprint does not fit at one of its endpoints."""
         if self.ompl.footprint is None:
             return None
         for pose, status in zip(
-            ends, (PlanStatus.START_OCCUPIED, PlanStatus.GOAL_OCCUPIED), strict=True
+            endpoints, (PlanStatus.START_OCCUPIED, PlanStatus.GOAL_OCCUPIED), strict=True
         ):
             if not self._check.state_valid(*pose.tolist()):
                 return status
@@ -208,9 +208,11 @@ class OmplPlanner:
             return "dubins"
         return "reeds-shepp" if self.ompl.space == "reeds-shepp" else "any-angle"
 
-    def _bound(self, reply: Reply, path: Path | None, ends: tuple[FloatArray, FloatArray]) -> float:
+    def _bound(
+        self, reply: Reply, path: Path | None, endpoints: tuple[FloatArray, FloatArray]
+    ) -> float:
         """Return a lower bound on the cost of all paths: the path without obstacles."""
-        straight = float(np.hypot(*(ends[1] - ends[0])[:2]))
+        straight = float(np.hypot(*(endpoints[1] - endpoints[0])[:2]))
         bound = max(straight, reply.bound_m)
         return bound if path is None else min(bound, path.length_m)
 
@@ -254,12 +256,12 @@ class OmplPlanner:
         states, radius_m = reply.points, self.ompl.turning_radius_m
         if radius_m is not None:
             reverses = self.ompl.space == "reeds-shepp"
-            pieces = [states[:1]]
+            segments = [states[:1]]
             for first, second in itertools.pairwise(states.tolist()):
                 curve = shortest_curve(first, second, radius_m=radius_m, reverses=reverses)
                 step_m = min(self._grid.resolution_m, radius_m)  # so that no arc is half a circle
-                pieces.append(curve.poses(step_m)[1:])
-            states = np.concatenate(pieces)
+                segments.append(curve.poses(step_m)[1:])
+            states = np.concatenate(segments)
         headings = states[:, 2].copy() if self.ompl.has_heading else None
         points = states[:, :2].copy()
         passed, is_curved = self._passed(points, cells), radius_m is not None
@@ -278,7 +280,7 @@ class OmplPlanner:
         return passed if inside and free[tuple(passed.T)].all() else cells
 
     def _by_line_of_sight(
-        self, cells: LongArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
+        self, cells: LongArray, endpoints: tuple[FloatArray, FloatArray], closed: LongArray | None
     ) -> Path | None:
         """Return the shortened path of the grid; None if the robot cannot drive it."""
         if self.ompl.turning_radius_m is not None:
@@ -287,19 +289,19 @@ class OmplPlanner:
         if closed is not None:
             allowed = self._settings.allow_unexplored
             sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=closed)
-        points = sight.shorten(cells, ends[0][:2], ends[1][:2])
+        points = sight.shorten(cells, endpoints[0][:2], endpoints[1][:2])
         steps = np.diff(points, axis=0)
         length_m = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
         if not self.ompl.has_heading:
             return Path(self._passed(points, cells), points, length_m)
-        poses = self._poses_along(points, ends, closed)
+        poses = self._poses_along(points, endpoints, closed)
         if not len(poses):
             return None
         points, headings = poses[:, :2].copy(), poses[:, 2].copy()
         return Path(self._passed(points, cells), points, length_m, headings)
 
     def _poses_along(
-        self, points: FloatArray, ends: tuple[FloatArray, FloatArray], closed: LongArray | None
+        self, points: FloatArray, endpoints: tuple[FloatArray, FloatArray], closed: LongArray | None
     ) -> FloatArray:
         """Return the poses of a robot along a polyline, float64 (n, 3).
 
@@ -310,9 +312,9 @@ class OmplPlanner:
         steps = np.diff(points, axis=0)
         ahead = np.arctan2(steps[:, 1], steps[:, 0])
         if self.ompl.space == "differential":
-            poses = np.column_stack([points, [ends[0][2], *ahead]])
-            return driven(check, np.vstack([poses, ends[1]]), reverses=self.ompl.reverses)
-        headings = np.concatenate([[ends[0][2]], np.repeat(ahead, 2), [ends[1][2]]])
+            poses = np.column_stack([points, [endpoints[0][2], *ahead]])
+            return driven(check, np.vstack([poses, endpoints[1]]), reverses=self.ompl.reverses)
+        headings = np.concatenate([[endpoints[0][2]], np.repeat(ahead, 2), [endpoints[1][2]]])
         poses = np.column_stack([np.repeat(points, 2, axis=0), headings])
         return poses if check.path_valid(poses) else np.empty((0, 3))
 

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.result import PlanResult, PlanStatus
-from hybridnav.route.walk import RouteOfCells, Walks
+from hybridnav.route.route_finder import RouteFinder, RouteOfCells
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
@@ -32,10 +32,11 @@ class Outcomes:
     def __init__(self, topology: TopologicalMap, preset: Preset) -> None:
         self._topology = topology
         self._preset = preset
-        self._walks = Walks(topology)
+        self._route_finder = RouteFinder(topology)
 
     def answer(self, status: PlanStatus, poses: Poses, **outcome: Any) -> PlanResult:
-        """Return a result that records the ends, the preset and the settings of the pyramid."""
+        """Return a result that records the endpoints, the preset and the settings of the
+        pyramid."""
         # Each result has its own settings, so that a change of one does not affect the next.
         settings = {
             key: dict(value) if isinstance(value, dict) else value
@@ -67,7 +68,9 @@ class Outcomes:
 
     def route_of(self, path: Path | None) -> RouteOfCells | None:
         """Return what the route of a path is found from, None for no path."""
-        return None if path is None else RouteOfCells(self._topology, self._walks, path.cells)
+        return (
+            None if path is None else RouteOfCells(self._topology, self._route_finder, path.cells)
+        )
 
     @cached_property
     def _settings(self) -> dict[str, Any]:

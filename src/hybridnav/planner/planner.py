@@ -14,7 +14,7 @@ from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
-from hybridnav.planner.ends import cells_of_ends, read_point, read_points, read_pose
+from hybridnav.planner.endpoints import cells_of_endpoints, read_point, read_points, read_pose
 from hybridnav.planner.outcome import Outcomes
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
@@ -119,8 +119,8 @@ class HybridPlanner:
             `(x, y)` in metres, map frame. The path runs between the centres of their cells, an
             any-angle one between the points; nothing is snapped to free space. On a map with rooms
             also the name of a room or of a named point. With OMPL in a space with headings `(x, y,
-            yaw)`, radians counter-clockwise from the x axis, and named ends face along the path; in
-            other spaces the third number is ignored.
+            yaw)`, radians counter-clockwise from the x axis, and named endpoints face along the
+            path; in other spaces the third number is ignored.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one; None as in the preset. Without
             effect for `shortest` and OMPL, whose paths are any-angle ones.
@@ -145,12 +145,14 @@ class HybridPlanner:
         """
         began = time.perf_counter()
         if isinstance(start, str) or isinstance(goal, str):
-            from hybridnav.planner.named import check_names, stop_points  # noqa: PLC0415 - on demand
+            from hybridnav.planner.named import check_names, points_of_waypoints  # noqa: PLC0415 - on demand
 
             check_names(self.topology, [start, goal])
             blocked = self.closed(blocked)
             settings = self.preset.planner
-            start, goal = stop_points(self.topology, settings, [start, goal], at=at, closed=blocked)
+            start, goal = points_of_waypoints(
+                self.topology, settings, [start, goal], at=at, closed=blocked
+            )
         poses = self._pose("start", start), self._pose("goal", goal)
         return self._between(poses, self._finish_asked_for(smooth), self.closed(blocked), began)
 
@@ -162,14 +164,14 @@ class HybridPlanner:
         began: float,
     ) -> PlanResult:
         """Plan between two points, or poses."""
-        ends = poses[0][:2], poses[1][:2]
+        endpoints = poses[0][:2], poses[1][:2]
         grid, allowed = self.topology.grid, self.preset.planner.allow_unexplored
-        cells = cells_of_ends(grid, ends, allow_unexplored=allowed)
+        cells = cells_of_endpoints(grid, endpoints, allow_unexplored=allowed)
         if isinstance(cells, PlanStatus):
             return self._outcomes.answer(cells, poses)
         if closed is not None and (refused := closed.refusal(cells, grid.shape)):
             return self._outcomes.answer(refused, poses)
-        plan = self._cells.plan(CellQuery(cells, ends, closed))
+        plan = self._cells.plan(CellQuery(cells, endpoints, closed))
         if plan.cells is None:
             return self._outcomes.no_path(plan, poses, self._cells.metric)
         if self._ompl is not None:
@@ -279,12 +281,12 @@ class HybridPlanner:
     ) -> PlanResult:
         """Return the result of the coarse path refined by OMPL."""
         assert plan.cells is not None  # noqa: S101 - the caller has looked
-        ends = poses[0][:2], poses[1][:2]
+        endpoints = poses[0][:2], poses[1][:2]
         now = time.perf_counter()
         flat = None if closed is None else closed.flat
         found = planner.plan(plan.cells, poses, flat, spent_s=now - began)
         seconds = {**plan.stats.seconds, "ompl": time.perf_counter() - now}
-        bound = max(found.lower_bound, self._cells.bound(plan, ends))
+        bound = max(found.lower_bound, self._cells.bound(plan, endpoints))
         if found.path is not None and found.status is PlanStatus.SOLVED:
             bound = min(bound, found.weighted_cost or found.path.length_m)
         return self._outcomes.answer(

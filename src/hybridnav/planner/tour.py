@@ -1,4 +1,4 @@
-"""Tours with several stops, described by rooms and doors."""
+"""Tours with several waypoints, described by rooms and doors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.itinerary import Guide, Leg, in_words
-from hybridnav.planner.named import At, check_names, stop_points
+from hybridnav.planner.named import At, check_names, points_of_waypoints
 from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _COUNTS = (
     "expanded",
     "expanded_places",
-    "expanded_gates",
+    "expanded_border_cells",
     "expanded_intervals",
     "corridor_cells",
 )
@@ -34,18 +34,18 @@ _COUNTS = (
 
 @dataclass(frozen=True, eq=False)
 class Tour:
-    """A tour through stops: a plan between each two, and the legs of all plans.
+    """A tour through waypoints: a plan between each two, and the legs of all plans.
 
     Examples
     --------
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> stops = [(0.5, 0.5), (1.5, 0.5), (0.5, 0.5)]
-    >>> round(hn.plan_tour(hn.HybridPlanner(topology), stops).length_m, 3)
+    >>> waypoints = [(0.5, 0.5), (1.5, 0.5), (0.5, 0.5)]
+    >>> round(hn.plan_tour(hn.HybridPlanner(topology), waypoints).length_m, 3)
     2.0
     """
 
     results: tuple[PlanResult, ...]
-    """Plans from stop to stop, up to the first that is not solved."""
+    """Plans from waypoint to waypoint, up to the first that is not solved."""
     legs: tuple[Leg, ...]
     """The tour by rooms; none unless it is solved and the map has rooms."""
 
@@ -89,13 +89,13 @@ class Tour:
 
     @property
     def lower_bound(self) -> float:
-        """A proved bound on the cost of a tour of the points of the stops, in their order."""
+        """A proved bound on the cost of a tour of the points of the waypoints, in their order."""
         return sum(result.lower_bound for result in self.results)
 
     @property
     def gap(self) -> float:
-        """Proved distance from the optimum between the stops, cost / lower bound - 1; NaN unless
-        the tour is solved."""
+        """Proved distance from the optimum between the waypoints, cost / lower bound - 1; NaN
+        unless the tour is solved."""
         if not self.solved:
             return math.nan
         return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
@@ -107,7 +107,7 @@ class Tour:
         person.
 
         Points and headings, places and arcs are those of all plans in order, with the place of a
-        stop once; if the robot turns at a stop, its point occurs twice. Counts and seconds are
+        stop once; if the robot turns at a waypoint, its point occurs twice. Counts and seconds are
         sums.
         """
         parts = [result.to_dict() for result in self.results]
@@ -150,8 +150,8 @@ def _joined_points(
     """Return points and headings of all parts.
 
     A point at which one part ends and the next begins occurs once, unless the robot turns there. A
-    part of one point, to a stop at the robot's position, has no heading of its own and is left out
-    unless all parts are like that.
+    part of one point, to a waypoint at the robot's position, has no heading of its own and is left
+    out unless all parts are like that.
     """
     parts = [part for part in parts if len(part["points"] or []) > 1] or parts[:1]
     points: list[list[float]] = []
@@ -176,24 +176,24 @@ def _summed(parts: list[dict[str, float]]) -> dict[str, float]:
 
 def plan_tour(
     planner: HybridPlanner,
-    stops: Sequence[ArrayLike | str],
+    waypoints: Sequence[ArrayLike | str],
     *,
     at: At = "anywhere",
     smooth: Smooth | None = None,
     blocked: Closable | None = None,
 ) -> Tour:
-    """Plan a tour that visits stops in the given order.
+    """Plan a tour that visits waypoints in the given order.
 
     Parameters
     ----------
     planner
         Planner of each part.
-    stops
+    waypoints
         Two or more: points `(x, y)` in metres, names of rooms or of named points. With OMPL in a
         space with headings, points are `(x, y, yaw)`, and names face along the path.
     at
-        Position in a room: `"anywhere"`, chosen for all stops together so that the whole cell path
-        is shortest, or at the room's `"point"`.
+        Position in a room: `"anywhere"`, chosen for all waypoints together so that the whole cell
+        path is shortest, or at the room's `"point"`.
     smooth, blocked
         As in `HybridPlanner.plan`.
 
@@ -205,22 +205,24 @@ def plan_tour(
     Raises
     ------
     InvalidValueError
-        When there are fewer than two stops, a name is not known, a point is not two finite numbers,
-        or a closed item is not on the map.
+        When there are fewer than two waypoints, a name is not known, a point is not two finite
+        numbers, or a closed item is not on the map.
 
     Examples
     --------
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> stops = [(0.5, 0.5), (2.0, 2.5), (0.5, 0.5)]
-    >>> tour = hn.plan_tour(hn.HybridPlanner(topology), stops)
+    >>> waypoints = [(0.5, 0.5), (2.0, 2.5), (0.5, 0.5)]
+    >>> tour = hn.plan_tour(hn.HybridPlanner(topology), waypoints)
     >>> tour.solved, len(tour.results)
     (True, 2)
     """
-    if len(stops) < 2:  # noqa: PLR2004
-        raise InvalidValueError(f"a way needs at least two stops, got {len(stops)}")
-    check_names(planner.topology, stops)
+    if len(waypoints) < 2:  # noqa: PLR2004
+        raise InvalidValueError(f"a tour needs at least two waypoints, got {len(waypoints)}")
+    check_names(planner.topology, waypoints)
     closed = planner.closed(blocked)
-    points = stop_points(planner.topology, planner.preset.planner, stops, at=at, closed=closed)
+    points = points_of_waypoints(
+        planner.topology, planner.preset.planner, waypoints, at=at, closed=closed
+    )
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):
         results.append(planner.plan(*pair, smooth=smooth, blocked=closed))
@@ -230,14 +232,14 @@ def plan_tour(
     legs: list[Leg] = []
     if results[-1].solved and topology.pyramid.rooms is not None:
         guide = Guide(topology.rooms)
-        for result, stop in zip(results, stops[1:], strict=True):
+        for result, waypoint in zip(results, waypoints[1:], strict=True):
             if result.path is not None:
-                legs += guide.legs(result.path, stop=_told(stop))
+                legs += guide.legs(result.path, waypoint=_waypoint_text(waypoint))
     return Tour(tuple(results), tuple(legs))
 
 
-def _told(stop: ArrayLike | str) -> str:
-    if isinstance(stop, str):
-        return stop
-    x, y = np.asarray(stop, dtype=np.float64)[:2].tolist()
+def _waypoint_text(waypoint: ArrayLike | str) -> str:
+    if isinstance(waypoint, str):
+        return waypoint
+    x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
     return f"({x:.10g}, {y:.10g})"

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.portals._descent_kernels import descend, with_ends
-from hybridnav.portals._path_kernels import FAR, cells_of_way, field_at
-from hybridnav.portals._side_kernels import best_gates, side_costs, ways_by_sides
+from hybridnav.portals._descent_kernels import descend, with_endpoints
+from hybridnav.portals._path_kernels import cells_of_path, field_at
+from hybridnav.portals._side_kernels import best_gates, bounds_by_sides, side_costs
+from hybridnav.search.moves import FAR
 
 
 @guarded
@@ -16,7 +17,7 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     """Find the cheapest path over gates between two cells that may be entered.
 
     Pairs of sides, one of the start's field and one of the goal's, are examined in the order of the
-    lower bounds on their ways, until no other pair can be better by more than `epsilon`.
+    lower bounds on their paths, until no other pair can be better by more than `epsilon`.
 
     Parameters
     ----------
@@ -31,25 +32,25 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     epsilon
         Share by which the answer may exceed the optimum, >= 0.
     frame
-        See `cells_of_way`.
+        See `cells_of_path`.
 
     Returns
     -------
     tuple
-        The lower cost of the way over gates and `inside`; a lower bound on both; the number of
-        stored paths that were walked to find the ends; the path's cells and points, which are empty
-        if it does not cost less than `inside`.
+        The lower cost of the path over gates and `inside`; a lower bound on both; the number of
+        stored paths that were walked to find the endpoints; the path's cells and points, which are
+        empty if it does not cost less than `inside`.
     """
     cells, points = np.empty((0, 2), np.int64), np.empty((0, 2), np.float64)
     side_start = portals.side_start
     side_gates_start = portals.side_gates_start
     gate_field = tables.gate_field
-    ends = np.int64(start), np.int64(goal)
+    endpoints = np.int64(start), np.int64(goal)
     fields = field_at(portals, cols, start), field_at(portals, cols, goal)
     low_start = side_costs(portals, cols, fields[0], start)
     low_goal = side_costs(portals, cols, fields[1], goal)
     s0, t0 = side_start[fields[0]], side_start[fields[1]]
-    low = ways_by_sides(tables.between, tables.shift, s0, t0, low_start, low_goal)
+    low = bounds_by_sides(tables.between, tables.shift, s0, t0, low_start, low_goal)
     first_q, last_q = side_gates_start[s0], side_gates_start[t0]
     known_start = np.full(side_gates_start[side_start[fields[0] + 1]] - first_q, -1, np.int64)
     known_goal = np.full(side_gates_start[side_start[fields[1] + 1]] - last_q, -1, np.int64)
@@ -66,7 +67,7 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
         low[best_i, best_j] = FAR
         sides = s0 + best_i, t0 + best_j
         over, x, s, w, more = best_gates(
-            portals, tables, cols, ends, fields, sides, (low_start[best_i], low_goal[best_j]),
+            portals, tables, cols, endpoints, fields, sides, (low_start[best_i], low_goal[best_j]),
             known_start[side_gates_start[sides[0]] - first_q :],
             known_goal[side_gates_start[sides[1]] - last_q :], upper,
         )  # fmt: skip
@@ -77,10 +78,10 @@ def answer(portals, tables, cols, start, goal, inside, epsilon, frame):
     if gate < 0:
         return inside, lower, walked, cells, points
     out, into, legs, crossings = descend(portals, tables, gate, source, across)
-    cost = with_ends(portals, gate_field, cols, start, goal, out, into, legs, crossings)
+    cost = with_endpoints(portals, gate_field, cols, start, goal, out, into, legs, crossings)
     if cost >= inside:
         return inside, lower, walked, cells, points
-    cells, points = cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame)
+    cells, points = cells_of_path(portals, gate_field, cols, start, goal, out, into, legs, frame)
     return cost, lower, walked, cells, points
 
 

@@ -9,7 +9,7 @@ from hybridnav._jit import njit
 
 @njit(cache=True, nogil=True)
 def least_over_boxes(box, portal, between, sides, start, goal):
-    """Return the least length of a way from a point to another over portals.
+    """Return the least length of a path from a point to another over portals.
 
     `sides` are the first side of the start's field and its end, and those of the goal's field.
     """

@@ -10,15 +10,16 @@ import numpy as np
 
 from hybridnav._jit import njit
 from hybridnav.portals._distance_kernels import next_gate
-from hybridnav.portals._path_kernels import FAR, stored_costs
+from hybridnav.portals._path_kernels import stored_costs
 from hybridnav.search.arrays import grow
+from hybridnav.search.moves import FAR
 
 
 @njit(cache=True, nogil=True)
 def descend(portals, tables, gate, source, last):
     """Follow shortest paths from a gate to a source, and cross from there to gate `last`.
 
-    `last` is -1 to end at the source. Return the gates by which the way leaves fields, those by
+    `last` is -1 to end at the source. Return the gates by which the path leaves fields, those by
     which it enters the next, and the costs inside the fields: leg 0 to the first gate, then from
     each gate entered to the next one left, and without `last` to the source. The last result is the
     cost of all crossings, FAR if rounded distances lead nowhere.
@@ -71,17 +72,17 @@ def _cost_of_exit(portals, gate, head):
 
 
 @njit(cache=True, nogil=True)
-def with_ends(portals, gate_field, cols, start, goal, out, into, legs, over):
-    """Return the cost of the whole way from start to goal; set the first and the last leg.
+def with_endpoints(portals, gate_field, cols, start, goal, out, into, legs, over):
+    """Return the cost of the whole path from start to goal; set the first and the last leg.
 
     Parameters
     ----------
     portals, gate_field, cols, start, goal, out, into
-        See `cells_of_way`; start and goal lie in the fields of the way's ends.
+        See `cells_of_path`; start and goal lie in the fields of the path's ends.
     legs
         int64, receives the costs of the two legs.
     over
-        Integer cost of the way between its first and last gate, `FAR` for none.
+        Integer cost of the path between its first and last gate, `FAR` for none.
     """
     n = out.size
     if n == 0 or over >= FAR:

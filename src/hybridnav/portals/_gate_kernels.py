@@ -183,7 +183,7 @@ def directions(near, far, n, cost, row, lanes, out):
 
     `LEAP` is added where the path goes on so for as many moves; such a path is taken before others
     of the same cost. A straight line of legal moves between two cells is the only shortest path, so
-    it is part of one to the source if the costs at its ends differ by its length.
+    it is part of one to the source if the costs at its endpoints differ by its length.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Kernels of the parts of portal routes: stored paths, and the cells of a way.
+"""Kernels of the parts of portal routes: stored paths, and the cells of a path.
 
 Directions are those of `search.moves`: 0 to 7, east and on counter-clockwise, with `LEAP` set
 where as many moves lead that way.
@@ -14,8 +14,6 @@ from hybridnav.portals._gate_kernels import LEAP
 from hybridnav.search.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 
 _INVERSE = DIAGONAL % STRAIGHT
-FAR = 1 << 60
-"""More than any path costs."""
 UNREACHED = np.uint32(0xFFFFFFFF)
 
 
@@ -102,10 +100,10 @@ def moves_of(cost):
 
 
 @njit(cache=True, nogil=True)
-def cells_of_way(portals, gate_field, cols, start, goal, out, into, legs, frame):
-    """Return the cells of a way and their centres.
+def cells_of_path(portals, gate_field, cols, start, goal, out, into, legs, frame):
+    """Return the cells of a path and their centres.
 
-    The way leaves its fields by the gates `out` and enters the next ones by `into`. Its parts are
+    The path leaves its fields by the gates `out` and enters the next ones by `into`. Its parts are
     walked side by side, as in `stored_costs`: from where each begins to the gate it ends at, the
     last one back from the goal.
 

@@ -1,4 +1,5 @@
-"""Kernels of the ends of a way: by which side it leaves its first field, and enters its last one.
+"""Kernels of the endpoints of a path: by which side it leaves its first field, and enters its last
+one.
 
 Costs are the integers of `search.moves`. Array fields of named tuples are read once, at the head
 of each kernel: reading them in a loop costs more than the loop.
@@ -10,8 +11,8 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.portals._distance_kernels import distances
-from hybridnav.portals._path_kernels import FAR, UNREACHED, position_of, stored_costs
-from hybridnav.search.moves import octile_cost
+from hybridnav.portals._path_kernels import UNREACHED, position_of, stored_costs
+from hybridnav.search.moves import FAR, octile_cost
 
 
 @njit(cache=True, nogil=True)
@@ -35,8 +36,8 @@ def side_costs(portals, cols, field, cell):
 
 
 @njit(cache=True, nogil=True)
-def ways_by_sides(between, shift, first, last, low_start, low_goal):
-    """Return lower bounds on the ways by each pair of sides of two fields, int64; FAR for none.
+def bounds_by_sides(between, shift, first, last, low_start, low_goal):
+    """Return lower bounds on the paths by each pair of sides of two fields, int64; FAR for none.
 
     `first` and `last` are the first sides of the two.
     """
@@ -138,8 +139,10 @@ def entries_of(portals, source_at, begin, end):
 
 
 @njit(cache=True, nogil=True)
-def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, known_goal, limit):
-    """Find the gates of two sides on the shortest way, if it costs less than `limit`.
+def best_gates(
+    portals, tables, cols, endpoints, fields, sides, lows, known_start, known_goal, limit
+):
+    """Find the gates of two sides on the shortest path, if it costs less than `limit`.
 
     Parameters
     ----------
@@ -147,7 +150,7 @@ def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, kn
         `Portals` and `Tables`.
     cols
         Columns of the grid.
-    ends, fields, sides, lows
+    endpoints, fields, sides, lows
         For start and goal each: flat cell, field, side of the field, lower bound on the costs to
         the side's gates.
     known_start, known_goal
@@ -158,7 +161,7 @@ def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, kn
     Returns
     -------
     tuple
-        The cost, `limit` or more for no way; the gate by which it leaves the start's field; the
+        The cost, `limit` or more for no path; the gate by which it leaves the start's field; the
         source; the gate across from the source, -1 if the source is in the goal's field; how many
         stored paths were walked.
     """
@@ -168,8 +171,8 @@ def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, kn
     b0, b1 = side_gates_start[sides[1]], side_gates_start[sides[1] + 1]
     near = np.empty(a1 - a0, np.int64)
     far = np.empty(b1 - b0, np.int64)
-    _weigh_gates(portals, cols, ends[0], a0, a1, lows[0], known_start, near)
-    _weigh_gates(portals, cols, ends[1], b0, b1, lows[1], known_goal, far)
+    _weigh_gates(portals, cols, endpoints[0], a0, a1, lows[0], known_start, near)
+    _weigh_gates(portals, cols, endpoints[1], b0, b1, lows[1], known_goal, far)
     place, source, step = entries_of(portals, tables.source_at, b0, b1)
     own_gates = side_gates[a0:a1]
     between = np.empty(near.size, np.int64)
@@ -182,8 +185,8 @@ def best_gates(portals, tables, cols, ends, fields, sides, lows, known_start, kn
             if near[i] + between[i] + rest < limit and between[i] < FAR:
                 wants_start[i] = True
                 wants_goal[place[e]] = True
-    walked = _walk(portals, cols, ends[0], fields[0], a0, a1, wants_start, known_start)
-    walked += _walk(portals, cols, ends[1], fields[1], b0, b1, wants_goal, known_goal)
+    walked = _walk(portals, cols, endpoints[0], fields[0], a0, a1, wants_start, known_start)
+    walked += _walk(portals, cols, endpoints[1], fields[1], b0, b1, wants_goal, known_goal)
     best, gate, entry = limit, np.int64(-1), np.int64(-1)
     for e in range(place.size):
         if not wants_goal[place[e]]:

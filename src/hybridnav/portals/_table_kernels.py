@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.portals._path_kernels import FAR, UNREACHED
+from hybridnav.portals._path_kernels import UNREACHED
+from hybridnav.search.moves import FAR
 
 LANES = 16
 """Portals that are searched from together."""

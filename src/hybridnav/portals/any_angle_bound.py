@@ -24,7 +24,7 @@ class AnyAngleBound:
 
     A path that leaves a field passes one of its portals, through the square of one of the portal's
     border cells. Between two portals it is at least as long as the straight line between the boxes
-    of these squares, and so is a path of several such legs as the shortest way over portals.
+    of these squares, and so is a path of several such legs as the shortest path over portals.
 
     Parameters
     ----------

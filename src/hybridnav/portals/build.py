@@ -2,8 +2,8 @@
 
 Every legal move between two fields, those that meet at a point only included, belongs to one
 portal: the moves between the same two fields whose lower cell lies in one square of a lattice. The
-cells at their ends are the *border cells* of a field; some or all of them are *gates*, to which the
-shortest paths from all cells of their field are stored.
+cells at their endpoints are the *border cells* of a field; some or all of them are *gates*, to
+which the shortest paths from all cells of their field are stored.
 """
 
 from __future__ import annotations
@@ -249,7 +249,7 @@ def _scratch(largest: int) -> tuple[NDArray[Any], ...]:
 
 def _assembled(layout: Layout, filled: dict[str, NDArray[Any]]) -> Portals:
     crossings = layout.crossings
-    tail, head = layout.gate_of[crossings.ends].reshape(2, -1)
+    tail, head = layout.gate_of[crossings.endpoints].reshape(2, -1)
     tail, head = np.concatenate([tail, head]), np.concatenate([head, tail])
     kept = np.flatnonzero(np.tile(layout.is_exit, 2))
     order = kept[np.argsort(tail[kept], kind="stable")]

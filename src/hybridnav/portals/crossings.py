@@ -24,7 +24,7 @@ class Crossings(NamedTuple):
     portal: LongArray
     """Number of its portal."""
     is_gate: BoolArray
-    """Whether its ends were chosen as gates."""
+    """Whether its endpoints were chosen as gates."""
 
     @property
     def n_portals(self) -> int:
@@ -32,7 +32,7 @@ class Crossings(NamedTuple):
         return int(self.portal.max(initial=-1)) + 1
 
     @property
-    def ends(self) -> LongArray:
+    def endpoints(self) -> LongArray:
         """int64 (2 n,), all lower cells, then all higher ones."""
         return np.concatenate([self.low, self.high])
 
@@ -63,8 +63,8 @@ def find_crossings(
     position = np.stack([low // cols, low % cols])
     fields = label[low] * (label.max(initial=0) + np.int64(1)) + label[high]
 
-    def groups(side: int) -> LongArray:
-        square = position[0] // side * cols + position[1] // side
+    def groups(square_cells: int) -> LongArray:
+        square = position[0] // square_cells * cols + position[1] // square_cells
         order = np.lexsort((square, fields))
         new = np.ones(len(order), dtype=np.bool_)
         new[1:] = (np.diff(fields[order]) != 0) | (np.diff(square[order]) != 0)

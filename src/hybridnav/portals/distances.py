@@ -49,7 +49,7 @@ def build_tables(portals: Portals, options: PortalOptions = DEFAULT_OPTIONS) -> 
     Returns
     -------
     Tables
-        Rounded by as many bits as the longest way needs.
+        Rounded by as many bits as the longest path needs.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def _tables(
 def _between(
     portals: Portals, source_at: IntArray, to_sides: NDArray[np.uint32], how: tuple[int, int]
 ) -> NDArray[np.uint32]:
-    """Return the least costs from side to side, of ways that enter the second one's field over
+    """Return the least costs from side to side, of paths that enter the second one's field over
     it."""
     shift, at_once = how
     place, source, step = entries_of(portals, source_at, 0, len(portals.side_gates))

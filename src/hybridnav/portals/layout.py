@@ -62,7 +62,7 @@ class Layout:
     @cached_property
     def gate_cell(self) -> LongArray:
         """int64 (G,), flat cells, in the order of their positions."""
-        cells = np.unique(self.crossings.ends[np.tile(self.crossings.is_gate, 2)])
+        cells = np.unique(self.crossings.endpoints[np.tile(self.crossings.is_gate, 2)])
         ordered: LongArray = cells[np.argsort(self.index[cells], kind="stable")]
         return ordered
 
@@ -81,7 +81,7 @@ class Layout:
     @cached_property
     def is_exit(self) -> BoolArray:
         """bool, which crossings lead from gate to gate."""
-        low, high = self.gate_of[self.crossings.ends].reshape(2, -1)
+        low, high = self.gate_of[self.crossings.endpoints].reshape(2, -1)
         is_exit: BoolArray = (low >= 0) & (high >= 0)
         return is_exit
 
@@ -97,7 +97,7 @@ class Layout:
         n_portals = self.crossings.n_portals
         field = np.empty(2 * n_portals, dtype=np.int64)
         portal = self.crossings.portal
-        field[np.concatenate([portal, portal + n_portals])] = self.label[self.crossings.ends]
+        field[np.concatenate([portal, portal + n_portals])] = self.label[self.crossings.endpoints]
         return np.argsort(field, kind="stable")
 
     @cached_property
@@ -108,11 +108,11 @@ class Layout:
         return rank
 
     @cached_property
-    def side_of_end(self) -> LongArray:
+    def side_of_endpoint(self) -> LongArray:
         """int64, the side of each end of a crossing."""
         portal = self.crossings.portal
-        ends = np.concatenate([portal, portal + self.crossings.n_portals])
-        side: LongArray = self.side_rank[ends]
+        endpoints = np.concatenate([portal, portal + self.crossings.n_portals])
+        side: LongArray = self.side_rank[endpoints]
         return side
 
     @cached_property
@@ -120,26 +120,26 @@ class Layout:
         """int64 (F + 1,), first side of each field."""
         n_sides = len(self.side_order)
         field = np.empty(n_sides, dtype=np.int64)
-        field[self.side_of_end] = self.label[self.crossings.ends]
+        field[self.side_of_endpoint] = self.label[self.crossings.endpoints]
         return starts_of(field, self.n_fields)
 
     @cached_property
     def side_gates(self) -> tuple[LongArray, LongArray]:
         """Gates of each side, each once: starts, and gates."""
-        gate = self.gate_of[self.crossings.ends]
+        gate = self.gate_of[self.crossings.endpoints]
         is_exit = np.tile(self.is_exit, 2)
         n_gates = max(len(self.gate_cell), 1)
-        pairs = np.unique(self.side_of_end[is_exit] * n_gates + gate[is_exit])
+        pairs = np.unique(self.side_of_endpoint[is_exit] * n_gates + gate[is_exit])
         return starts_of(pairs // n_gates, len(self.side_order)), pairs % n_gates
 
     @cached_property
     def side_box(self) -> IntArray:
-        """int32 (R, 4), first and last row, first and last column of the ends of each side."""
-        order = np.argsort(self.side_of_end, kind="stable")
-        row, col = np.divmod(self.crossings.ends[order], self.cols)
+        """int32 (R, 4), first and last row, first and last column of the endpoints of each side."""
+        order = np.argsort(self.side_of_endpoint, kind="stable")
+        row, col = np.divmod(self.crossings.endpoints[order], self.cols)
         if not len(order):
             return np.empty((0, 4), dtype=np.int32)
-        at = starts_of(self.side_of_end[order], len(self.side_order))[:-1]
+        at = starts_of(self.side_of_endpoint[order], len(self.side_order))[:-1]
         box = [edge.reduceat(x, at) for x in (row, col) for edge in (np.minimum, np.maximum)]
         return np.stack(box, axis=1).astype(np.int32)
 

@@ -22,7 +22,7 @@ class PortalOptions:
         searched cell by cell.
     spacing_cells
         Side of the lattice squares of portals where every border cell is a gate, in cells.
-    all_gates_levels
+    all_border_cells_levels
         Number of levels to try with a gate at every border cell, before fewer gates: the regions,
         then those below.
     sparse_spacings_cells
@@ -47,13 +47,13 @@ class PortalOptions:
     Examples
     --------
     >>> from hybridnav.portals import PortalOptions
-    >>> PortalOptions(all_gates_levels=0, sparse_spacings_cells=(32,)).spacing_cells
+    >>> PortalOptions(all_border_cells_levels=0, sparse_spacings_cells=(32,)).spacing_cells
     16
     """
 
     least_regions: int = 10
     spacing_cells: int = 16
-    all_gates_levels: int = 2
+    all_border_cells_levels: int = 2
     sparse_spacings_cells: tuple[int, ...] = (16, 32, 64, 128, 256)
     most_bytes_per_cell: float = 640.0
     most_sparse_bytes_per_cell: float = 160.0
@@ -90,7 +90,7 @@ def _is_real(value: object) -> bool:
 _WHOLE = {
     "least_regions": 1,
     "spacing_cells": 1,
-    "all_gates_levels": 0,
+    "all_border_cells_levels": 0,
     "rows_at_once": 1,
     "dropped_bits": 0,
 }

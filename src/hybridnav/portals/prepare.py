@@ -123,7 +123,7 @@ def _first_that_fits(
 
 def _choices(levels: Iterator[Level], options: PortalOptions) -> Iterator[tuple[Level, int, int]]:
     """Yield levels and the spacings of portals and of gates, those with gates everywhere first."""
-    first = list(islice(levels, options.all_gates_levels))
+    first = list(islice(levels, options.all_border_cells_levels))
     for level in first:
         yield level, options.spacing_cells, 1
     for level in chain(first, levels):

@@ -11,10 +11,10 @@ import numpy as np
 
 from hybridnav.grid.centres import centres
 from hybridnav.portals import _answer_kernels as kernels
-from hybridnav.portals._path_kernels import FAR
 from hybridnav.portals.any_angle_bound import AnyAngleBound
 from hybridnav.search.moves import (
     DIAGONAL,
+    FAR,
     STRAIGHT,
     cost_of,
     length_in_cells,
@@ -48,7 +48,7 @@ class PortalAnswer:
     length_cells: float
     """Its length, infinite for none."""
     lower_bound_cells: float
-    expanded_gates: int
+    expanded_border_cells: int
     expanded: int
     """Cells that were expanded."""
 
@@ -108,7 +108,7 @@ class PortalSearch:
         """Find a shortest path between two cells, and a lower bound on the length of any.
 
         Where every border cell is a gate, look-ups find it; elsewhere a search of cells goes on
-        from the best way over gates.
+        from the best path over gates.
 
         Parameters
         ----------

@@ -45,12 +45,12 @@ def raise_powers(power, squares, halves, p):
 
     `squares` and `halves` are `uniform_squares` of this power and of the one below.
     """
-    side = 1 << (p - 1)
+    width = 1 << (p - 1)
     for row in range(squares.shape[0]):
         for col in range(squares.shape[1]):
             if squares[row, col] != 0 and (p == 1 or amid_its_class(halves, row, col)):
-                for i in range(row * side, (row + 1) * side):
-                    for j in range(col * side, (col + 1) * side):
+                for i in range(row * width, (row + 1) * width):
+                    for j in range(col * width, (col + 1) * width):
                         power[i, j] = p
 
 

@@ -59,7 +59,7 @@ def field_extents(field_of, cols, n_vertices):
 
 
 @njit(cache=True, nogil=True)
-def edge_ends(base_edge, cols):
+def edge_endpoints(base_edge, cols):
     """Return the two flat cells of a base edge, the lower one first."""
     cell = base_edge >> 1
     return cell, cell + (cols if base_edge & 1 else 1)
@@ -74,7 +74,7 @@ def other_crack(field_of, cols, corner, base_edge):
     count = 0
     other = -1
     for edge in (2 * a, 2 * c, 2 * a + 1, 2 * b + 1):
-        u, v = edge_ends(edge, cols)
+        u, v = edge_endpoints(edge, cols)
         if field_of[u] != field_of[v]:
             count += 1
             if edge != base_edge:
@@ -155,7 +155,7 @@ def find_cracks(field_of, rows, cols):
 def next_at_cell(cell, direction, edge_end, cols):
     """Return the first dart of a base cell counter-clockwise after a direction, else -1.
 
-    Directions are 0 east to 3 south. Darts of the base are 2 * base edge + side; the full turn ends
+    Directions are 0 east to 3 south. Darts of the base are 2 * base edge + half; the full turn ends
     with the direction itself.
     """
     for i in range(1, 5):
@@ -234,11 +234,11 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
     protected = np.zeros(2 * n_edges, np.bool_)
     alive = 2 * level + 2
     for e in range(n_edges):
-        first, second = edge_ends(edges[e], cols)
+        first, second = edge_endpoints(edges[e], cols)
         origin[2 * e] = field_of[first]
         origin[2 * e + 1] = field_of[second]
-        for side in range(2):
-            dart = 2 * edges[e] + side
+        for half in range(2):
+            dart = 2 * edges[e] + half
             is_protected = False
             while True:
                 if base_protected(dart ^ 1, vertex_end, rows, cols):
@@ -249,9 +249,9 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
                     break
                 if end & 1 == 0:
                     dart ^= 1
-            sigma[2 * e + side] = 2 * place_of(edges, dart >> 1) + (dart & 1)
+            sigma[2 * e + half] = 2 * place_of(edges, dart >> 1) + (dart & 1)
             if is_protected:
-                protected[2 * e + (1 - side)] = True
+                protected[2 * e + (1 - half)] = True
     for d in range(2 * n_edges):
         follow = sigma[d ^ 1]
         while protected[d] and not protected[follow]:
@@ -284,7 +284,7 @@ def sweeps(survivors, edge_end, level, cols):
                 end = edge_end[edge]
                 if end == 0 or end & 1 or end >= 2 * level + 2:
                     continue
-                first, second = edge_ends(edge, cols)
+                first, second = edge_endpoints(edge, cols)
                 beyond = second if first == cell else first
                 rise = (beyond - cell) // cols if edge & 1 else 0
                 sweep[beyond] = sweep[cell] + rise * (cell % cols)
@@ -294,7 +294,7 @@ def sweeps(survivors, edge_end, level, cols):
 
 
 @njit(cache=True, nogil=True)
-def way_to_rim(start, inside, field_of, edge_end, level, cols, came):
+def edges_to_rim(start, inside, field_of, edge_end, level, cols, came):
     """Return the base edges from a face in a field to the nearest rim, int64, the last one first.
 
     The rim is a face that is not ordinary or a block that holds a crack. The search follows removed

@@ -18,11 +18,11 @@ def turn(points, i, j, row, col):
 
 
 @njit(cache=True, nogil=True)
-def chain(rows, cols, count, side, points, start):
-    """Append one side of the hull of points sorted by row (monotone chain, Andrew 1979)."""
+def chain(rows, cols, count, hand, points, start):
+    """Append one half of the hull of points sorted by row (monotone chain, Andrew 1979)."""
     end = start
     for i in range(count):
-        while end - start >= 2 and side * turn(points, end - 2, end - 1, rows[i], cols[i]) <= 0:
+        while end - start >= 2 and hand * turn(points, end - 2, end - 1, rows[i], cols[i]) <= 0:
             end -= 1
         points[end, 0] = rows[i]
         points[end, 1] = cols[i]
@@ -76,14 +76,14 @@ def hulls_of_points(offset, points):
     for v in range(offset.size - 1):
         low, high = offset[v], offset[v + 1]
         # Only the first and the last point of a row belong to the left and the right chain.
-        for side in (-1, 1):
+        for hand in (-1, 1):
             count = 0
             for i in range(low, high):
-                beside = i + side
+                beside = i + hand
                 if beside < low or beside >= high or points[i, 0] != points[beside, 0]:
                     rows[count], cols[count] = points[i, 0], points[i, 1]
                     count += 1
-            end = chain(rows, cols, count, side, hulls, end)
+            end = chain(rows, cols, count, hand, hulls, end)
         start[v + 1] = end
     return start, hulls[:end].copy()
 

@@ -97,7 +97,7 @@ def near_enough(u, v, hull_start, hull_points, limit):
 
 
 @njit(cache=True, nogil=True)
-def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
+def possible_survivors(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
     """Return which of two vertices may survive their merging, or UNDECIDED.
 
     The caller has found that the common box of the fields is too large to decide.
@@ -126,24 +126,26 @@ def ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
             return UNDECIDED
         near = near_enough(u, v, hull_start, hull_points, limit)
         return EITHER_MAY_SURVIVE if near else 0
-    way = 0
+    survivors = 0
     if far_corner(cells, u, boxes, v) < limit:
-        way |= FIRST_MAY_SURVIVE
+        survivors |= FIRST_MAY_SURVIVE
     elif hull_start.size == 0:
         return UNDECIDED
     elif field_within(cells, u, hull_start, hull_points, v, limit):
-        way |= FIRST_MAY_SURVIVE
+        survivors |= FIRST_MAY_SURVIVE
     if far_corner(cells, v, boxes, u) < limit:
-        way |= SECOND_MAY_SURVIVE
+        survivors |= SECOND_MAY_SURVIVE
     elif hull_start.size == 0:
         return UNDECIDED
     elif field_within(cells, v, hull_start, hull_points, u, limit):
-        way |= SECOND_MAY_SURVIVE
-    return way
+        survivors |= SECOND_MAY_SURVIVE
+    return survivors
 
 
 @njit(cache=True, nogil=True)
-def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed, keys, ways, best):
+def contractible(
+    origin, base_edge, vertices, hulls, level, linkage, limit, seed, keys, survivors_of_edge, best
+):
     """Fill `keys` with the contractible edges; return their number, or UNDECIDED without hulls.
 
     The attribute by which edges are matched is the longer side of the box round both fields: small
@@ -159,12 +161,12 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
     level
         Number of the level.
     linkage, limit
-        See `ways_of`.
+        See `possible_survivors`.
     seed
         uint64, orders equal attributes.
     keys
         uint64 (n_edges,), filled in.
-    ways
+    survivors_of_edge
         uint8 (n_edges,), receives which end of an edge may survive.
     best
         uint64 (n_vertices,), receives the least key of each vertex.
@@ -184,16 +186,18 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
             continue
         height = np.int64(max(boxes[u, 2], boxes[v, 2]) - min(boxes[u, 0], boxes[v, 0]))
         width = np.int64(max(boxes[u, 3], boxes[v, 3]) - min(boxes[u, 1], boxes[v, 1]))
-        way = EITHER_MAY_SURVIVE
+        survivors = EITHER_MAY_SURVIVE
         if spread * (height * height + width * width) >= limit:
-            way = ways_of(u, v, cells, boxes, hull_start, hull_points, linkage, limit)
-            if way == UNDECIDED:
+            survivors = possible_survivors(
+                u, v, cells, boxes, hull_start, hull_points, linkage, limit
+            )
+            if survivors == UNDECIDED:
                 return UNDECIDED
-            if way == 0:
+            if survivors == 0:
                 continue
         key = make_key(max(height, width), base_edge[e], seed, e)
         keys[count] = key
-        ways[e] = way
+        survivors_of_edge[e] = survivors
         best[u] = min(best[u], key)
         best[v] = min(best[v], key)
         count += 1
@@ -201,13 +205,13 @@ def contractible(origin, base_edge, vertices, hulls, level, linkage, limit, seed
 
 
 @njit(cache=True, nogil=True)
-def open_candidates(origin, base_edge, arcs, ranks, seed, keys, ways, best):
+def open_candidates(origin, base_edge, arcs, ranks, seed, keys, survivors_of_edge, best):
     """Fill `keys` with some arcs in the order of their ranks; let either end of each survive.
 
     `arcs`, int64 (n,), are edges, `ranks`, int64 (n,), their attributes, at most `ATTRIBUTE_MAX`,
     the least first; `origin`, int32 (2 n_edges,), and `base_edge`, int32 (n_edges,), are those of
-    the darts, `seed` orders equal ranks. Out: `keys`, uint64 (n,); `ways`, uint8 by edge, which end
-    may survive; `best`, uint64 by vertex, its least key.
+    the darts, `seed` orders equal ranks. Out: `keys`, uint64 (n,); `survivors_of_edge`, uint8 by
+    edge, which end may survive; `best`, uint64 by vertex, its least key.
     """
     for v in range(best.size):
         best[v] = _NO_KEY
@@ -215,7 +219,7 @@ def open_candidates(origin, base_edge, arcs, ranks, seed, keys, ways, best):
         edge = arcs[i]
         key = make_key(ranks[i], base_edge[edge], seed, edge)
         keys[i] = key
-        ways[edge] = EITHER_MAY_SURVIVE
+        survivors_of_edge[edge] = EITHER_MAY_SURVIVE
         for dart in (2 * edge, 2 * edge + 1):
             end = np.uint32(origin[dart])
             best[end] = min(best[end], key)
@@ -262,12 +266,12 @@ def match(origin, keys, best, matched, rest):
 
 
 @njit(cache=True, nogil=True)
-def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
+def join_leaves(origin, keys, survivors_of_edge, matched, best, parent, kernel_dart):
     """Let every vertex without a partner join the best matched neighbour that may survive it.
 
     Parameters
     ----------
-    origin, keys, ways
+    origin, keys, survivors_of_edge
         See `contractible`.
     matched
         int32 (n_vertices,), from `match`.
@@ -286,11 +290,11 @@ def join_leaves(origin, keys, ways, matched, best, parent, kernel_dart):
         v = np.uint32(origin[dart + np.uint64(1)])
         if matched[v] >= 0 and matched[u] >= 0:
             continue
-        if matched[v] < 0 and ways[edge] & FIRST_MAY_SURVIVE and key < best[v]:
+        if matched[v] < 0 and survivors_of_edge[edge] & FIRST_MAY_SURVIVE and key < best[v]:
             best[v] = key
             parent[v] = u
             kernel_dart[v] = dart
-        elif matched[u] < 0 and ways[edge] & SECOND_MAY_SURVIVE and key < best[u]:
+        elif matched[u] < 0 and survivors_of_edge[edge] & SECOND_MAY_SURVIVE and key < best[u]:
             best[u] = key
             parent[u] = v
             kernel_dart[u] = dart + np.uint64(1)
@@ -324,15 +328,18 @@ def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
 
 
 @njit(cache=True, nogil=True)
-def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, seed, stars):
+def select_stars(
+    darts_origin, base_edge, keys, survivors_of_edge, matched, best, vertices, seed, stars
+):
     """Fill in the stars of a maximal matching (MIES): the parent of each vertex and the dart to it.
 
-    A matched edge whose ends both gained leaves is dropped, so that no tree has diameter three. In
-    a pair without leaves, the vertex with the smaller merged radius survives; the hash breaks ties.
+    A matched edge whose endpoints both gained leaves is dropped, so that no tree has diameter
+    three. In a pair without leaves, the vertex with the smaller merged radius survives; the hash
+    breaks ties.
 
     Parameters
     ----------
-    darts_origin, base_edge, keys, ways, vertices, seed
+    darts_origin, base_edge, keys, survivors_of_edge, vertices, seed
         See `contractible`.
     matched, best
         See `join_leaves`.
@@ -346,7 +353,7 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
         parent[v] = v
         kernel_dart[v] = -1
         has_leaf[v] = False
-    join_leaves(darts_origin, keys, ways, matched, best, parent, kernel_dart)
+    join_leaves(darts_origin, keys, survivors_of_edge, matched, best, parent, kernel_dart)
     for v in range(matched.size):
         if parent[v] != v:
             has_leaf[np.uint32(parent[v])] = True
@@ -357,25 +364,25 @@ def select_stars(darts_origin, base_edge, keys, ways, matched, best, vertices, s
         u, v = np.uint32(darts_origin[2 * edge]), np.uint32(darts_origin[2 * edge + 1])
         if u != end:
             continue
-        way = ways[edge]
+        survivors = survivors_of_edge[edge]
         if has_leaf[u] and has_leaf[v]:
             continue
         if has_leaf[u]:
-            way &= FIRST_MAY_SURVIVE
+            survivors &= FIRST_MAY_SURVIVE
         elif has_leaf[v]:
-            way &= SECOND_MAY_SURVIVE
-        elif way == EITHER_MAY_SURVIVE:
+            survivors &= SECOND_MAY_SURVIVE
+        elif survivors == EITHER_MAY_SURVIVE:
             reach_u = max(far_corner(cells, u, boxes, v), far_corner(cells, u, boxes, u))
             reach_v = max(far_corner(cells, v, boxes, u), far_corner(cells, v, boxes, v))
             coin = make_key(0, base_edge[edge], seed, 0) >> np.uint64(30) & np.uint64(1)
             if reach_u < reach_v or (reach_u == reach_v and coin):
-                way = FIRST_MAY_SURVIVE
+                survivors = FIRST_MAY_SURVIVE
             else:
-                way = SECOND_MAY_SURVIVE
-        if way == FIRST_MAY_SURVIVE:
+                survivors = SECOND_MAY_SURVIVE
+        if survivors == FIRST_MAY_SURVIVE:
             parent[v] = u
             kernel_dart[v] = 2 * edge
-        elif way == SECOND_MAY_SURVIVE:
+        elif survivors == SECOND_MAY_SURVIVE:
             parent[u] = v
             kernel_dart[u] = 2 * edge + 1
 

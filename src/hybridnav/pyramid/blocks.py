@@ -103,12 +103,12 @@ def _inside(power: int, along: int, across: int, *, upright: bool) -> int:
 
 def make_templates() -> Templates:
     """Fill the tables."""
-    powers, side = MAX_POWER + 1, 1 << MAX_POWER
+    powers, width = MAX_POWER + 1, 1 << MAX_POWER
     vertex_end = np.full((powers, _PERIOD, _PERIOD), SURVIVES, np.uint8)
     parent_rows = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
     parent_cols = np.zeros((powers, _PERIOD, _PERIOD), np.int64)
-    inside_east = np.zeros((powers, side, side), np.uint8)
-    inside_north = np.zeros((powers, side, side), np.uint8)
+    inside_east = np.zeros((powers, width, width), np.uint8)
+    inside_north = np.zeros((powers, width, width), np.uint8)
     for power, row, col in np.ndindex(powers, _PERIOD, _PERIOD):
         by_row, by_col = _death(row), _death(col)
         if by_col <= min(power, by_row):
@@ -117,11 +117,13 @@ def make_templates() -> Templates:
         elif by_row <= power:
             vertex_end[power, row, col] = 2 * by_row
             parent_rows[power, row, col] = survivor_at(by_row, row) - row
-    for power, row, col in np.ndindex(powers, side, side):
+    for power, row, col in np.ndindex(powers, width, width):
         inside_east[power, row, col] = _inside(power, col, row, upright=True)
         inside_north[power, row, col] = _inside(power, row, col, upright=False)
     across_east, across_north = (
-        np.array([[_across(p, i, upright=u) for i in range(side)] for p in range(powers)], np.uint8)
+        np.array(
+            [[_across(p, i, upright=u) for i in range(width)] for p in range(powers)], np.uint8
+        )
         for u in (True, False)
     )
     return Templates(

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
 
 
-__all__ = ["cell_pairs", "ends_of", "find_cracks", "middles_of", "sides_of"]
+__all__ = ["cell_pairs", "endpoints_of", "find_cracks", "middles_of", "sides_of"]
 
 
-def ends_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
+def endpoints_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
     """Return the two flat cells of each base edge, the lower one first."""
     first = base_edges >> 1
     return first, first + np.where(base_edges & 1, cols, 1)
@@ -23,7 +23,7 @@ def ends_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
 
 def cell_pairs(base_edges: LongArray, cols: int) -> LongArray:
     """Return the two cells of each base edge, int64 (n, 2, 2), (row, col)."""
-    flat = np.stack(ends_of(base_edges, cols), axis=1)
+    flat = np.stack(endpoints_of(base_edges, cols), axis=1)
     return np.stack(divmod(flat, cols), axis=-1)
 
 

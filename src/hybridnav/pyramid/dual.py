@@ -50,8 +50,8 @@ class DualGraph:
 
     @property
     def edges(self) -> LongArray:
-        """int64 (n_arcs, 2), the faces on the right of darts 2a and 2a + 1: the ends of the dual
-        edge that crosses arc a."""
+        """int64 (n_arcs, 2), the faces on the right of darts 2a and 2a + 1: the endpoints of the
+        dual edge that crosses arc a."""
         return self.face_of.reshape(-1, 2)
 
     @classmethod

@@ -1,7 +1,8 @@
 """The expansion rating: the steering by which regions grow out of places.
 
 M. Holtgrewe, P. Sanders, C. Schulz: Engineering a scalable high quality graph partitioner, IPDPS
-2010, where the rating of an edge is its squared weight over the product of the weights of its ends.
+2010, where the rating of an edge is its squared weight over the product of the weights of its
+endpoints.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ class Expansion:
 
     The rating of an arc is the squared length of what two fields have in common, over the product
     of their areas. The length is that of all arcs between the two, in cracks: merging two fields
-    takes all of them away. An arc waits while another one at either of its ends is rated more than
-    twice as high, so that the order is nearly that of one contraction at a time.
+    takes all of them away. An arc waits while another one at either of its endpoints is rated more
+    than twice as high, so that the order is nearly that of one contraction at a time.
 
     Parameters
     ----------
@@ -59,17 +60,17 @@ class Expansion:
         self, _field_of: Callable[[], IntArray], darts: Darts, vertices: Vertices
     ) -> tuple[LongArray, LongArray]:
         """Return the arcs that no better one keeps waiting, the greatest rating first."""
-        ends = darts.origin.reshape(-1, 2)
-        u, v = ends.T
+        endpoints = darts.origin.reshape(-1, 2)
+        u, v = endpoints.T
         kinds, areas = vertices.classes, self._areas
         may = (u != v) & (kinds[u] == kinds[v]) & (areas[u] + areas[v] <= self._most_cells)
-        ratings = self._ratings = np.zeros(len(ends))
-        ratings[may] = self._rated(ends[may])
+        ratings = self._ratings = np.zeros(len(endpoints))
+        ratings[may] = self._rated(endpoints[may])
         best = np.zeros(len(areas))
-        np.maximum.at(best, ends, ratings[:, None])
+        np.maximum.at(best, endpoints, ratings[:, None])
         self._levels += 1
         share = 0.5 if self._levels <= _PATIENCE else 0.0
-        arcs = np.flatnonzero(may & (ratings >= share * best[ends].max(axis=1, initial=0.0)))
+        arcs = np.flatnonzero(may & (ratings >= share * best[endpoints].max(axis=1, initial=0.0)))
         _, rank = np.unique(-ratings[arcs], return_inverse=True)
         return arcs, rank * ATTRIBUTE_MAX // max(int(rank.max(initial=0)), ATTRIBUTE_MAX)
 
@@ -83,29 +84,29 @@ class Expansion:
 
     def merge(self, merged_into: IntArray, n_vertices: int) -> None:
         """Add up the areas of the fields, and the boundaries between them."""
-        ends = merged_into[np.stack(np.divmod(self._keys, len(self._areas)), axis=1)]
-        apart = ends[:, 0] != ends[:, 1]
+        endpoints = merged_into[np.stack(np.divmod(self._keys, len(self._areas)), axis=1)]
+        apart = endpoints[:, 0] != endpoints[:, 1]
         areas = np.zeros(n_vertices, dtype=np.int64)
         np.add.at(areas, merged_into, self._areas)
         self._areas = areas
-        self._keys, self._lengths = self._joined(ends[apart], self._lengths[apart])
+        self._keys, self._lengths = self._joined(endpoints[apart], self._lengths[apart])
 
-    def _rated(self, ends: IntArray) -> FloatArray:
+    def _rated(self, endpoints: IntArray) -> FloatArray:
         """Return the rating of arcs, int32 (n, 2), between different fields."""
-        at = np.searchsorted(self._keys, self._keys_of(ends))
-        area = self._areas[ends].astype(np.float64)
+        at = np.searchsorted(self._keys, self._keys_of(endpoints))
+        area = self._areas[endpoints].astype(np.float64)
         ratings: FloatArray = self._lengths[at] ** 2 / (area[:, 0] * area[:, 1])
         return ratings
 
-    def _joined(self, ends: IntArray, lengths: LongArray) -> tuple[LongArray, LongArray]:
+    def _joined(self, endpoints: IntArray, lengths: LongArray) -> tuple[LongArray, LongArray]:
         """Return the pairs of fields that have boundaries, and the length of all of each pair."""
-        keys, of_key = np.unique(self._keys_of(ends), return_inverse=True)
+        keys, of_key = np.unique(self._keys_of(endpoints), return_inverse=True)
         total = np.zeros(len(keys), dtype=np.int64)
         np.add.at(total, of_key, lengths)
         return keys, total
 
-    def _keys_of(self, ends: IntArray) -> LongArray:
+    def _keys_of(self, endpoints: IntArray) -> LongArray:
         """Return one number for each pair of vertices, in either order."""
-        low, high = np.sort(ends.astype(np.int64), axis=1).T
+        low, high = np.sort(endpoints.astype(np.int64), axis=1).T
         keys: LongArray = low * len(self._areas) + high
         return keys

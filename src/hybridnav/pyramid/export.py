@@ -24,7 +24,10 @@ Node = tuple[int, dict[str, Any]]
 
 
 def multigraph(
-    about: dict[str, Any], nodes: Iterable[Node], ends: IntArray | LongArray, **columns: list[Any]
+    about: dict[str, Any],
+    nodes: Iterable[Node],
+    endpoints: IntArray | LongArray,
+    **columns: list[Any],
 ) -> nx.MultiGraph[int]:
     """Return a multigraph with an edge for each arc, parallel arcs and self-loops included.
 
@@ -34,7 +37,7 @@ def multigraph(
         Attributes of the graph.
     nodes
         Nodes with their attributes.
-    ends
+    endpoints
         int (n_arcs, 2), the nodes that each arc joins; the key of an edge is the index of its arc.
     columns
         Attributes of the edges, a value for each arc.
@@ -43,7 +46,7 @@ def multigraph(
 
     graph: nx.MultiGraph[int] = MultiGraph(**about)
     graph.add_nodes_from(nodes)
-    for arc, (pair, *values) in enumerate(zip(ends.tolist(), *columns.values(), strict=True)):
+    for arc, (pair, *values) in enumerate(zip(endpoints.tolist(), *columns.values(), strict=True)):
         graph.add_edge(pair[0], pair[1], key=arc, **dict(zip(columns, values, strict=True)))
     return graph
 

@@ -11,7 +11,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels, _hull_kernels
-from hybridnav.pyramid.cracks import cell_pairs, ends_of, middles_of, sides_of
+from hybridnav.pyramid.cracks import cell_pairs, endpoints_of, middles_of, sides_of
 from hybridnav.pyramid.dual import DualGraph, FaceKind
 from hybridnav.pyramid.export import multigraph, vertices_with_attributes
 from hybridnav.pyramid.record import SURVIVES
@@ -329,7 +329,7 @@ class Level:
         """
         distance = field_distances(self._grid.classes, self._labels[0], self._labels[1])
         edges, arc = self.boundary_table
-        first, second = ends_of(edges, self._grid.shape[1])
+        first, second = endpoints_of(edges, self._grid.shape[1])
         across = distance[first] + distance[second] + STRAIGHT
         least = np.full(self.n_arcs, np.iinfo(np.int64).max)
         np.minimum.at(least, arc, across)
@@ -414,8 +414,8 @@ class Level:
         cell = base_edge >> 1
         where = field_of[cell], field_of, self._record.edge_end, self.index, cols, came
         faces = cell, cell - (1 if base_edge & 1 else cols)
-        ways = [_field_kernels.way_to_rim(face, *where) for face in faces]
-        return np.concatenate([*ways, [base_edge]])
+        parts = [_field_kernels.edges_to_rim(face, *where) for face in faces]
+        return np.concatenate([*parts, [base_edge]])
 
 
 def _frozen(array: _Array) -> _Array:

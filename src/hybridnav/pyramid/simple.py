@@ -146,7 +146,8 @@ def report_of(arcs: IntArray, n_vertices: int) -> SimpleGraphReport:
 
 
 def _groups(arcs: IntArray, mask: BoolArray) -> list[ArcGroup]:
-    """Return the arcs of a mask in groups with the same two ends, in the order of the ends."""
+    """Return the arcs of a mask in groups with the same two endpoints, in the order of the
+    endpoints."""
     index: LongArray = np.flatnonzero(mask)
     pairs, group_of = np.unique(np.sort(arcs[index], axis=1), axis=0, return_inverse=True)
     order = np.argsort(group_of.ravel(), kind="stable")

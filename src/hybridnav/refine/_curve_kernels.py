@@ -1,7 +1,7 @@
 """Kernels of the shortest curves of a vehicle with a turning circle, forwards or both ways.
 
-A word is a row of pieces: kinds (1 for an arc to the left, 0 for straight on, -1 to the right) and
-signed lengths, negative backwards, in turning radii unless stated otherwise. Poses are x, y in
+A word is a row of segments: kinds (1 for an arc to the left, 0 for straight on, -1 to the right)
+and signed lengths, negative backwards, in turning radii unless stated otherwise. Poses are x, y in
 turning radii and phi in radians; `sine` and `cosine` are those of phi. The functions of words take
 `kinds` and `lengths`, int64 and float64 (5,), of the best word so far, its length `best`, and
 whether to mirror the word and to flip its direction.
@@ -31,13 +31,13 @@ def _forward(angle):
 
 @njit(cache=True, nogil=True)
 def _wrapped(angle):
-    """Bring an angle to [-pi, pi]; for the two ends, return the upper one."""
+    """Bring an angle to [-pi, pi]; for the two endpoints, return the upper one."""
     angle -= _FULL * np.rint(angle / _FULL)
     return angle + _FULL if angle < -math.pi + _ROUNDING else angle
 
 
 @njit(cache=True, nogil=True)
-def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
+def _take(kinds, lengths, best, mirror, flip, back, word, segments):
     """Keep a word if it is shorter than the best one; return the lesser length.
 
     Parameters
@@ -50,18 +50,18 @@ def _take(kinds, lengths, best, mirror, flip, back, word, pieces):
         -1 for a word that is mirrored, or driven in the other direction; else 1.
     back
         Whether it is driven from its end.
-    word, pieces
-        Kinds and signed lengths of its pieces.
+    word, segments
+        Kinds and signed lengths of its segments.
     """
     total = 0.0
-    for piece in pieces:
-        total += abs(piece)
+    for segment in segments:
+        total += abs(segment)
     if total >= best:
         return best
-    n = len(pieces)
+    n = len(segments)
     for i in range(n):
         j = n - 1 - i if back else i
-        kinds[j], lengths[j] = mirror * word[i], flip * pieces[i]
+        kinds[j], lengths[j] = mirror * word[i], flip * segments[i]
     for i in range(n, 5):
         kinds[i], lengths[i] = 0, 0.0
     return total
@@ -109,7 +109,7 @@ def _tau_omega(u, v, xi, eta, phi):
 
 
 @njit(cache=True, nogil=True)
-def _three_pieces(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
+def _three_segments(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     """Try the words of an arc, a straight line and an arc; return the least length.
 
     Parameters
@@ -144,7 +144,7 @@ def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     Parameters
     ----------
     x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip
-        See `_three_pieces`.
+        See `_three_segments`.
     """
     xi, eta = x + sine, y - 1 - cosine
     squared = xi * xi + eta * eta
@@ -172,7 +172,7 @@ def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     Parameters
     ----------
     x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip
-        See `_three_pieces`.
+        See `_three_segments`.
     """
     quarter = math.pi / 2
     xi, eta = x + sine, y - 1 - cosine
@@ -183,8 +183,8 @@ def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
             t = _wrapped(math.atan2((4 - u) * xi - 2 * eta, -2 * xi + (u - 4) * eta))
             v = _wrapped(t - phi)
             if t >= -_ROUNDING and v >= -_ROUNDING:
-                word, pieces = (1, -1, 0, 1, -1), (t, -quarter, u, -quarter, v)
-                best = _take(kinds, lengths, best, mirror, flip, False, word, pieces)
+                word, segments = (1, -1, 0, 1, -1), (t, -quarter, u, -quarter, v)
+                best = _take(kinds, lengths, best, mirror, flip, False, word, segments)
     return best
 
 
@@ -197,7 +197,7 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     Parameters
     ----------
     x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip
-        See `_three_pieces`.
+        See `_three_segments`.
     back
         Whether the word is driven from its end.
     """
@@ -216,16 +216,16 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
         t = _wrapped(angle + math.atan2(r, -2.0))
         v = _wrapped(phi - quarter - t)
         if t >= -_ROUNDING and u <= _ROUNDING and v <= _ROUNDING:
-            word, pieces = (1, -1, 0, 1), (t, -quarter, u, v)
-            best = _take(kinds, lengths, best, mirror, flip, back, word, pieces)
+            word, segments = (1, -1, 0, 1), (t, -quarter, u, v)
+            best = _take(kinds, lengths, best, mirror, flip, back, word, segments)
     xi, eta = x + sine, y - 1 - cosine
     distance = math.sqrt(xi * xi + eta * eta)
     if distance >= 2:
         u, t = 2 - distance, math.atan2(xi, -eta)
         v = _wrapped(t + quarter - phi)
         if t >= -_ROUNDING and v <= _ROUNDING:
-            word, pieces = (1, -1, 0, -1), (t, -quarter, u, v)
-            best = _take(kinds, lengths, best, mirror, flip, back, word, pieces)
+            word, segments = (1, -1, 0, -1), (t, -quarter, u, v)
+            best = _take(kinds, lengths, best, mirror, flip, back, word, segments)
     return best
 
 
@@ -242,7 +242,7 @@ def _reeds_shepp(x, y, phi, kinds, lengths):
         for mirror in (1, -1):
             a, b, turn, turn_sine = flip * x, mirror * y, flip * mirror * phi, flip * mirror * sine
             pose = (a, b, turn, turn_sine, cosine)
-            best = _three_pieces(*pose, kinds, lengths, best, mirror, flip)
+            best = _three_segments(*pose, kinds, lengths, best, mirror, flip)
             best = _four_arcs(*pose, kinds, lengths, best, mirror, flip)
             best = _quarter_turns(*pose, kinds, lengths, best, mirror, flip)
             best = _turned(*pose, kinds, lengths, best, mirror, flip, False)
@@ -254,7 +254,7 @@ def _reeds_shepp(x, y, phi, kinds, lengths):
 
 @njit(cache=True, nogil=True)
 def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
-    """Find the shortest curve between two poses; return the number of its pieces.
+    """Find the shortest curve between two poses; return the number of its segments.
 
     It is 0 for poses that are not finite or have headings beyond `LARGEST_HEADING`.
 
@@ -265,7 +265,7 @@ def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
     radius
         Turning radius, in the unit of the positions.
     reverses
-        Whether backward pieces are allowed.
+        Whether backward segments are allowed.
     kinds
         int64 (5,), receives 1 for an arc to the left, 0 for straight on, -1 for one to the right.
     lengths

@@ -46,7 +46,7 @@ def _add(string, size, row, col):
 
 
 @njit(cache=True, nogil=True)
-def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
+def _detour(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     """Walk cells straight from u to w, and round obstacles always on one hand.
 
     After V. Lumelsky, A. Stepanov: Path-planning strategies for a point mobile automaton, 1987
@@ -80,7 +80,7 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
     string[0, 0], string[0, 1], string[0, 2] = u_row, u_col, 1.0
     per_row = 1 / to_row if to_row != 0.0 else np.inf
     per_col = 1 / to_col if to_col != 0.0 else np.inf
-    row_side, col_side = (to_row > 0) - u_row, (to_col > 0) - u_col
+    row_ahead, col_ahead = (to_row > 0) - u_row, (to_col > 0) - u_col
     row_turn, col_turn = 1 if to_row > 0 else 3, 0 if to_col > 0 else 2
     reach = (abs(to_row) + abs(to_col)) / 2
     size, last, hit, follows, heading = 1, -1, 0.0, False, 0
@@ -104,19 +104,19 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
             heading = (heading - hand) & 3
         else:
             # Share of the line at which it leaves the cell.
-            at_row = (row + row_side) * per_row if to_row != 0.0 else np.inf
-            at_col = (col + col_side) * per_col if to_col != 0.0 else np.inf
+            at_row = (row + row_ahead) * per_row if to_row != 0.0 else np.inf
+            at_col = (col + col_ahead) * per_col if to_col != 0.0 else np.inf
             at = min(at_row, at_col)
             if at >= 1.0 - 1e-12:
                 string[size, 0], string[size, 1], string[size, 2] = w_row, w_col, 1.0
                 return size + 1, step
             heading = row_turn if at_row < at_col else col_turn
-        free_way = False
+        is_free = False
         for _ in range(4):
             n_row = row + (heading == 1) - (heading == 3)
             n_col = col + (heading == 0) - (heading == 2)
             if 0 <= n_row < rows and 0 <= n_col < cols and (marks[n_row, n_col] >= FREE):
-                free_way = True
+                is_free = True
                 break
             if not follows:
                 follows, hit, last = True, at + 0.5 / distance, -1
@@ -124,7 +124,7 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
                 hit_col = min(max(u_col + at * to_col, float(col)), col + 1.0)
                 size = _add(string, size, hit_row, hit_col)
             heading = (heading + hand) & 3
-        if not free_way:
+        if not is_free:
             return 0, step
         if follows:
             if heading != last:
@@ -132,8 +132,8 @@ def _way_round(marks, string, u_row, u_col, w_row, w_col, limit, hand):
                 last = heading
             from_row, from_col = n_row + 0.5 - u_row, n_col + 0.5 - u_col
             d_row, d_col = from_row - to_row, from_col - to_col
-            way = math.sqrt(from_row * from_row + from_col * from_col)
-            if way + math.sqrt(d_row * d_row + d_col * d_col) > limit:
+            near = math.sqrt(from_row * from_row + from_col * from_col)
+            if near + math.sqrt(d_row * d_row + d_col * d_col) > limit:
                 return 0, step
         row, col = n_row, n_col
     return 0, step
@@ -172,24 +172,30 @@ def improve(marks, string, n, budget):
             for hand in (1, -1):
                 if budget <= 0:
                     return string, n
-                size, steps = _way_round(marks, room, u_row, u_col, w_row, w_col, length, hand)
+                size, steps = _detour(marks, room, u_row, u_col, w_row, w_col, length, hand)
                 budget -= steps + 20
                 if size == 0:
                     continue
                 budget -= 10 * size
-                way, size = tighten(marks, room[:size].copy(), size)
-                if _length(way, 0, size - 1) > length - 1e-9:
+                detour, size = tighten(marks, room[:size].copy(), size)
+                if _length(detour, 0, size - 1) > length - 1e-9:
                     continue
                 legal = True
                 for k in range(size - 1):
                     legal = legal and is_legal(
-                        marks, way[k, 0], way[k, 1], way[k + 1, 0], way[k + 1, 1], FREE, FREE
+                        marks,
+                        detour[k, 0],
+                        detour[k, 1],
+                        detour[k + 1, 0],
+                        detour[k + 1, 1],
+                        FREE,
+                        FREE,
                     )
                 if not legal:
                     continue
                 larger = np.empty((n - span + size - 1, 3))
                 larger[:i] = string[:i]
-                larger[i : i - 1 + size] = way[1:size]
+                larger[i : i - 1 + size] = detour[1:size]
                 larger[i - 1 + size :] = string[j + 1 : n]
                 larger[:, 2] = 1.0
                 string, n = tighten(marks, larger, larger.shape[0])

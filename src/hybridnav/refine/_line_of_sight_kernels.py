@@ -45,7 +45,7 @@ def shorten(marks, cells, metres, origin, per_metre, corner_cutting):
     blocked cells the string is cut there, and its parts are shortened one by one.
     """
     n = cells.shape[0]
-    points, string, ends = np.empty((64, 2)), np.empty((64, 3)), np.empty((2, 2))
+    points, string, endpoints = np.empty((64, 2)), np.empty((64, 3)), np.empty((2, 2))
     for end in range(2):
         x, y = metres[end, 0] - origin[0], metres[end, 1] - origin[1]
         for k in range(2):
@@ -55,8 +55,8 @@ def shorten(marks, cells, metres, origin, per_metre, corner_cutting):
                 return points[:0]
             # Few enough digits for exact tests; a point outside the cell by rounding moves to its
             # rim.
-            ends[end, k] = min(max(np.rint(position * 2.0**24) / 2.0**24, low), low + 1)
-    string[0, :2] = ends[0]
+            endpoints[end, k] = min(max(np.rint(position * 2.0**24) / 2.0**24, low), low + 1)
+    string[0, :2] = endpoints[0]
     found, size = 0, 1
     for i in range(1, n):
         row, col = cells[i, 0], cells[i, 1]
@@ -80,7 +80,7 @@ def shorten(marks, cells, metres, origin, per_metre, corner_cutting):
         if i < n - 1 and bends:
             string[size, 0], string[size, 1] = row + 0.5, col + 0.5
             size += 1
-    string[size, :2] = ends[1]
+    string[size, :2] = endpoints[1]
     budget = _STEPS + _STEPS_PER_CELL * n
     points, found = _finish(marks, string, size + 1, budget, points, found)
     if found == 1 and (metres[0, 0] != metres[1, 0] or metres[0, 1] != metres[1, 1]):

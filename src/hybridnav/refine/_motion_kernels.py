@@ -300,7 +300,7 @@ def body_steers(
     radius
         Turning radius in metres.
     reverses
-        Whether backward pieces are allowed.
+        Whether backward segments are allowed.
     """
     kinds, lengths = np.empty(5, np.int64), np.empty(5)
     n = shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths)

@@ -24,7 +24,7 @@ def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
     marks
         uint8 (rows, cols), mark of each cell.
     a_row, a_col, b_row, b_col
-        Different positions in the map, the ends of the segment.
+        Different positions in the map, the endpoints of the segment.
     stand
         The least mark of a cell that may be stood on.
     pass_by
@@ -66,9 +66,9 @@ def is_legal(marks, a_row, a_col, b_row, b_col, stand, pass_by):
         if row == last_row and col == last_col:
             return True
         # The side of the segment on which the corner ahead lies.
-        side = turn * turn_of(a_row, a_col, b_row, b_col, row + 0.0 + up, col + 1.0)
-        if side == 0 and marks[row, col + 1] < pass_by and marks[row + turn, col] < pass_by:
+        hand = turn * turn_of(a_row, a_col, b_row, b_col, row + 0.0 + up, col + 1.0)
+        if hand == 0 and marks[row, col + 1] < pass_by and marks[row + turn, col] < pass_by:
             return False
-        row += turn * (side >= 0)
-        col += side <= 0
+        row += turn * (hand >= 0)
+        col += hand <= 0
     return False

@@ -53,8 +53,8 @@ def _critical(part, square, low, high, headings):
     i = part.shape[0] - 1
     for j in range(part.shape[0]):
         radius, angle = math.hypot(part[j, 0], part[j, 1]), math.atan2(part[j, 1], part[j, 0])
-        for side in range(2):
-            row, col = square[0] + side, square[1] + side
+        for offset in range(2):
+            row, col = square[0] + offset, square[1] + offset
             if abs(row) < radius:
                 at = math.asin(row / radius)
                 count = _note(headings, count, at - angle, low, high)

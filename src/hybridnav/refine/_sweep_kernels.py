@@ -203,9 +203,9 @@ def _hull(before, after, first, last):
 def rows_seen(rows, before, after, first, last, margin, moves, columns):
     """Fill in the columns of the hull of a convex polygon in two places; return its rows.
 
-    Each row of cells sees one run of columns of the hull. If the polygon does not turn, the ends of
-    a run are those of its edges and of the lines that its corners move on; if it turns, an edge of
-    the hull may join two different corners.
+    Each row of cells sees one run of columns of the hull. If the polygon does not turn, the
+    endpoints of a run are those of its edges and of the lines that its corners move on; if it
+    turns, an edge of the hull may join two different corners.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Kernels of taut strings: cell paths pulled tight, exactly, round blocked corners.
 
 Positions are (row, col) in grid units: cell (r, c) spans [r, r + 1] x [c, c + 1], so corners are
-whole numbers, centres are halves and only the two ends of a path can be anything else; they are
-rounded to 2^-24 of a cell. Differences of such numbers fit a float64 on any map below 2^28 cells
-across, and products are compared with their rounding errors: every turn is decided exactly.
+whole numbers, centres are halves and only the two endpoints of a path can be anything else; they
+are rounded to 2^-24 of a cell. Differences of such numbers fit a float64 on any map below 2^28
+cells across, and products are compared with their rounding errors: every turn is decided exactly.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ def marks_of(free):
 
 @njit(cache=True, nogil=True)
 def _faces(d_row, d_col, kind):
-    """Return the side of a direction on which the blocked cell of a touched corner lies."""
+    """Return the hand of a direction, 1 for the left, on which the blocked cell of a touched corner
+    lies."""
     left = d_row if kind & 1 else -d_row
     right = d_col if kind & 2 else -d_col
     return int(left > right) - int(left < right)
@@ -67,7 +68,7 @@ def grown(array, size):
 
 
 @njit(cache=True, nogil=True)
-def _insert(chain, size, side, v_row, v_col, row, col):
+def _insert(chain, size, hand, v_row, v_col, row, col):
     """Put a corner into the chain that holds a string from chain[0] to chain[size - 1].
 
     Parameters
@@ -76,7 +77,7 @@ def _insert(chain, size, side, v_row, v_col, row, col):
         float64 (m, 2) positions, convex towards v and ordered by angle as seen from there; changed.
     size
         Number of its points.
-    side
+    hand
         1 or -1.
     v_row, v_col
         Position v.
@@ -93,7 +94,7 @@ def _insert(chain, size, side, v_row, v_col, row, col):
         middle = (low + high) // 2
         m_row, m_col = chain[middle, 0], chain[middle, 1]
         turn = turn_of(v_row, v_col, m_row, m_col, row, col)
-        if turn == side:
+        if turn == hand:
             low = middle
         elif turn != 0:
             high = middle
@@ -104,17 +105,17 @@ def _insert(chain, size, side, v_row, v_col, row, col):
         else:
             return size
     if not above and (
-        turn_of(chain[low, 0], chain[low, 1], chain[high, 0], chain[high, 1], row, col) != side
+        turn_of(chain[low, 0], chain[low, 1], chain[high, 0], chain[high, 1], row, col) != hand
     ):
         return size
     while high < size - 1 and (
         turn_of(row, col, chain[high, 0], chain[high, 1], chain[high + 1, 0], chain[high + 1, 1])
-        != -side
+        != -hand
     ):
         high += 1
     while low > 0 and (
         turn_of(chain[low - 1, 0], chain[low - 1, 1], chain[low, 0], chain[low, 1], row, col)
-        != -side
+        != -hand
     ):
         low -= 1
     gap = high - low - 1
@@ -152,8 +153,8 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
     chain[0, 0], chain[0, 1] = u_row, u_col
     chain[1, 0], chain[1, 1] = w_row, w_col
     size = 2
-    side = turn_of(u_row, u_col, w_row, w_col, v_row, v_col)
-    if side == 0:
+    hand = turn_of(u_row, u_col, w_row, w_col, v_row, v_col)
+    if hand == 0:
         return size
     uv_row, uv_col, vw_row, vw_col = v_row - u_row, v_col - u_col, w_row - v_row, w_col - v_col
     rows, cols = marks.shape
@@ -161,7 +162,7 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
         if 0 < v_row < rows and 0 < v_col < cols:
             kind = int(marks[int(v_row), int(v_col)]) & (FREE - 1)
             if kind < _KINDS:
-                if _faces(uv_row, uv_col, kind) == -side and _faces(vw_row, vw_col, kind) == -side:
+                if _faces(uv_row, uv_col, kind) == -hand and _faces(vw_row, vw_col, kind) == -hand:
                     return 0
     # The triangle's points from the lowest row to the highest.
     l_row, l_col, m_row, m_col, h_row, h_col = u_row, u_col, v_row, v_col, w_row, w_col
@@ -187,18 +188,18 @@ def _relax(marks, chain, u_row, u_col, v_row, v_col, w_row, w_col):
             if kind >= _KINDS:
                 col += kind - (_KINDS - 1)
                 continue
-            if turn_of(u_row, u_col, w_row, w_col, row, col) == side:
+            if turn_of(u_row, u_col, w_row, w_col, row, col) == hand:
                 turn = turn_of(u_row, u_col, v_row, v_col, row, col)
                 if turn == 0:
                     turn = _faces(uv_row, uv_col, kind)
-                if turn == -side:
+                if turn == -hand:
                     turn = turn_of(v_row, v_col, w_row, w_col, row, col)
                     if turn == 0:
                         turn = _faces(vw_row, vw_col, kind)
-                    if turn == -side:
+                    if turn == -hand:
                         if size == chain.shape[0]:
                             return -1
-                        size = _insert(chain, size, side, v_row, v_col, float(row), float(col))
+                        size = _insert(chain, size, hand, v_row, v_col, float(row), float(col))
             col += 1
     return size
 

@@ -32,11 +32,11 @@ class Curve:
 
     @property
     def length_m(self) -> float:
-        """Metres along the curve, backward pieces counted like forward ones."""
+        """Metres along the curve, backward segments counted like forward ones."""
         return math.fsum(np.abs(self.lengths_m).tolist())
 
     def poses(self, step_m: float) -> FloatArray:
-        """Return poses along the curve, at most a step apart, including the ends of pieces.
+        """Return poses along the curve, at most a step apart, including the endpoints of segments.
 
         Parameters
         ----------
@@ -59,12 +59,12 @@ class Curve:
                 f"step must be a length in metres above 0 and not far below the curve's, "
                 f"got {step_m} on {self.length_m:.3g} m"
             )
-        pieces = [np.array([self.start])]
+        segments = [np.array([self.start])]
         for kind, length_m in zip(self.kinds.tolist(), self.lengths_m.tolist(), strict=True):
             count = math.ceil(abs(length_m) / step_m)
             along = length_m * np.arange(1, count + 1) / max(count, 1)
-            pieces.append(self._ahead(pieces[-1][-1], kind, along))
-        return np.concatenate(pieces)
+            segments.append(self._ahead(segments[-1][-1], kind, along))
+        return np.concatenate(segments)
 
     def _ahead(self, pose: FloatArray, kind: int, along_m: FloatArray) -> FloatArray:
         """Return the poses at some metres along an arc or a straight line."""

@@ -22,7 +22,7 @@ def driven(check: MotionCheck, poses: FloatArray, *, reverses: bool = False) -> 
     """Return the turns and drives of a robot that visits some poses, pose by pose.
 
     The robot drives straight from point to point, forwards if possible. At each point it turns from
-    one drive's heading to the next one's, at the ends from or to the heading of the pose. The
+    one drive's heading to the next one's, at the endpoints from or to the heading of the pose. The
     headings of the poses in between are left out: a robot that can turn to them can turn past them,
     one way round or the other.
 

@@ -338,7 +338,7 @@ def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> tuple[Any, ..
             f"the map is inflated by {grid.robot_radius_m:g} m, but the largest circle about the "
             f"base inside the footprint has a radius of {footprint.inscribed_radius_m:g} m: load "
             "the map with that robot_radius_m (--robot-radius "
-            f"{math.floor(footprint.inscribed_radius_m * 1e4 + 1e-6) / 1e4:g}), or ways that the "
+            f"{math.floor(footprint.inscribed_radius_m * 1e4 + 1e-6) / 1e4:g}), or paths that the "
             "robot can take are closed"
         )
     parts = footprint.convex_parts()

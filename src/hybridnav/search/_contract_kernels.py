@@ -5,8 +5,8 @@ removed one by one. A shortcut is added between two neighbours of a removed corn
 through it may be the only shortest one.
 
 The arcs from one corner are adjacent in a pool, int64 (n, 3): the cost; the head and the classes at
-both ends (see `pack`); the middle, which is the corner that a shortcut leads past or -1, and the
-number of legs. Each arc comes with its reverse.
+both endpoints (see `pack`); the middle, which is the corner that a shortcut leads past or -1, and
+the number of legs. Each arc comes with its reverse.
 
 A *class* groups arcs by the way they leave a corner, and a table states which two classes a
 shortest path may join there: a bend to the wrong side is never on one.
@@ -79,7 +79,7 @@ def _search(graph, node, source, limit, n_wanted, stamp, work):
     stamp
         Number of this search.
     work
-        Records, int64 (n, 3): distance, stamp and class of the way back, stamp of the wanted
+        Records, int64 (n, 3): distance, stamp and class of the path back, stamp of the wanted
         corners; a heap; the most corners to settle. The heap has room for that number times the
         greatest number of arcs from a corner.
     """

@@ -18,7 +18,7 @@ _SAME_GENERATION = 1 << _GENERATION_SHIFT
 GENERATIONS = (1 << (32 - _GENERATION_SHIFT)) - 1
 """Number of searches after which the array of records must be filled with zeros again."""
 
-NO_ROOM = -2
+BUCKET_FULL = -2
 """Returned by `astar` when a bucket of its open list is full."""
 
 # Width of a bucket of the open list, 0.41 of a straight step; a quarter and an eighth of that are
@@ -64,7 +64,7 @@ def forbid(moves, cols, blocked, corner_cutting):
 def astar(
     moves,
     cols,
-    ends,
+    endpoints,
     limit,
     successors,
     detours,
@@ -76,7 +76,7 @@ def astar(
 ):
     """Return the cost of the optimal path between two flat cells in a corridor, and the expansions.
 
-    The cost is -1 if there is no path below `limit`, `NO_ROOM` if a bucket is full.
+    The cost is -1 if there is no path below `limit`, `BUCKET_FULL` if a bucket is full.
 
     The open list is a ring of buckets of f, each a stack of cells: the newest comes first, which
     breaks ties in favour of the deeper cell. A successor in the current bucket is expanded next
@@ -102,7 +102,7 @@ def astar(
     ----------
     moves, cols
         uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
-    ends, limit
+    endpoints, limit
         Flat cells of start and goal, and the integer cost that a path must stay below.
     successors, detours
         Those of `grid_search.move_tables`.
@@ -116,7 +116,7 @@ def astar(
     generation
         Number of this search, below `GENERATIONS`.
     """
-    start, goal = ends
+    start, goal = endpoints
     stamp = np.int64(generation) << _GENERATION_SHIFT
     goal_row, goal_col = goal // cols, goal % cols
     per_col = 1.0 / cols
@@ -177,7 +177,7 @@ def astar(
                     continue
             into &= BUCKETS - 1
             if count[np.uint64(into)] == room:
-                return NO_ROOM, expanded
+                return BUCKET_FULL, expanded
             waiting[np.uint64(into * room + count[np.uint64(into)])] = entry
             count[np.uint64(into)] += 1
             n_waiting += 1
@@ -251,10 +251,10 @@ def field_distances(classes, field_of, sources):
                     if field_of[to] != v:
                         continue
                     if k & 1:
-                        side, other_side = classes[row, to_col], classes[to_row, col]
-                        if side == 0 or other_side == 0:
+                        side_cell, other_side_cell = classes[row, to_col], classes[to_row, col]
+                        if side_cell == 0 or other_side_cell == 0:
                             continue
-                        if free_only and (side != 1 or other_side != 1):
+                        if free_only and (side_cell != 1 or other_side_cell != 1):
                             continue
                     new_cost = cost + (DIAGONAL if k & 1 else STRAIGHT)
                     if distance[to] >= 0 and distance[to] <= new_cost:

@@ -14,6 +14,8 @@ from hybridnav._jit import njit
 
 STRAIGHT = 80782
 DIAGONAL = 114243
+FAR = 1 << 60
+"""More than any path costs; two of them add up without an overflow."""
 
 # Directions in the order east, north-east, north, ... counter-clockwise; odd ones are diagonal.
 ROW_STEP = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int64)

@@ -11,16 +11,16 @@ NO_ARC = -1
 
 
 @njit(cache=True, nogil=True)
-def _unpack(arcs, way, nodes, count):
+def _unpack(arcs, entry, nodes, count):
     """Append the corners on an arc to those of a path, except its tail.
 
-    `way` holds the corner where the arc is entered, the corner where it is left, and the number of
-    the arc, or -1 minus that number if it is passed backwards. Return the corners, a new array if
-    there was no room, and their number.
+    `entry` holds the corner where the arc is entered, the corner where it is left, and the number
+    of the arc, or -1 minus that number if it is passed backwards. Return the corners, a new array
+    if there was no room, and their number.
     """
     first, middles = arcs
     stack = np.empty((64, 3), np.int64)
-    stack[0, 0], stack[0, 1], stack[0, 2] = way
+    stack[0, 0], stack[0, 1], stack[0, 2] = entry
     depth = 1
     while depth > 0:
         depth -= 1
@@ -55,7 +55,7 @@ def corners_between(arcs, meeting, records):
         Offsets of the arcs of each corner, and their middles, from `contract`; no middles in a
         graph that is not contracted.
     meeting
-        The corner where the searches from both ends meet.
+        The corner where the searches from both endpoints meet.
     records
         int64 (n, 4): columns 2 and 3 hold the tail (in the high half) and arc by which each corner
         was reached from the start and from the goal, or `NO_ARC`.

@@ -124,15 +124,15 @@ class GridSearch:
     def _path(
         self,
         moves: ByteArray,
-        ends: tuple[int, int],
+        endpoints: tuple[int, int],
         limit: int,
         corridor: tuple[NDArray[np.int16 | np.int32] | None, BoolArray | None],
     ) -> CellPath:
         """Find a shortest path between two flat cells; see `search`."""
         tables = move_tables(corner_cutting=self._corner_cutting)
         with self._works.lent() as work:
-            cost = _kernels.NO_ROOM
-            while cost == _kernels.NO_ROOM:
+            cost = _kernels.BUCKET_FULL
+            while cost == _kernels.BUCKET_FULL:
                 if work.generation == _kernels.GENERATIONS:
                     work.records.fill(0)
                     work.generation = 0
@@ -140,7 +140,7 @@ class GridSearch:
                 cost, expanded = _kernels.astar(
                     moves,
                     self._cols,
-                    ends,
+                    endpoints,
                     limit,
                     *tables,
                     *corridor,
@@ -148,11 +148,11 @@ class GridSearch:
                     work.generation,
                     work.waiting,
                 )
-                if cost == _kernels.NO_ROOM:
+                if cost == _kernels.BUCKET_FULL:
                     work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
             if cost < 0:
                 return CellPath(None, int(expanded))
-            cells: LongArray = trace_cells(work.records, self._cols, *ends)
+            cells: LongArray = trace_cells(work.records, self._cols, *endpoints)
         return CellPath(cells, int(expanded))
 
 
@@ -201,16 +201,16 @@ def _after_turn(
     legal: list[BoolArray], d: int, turn: int, *, corner_cutting: bool
 ) -> tuple[BoolArray, BoolArray]:
     """Return for each mask whether a legal move is a successor, and whether it is a detour."""
-    side = 1 if turn < 4 else -1  # noqa: PLR2004 - 8 directions
+    hand = 1 if turn < 4 else -1  # noqa: PLR2004 - 8 directions
     turns = min(turn, 8 - turn)
-    second, third = (legal[(d + side * n) & 7] for n in (2, 3))
+    second, third = (legal[(d + hand * n) & 7] for n in (2, 3))
     never, always = np.zeros(256, dtype=np.bool_), np.ones(256, dtype=np.bool_)
     if turns == 0 or (turns == 1 and d & 1):
         return always, never
     if turns == 1:
         # The diagonal from p to z: illegal past a blocked cell, unless corners are cut.
-        open_way = second if corner_cutting else third
-        return ~open_way, open_way
+        is_open = second if corner_cutting else third
+        return ~is_open, is_open
     if turns == 2:  # noqa: PLR2004
         if d & 1:
             return ~third, third

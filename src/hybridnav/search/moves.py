@@ -15,6 +15,7 @@ import numpy as np
 from hybridnav.search._move_kernels import (
     COL_STEP,
     DIAGONAL,
+    FAR,
     ROW_STEP,
     STRAIGHT,
     legal_moves,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COL_STEP",
     "DIAGONAL",
+    "FAR",
     "ROW_STEP",
     "STEPS",
     "STRAIGHT",

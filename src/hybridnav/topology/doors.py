@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.grid.clearance import clearance_cells
-from hybridnav.pyramid.cracks import ends_of, find_cracks, middles_of, sides_of
+from hybridnav.pyramid.cracks import endpoints_of, find_cracks, middles_of, sides_of
 from hybridnav.pyramid.start import kinds_of
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.rooms import Point
+    from hybridnav.grid.room_labels import Point
 
 LEAST_DOOR_M = 0.3
 """Width below which a boundary counts as a gap, in metres: a scan's noise makes many. Gaps have
@@ -77,7 +77,7 @@ class RoomBoundaries:
         kinds = kinds_of(grid.measured, rooms.label_of).astype(np.int32).ravel() - np.int32(1)
         kinds.flags.writeable = False  # as the kernel is compiled for
         edges, classes = find_cracks(kinds, rows, cols)
-        first, second = ends_of(edges, cols)
+        first, second = endpoints_of(edges, cols)
         free = grid.measured.ravel() == CellClass.FREE
         between = free[first] & free[second]  # then their rooms differ
         edges, first, second = edges[between], first[between], second[between]
@@ -144,9 +144,9 @@ class RoomBoundaries:
             k=list(range(1, min(_NEAREST_CRACKS, len(self.edges)) + 1)),
             distance_upper_bound=_SAME_DOOR_M,
         )
-        away, side = np.asarray(near[0]), np.asarray(near[1])
+        away, nearest = np.asarray(near[0]), np.asarray(near[1])
         row, col = np.nonzero(np.isfinite(away))
-        boundary = self.boundary_of[side[row, col]]
+        boundary = self.boundary_of[nearest[row, col]]
         half_cells = np.round(2 * away[row, col] / self.resolution_m)
         to_middle = np.hypot(*(points[row] - self.middles[boundary]).T)
         names = names[row]

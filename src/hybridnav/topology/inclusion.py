@@ -84,9 +84,9 @@ class Inclusion:
     def _parent_block(self) -> LongArray:
         """The block on the outer side of the self-loop above each block, itself for a root."""
         loop = self._loop_above
-        sides = self._block_of_face[self._level.dual.edges[loop]]
+        both_blocks = self._block_of_face[self._level.dual.edges[loop]]
         blocks = np.arange(len(loop))
-        outer = np.where(sides[:, 0] == blocks, sides[:, 1], sides[:, 0])
+        outer = np.where(both_blocks[:, 0] == blocks, both_blocks[:, 1], both_blocks[:, 0])
         return np.where(loop >= 0, outer, blocks)
 
     @cached_property
@@ -269,16 +269,16 @@ def _loop_tree(level: Level) -> tuple[LongArray, LongArray]:
     loops = np.flatnonzero(level.is_self_loop)
     block_of_face = _groups(dual.edges[~level.is_self_loop], dual.n_faces)
     n_blocks = int(block_of_face.max(initial=-1)) + 1
-    sides = block_of_face[dual.edges[loops]]
+    both_blocks = block_of_face[dual.edges[loops]]
     roots = np.unique(block_of_face[dual.kinds == FaceKind.OUTSIDE])
     top = np.full(len(roots), n_blocks)
-    tail = np.concatenate([sides[:, 0], top])
-    head = np.concatenate([sides[:, 1], roots])
+    tail = np.concatenate([both_blocks[:, 0], top])
+    head = np.concatenate([both_blocks[:, 1], roots])
     tree = coo_array(
         (np.ones(len(tail), dtype=np.int8), (tail, head)), shape=(n_blocks + 1, n_blocks + 1)
     )
     _, above = breadth_first_order(tree.tocsr(), n_blocks, directed=False)
     loop_above = np.full(n_blocks, -1, dtype=np.int64)
-    first_is_inside = above[sides[:, 0]] == sides[:, 1]
-    loop_above[np.where(first_is_inside, sides[:, 0], sides[:, 1])] = loops
+    first_is_inside = above[both_blocks[:, 0]] == both_blocks[:, 1]
+    loop_above[np.where(first_is_inside, both_blocks[:, 0], both_blocks[:, 1])] = loops
     return loop_above, block_of_face

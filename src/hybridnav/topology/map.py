@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
     from hybridnav.topology.inclusion import Enclosed, Inclusion
-    from hybridnav.topology.rooms import Rooms
+    from hybridnav.topology.room_level import Rooms
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class TopologicalMap:
         InvalidValueError
             When the pyramid was built without rooms.
         """
-        from hybridnav.topology.rooms import Rooms  # noqa: PLC0415 - most maps have none
+        from hybridnav.topology.room_level import Rooms  # noqa: PLC0415 - most maps have none
 
         return Rooms(self.pyramid)
 

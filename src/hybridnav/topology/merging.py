@@ -1,4 +1,4 @@
-"""Merging of pieces of free space to rooms: convex pieces, and pieces that are too small."""
+"""Merging of segments of free space to rooms: convex segments, and segments that are too small."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, IntArray
 
 _REACH_M = 0.25
-"""How far pieces reach into what is not free: walls between two pieces are about half as thick."""
+"""How far segments reach into what is not free: walls between two segments are about half as
+thick."""
 _RUNS_ON = 0.9
 """Share of their breadth that the border of two parts of one corridor has at least."""
 _ROUNDING = 1e-9
 
 
-class Pieces:
-    """Pieces of a label image, with their neighbours: how long each common border is, and how much
-    of it is open.
+class Segments:
+    """Segments of a label image, with their neighbours: how long each common border is, and how
+    much of it is open.
 
-    The size of a piece is its area of free cells. Its shape alone (solidity, breadth, the length of
-    borders) includes half of the walls between pieces.
+    The size of a segment is its area of free cells. Its shape alone (solidity, breadth, the length
+    of borders) includes half of the walls between segments.
 
     Parameters
     ----------
     label_of
-        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
     resolution_m
         Side of a cell in metres.
     """
@@ -49,7 +50,7 @@ class Pieces:
         self._parent = list(range(self._n))
         self._version = [0] * self._n
         self._hulls = _hulls(reaching, self._n)
-        self._breadths = [self._breadth(piece) for piece in range(self._n)]
+        self._breadths = [self._breadth(segment) for segment in range(self._n)]
         self._borders: list[dict[int, tuple[int, int]]] = [{} for _ in range(self._n)]
         opened = _common_sides(self._label_of)
         for (u, v), length in _common_sides(reaching).items():
@@ -57,8 +58,8 @@ class Pieces:
 
     @property
     def label_of(self) -> IntArray:
-        """int32 (rows, cols), the pieces as they are now, numbered from 0."""
-        final = np.array([self._find(piece) for piece in range(self._n)] + [-1])
+        """int32 (rows, cols), the segments as they are now, numbered from 0."""
+        final = np.array([self._find(segment) for segment in range(self._n)] + [-1])
         _, dense = np.unique(final, return_inverse=True)
         labels: IntArray = (dense.ravel()[self._label_of] - 1).astype(np.int32)
         return labels
@@ -77,8 +78,8 @@ class Pieces:
         least_open
             Share of the common border, walls and all, that must be open, in (0, 1].
         least_straight
-            Solidity that is enough where the border is about as long as both pieces are broad: two
-            parts of one corridor, whose niches no convex hull forgives.
+            Solidity that is enough where the border is about as long as both segments are broad:
+            two parts of one corridor, whose niches no convex hull forgives.
         """
         heap: list[tuple[float, int, int, int, int]] = []
 
@@ -104,26 +105,30 @@ class Pieces:
                 offer(min(u, other), max(u, other))
 
     def merge_small(self, least_m2: float) -> None:
-        """Merge pieces of a smaller free area into the neighbour with the longest open border, the
-        smallest first; pieces without a neighbour stay."""
+        """Merge segments of a smaller free area into the neighbour with the longest open border,
+        the smallest first; segments without a neighbour stay."""
         least = least_cells(least_m2, self._cell_m2)
-        heap = [(int(self._free[piece]), piece) for piece in range(self._n) if self._is_root(piece)]
+        heap = [
+            (int(self._free[segment]), segment)
+            for segment in range(self._n)
+            if self._is_root(segment)
+        ]
         heapq.heapify(heap)
         while heap:
-            cells, piece = heapq.heappop(heap)
-            if not self._is_root(piece) or cells != self._free[piece]:
+            cells, segment = heapq.heappop(heap)
+            if not self._is_root(segment) or cells != self._free[segment]:
                 continue
             if cells >= least:
                 break
-            borders = self._borders[piece]
+            borders = self._borders[segment]
             opened = max(borders, key=lambda other: (borders[other][0], -other), default=-1)
             if opened < 0 or borders[opened][0] == 0:
                 continue
-            self._merge(opened, piece)
+            self._merge(opened, segment)
             heapq.heappush(heap, (int(self._free[opened]), opened))
 
     def _solidity(self, u: int, v: int) -> float:
-        """Return the area of two pieces divided by that of the convex hull of both."""
+        """Return the area of two segments divided by that of the convex hull of both."""
         _, hull_area = _hull(np.concatenate([self._hulls[u], self._hulls[v]]))
         return float((self._areas[u] + self._areas[v]) / hull_area)
 
@@ -146,20 +151,20 @@ class Pieces:
             self._borders[u][other] = self._borders[other][u] = border
         self._borders[v] = {}
 
-    def _breadth(self, piece: int) -> float:
-        """Return the mean breadth of a piece: its area divided by its length, in cells, without its
-        reach into the walls on both sides."""
-        corners = self._hulls[piece]
+    def _breadth(self, segment: int) -> float:
+        """Return the mean breadth of a segment: its area divided by its length, in cells, without
+        its reach into the walls on both sides."""
+        corners = self._hulls[segment]
         length = np.hypot(*(corners[:, None] - corners[None]).T).max()
-        return float(self._areas[piece] / length) - 2 * self._reach
+        return float(self._areas[segment] / length) - 2 * self._reach
 
-    def _is_root(self, piece: int) -> bool:
-        return self._parent[piece] == piece
+    def _is_root(self, segment: int) -> bool:
+        return self._parent[segment] == segment
 
-    def _find(self, piece: int) -> int:
-        while self._parent[piece] != piece:
-            piece = self._parent[piece]
-        return piece
+    def _find(self, segment: int) -> int:
+        while self._parent[segment] != segment:
+            segment = self._parent[segment]
+        return segment
 
 
 def least_cells(least_m2: float, cell_m2: float) -> int:
@@ -179,7 +184,7 @@ def grown(label_of: IntArray, reach_cells: float) -> IntArray:
 
 
 def _common_sides(label_of: IntArray) -> dict[tuple[int, int], int]:
-    """Return the sides between cells of two pieces, counted by pair, the lower piece first."""
+    """Return the sides between cells of two segments, counted by pair, the lower segment first."""
     pairs = []
     for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
         between = (tail >= 0) & (head >= 0) & (tail != head)
@@ -188,11 +193,11 @@ def _common_sides(label_of: IntArray) -> dict[tuple[int, int], int]:
     return {(u, v): n for (u, v), n in zip(found.tolist(), counts.tolist(), strict=True)}
 
 
-def _hulls(label_of: IntArray, n_pieces: int) -> list[FloatArray]:
-    """Return the corners of the convex hull of each piece, (row, col) in cells."""
+def _hulls(label_of: IntArray, n_segments: int) -> list[FloatArray]:
+    """Return the corners of the convex hull of each segment, (row, col) in cells."""
     hulls = []
-    for piece, window in enumerate(ndimage.find_objects(label_of + 1, n_pieces)):
-        inside = label_of[window] == piece
+    for segment, window in enumerate(ndimage.find_objects(label_of + 1, n_segments)):
+        inside = label_of[window] == segment
         rows = np.flatnonzero(inside.any(axis=1))
         left = inside[rows].argmax(axis=1)
         right = inside.shape[1] - inside[rows, ::-1].argmax(axis=1)

@@ -11,14 +11,14 @@ from scipy import ndimage
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.grid.names import Segmentation
-from hybridnav.grid.rooms import MAX_ROOMS
+from hybridnav.grid.room_labels import MAX_ROOMS
 from hybridnav.topology import _segmentation_kernels
-from hybridnav.topology.merging import Pieces, grown, least_cells
-from hybridnav.topology.pieces import (
-    LEAST_PIECE_M2,
-    contracted_pieces,
-    walled_pieces,
-    watershed_pieces,
+from hybridnav.topology.merging import Segments, grown, least_cells
+from hybridnav.topology.segments import (
+    LEAST_SEGMENT_M2,
+    contracted_segments,
+    walled_segments,
+    watershed_segments,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ on that is the outside."""
 _LARGEST_LEAST_M2 = 1e9
 """Least areas beyond it are taken for a mistake."""
 _SPLINTER_M2 = 0.5
-"""Smaller pieces are merged first: they would be convex with anything."""
+"""Smaller segments are merged first: they would be convex with anything."""
 _SOLIDITY = 0.8
 _OPEN = 0.65
 _STRAIGHT: dict[Segmentation, float] = {"walls": 0.35, "watershed": 0.35, "contraction": _SOLIDITY}
@@ -60,10 +60,11 @@ def find_rooms(
     method
         Where free space is cut: `"walls"`, along the lines of walls that continue behind an
         opening, and at pinched passages; `"watershed"`, along the watersheds of the distance
-        transform; `"contraction"`, where boundaries resist the contraction of a pyramid. The pieces
-        are then merged in the same way, where their union is nearly convex and hardly walled.
+        transform; `"contraction"`, where boundaries resist the contraction of a pyramid. The
+        segments are then merged in the same way, where their union is nearly convex and hardly
+        walled.
     least_area_m2
-        In square metres of free cells, positive, at most 1e9. Smaller pieces go to the neighbour
+        In square metres of free cells, positive, at most 1e9. Smaller segments go to the neighbour
         with the longest open border; without one they are no room. Free space outside the building
         is no room either: it surrounds other free space, along most of the map's border.
 
@@ -93,15 +94,15 @@ def find_rooms(
         )
     outside = _outside(grid)
     grid = _walled(grid)
-    cut = np.where(outside, np.int32(NO_ROOM), _pieces(grid, method, least_area_m2))
-    pieces = Pieces(cut, grid.resolution_m)
-    pieces.merge_small(min(least_area_m2, _SPLINTER_M2))
-    pieces.merge_convex(
+    cut = np.where(outside, np.int32(NO_ROOM), _segments(grid, method, least_area_m2))
+    segments = Segments(cut, grid.resolution_m)
+    segments.merge_small(min(least_area_m2, _SPLINTER_M2))
+    segments.merge_convex(
         least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
     )
-    pieces.merge_small(least_area_m2)
+    segments.merge_small(least_area_m2)
     least = least_cells(least_area_m2, grid.resolution_m**2)
-    labels = _in_reading_order(pieces.label_of, least)
+    labels = _in_reading_order(segments.label_of, least)
     n_rooms = int(labels.max(initial=NO_ROOM)) + 1
     if n_rooms > MAX_ROOMS:
         raise InvalidValueError(
@@ -135,11 +136,11 @@ def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
     return divided
 
 
-def _pieces(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
-    """Return the pieces into which free space is cut."""
+def _segments(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
+    """Return the segments into which free space is cut."""
     if method == "walls":
-        return walled_pieces(grid, least_m2=min(least_m2, LEAST_PIECE_M2))
-    return watershed_pieces(grid) if method == "watershed" else contracted_pieces(grid)
+        return walled_segments(grid, least_m2=min(least_m2, LEAST_SEGMENT_M2))
+    return watershed_segments(grid) if method == "watershed" else contracted_segments(grid)
 
 
 def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
@@ -169,13 +170,13 @@ def _outside(grid: OccupancyGrid) -> BoolArray:
     """
     free = grid.measured == CellClass.FREE
     part_of, n_parts = ndimage.label(free)
-    sides = [part_of[0], part_of[-1], part_of[:, 0], part_of[:, -1]]
-    on_side = [np.bincount(side, minlength=n_parts + 1) for side in sides]
-    n_border = sum(len(side) for side in sides)
-    around = np.all(np.stack(on_side) > 0, axis=0) & (2 * sum(on_side) >= n_border)
+    borders = [part_of[0], part_of[-1], part_of[:, 0], part_of[:, -1]]
+    on_border = [np.bincount(border, minlength=n_parts + 1) for border in borders]
+    n_border = sum(len(border) for border in borders)
+    around = np.all(np.stack(on_border) > 0, axis=0) & (2 * sum(on_border) >= n_border)
     around[0] = False
     areas = np.bincount(part_of.ravel(), minlength=n_parts + 1)
-    inside = areas[1:][~np.any(np.stack(on_side) > 0, axis=0)[1:]].sum()
+    inside = areas[1:][~np.any(np.stack(on_border) > 0, axis=0)[1:]].sum()
     around &= inside >= _LEAST_INSIDE * areas
     found: BoolArray = around[part_of]
     return found

@@ -12,11 +12,11 @@ from hybridnav.viz.mesh import plot_mesh
 from hybridnav.viz.paper import plot_figure1
 from hybridnav.viz.paths import plot_paths
 from hybridnav.viz.plan import plot_plan
-from hybridnav.viz.rooms import plot_rooms
+from hybridnav.viz.room_map import plot_rooms
+from hybridnav.viz.routes import plot_alternatives, plot_tour
 from hybridnav.viz.save import save_figure
 from hybridnav.viz.search import plot_search
 from hybridnav.viz.topology import plot_topology
-from hybridnav.viz.ways import plot_alternatives, plot_tour
 
 __all__ = [
     "method_styles",

@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from hybridnav.grid import CellClass
 from hybridnav.pyramid.dual import FaceKind
 from hybridnav.search.moves import STEPS
-from hybridnav.viz.fields import Field, Walks, distance_to_rim, rounded, smoothed
+from hybridnav.viz.fields import Field, WalkTree, distance_to_rim, rounded, smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,10 +51,10 @@ def boundary_line(level: Level, arc: int) -> LongArray:
         that of dart 2 arc + 1. The line of a ring ends at its start.
     """
     pairs = np.sort(level.boundary(arc), axis=1)
-    sides = [_ends_of_side(*pair) for pair in pairs.tolist()]
+    sides = [_endpoints_of_side(*pair) for pair in pairs.tolist()]
     sides_at: dict[Corner, list[int]] = {}
-    for side, ends in enumerate(sides):
-        for corner in ends:
+    for side, endpoints in enumerate(sides):
+        for corner in endpoints:
             sides_at.setdefault(corner, []).append(side)
     base = np.sort(level.base_pairs[arc], axis=0)
     first = int(np.flatnonzero((pairs == base).all(axis=(1, 2)))[0])
@@ -75,8 +75,8 @@ def boundary_line(level: Level, arc: int) -> LongArray:
     return np.array(one[::-1] + other)
 
 
-def _ends_of_side(low: Sequence[int], high: Sequence[int]) -> tuple[Corner, Corner]:
-    """Return the ends of the side between two cells, right and left of a step up or east."""
+def _endpoints_of_side(low: Sequence[int], high: Sequence[int]) -> tuple[Corner, Corner]:
+    """Return the endpoints of the side between two cells, right and left of a step up or east."""
     row, col = high
     return ((row, col), (row + 1, col)) if low[0] == row else ((row, col + 1), (row, col))
 
@@ -116,7 +116,7 @@ class Boundaries:
         holes: dict[int, int] = {}
         loops_last = np.argsort(self.level.is_self_loop, kind="stable")
         for arc in loops_last.tolist():
-            for face, (row, col) in self._ends(arc):
+            for face, (row, col) in self._endpoints(arc):
                 hole = int(self._hole_of[row : row + 2, col : col + 2].max())
                 if hole and self.level.dual.kinds[face] != FaceKind.ORDINARY:
                     holes.setdefault(face, hole)
@@ -127,7 +127,7 @@ class Boundaries:
         """Corners at which each ordinary face may be drawn: a meeting point, or all of a ring."""
         corners: dict[int, LongArray] = {}
         for arc in np.flatnonzero(~self.level.is_self_loop).tolist():
-            line, (one, other) = self._corners[arc], self._ends(arc)
+            line, (one, other) = self._corners[arc], self._endpoints(arc)
             if self._is_ring(arc):
                 corners[one[0]] = line[:-1]
                 continue
@@ -136,14 +136,14 @@ class Boundaries:
                     corners[face] = np.array([corner])
         return corners
 
-    def _ends(self, arc: int) -> list[tuple[int, Corner]]:
-        """Return the faces that a dual edge joins, with the ends of its line."""
-        ends = self._corners[arc][[0, -1]].tolist()
+    def _endpoints(self, arc: int) -> list[tuple[int, Corner]]:
+        """Return the faces that a dual edge joins, with the endpoints of its line."""
+        endpoints = self._corners[arc][[0, -1]].tolist()
         faces = self.level.dual.edges[arc].tolist()
-        return [(face, (row, col)) for face, (row, col) in zip(faces, ends, strict=True)]
+        return [(face, (row, col)) for face, (row, col) in zip(faces, endpoints, strict=True)]
 
     def _is_ring(self, arc: int) -> bool:
-        one, other = self._ends(arc)
+        one, other = self._endpoints(arc)
         return one == other and _goes_on(self.level, one[1])
 
     @cached_property
@@ -152,37 +152,38 @@ class Boundaries:
         lines = [line.astype(np.float64) for line in self._corners]
         starts: dict[int, FloatArray] = {}
         for loop in np.flatnonzero(self.level.is_self_loop).tolist():
-            lines[loop] = self._way_across(loop)
-            for (face, _), point in zip(self._ends(loop), lines[loop][[0, -1]], strict=True):
+            lines[loop] = self._line_across(loop)
+            for (face, _), point in zip(self._endpoints(loop), lines[loop][[0, -1]], strict=True):
                 starts.setdefault(face, point)
         for arc in np.flatnonzero(~self.level.is_self_loop).tolist():
-            face, _ = self._ends(arc)[0]
+            face, _ = self._endpoints(arc)[0]
             if self._is_ring(arc) and face in starts:
                 # A ring begins at its dual vertex, where another line meets it.
                 at = int(np.abs(lines[arc] - starts[face]).sum(axis=1).argmin())
                 lines[arc] = np.concatenate([lines[arc][at:-1], lines[arc][: at + 1]])
         return lines
 
-    def _way_across(self, loop: int) -> FloatArray:
-        """Return the shortest path inside its place between the ends of a self-loop's dual edge.
+    def _line_across(self, loop: int) -> FloatArray:
+        """Return the shortest path inside its place between the endpoints of a self-loop's dual
+        edge.
 
         The line of its boundary may end at another one, half-way along a shared face.
         """
         field = Field(self.level, int(self.level.arcs[loop, 0]), 1.0)
         middles = field.cells + field.corner + 0.5
-        ends = []
-        for face, _ in self._ends(loop):
+        endpoints = []
+        for face, _ in self._endpoints(loop):
             distance, nearest = self._tree(face).query(middles, p=np.inf, distance_upper_bound=1.5)
             touching = np.flatnonzero(distance <= 1)
-            ends.append((touching, self._tree(face).data[np.asarray(nearest)[touching]]))
-        (tails, starts), (heads, stops) = ends
+            endpoints.append((touching, self._tree(face).data[np.asarray(nearest)[touching]]))
+        (tails, starts), (heads, goals) = endpoints
         if len(tails) == 0 or len(heads) == 0:
             return self._corners[loop].astype(np.float64)
         walks = field.walks_from(tails)
         head = int(walks.length[heads].argmin())
         walk = walks.to(int(heads[head]))
         tail = int(np.flatnonzero((field.cells[tails] == walk[0]).all(axis=1))[0])
-        middles = np.concatenate([starts[[tail]], stops[[head]]]) - field.corner - 0.5
+        middles = np.concatenate([starts[[tail]], goals[[head]]]) - field.corner - 0.5
         whole = np.concatenate([middles[:1], walk, middles[1:]])
         return smoothed(whole, field.distance, _TAUT) + field.corner + 0.5
 
@@ -213,14 +214,14 @@ class Boundaries:
     @cached_property
     def holes(self) -> dict[int, Hole]:
         """The holes, by the index of their face."""
-        ends: dict[int, list[FloatArray]] = {face: [] for face in self._face_holes}
+        endpoints: dict[int, list[FloatArray]] = {face: [] for face in self._face_holes}
         for line, faces in zip(self.lines, self.level.dual.edges.tolist(), strict=True):
             for face, point in zip(faces, line[[0, -1]], strict=True):
-                if face in ends:
-                    ends[face].append(point)
+                if face in endpoints:
+                    endpoints[face].append(point)
         windows = ndimage.find_objects(self._hole_of)
         holes = {}
-        for face, points in ends.items():
+        for face, points in endpoints.items():
             tree, at = self._tree(face), np.array(points)
             name = self._face_holes[face]
             window = windows[name - 1]
@@ -235,15 +236,17 @@ class Boundaries:
 
 @dataclass(frozen=True, eq=False)
 class Hole:
-    """A hole with its dual vertex, and lines from the ends of dual edges to it."""
+    """A hole with its dual vertex, and lines from the endpoints of dual edges to it."""
 
     position: FloatArray
     links: list[FloatArray]
     """One line for each end, from there to the dual vertex."""
 
     @classmethod
-    def of(cls, mask: BoolArray, nearest: LongArray, ends: FloatArray, *, outside: bool) -> Hole:
-        """Find a place for the dual vertex: deep inside a hole, between the ends outside.
+    def of(
+        cls, mask: BoolArray, nearest: LongArray, endpoints: FloatArray, *, outside: bool
+    ) -> Hole:
+        """Find a place for the dual vertex: deep inside a hole, between the endpoints outside.
 
         Parameters
         ----------
@@ -251,8 +254,8 @@ class Hole:
             Cells of the hole in a window with a margin of one cell.
         nearest
             int64 (n, 2), the cell beside each end of a dual edge.
-        ends
-            float64 (n, 2), these ends.
+        endpoints
+            float64 (n, 2), these endpoints.
         outside
             Whether the vertex stands for the outside.
         """
@@ -272,9 +275,9 @@ class Hole:
         length, before = dijkstra(
             graph, directed=False, indices=np.array([centre]), return_predecessors=True
         )
-        walks = Walks(cells, length[0], before[0])
+        walks = WalkTree(cells, length[0], before[0])
         links = []
-        for cell, end in zip(found.tolist(), ends, strict=True):
+        for cell, end in zip(found.tolist(), endpoints, strict=True):
             walk = np.concatenate([end[None], walks.to(cell)[::-1]])
             short = len(walk) <= _SHORT
             links.append(smoothed(walk, distance, 1.0) if short else rounded(walk))
@@ -296,5 +299,5 @@ def _links(number: LongArray) -> Any:
         heads.append(beyond[linked])
         lengths.append(np.full(len(tails[-1]), np.hypot(up, right)))
     size = int(number.max()) + 1
-    ends = np.concatenate(tails), np.concatenate(heads)
-    return coo_array((np.concatenate(lengths), ends), shape=(size, size)).tocsr()
+    endpoints = np.concatenate(tails), np.concatenate(heads)
+    return coo_array((np.concatenate(lengths), endpoints), shape=(size, size)).tocsr()

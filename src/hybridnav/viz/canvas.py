@@ -88,8 +88,8 @@ def known_view(grid: OccupancyGrid) -> View:
     points = grid.frame.points_of_grid(np.concatenate([np.stack(c, axis=1) for c in corners]))
     low, high = points.min(axis=0), points.max(axis=0)
     margin = max(0.015 * (high - low).max(), grid.resolution_m)
-    sides = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * grid.shape
-    whole = grid.frame.points_of_grid(sides)
+    map_corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * grid.shape
+    whole = grid.frame.points_of_grid(map_corners)
     return View(
         np.maximum(low - margin, whole.min(axis=0)), np.minimum(high + margin, whole.max(axis=0))
     )

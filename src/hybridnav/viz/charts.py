@@ -289,13 +289,13 @@ def _tick_decades(axis: Axis, span: float, *, factor: float = 1.0) -> None:
 def _tick_losses(axis: Axis) -> None:
     """Label 0 and powers of ten on both sides of it, fewer of them the more decades there are."""
     low, high = axis.get_view_interval()
-    sides = [math.log10(max(side / LEAST_LOSS, 1.0)) for side in (-low, high)]
-    step = math.ceil(sum(sides) / _MOST_DECADES)
-    top = math.floor(math.log10(LEAST_LOSS) + max(sides) + 1e-9)
+    decades = [math.log10(max(side / LEAST_LOSS, 1.0)) for side in (-low, high)]
+    step = math.ceil(sum(decades) / _MOST_DECADES)
+    top = math.floor(math.log10(LEAST_LOSS) + max(decades) + 1e-9)
     # The least power lies close to 0, and goes first.
     least = round(math.log10(LEAST_LOSS)) + (step > 1)
     powers = 10.0 ** np.arange(top, least - 1, -step)
-    if sum(sides) <= _MOST_DECADES / 2:
+    if sum(decades) <= _MOST_DECADES / 2:
         powers = np.concatenate([powers, 3 * powers])
     ticks = np.concatenate([-powers, [0.0], powers])
     axis.set_major_locator(FixedLocator(np.sort(ticks[(ticks >= low) & (ticks <= high)]).tolist()))

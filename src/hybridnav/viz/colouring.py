@@ -13,7 +13,7 @@ N_COLOURS = 6
 
 
 def colour_vertices(arcs: IntArray, n_vertices: int) -> LongArray:
-    """Colour a plane graph with six colours, so that the ends of an arc differ.
+    """Colour a plane graph with six colours, so that the endpoints of an arc differ.
 
     Vertices of degree at most five are peeled off in layers until none is left (a plane graph
     always has one) and coloured in the reverse order, so that each has at most five coloured

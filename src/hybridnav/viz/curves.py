@@ -46,8 +46,8 @@ class Arc:
     @cached_property
     def owner(self) -> LongArray:
         """Field of each cell in the window: 1, 2, or 0 for neither."""
-        ends = [field.corner + field.mask.shape for field in (self.one, self.other)]
-        owner = np.zeros(np.maximum(*ends) - self.corner, dtype=np.int64)
+        endpoints = [field.corner + field.mask.shape for field in (self.one, self.other)]
+        owner = np.zeros(np.maximum(*endpoints) - self.corner, dtype=np.int64)
         for name, field in ((1, self.one), (2, self.other)):
             owner[tuple((field.cells + field.corner - self.corner).T)] = name
         return owner
@@ -101,11 +101,11 @@ class Arc:
 
     def _walk(self) -> FloatArray:
         """Return the cells of the shortest walk across the boundary."""
-        sides = []
+        halves = []
         for field, cells in zip((self.one, self.other), self.boundary.swapaxes(0, 1), strict=True):
-            sides.append(field.number[tuple((cells - field.corner).T)])
-        lengths = self.one.walks.length[sides[0]] + self.other.walks.length[sides[1]]
+            halves.append(field.number[tuple((cells - field.corner).T)])
+        lengths = self.one.walks.length[halves[0]] + self.other.walks.length[halves[1]]
         best = int(lengths.argmin())
-        out = self.one.walks.to(int(sides[0][best])) + self.one.corner
-        back = self.other.walks.to(int(sides[1][best])) + self.other.corner
+        out = self.one.walks.to(int(halves[0][best])) + self.one.corner
+        back = self.other.walks.to(int(halves[1][best])) + self.other.corner
         return np.concatenate([out, back[::-1]]) - self.corner

@@ -85,11 +85,11 @@ class Field:
         near = 1 + _NEAR_RIM * np.clip(1 - self.distance[self.mask] / self.clearance, 0, 1)
         cost = np.hypot(*(self.cells[tail] - self.cells[head]).T) * (near[tail] + near[head])
         copy = np.arange(copies)[:, None]
-        ends = (tail + n * copy).ravel(), (head + n * (copy ^ flip)).ravel()
+        endpoints = (tail + n * copy).ravel(), (head + n * (copy ^ flip)).ravel()
         size = n * copies
-        return coo_array((np.tile(cost, copies), ends), shape=(size, size)).tocsr()
+        return coo_array((np.tile(cost, copies), endpoints), shape=(size, size)).tocsr()
 
-    def walks_from(self, cells: LongArray, lines: LongArray | None = None) -> Walks:
+    def walks_from(self, cells: LongArray, lines: LongArray | None = None) -> WalkTree:
         """Return the shortest walks from the nearest of some cells, given by number, to all
         cells."""
         length, before, _ = dijkstra(
@@ -99,7 +99,7 @@ class Field:
             return_predecessors=True,
             min_only=True,
         )
-        return Walks(self.cells, length, before)
+        return WalkTree(self.cells, length, before)
 
     @property
     def start(self) -> LongArray:
@@ -108,13 +108,13 @@ class Field:
         return start
 
     @cached_property
-    def walks(self) -> Walks:
+    def walks(self) -> WalkTree:
         """Shortest walks from the surviving cell to all cells."""
         return self.walks_from(self.start)
 
 
 @dataclass(frozen=True, eq=False)
-class Walks:
+class WalkTree:
     """Shortest walks from one cell."""
 
     cells: LongArray
@@ -138,7 +138,8 @@ def distance_to_rim(mask: BoolArray) -> FloatArray:
 
 
 def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatArray:
-    """Return a walk smoothed like a rubber band that is fixed at its ends and pushed off the rim.
+    """Return a walk smoothed like a rubber band that is fixed at its endpoints and pushed off the
+    rim.
 
     Parameters
     ----------
@@ -155,7 +156,7 @@ def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatA
         float64 (n, 2), a smooth curve; it may slip over obstacles of a cell or two.
     """
     slope = [np.gradient(distance, axis=axis) for axis in (0, 1)]
-    field = np.stack([distance, *slope], axis=-1)
+    potential = np.stack([distance, *slope], axis=-1)
     band = walk
     for step in range(_STEPS):
         if step % 25 == 0:
@@ -164,7 +165,7 @@ def smoothed(walk: FloatArray, distance: FloatArray, clearance: float) -> FloatA
         pull = (band[:-2] + band[2:]) / 2 - inner
         push = np.zeros_like(inner)
         if step < _STEPS - _LAST_STEPS:  # the last steps smooth the staircase of cells
-            at = _between(field, inner)
+            at = _between(potential, inner)
             push = _PUSH * at[:, 1:] * np.maximum(clearance - at[:, :1], 0)
         band = np.concatenate([band[:1], inner + 0.5 * pull + push, band[-1:]])
     return rounded(band)
@@ -188,7 +189,7 @@ def _evenly(line: FloatArray, spacing: float) -> FloatArray:
 
 
 def rounded(line: FloatArray) -> FloatArray:
-    """Return a line after Chaikin's corner cutting, with the same ends."""
+    """Return a line after Chaikin's corner cutting, with the same endpoints."""
     for _ in range(2):
         early, late = line[:-1] * 0.75 + line[1:] * 0.25, line[:-1] * 0.25 + line[1:] * 0.75
         cut = np.stack([early, late], axis=1).reshape(-1, 2)

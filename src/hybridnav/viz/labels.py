@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hybridnav.viz.canvas import Canvas
 
 _SHAPES = {"start": ("o", 6.5), "goal": ("D", 6.0)}
-_SIDES = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
+_ANCHORS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
 _OUTSIDE, _OVERLAP = 1000.0, 100.0  # penalties; covering all of the path costs 10
 
 
@@ -63,7 +63,7 @@ class LabelPlacer:
         self, point: FloatArray, half_points: FloatArray, reaches: Sequence[float]
     ) -> list[FloatArray]:
         """Return boxes on all sides of a point, at each of some distances in points of the page."""
-        shifts = np.concatenate([_SIDES * (half_points + reach) for reach in reaches])
+        shifts = np.concatenate([_ANCHORS * (half_points + reach) for reach in reaches])
         centres = point + shifts / self.canvas.sizes.points_per_metre
         return [self.box(centre, half_points) for centre in centres]
 

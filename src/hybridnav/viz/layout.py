@@ -41,12 +41,12 @@ def text_width(text: str, font: float, weight: str = "normal") -> float:
     return float(width)
 
 
-def wrapped(pieces: Sequence[str], font: float, room: float) -> str:
-    """Return pieces joined by dots, in as few and as equal lines as fit the room.
+def wrapped(parts: Sequence[str], font: float, room: float) -> str:
+    """Return parts joined by dots, in as few and as equal lines as fit the room.
 
-    The room is in points; pieces that are too long are cut.
+    The room is in points; parts that are too long are cut.
     """
-    fitting = [_cut(piece, font, room) for piece in filter(None, pieces)]
+    fitting = [_cut(part, font, room) for part in filter(None, parts)]
     lines = _filled(fitting, font, room)
     for share in _NARROWER:
         narrower = _filled(fitting, font, share * room)
@@ -56,15 +56,15 @@ def wrapped(pieces: Sequence[str], font: float, room: float) -> str:
     return "\n".join(lines)
 
 
-def _filled(pieces: Sequence[str], font: float, room: float) -> list[str]:
+def _filled(parts: Sequence[str], font: float, room: float) -> list[str]:
     """Return lines filled one after the other."""
     lines: list[str] = []
-    for piece in pieces:
-        longer = f"{lines[-1]}  ·  {piece}" if lines else piece
+    for part in parts:
+        longer = f"{lines[-1]}  ·  {part}" if lines else part
         if lines and text_width(longer, font) <= room:
             lines[-1] = longer
         else:
-            lines.append(piece)
+            lines.append(part)
     return lines
 
 
@@ -86,11 +86,11 @@ def round_length(limit_m: float) -> float:
     return max(fitting, default=power)  # log10 may round up past the limit
 
 
-def add_title(canvas: Canvas, pieces: Sequence[str]) -> None:
+def add_title(canvas: Canvas, parts: Sequence[str]) -> None:
     """Put a title over the map, no wider than the room."""
     font = canvas.sizes.font
     canvas.ax.set_title(
-        wrapped(pieces, font, _room_over(canvas)),
+        wrapped(parts, font, _room_over(canvas)),
         fontsize=font,
         pad=0.6 * font,
         linespacing=1.3,

@@ -96,7 +96,7 @@ def plot_levels(  # noqa: PLR0913 - all but the first have defaults
 
 
 def _words(level: Level) -> list[str]:
-    """Return the pieces of a panel's title."""
+    """Return the parts of a panel's title."""
     return [f"level {level.index}", f"{level.n_vertices:,} vertices", f"{level.n_arcs:,} arcs"]
 
 

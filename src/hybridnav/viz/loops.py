@@ -44,13 +44,13 @@ class Loops:
         return np.asarray(label)
 
     @cached_property
-    def ends(self) -> dict[int, list[int]]:
+    def endpoints(self) -> dict[int, list[int]]:
         """The two holes that each self-loop of the place joins."""
         of_place = (self.field.level.arcs == self.field.vertex).all(axis=1)
-        return {loop: self._ends_of(loop) for loop in np.flatnonzero(of_place).tolist()}
+        return {loop: self._endpoints_of(loop) for loop in np.flatnonzero(of_place).tolist()}
 
-    def _ends_of(self, loop: int) -> list[int]:
-        low, high = self._sides(loop)
+    def _endpoints_of(self, loop: int) -> list[int]:
+        low, high = self._cells_beside(loop)
         # Ends of the sides between two cells, each named by the cell to its upper right.
         corners = np.concatenate([high, high + (high - low)[:, ::-1]])
         found, count = np.unique(corners, axis=0, return_counts=True)
@@ -58,7 +58,7 @@ class Loops:
         around = np.stack([self.hole_of[rows - i, cols - j] for i in (0, 1) for j in (0, 1)])
         return [int(hole) for hole in around.max(axis=0)]
 
-    def _sides(self, loop: int) -> tuple[LongArray, LongArray]:
+    def _cells_beside(self, loop: int) -> tuple[LongArray, LongArray]:
         """Return the lower and the higher cell beside each side of a self-loop's line."""
         low, high = np.moveaxis(np.sort(self.field.level.boundary(loop), axis=1), 1, 0)
         return low - self.field.corner, high - self.field.corner
@@ -66,14 +66,14 @@ class Loops:
     @cached_property
     def enclosed(self) -> dict[int, BoolArray]:
         """For each self-loop the cells of the holes that it encloses."""
-        joined = np.array(list(self.ends.values()))
+        joined = np.array(list(self.endpoints.values()))
         size = int(self.hole_of.max()) + 1
         tree = coo_array((np.ones(len(joined)), joined.T), shape=(size, size)).tocsr()
         order, above = breadth_first_order(tree, _OUTSIDE, directed=False)
         below = {int(hole): np.arange(size) == hole for hole in order}
         for hole in order[:0:-1]:  # leaves first
             below[int(above[hole])] |= below[int(hole)]
-        inner = {loop: a if above[a] == b else b for loop, (a, b) in self.ends.items()}
+        inner = {loop: a if above[a] == b else b for loop, (a, b) in self.endpoints.items()}
         return {loop: below[hole][self.hole_of] for loop, hole in inner.items()}
 
     def curve(self, loop: int) -> FloatArray:
@@ -122,18 +122,18 @@ class Loops:
         field = self.field
         lines = np.zeros((2, *field.mask.shape), dtype=np.int64)
         for bit, loop in enumerate(loops):
-            low, high = self._sides(loop)
+            low, high = self._cells_beside(loop)
             lines[(high - low)[:, 1], low[:, 0], low[:, 1]] ^= 1 << bit
         return field.walks_from(field.start, lines).to(int(field.start[0]), copy=1)
 
     def _nearest(self, loop: int) -> list[int]:
         """Return a self-loop of the place and those that join the holes nearest to it in the
         tree."""
-        reached, found = set(self.ends[loop]), [loop]
-        others = set(self.ends) - {loop}
+        reached, found = set(self.endpoints[loop]), [loop]
+        others = set(self.endpoints) - {loop}
         while others and len(found) < _MOST_LINES:
-            found.append(min(other for other in others if reached & set(self.ends[other])))
-            reached |= set(self.ends[found[-1]])
+            found.append(min(other for other in others if reached & set(self.endpoints[other])))
+            reached |= set(self.endpoints[found[-1]])
             others.remove(found[-1])
         return found
 

@@ -114,8 +114,8 @@ def draw_sides(canvas: Canvas, grid: OccupancyGrid, mesh: ConvexMesh) -> None:
     """Draw the sides that two polygons share, each once."""
     slots = np.flatnonzero(mesh.twins > np.arange(len(mesh.twins)))
     # The twin begins at the end of the side.
-    ends = np.stack([mesh.begins[slots], mesh.begins[mesh.twins[slots]]], axis=1)
-    lines = grid.frame.points_of_grid(mesh.corners[ends].reshape(-1, 2)).reshape(-1, 2, 2)
+    endpoints = np.stack([mesh.begins[slots], mesh.begins[mesh.twins[slots]]], axis=1)
+    lines = grid.frame.points_of_grid(mesh.corners[endpoints].reshape(-1, 2)).reshape(-1, 2, 2)
     width = 0.45 * canvas.sizes.line
     canvas.add_lines(lines, colors=_SIDE, linewidths=width, alpha=0.6, zorder=3, gid="sides")
 
@@ -139,12 +139,12 @@ def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> l
         (dot, "root"),
         (Line2D([], [], color=_SIDE, lw=0.8 * line), "side of a polygon"),
     ]
-    ends = grid.frame.points_of_grid(trace.ends)
+    endpoints = grid.frame.points_of_grid(trace.endpoints)
     if trace.path.positions is not None:
         points = grid.frame.points_of_grid(trace.path.positions)
         ax.add_line(Line2D(*points.T, color=style.PATH, lw=1.8 * line, zorder=6, gid="path"))
         entries.append((Line2D([], [], color=style.PATH, lw=1.8 * line), "shortest path"))
-    for point, marker in zip(ends, "os", strict=True):
+    for point, marker in zip(endpoints, "os", strict=True):
         ax.plot(
             *point, marker, ms=5 * line, mfc=style.FREE, mec=style.PATH, mew=1.4 * line, zorder=7
         )
@@ -172,10 +172,10 @@ def _views(trace: SearchTrace) -> FloatArray:
 def _met(roots: FloatArray, points: FloatArray, intervals: FloatArray) -> FloatArray:
     """Return the points where segments from roots to points cross intervals; a root that lies on
     one."""
-    along, way = intervals[:, 1] - intervals[:, 0], points - roots
+    along, drawn = intervals[:, 1] - intervals[:, 0], points - roots
     off = intervals[:, 0] - roots
-    cross = way[:, 0] * along[:, 1] - way[:, 1] * along[:, 0]
+    cross = drawn[:, 0] * along[:, 1] - drawn[:, 1] * along[:, 0]
     reach = off[:, 0] * along[:, 1] - off[:, 1] * along[:, 0]
     share = np.divide(reach, cross, out=np.zeros(len(cross)), where=cross != 0)
-    met: FloatArray = roots + share.clip(0, 1)[:, None] * way
+    met: FloatArray = roots + share.clip(0, 1)[:, None] * drawn
     return met

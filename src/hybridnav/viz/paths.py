@@ -42,7 +42,7 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw a path and a shortest one between the same ends, on the part of the map round them.
+    """Draw a path and a shortest one between the same endpoints, on the part of the map round them.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
         )
         canvas.ax.add_line(line)
         entries.append((line, "shortest path"))
-    ends = next((line[[0, -1]] for line in lines if len(line)), np.empty((0, 2)))
-    markers = [Marker(name, end) for name, end in zip(("start", "goal"), ends, strict=False)]
+    endpoints = next((line[[0, -1]] for line in lines if len(line)), np.empty((0, 2)))
+    markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
     draw_markers(canvas, markers, points)
     if (grid.classes == CellClass.UNEXPLORED).any():
         entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))

@@ -72,9 +72,9 @@ class Places:
     def lines(self, arcs: BoolArray) -> list[FloatArray]:
         """Return a line from place to place through the middle of the boundary, for each arc of a
         mask."""
-        ends = self.positions[self.level.arcs[arcs]]
+        endpoints = self.positions[self.level.arcs[arcs]]
         middles = self.level.boundary_middles[arcs]
-        return list(np.stack([ends[:, 0], middles, ends[:, 1]], axis=1))
+        return list(np.stack([endpoints[:, 0], middles, endpoints[:, 1]], axis=1))
 
     def loops(self, arcs: BoolArray) -> list[FloatArray]:
         """Return a closed curve from a place through the middle of its boundary, for each
@@ -98,12 +98,12 @@ def draw_arcs(canvas: Canvas, places: Places, *, self_loops: bool = False) -> No
     n_free = places.free[level.arcs].sum(axis=1)
     width = min(0.9 * sizes.line, 0.3 * places.dot(sizes))
     look: dict[str, Any] = {"capstyle": "round", "joinstyle": "round", "zorder": 3}
-    for free_ends, colour, share, gid in (
+    for free_endpoints, colour, share, gid in (
         (0, style.UNEXPLORED_ARC, 0.6, "unexplored-arcs"),
         (1, style.RIM_ARC, 0.6, "rim-arcs"),
         (2, style.ARC, 1.0, "arcs"),
     ):
-        lines = places.lines(seen & (n_free == free_ends))
+        lines = places.lines(seen & (n_free == free_endpoints))
         canvas.add_lines(lines, colors=colour, linewidths=share * width, **look, gid=gid)
     if self_loops:
         loops = places.loops(level.is_self_loop)

@@ -57,7 +57,7 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     ax
         Axes to draw on; by default new ones in a new figure. Leave room below for the legend.
     start, goal
-        `(x, y)` in metres, map frame; by default the ends of the path.
+        `(x, y)` in metres, map frame; by default the endpoints of the path.
     title
         Title instead of the map's name, length, loss and places; empty for none.
     optimum_m
@@ -108,9 +108,9 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
 
 
 def _markers(result: PlanResult, start: ArrayLike | None, goal: ArrayLike | None) -> list[Marker]:
-    ends = result.path.points[[0, -1]] if result.path is not None else (None, None)
+    endpoints = result.path.points[[0, -1]] if result.path is not None else (None, None)
     markers = []
-    for name, given, end in zip(("start", "goal"), (start, goal), ends, strict=True):
+    for name, given, end in zip(("start", "goal"), (start, goal), endpoints, strict=True):
         point = end if given is None else _checked_point(name, given)
         if point is not None:
             markers.append(Marker(name, point))
@@ -176,7 +176,7 @@ def draw_path(canvas: Canvas, points: FloatArray) -> None:
 
 
 def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None) -> list[str]:
-    """Return the pieces of the title."""
+    """Return the parts of the title."""
     words = [topology.grid.name]
     if result.path is None:
         return [*words, str(result.status)]

@@ -79,9 +79,9 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     >>> from hybridnav.mesh import build_mesh, trace_search
     >>> from hybridnav.viz import plot_search
     >>> grid = hn.example_map("figure1")
-    >>> ends = (5, 5), (25, 20)
-    >>> centres = tuple((row + 0.5, col + 0.5) for row, col in ends)
-    >>> trace = trace_search(build_mesh(grid.enterable()), ends, centres)
+    >>> endpoints = (5, 5), (25, 20)
+    >>> centres = tuple((row + 0.5, col + 0.5) for row, col in endpoints)
+    >>> trace = trace_search(build_mesh(grid.enterable()), endpoints, centres)
     >>> plot_search(grid, trace, title="search").get_title()
     'search'
     """
@@ -103,8 +103,8 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
         counts = [f"{sizes[0]:,} states", f"{sizes[1]:,} motions"]
     line = canvas.sizes.line
     if path is not None:
-        way = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5, gid="path")
-        canvas.ax.add_line(way)
+        drawn = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5, gid="path")
+        canvas.ax.add_line(drawn)
         entries.append((Line2D([], [], color=style.PATH, lw=1.8 * line), "path"))
     if corridor is not None:
         (colour,) = style.rgb(_CORRIDOR, strength=_STRENGTH) / 255

@@ -93,11 +93,11 @@ class Graph:
         clearance_m
             Distance that curves keep from obstacles, where there is room.
         """
-        level, side = self.level, self.level.grid.resolution_m
-        least = self.least_area_m2 / side**2
-        ends = level.arcs[self.plain | level.is_self_loop]
-        wide = max(clearance_m / side, _LEAST_CLEARANCE)
-        fields = {vertex: Field(level, vertex, wide) for vertex in np.unique(ends).tolist()}
+        level, cell_m = self.level, self.level.grid.resolution_m
+        least = self.least_area_m2 / cell_m**2
+        endpoints = level.arcs[self.plain | level.is_self_loop]
+        wide = max(clearance_m / cell_m, _LEAST_CLEARANCE)
+        fields = {vertex: Field(level, vertex, wide) for vertex in np.unique(endpoints).tolist()}
         curves = {}
         for arc in np.flatnonzero(self.plain).tolist():
             one, other = (fields[vertex] for vertex in level.arcs[arc].tolist())
@@ -220,7 +220,7 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
 
 
 def _words(graph: Graph, *, simple: bool) -> list[str]:
-    """Return the pieces of the title."""
+    """Return the parts of the title."""
     level = graph.level
     n_free = int((level.classes == CellClass.FREE).sum())
     words = [level.grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]

@@ -14,7 +14,7 @@ from hybridnav._files import MODEL_SUFFIX
 from hybridnav._version import __version__
 from hybridnav.errors import MapError, ModelError
 from hybridnav.grid import MAX_CELLS
-from hybridnav.io import rooms, ros
+from hybridnav.io import rooms_in, ros
 from hybridnav.io.models.container import FORMAT, write_parts
 from hybridnav.io.models.model import open_model
 from hybridnav.io.models.parts import plain
@@ -81,7 +81,7 @@ def key_of(
     """
     is_ros = map_file.suffix.lower() in {".yaml", ".yml"}
     files = ros.files_of(map_file) if is_ros else [map_file]
-    files += [] if rooms_file is None else rooms.files_of(rooms_file)
+    files += [] if rooms_file is None else rooms_in.files_of(rooms_file)
     settings = plain(preset.model_dump(mode="json"))
     made_with = [__version__, FORMAT, *map(str, [map_file.absolute(), *files]), settings, reading]
     digest = hashlib.sha256(json.dumps(made_with, sort_keys=True).encode())

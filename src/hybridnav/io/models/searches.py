@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from hybridnav import jumps, portals
 from hybridnav import mesh as meshes
-from hybridnav.io.models.fields import refusal
+from hybridnav.io.models.array_specs import refusal
 from hybridnav.io.models.parts import plain, values_of
 from hybridnav.io.models.structures import (
     CORNER_EDGES,

@@ -9,30 +9,30 @@ from __future__ import annotations
 from functools import partial
 
 from hybridnav.grid.limits import MAX_CELLS
-from hybridnav.io.models.fields import MOST, Field, Structure
+from hybridnav.io.models.array_specs import MOST, ArraySpec, Structure
 
 GRID = Structure(
     "grid",
     1,
     (
-        Field("palette", "float32", ("levels",)),
-        Field("probability", "uint8 float32", ("rows", "cols")),
-        Field("measured", "uint8", ("rows", "cols"), below=3),
-        Field("classes", "uint8", ("rows", "cols"), below=3),
+        ArraySpec("palette", "float32", ("levels",)),
+        ArraySpec("probability", "uint8 float32", ("rows", "cols")),
+        ArraySpec("measured", "uint8", ("rows", "cols"), below=3),
+        ArraySpec("classes", "uint8", ("rows", "cols"), below=3),
     ),
     {"rows": MAX_CELLS, "cols": MAX_CELLS, "levels": 256},
 )
 """Occupancy, as an index into a palette if it has few values, like that of an image."""
 
-ROOMS = Structure("rooms", 1, (Field("label_of", "int32", ("rows", "cols"), least=-1),), {})
+ROOMS = Structure("rooms", 1, (ArraySpec("label_of", "int32", ("rows", "cols"), least=-1),), {})
 
 PYRAMID = Structure(
     "pyramid",
     1,
     (
-        Field("vertex_end", "uint8", ("cells",), frozen=False),
-        Field("vertex_parent", "int32", ("cells",), least=-1, below="cells", frozen=False),
-        Field("edge_end", "uint8", ("2*cells",), frozen=False),
+        ArraySpec("vertex_end", "uint8", ("cells",), frozen=False),
+        ArraySpec("vertex_parent", "int32", ("cells",), least=-1, below="cells", frozen=False),
+        ArraySpec("edge_end", "uint8", ("2*cells",), frozen=False),
     ),
     {},
 )
@@ -41,18 +41,18 @@ MESH = Structure(
     "mesh",
     1,
     (
-        Field("corners", "int32", ("corners", 2), least=0, below="cells+1"),
-        Field("kinds", "uint8", ("corners",), below=5),
-        Field("first", "int32", ("polygons+1",), below="slots", is_offsets=True),
-        Field("begins", "int32", ("slots",), least=0, below="corners"),
-        Field("twins", "int32", ("slots",), least=-1, below="slots"),
-        Field("polygon_of", "int32", ("slots",), least=0, below="polygons"),
-        Field("polygon_at", "int32", ("rows", "cols"), least=-1, below="polygons"),
-        Field("block_of", "int32", ("slots",), least=-1, below="blocks"),
-        Field("block_head", "int32", ("blocks",), least=0, below="polygons"),
-        Field("block_up", "int32", ("polygons",), least=-1, below="blocks"),
-        Field("component", "int32", ("polygons",), least=0, below="polygons"),
-        Field("depth", "int32", ("polygons",), least=0, below="polygons"),
+        ArraySpec("corners", "int32", ("corners", 2), least=0, below="cells+1"),
+        ArraySpec("kinds", "uint8", ("corners",), below=5),
+        ArraySpec("first", "int32", ("polygons+1",), below="slots", is_offsets=True),
+        ArraySpec("begins", "int32", ("slots",), least=0, below="corners"),
+        ArraySpec("twins", "int32", ("slots",), least=-1, below="slots"),
+        ArraySpec("polygon_of", "int32", ("slots",), least=0, below="polygons"),
+        ArraySpec("polygon_at", "int32", ("rows", "cols"), least=-1, below="polygons"),
+        ArraySpec("block_of", "int32", ("slots",), least=-1, below="blocks"),
+        ArraySpec("block_head", "int32", ("blocks",), least=0, below="polygons"),
+        ArraySpec("block_up", "int32", ("polygons",), least=-1, below="blocks"),
+        ArraySpec("component", "int32", ("polygons",), least=0, below="polygons"),
+        ArraySpec("depth", "int32", ("polygons",), least=0, below="polygons"),
     ),
     {"corners": "4*cells", "polygons": "2*corners", "slots": "6*corners", "blocks": "polygons"},
 )
@@ -63,24 +63,24 @@ CORNER_GRAPH = Structure(
     "corner graph",
     1,
     (
-        Field("first", "int64", ("2*corners+1",), below="edges", is_offsets=True),
-        Field("heads", "int32", ("edges",), least=0, below="corners"),
-        Field("landmark_distances", "float64", ("corners", "landmarks"), least=0),
+        ArraySpec("first", "int64", ("2*corners+1",), below="edges", is_offsets=True),
+        ArraySpec("heads", "int32", ("edges",), least=0, below="corners"),
+        ArraySpec("landmark_distances", "float64", ("corners", "landmarks"), least=0),
     ),
     {**_EDGES, "landmarks": 256},
 )
 
-CORNER_EDGES = Structure("corner edges", 1, CORNER_GRAPH.fields[:2], dict(_EDGES))
+CORNER_EDGES = Structure("corner edges", 1, CORNER_GRAPH.arrays[:2], dict(_EDGES))
 """The edges alone: a hierarchy keeps only these of the contracted graph."""
 
 CORNER_HIERARCHY = Structure(
     "corner hierarchy",
     2,
     (
-        Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
-        Field("arcs", "int64", ("arcs", 2), least=0),
-        Field("middles", "int64", ("arcs",), least=-1, below="4294967296*corners"),
-        Field("follow", "int64", (4, 64)),
+        ArraySpec("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
+        ArraySpec("arcs", "int64", ("arcs", 2), least=0),
+        ArraySpec("middles", "int64", ("arcs",), least=-1, below="4294967296*corners"),
+        ArraySpec("follow", "int64", (4, 64)),
     ),
     {"corners": "4*cells", "arcs": "2000*corners"},
 )
@@ -89,14 +89,14 @@ JUMP_GRAPH = Structure(
     "jump graph",
     2,
     (
-        Field("index", "int64", ("words", 3)),
-        Field("ahead", "int16 int32", ("free", 8)),
-        Field("order", "int32", ("corners",), least=0, below="corners"),
-        Field("places", "int64", ("corners",), least=0),
-        Field("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
-        Field("arcs", "int64", ("arcs", 2), least=0),
-        Field("middles", "int64", ("middles",), least=-1, below="4294967296*corners"),
-        Field("component", "int32", ("corners",), least=0, below="corners"),
+        ArraySpec("index", "int64", ("words", 3)),
+        ArraySpec("ahead", "int16 int32", ("free", 8)),
+        ArraySpec("order", "int32", ("corners",), least=0, below="corners"),
+        ArraySpec("places", "int64", ("corners",), least=0),
+        ArraySpec("first", "int32", ("corners+1",), below="arcs", is_offsets=True),
+        ArraySpec("arcs", "int64", ("arcs", 2), least=0),
+        ArraySpec("middles", "int64", ("middles",), least=-1, below="4294967296*corners"),
+        ArraySpec("component", "int32", ("corners",), least=0, below="corners"),
     ),
     {
         "words": "cells",
@@ -107,7 +107,7 @@ JUMP_GRAPH = Structure(
     },
 )
 
-_Open = partial(Field, frozen=False)
+_Open = partial(ArraySpec, frozen=False)
 
 PORTALS = Structure(
     "portals",
@@ -163,7 +163,7 @@ TABLES = Structure(
     {"gates": "cells", "sources": "gates", "sides": "8*cells"},
 )
 
-PRESET = Structure("preset", 1, (), {})
+PRESET = Structure("preset", 2, (), {})
 
 KEY = Structure("key", 1, (), {})
 """Key by which a kept model is found."""

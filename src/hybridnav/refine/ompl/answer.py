@@ -9,15 +9,15 @@ import numpy as np
 
 from hybridnav.refine.ompl import chain
 from hybridnav.refine.ompl.attempts import Attempts
-from hybridnav.refine.ompl.corridor import corridor_of
 from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
 from hybridnav.refine.ompl.sampler import draw_from
+from hybridnav.refine.ompl.search_area import search_area_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridnav.refine.ompl.corridor import Base, Corridor
     from hybridnav.refine.ompl.messages import Query, Reply
+    from hybridnav.refine.ompl.search_area import Base, SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
 _FIRST = 0.7
@@ -45,14 +45,14 @@ def answer(base: Base, query: Query, send: Callable[[Reply], None]) -> Reply:
     attempts = Attempts(base, query, send)
     last = len(query.corridors) - 1
     for number, (name, fields) in enumerate(query.corridors):
-        corridor = corridor_of(base, query, fields)
+        corridor = search_area_of(base, query, fields)
         _attempt(attempts, corridor, part=1.0 if number == last else _FIRST)
         if not attempts.leave(name):
             break
     return attempts.last_reply()
 
 
-def _attempt(attempts: Attempts, corridor: Corridor, *, part: float) -> None:
+def _attempt(attempts: Attempts, corridor: SearchArea, *, part: float) -> None:
     whole, query, settings = attempts.enter(corridor), attempts.query, attempts.settings
     if np.array_equal(query.start, query.goal):
         attempts.better(query.start[None], 0.0)
@@ -66,7 +66,7 @@ def _attempt(attempts: Attempts, corridor: Corridor, *, part: float) -> None:
     _at_once(attempts, corridor, whole, part=part)
 
 
-def _at_once(attempts: Attempts, corridor: Corridor, whole: StateSpace, *, part: float) -> None:
+def _at_once(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, part: float) -> None:
     """Solve the whole corridor as one problem."""
     settings = attempts.settings
     if settings.confine == "prm":

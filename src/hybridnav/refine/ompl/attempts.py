@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._typing import FloatArray
-    from hybridnav.refine.ompl.corridor import Base, Corridor
     from hybridnav.refine.ompl.messages import Query
+    from hybridnav.refine.ompl.search_area import Base, SearchArea
 
 _KEPT = 0.03
 """Share of the time reserved for the reply."""
@@ -59,7 +59,7 @@ class Attempts:
         self._cost = math.inf
         self._near: FloatArray = np.empty((0, 3))
 
-    def enter(self, corridor: Corridor) -> StateSpace:
+    def enter(self, corridor: SearchArea) -> StateSpace:
         """Begin with a corridor, and return the state space of all of it."""
         whole = self._whole = self.space(corridor, *corridor.bounds)
         self.bound_m = whole.length(np.stack([self.query.start, self.query.goal]))
@@ -97,7 +97,7 @@ class Attempts:
         if self._miss(points) < least and self._whole.is_valid(points):
             self._near = points
 
-    def space(self, corridor: Corridor, low: FloatArray, high: FloatArray) -> StateSpace:
+    def space(self, corridor: SearchArea, low: FloatArray, high: FloatArray) -> StateSpace:
         """Return a state space of the query inside some bounds."""
         note = None if self.search is None else self._note
         return StateSpace(self.settings, corridor.check, low, high, note=note)

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.refine.ompl.corridor import bounds_of
 from hybridnav.refine.ompl.planners import IMPROVING, Problem, solve
 from hybridnav.refine.ompl.poses import Poses
+from hybridnav.refine.ompl.search_area import bounds_of
 from hybridnav.refine.ompl.simplify import Simplifier
 from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.refine.ompl.attempts import Attempts
-    from hybridnav.refine.ompl.corridor import Box, Corridor
+    from hybridnav.refine.ompl.search_area import Box, SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
 _WINDING, _SLACK_CELLS = 1.2, 4
@@ -43,7 +43,7 @@ _ROUNDS_WITHOUT_GAIN = 2
 _LEAST_GAIN = 2e-4
 
 
-def attempt(attempts: Attempts, corridor: Corridor, whole: StateSpace, *, part: float) -> bool:
+def attempt(attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, part: float) -> bool:
     """Solve leg after leg, join and simplify them, and improve windows of the path; return success.
 
     Parameters
@@ -72,15 +72,15 @@ def attempt(attempts: Attempts, corridor: Corridor, whole: StateSpace, *, part: 
 
 
 def _legs(
-    attempts: Attempts, corridor: Corridor, whole: StateSpace, *, part: float
+    attempts: Attempts, corridor: SearchArea, whole: StateSpace, *, part: float
 ) -> FloatArray | None:
     """Return the legs, solved and joined; None if one has no path."""
     cells = attempts.query.cells
     poses = Poses(attempts.query, corridor, whole)
-    stops = [index for index in _stops(attempts, cells) if poses.at(index) is not None]
-    waiting = list(itertools.pairwise(stops))[::-1]
+    joints = [index for index in _joints(attempts, cells) if poses.at(index) is not None]
+    waiting = list(itertools.pairwise(joints))[::-1]
     joined = [attempts.query.start[None]]
-    stop_at = (1 - part) * attempts.budget.left()
+    latest_s = (1 - part) * attempts.budget.left()
     while waiting:
         first, last = waiting.pop()
         share = _LEG / (len(waiting) + 1)
@@ -88,7 +88,9 @@ def _legs(
         middle = (first + last) // 2
         if found is not None:
             joined.append(found[1:])
-        elif last - first > 1 and poses.at(middle) is not None and attempts.budget.left() > stop_at:
+        elif (
+            last - first > 1 and poses.at(middle) is not None and attempts.budget.left() > latest_s
+        ):
             waiting += [(middle, last), (first, middle)]
         else:
             attempts.partial(np.concatenate(joined))
@@ -98,11 +100,11 @@ def _legs(
     return points if len(points) else None
 
 
-def _stops(attempts: Attempts, cells: LongArray) -> list[int]:
+def _joints(attempts: Attempts, cells: LongArray) -> list[int]:
     """Return the indices of the cells at which the path of cells is cut into legs.
 
-    These are its ends, the crossings from one field to the next, and points in between until no leg
-    winds.
+    These are its endpoints, the crossings from one field to the next, and points in between until
+    no leg winds.
     """
     last = len(cells) - 1
     field_of = attempts.setup.field_of
@@ -111,7 +113,7 @@ def _stops(attempts: Attempts, cells: LongArray) -> list[int]:
         fields = field_of[cells[:, 0], cells[:, 1]]
         crossings = (np.flatnonzero(np.diff(fields)) + 1).tolist()
     waiting = list(itertools.pairwise(sorted({0, *crossings, last})))[::-1]
-    stops = [0]
+    joints = [0]
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
     while waiting:
         first, end = waiting.pop()
@@ -120,22 +122,22 @@ def _stops(attempts: Attempts, cells: LongArray) -> list[int]:
             middle = (first + end) // 2
             waiting += [(middle, end), (first, middle)]
         else:
-            stops.append(end)
-    return stops
+            joints.append(end)
+    return joints
 
 
 def _leg(
     attempts: Attempts,
-    corridor: Corridor,
+    corridor: SearchArea,
     cells: LongArray,
-    ends: tuple[FloatArray, FloatArray],
+    endpoints: tuple[FloatArray, FloatArray],
     share: float,
 ) -> FloatArray | None:
     """Return a path between two near states, float64 (n, 3), or None.
 
     The result is None if every path found is much longer than the path of cells.
     """
-    flat, straight = not attempts.settings.has_heading, np.stack(ends)
+    flat, straight = not attempts.settings.has_heading, np.stack(endpoints)
     if flat and corridor.check.path_valid(straight[:, :2]):
         return straight
     if flat and len(cells) <= _SHORT_CELLS:
@@ -147,7 +149,7 @@ def _leg(
     objective = attempts.objective.of(space)
     most = _TRIES * len(cells) if flat or turns_and_drives else None
     found = solve(
-        Problem(space, *ends, objective),
+        Problem(space, *endpoints, objective),
         attempts.settings,
         attempts.budget.stopper(share, most=most),
         search=attempts.search,
@@ -164,7 +166,7 @@ def _leg(
 _MARGIN_CELLS = 8
 
 
-def _bounds(corridor: Corridor, cells: LongArray) -> tuple[FloatArray, FloatArray]:
+def _bounds(corridor: SearchArea, cells: LongArray) -> tuple[FloatArray, FloatArray]:
     """Return the bounds round some cells with a margin, inside those of the corridor."""
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
     margin = _MARGIN_CELLS + int((high - low).max()) // 4
@@ -177,7 +179,9 @@ def _bounds(corridor: Corridor, cells: LongArray) -> tuple[FloatArray, FloatArra
     return bounds_of(corridor.grid, box)
 
 
-def _improve(attempts: Attempts, corridor: Corridor, whole: StateSpace, points: FloatArray) -> None:
+def _improve(
+    attempts: Attempts, corridor: SearchArea, whole: StateSpace, points: FloatArray
+) -> None:
     """Plan windows of the path again, each in the ellipse that can shorten it."""
     budget = attempts.budget
     cost_of = attempts.objective.cost
@@ -197,7 +201,7 @@ def _improve(attempts: Attempts, corridor: Corridor, whole: StateSpace, points: 
 
 def _window(
     attempts: Attempts,
-    corridor: Corridor,
+    corridor: SearchArea,
     whole: StateSpace,
     points: FloatArray,
     along: tuple[float, float],
@@ -228,8 +232,8 @@ def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:
     return max(first, 0), min(last, len(points) - 1)
 
 
-def _ellipse(corridor: Corridor, inner: FloatArray, cost: float) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of the ellipse of paths up to a cost between the ends of a part.
+def _ellipse(corridor: SearchArea, inner: FloatArray, cost: float) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds of the ellipse of paths up to a cost between the endpoints of a part.
 
     They lie inside the bounds of the corridor (J. Gammell and others: Informed RRT*, 2014).
     """

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hybridnav.config import OmplSettings
     from hybridnav.grid import OccupancyGrid
 
-Outcome = Literal["solved", "approximate", "timeout"]
+ReplyStatus = Literal["solved", "approximate", "timeout"]
 
 
 SEARCH_S = 60.0
@@ -67,7 +67,7 @@ class Search:
 class Reply:
     """Result of a query; a worker may send several for one query, each better than the last."""
 
-    outcome: Outcome
+    outcome: ReplyStatus
     points: FloatArray
     """float64 (n, 3), states of the path in order; an approximate path does not end at the goal.
     Shape (0, 3) if there is no path."""

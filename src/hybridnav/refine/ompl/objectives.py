@@ -72,16 +72,16 @@ class _Line(base.OptimizationObjective):  # type: ignore[misc]  # the bindings h
         self._cost = cost
         self._flat = space.dimension == 2  # noqa: PLR2004
 
-    def _ends(self, first: Any, second: Any) -> tuple[float, float, float, float]:
+    def _endpoints(self, first: Any, second: Any) -> tuple[float, float, float, float]:
         if self._flat:
             return first[0], first[1], second[0], second[1]
         return first.getX(), first.getY(), second.getX(), second.getY()
 
     def motionCost(self, first: Any, second: Any) -> Any:  # noqa: N802 - OMPL's names
-        return base.Cost(self._cost(*self._ends(first, second)))
+        return base.Cost(self._cost(*self._endpoints(first, second)))
 
     def motionCostHeuristic(self, first: Any, second: Any) -> Any:  # noqa: N802
-        return base.Cost(_length(*self._ends(first, second)))
+        return base.Cost(_length(*self._endpoints(first, second)))
 
     def stateCost(self, state: Any) -> Any:  # noqa: ARG002, N802
         return base.Cost(0.0)

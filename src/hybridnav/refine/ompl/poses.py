@@ -9,8 +9,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
-    from hybridnav.refine.ompl.corridor import Corridor
     from hybridnav.refine.ompl.messages import Query
+    from hybridnav.refine.ompl.search_area import SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
 _AHEAD_M = 1.0
@@ -22,8 +22,8 @@ _ASIDE_CELLS = (0, 2, -2, 4, -4, 8, -8)
 class Poses:
     """Valid states at cells of a path.
 
-    The ends are those of the query. The others head along the path, turned or moved aside if that
-    is not valid.
+    The endpoints are those of the query. The others head along the path, turned or moved aside if
+    that is not valid.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Poses:
         State space of the corridor.
     """
 
-    def __init__(self, query: Query, corridor: Corridor, whole: StateSpace) -> None:
+    def __init__(self, query: Query, corridor: SearchArea, whole: StateSpace) -> None:
         self._check = corridor.check
         self._has_heading = whole.dimension > 2  # noqa: PLR2004
         self._resolution_m = corridor.grid.resolution_m

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 from ompl import base, util
 
 if TYPE_CHECKING:
-    from hybridnav.refine.ompl.corridor import Corridor
+    from hybridnav.refine.ompl.search_area import SearchArea
     from hybridnav.refine.ompl.spaces import StateSpace
 
 
 class _CellSampler(base.ValidStateSampler):  # type: ignore[misc]  # the bindings have no types
     """Points in cells, each cell as likely as any other, with any heading."""
 
-    def __init__(self, information: Any, corridor: Corridor, space: StateSpace) -> None:
+    def __init__(self, information: Any, corridor: SearchArea, space: StateSpace) -> None:
         super().__init__(information)
         self._cells = corridor.cells
         self._frame = corridor.grid.frame
@@ -35,7 +35,7 @@ class _CellSampler(base.ValidStateSampler):  # type: ignore[misc]  # the binding
         return self.sample(state)
 
 
-def draw_from(corridor: Corridor, space: StateSpace) -> None:
+def draw_from(corridor: SearchArea, space: StateSpace) -> None:
     """Make a space draw its valid states from the cells of a corridor."""
 
     def allocate(information: Any) -> _CellSampler:

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import HybridNavError
-from hybridnav.refine.ompl.corridor import Base
 from hybridnav.refine.ompl.messages import SEARCH_S, Failure, ended, without_answer
+from hybridnav.refine.ompl.search_area import Base
 
 if TYPE_CHECKING:
     from collections.abc import Callable

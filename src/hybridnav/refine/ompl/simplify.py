@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from hybridnav.refine.ompl.objectives import Objective
     from hybridnav.refine.ompl.spaces import StateSpace
 
-_PIECE = 16
-"""States of the pieces that are simplified one by one: PathSimplifier tries pairs of states
+_SEGMENT_STATES = 16
+"""States of the segments that are simplified one by one: PathSimplifier tries pairs of states
 anywhere on the path, nearly all of which are out of sight of each other on a long path, and some of
 its steps take quadratic time."""
 _STEPS = 8
-"""Steps for each state of a piece."""
+"""Steps for each state of a segment."""
 _SNAP = 1e-3
 _LEAST_GAIN = 5e-4
 """Share that a round must gain to count as fruitful."""
@@ -60,21 +60,21 @@ def simplify(
         points = _round(simplifier, points, budget, shift)
         cost = objective.cost(points)
         fruitless = 0 if cost < before * (1 - _LEAST_GAIN) else fruitless + 1
-        shift = 0 if shift else _PIECE // 2
+        shift = 0 if shift else _SEGMENT_STATES // 2
         on_better(points, cost)
     return points
 
 
 def _round(simplifier: Simplifier, points: FloatArray, budget: Budget, shift: int) -> FloatArray:
-    """Simplify piece by piece; pieces begin at other states in every other round."""
-    cuts = [0, *range(shift or _PIECE, len(points) - 1, _PIECE), len(points) - 1]
+    """Simplify segment by segment; segments begin at other states in every other round."""
+    cuts = [0, *range(shift or _SEGMENT_STATES, len(points) - 1, _SEGMENT_STATES), len(points) - 1]
     done = [points[:1]]
     for first, last in itertools.pairwise(cuts):
-        piece = points[first : last + 1]
-        if len(piece) > 2 and budget.left() > 0:  # noqa: PLR2004
-            piece = simplifier.shorter(piece)
+        segment = points[first : last + 1]
+        if len(segment) > 2 and budget.left() > 0:  # noqa: PLR2004
+            segment = simplifier.shorter(segment)
             budget.spend(_STEPS * (last - first))
-        done.append(piece[1:])
+        done.append(segment[1:])
     return np.concatenate(done)
 
 

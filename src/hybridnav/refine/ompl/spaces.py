@@ -197,7 +197,7 @@ class _Turning(base.MotionValidator):  # type: ignore[misc]
         )  # fmt: skip
 
 
-def _either_way(check: MotionCheck) -> Callable[..., bool]:
+def _either_direction(check: MotionCheck) -> Callable[..., bool]:
     valid = check.drive_valid
     return lambda *poses: valid(*poses) or valid(*poses, backwards=True)
 
@@ -208,7 +208,9 @@ def _motions_of(settings: OmplSettings, check: MotionCheck, information: Any) ->
     if settings.space == "se2":
         return _Turning(information, check.turn_valid)
     if settings.space == "differential":
-        return _Turning(information, _either_way(check) if settings.reverses else check.drive_valid)
+        return _Turning(
+            information, _either_direction(check) if settings.reverses else check.drive_valid
+        )
     assert settings.turning_radius_m is not None  # noqa: S101 - the settings are checked
     curve = check.dubins_valid if settings.space == "dubins" else check.reeds_shepp_valid
     return _Turning(information, partial(curve, radius_m=settings.turning_radius_m))

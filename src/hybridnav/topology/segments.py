@@ -1,4 +1,4 @@
-"""Pieces of free space, cut at its narrow places: the first stage of the segmentation into
+"""Segments of free space, cut at its narrow places: the first stage of the segmentation into
 rooms."""
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 _PERSISTENCE = 0.8
-"""A passage parts two pieces when its clearance is below this share of that of either piece."""
+"""A passage parts two segments when its clearance is below this share of that of either segment."""
 _FINE_M = 1.0
 """U_d of the places that the steered contraction begins with."""
 
 _PINCH = 0.4
 _PINCH_M = 0.65
 """Besides wall lines only a passage with less clearance than this, and than this share of that on
-both sides, parts two pieces: a door in a wall that is no line."""
+both sides, parts two segments: a door in a wall that is no line."""
 
 _GAP_M = 6.0
 _DOOR_M = 1.5
@@ -39,11 +39,11 @@ _RIM_M = 0.3
 _WALL_SLACK_M = 0.15
 """A wall bends by so much at most where it continues another, on either side."""
 _LEAST_TILT_RAD = 0.02
-LEAST_PIECE_M2 = 1.0
-"""Smaller pieces between wall lines go to neighbours, unless the caller allows smaller rooms."""
+LEAST_SEGMENT_M2 = 1.0
+"""Smaller segments between wall lines go to neighbours, unless the caller allows smaller rooms."""
 
 
-def watershed_pieces(grid: OccupancyGrid) -> IntArray:
+def watershed_segments(grid: OccupancyGrid) -> IntArray:
     """Cut free space along the watersheds of the clearance, where passages are narrow.
 
     The distance transform is flooded from its peaks. Two basins merge where they meet unless the
@@ -60,7 +60,7 @@ def watershed_pieces(grid: OccupancyGrid) -> IntArray:
     Returns
     -------
     IntArray
-        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
     """
     return _basins(grid, ratio=_PERSISTENCE, broad_m=math.inf)
 
@@ -75,19 +75,19 @@ def _basins(grid: OccupancyGrid, *, ratio: float, broad_m: float) -> IntArray:
     order = inside[np.argsort(-flat[inside], kind="stable")]
     broad = broad_m / grid.resolution_m
     basins = _segmentation_kernels.flood_basins(flat, order, clearance.shape[1], ratio, broad)
-    pieces: IntArray = basins.reshape(clearance.shape)[1:-1, 1:-1].copy()
-    return pieces
+    segments: IntArray = basins.reshape(clearance.shape)[1:-1, 1:-1].copy()
+    return segments
 
 
 def _clearance(grid: OccupancyGrid) -> FloatArray:
     """Return the clearance in cells of the map as measured. Without an occupied cell it is 1
-    everywhere, so that all is one piece."""
+    everywhere, so that all is one segment."""
     clearance = clearance_cells(grid.measured == CellClass.OCCUPIED)
     clearance[~np.isfinite(clearance)] = 1.0
     return clearance
 
 
-def contracted_pieces(grid: OccupancyGrid) -> IntArray:
+def contracted_segments(grid: OccupancyGrid) -> IntArray:
     """Return the fields of the apex of a pyramid in which narrow boundaries resist.
 
     The pyramid grows on above fine places of the map as it was measured. Each level contracts the
@@ -103,18 +103,18 @@ def contracted_pieces(grid: OccupancyGrid) -> IntArray:
     Returns
     -------
     IntArray
-        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
     """
     apex = DualGraphPyramid.build(
         replace(grid, robot_radius_m=0.0, least_island_m2=0.0),
         merge_distance_m=max(_FINE_M, 2 * grid.resolution_m),
         resistance=Resistance(_clearance(grid), _PERSISTENCE),
     )[-1]
-    pieces: IntArray = np.where(grid.measured == CellClass.FREE, apex.field_of, -1)
-    return pieces.astype(np.int32)
+    segments: IntArray = np.where(grid.measured == CellClass.FREE, apex.field_of, -1)
+    return segments.astype(np.int32)
 
 
-def walled_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> IntArray:
+def walled_segments(grid: OccupancyGrid, *, least_m2: float = LEAST_SEGMENT_M2) -> IntArray:
     """Cut free space along wall lines, and at pinched passages between them.
 
     Parameters
@@ -122,28 +122,28 @@ def walled_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> I
     grid
         The map; cells count as they were measured, whatever the robot's radius.
     least_m2
-        As in `wall_line_pieces`.
+        As in `wall_line_segments`.
 
     Returns
     -------
     IntArray
-        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
     """
-    lines = wall_line_pieces(grid, least_m2=least_m2).astype(np.int64)
+    lines = wall_line_segments(grid, least_m2=least_m2).astype(np.int64)
     basins = _basins(grid, ratio=_PINCH, broad_m=_PINCH_M)
     both = np.where((lines >= 0) & (basins >= 0), lines * (int(basins.max()) + 1) + basins, -1)
     found, dense = np.unique(both, return_inverse=True)
     none = int(np.searchsorted(found, 0))
-    pieces: IntArray = (dense.reshape(both.shape) - none).astype(np.int32)
-    return np.maximum(pieces, -1)
+    segments: IntArray = (dense.reshape(both.shape) - none).astype(np.int32)
+    return np.maximum(segments, -1)
 
 
-def wall_line_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -> IntArray:
+def wall_line_segments(grid: OccupancyGrid, *, least_m2: float = LEAST_SEGMENT_M2) -> IntArray:
     """Cut free space along the lines of its walls, where they continue behind an opening.
 
     In the two main directions of the building, a gap between two walls on one line counts as an
     opening: up to 6 m with enough wall on both sides, up to 1.5 m (doors) with enough on one. Cells
-    that stay connected form a piece; small ones go to their neighbours. Kin to the wall lines
+    that stay connected form a segment; small ones go to their neighbours. Kin to the wall lines
     of M. Luperto, F. Amigoni: Extracting structure of buildings using layout reconstruction, 2019.
 
     Parameters
@@ -151,12 +151,12 @@ def wall_line_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -
     grid
         The map; cells count as they were measured, whatever the robot's radius.
     least_m2
-        Square metres of free cells below which a piece goes to its neighbours.
+        Square metres of free cells below which a segment goes to its neighbours.
 
     Returns
     -------
     IntArray
-        int32 (rows, cols), a piece for each free cell, -1 elsewhere.
+        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
     """
     free = grid.measured == CellClass.FREE
     occupied = grid.measured == CellClass.OCCUPIED
@@ -173,10 +173,10 @@ def wall_line_pieces(grid: OccupancyGrid, *, least_m2: float = LEAST_PIECE_M2) -
     areas_m2 = np.bincount(labels.ravel()) * grid.resolution_m**2
     kept = areas_m2 >= least_m2
     kept[0] = False
-    pieces: IntArray = np.where(kept[labels], labels - 1, -1).astype(np.int32)
+    segments: IntArray = np.where(kept[labels], labels - 1, -1).astype(np.int32)
     everywhere = np.where(free, np.int32(0), np.int32(-1))
-    _segmentation_kernels.grow_labels(pieces, everywhere, free.size)
-    return pieces
+    _segmentation_kernels.grow_labels(segments, everywhere, free.size)
+    return segments
 
 
 def main_direction(occupied: BoolArray) -> float:

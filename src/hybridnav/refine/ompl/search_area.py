@@ -62,7 +62,7 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class Corridor:
+class SearchArea:
     """The part of the map that a query may search."""
 
     grid: OccupancyGrid
@@ -96,7 +96,7 @@ def bounds_of(grid: OccupancyGrid, box: Box) -> tuple[FloatArray, FloatArray]:
     return points.min(axis=0), points.max(axis=0)
 
 
-def corridor_of(base: Base, query: Query, fields: BoolArray | None) -> Corridor:
+def search_area_of(base: Base, query: Query, fields: BoolArray | None) -> SearchArea:
     """Return the corridor of some fields; for None, that of all cells."""
     setup, grid, inside = base.setup, base.setup.grid, None
     box: Box = (0, grid.shape[0], 0, grid.shape[1])
@@ -113,4 +113,4 @@ def corridor_of(base: Base, query: Query, fields: BoolArray | None) -> Corridor:
         # -1, for no field, reads the last entry, which is False.
         inside[box[0] : box[1], box[2] : box[3]] = np.append(fields, False)[part]
     check = base.check.confined(inside=inside, closed=query.closed)
-    return Corridor(grid, inside, box, check, setup.allow_unexplored)
+    return SearchArea(grid, inside, box, check, setup.allow_unexplored)

@@ -1,4 +1,4 @@
-"""Pictures of rooms and ways: names that do not hide each other, doors by number, all routes."""
+"""Pictures of rooms and routes: names that do not hide each other, doors by number, all routes."""
 
 import itertools
 import re
@@ -74,9 +74,9 @@ def test_names_hide_neither_each_other_nor_the_room_beside(side, width_in):
         assert wide <= 4 or high <= 0.2 * one.height  # a font's box is higher than its letters
     for gid, box in boxes.items():
         middle = ax.transData.inverted().transform([((box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2)])
-        ends = ax.transData.inverted().transform([(box.x0 + 4, box.y0), (box.x1 - 4, box.y0)])
-        ends[:, 1] = middle[0, 1]
-        cells = grid.frame.cells_of(np.concatenate([middle, ends]))
+        endpoints = ax.transData.inverted().transform([(box.x0 + 4, box.y0), (box.x1 - 4, box.y0)])
+        endpoints[:, 1] = middle[0, 1]
+        cells = grid.frame.cells_of(np.concatenate([middle, endpoints]))
         assert set(labels.label_of[tuple(cells.T)].tolist()) <= {-1, int(gid.split("-")[1])}
     told = [re.fullmatch(r"rooms \((\d+) without their name\)", entry) for entry in legend(ax)]
     left_out = sum(int(found[1]) for found in told if found)
@@ -106,16 +106,16 @@ def test_names_lie_beside_the_way_where_there_is_room(width_in, size_m):
     grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(size_m))
     pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=4 * size_m, rooms=rooms)
     planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="grid-astar")
-    ends = np.array([[3.5, 10.5], [37.5, 10.5]]) * size_m  # along the middle of both rooms
-    ax = plot_tour(planner.topology, hn.plan_tour(planner, ends), width_in=width_in)
+    endpoints = np.array([[3.5, 10.5], [37.5, 10.5]]) * size_m  # along the middle of both rooms
+    ax = plot_tour(planner.topology, hn.plan_tour(planner, endpoints), width_in=width_in)
     (line,) = (line for line in ax.lines if line.get_gid() == "path")
-    way = ax.transData.transform(line.get_xydata())
+    path = ax.transData.transform(line.get_xydata())
     renderer = FigureCanvasAgg(ax.figure.figure).get_renderer()
     names = texts(ax, r"room-\d+")
     assert len(names) == 2
     for text in names.values():
         box = text.get_window_extent(renderer)
-        inside = (way >= [box.x0, box.y0]) & (way <= [box.x1, box.y1])
+        inside = (path >= [box.x0, box.y0]) & (path <= [box.x1, box.y1])
         assert not inside.all(axis=1).any(), text.get_text()
 
 
@@ -139,7 +139,7 @@ def test_all_alternatives_are_drawn_each_in_its_colour(ring):
     for line, alternative in zip(lines, found, strict=True):
         assert np.array_equal(np.column_stack(line.get_data()), alternative.path.points)
     assert len({to_rgb(line.get_color()) for line in lines}) == 2
-    # Where they share their way, the shorter lies on the longer, which shows on both its sides.
+    # Where they share cells, the shorter lies on the longer, which shows on both its sides.
     assert lines[0].get_zorder() > lines[1].get_zorder()
     assert lines[0].get_linewidth() < lines[1].get_linewidth()
     told = [f"route {n}, {a.path.length_m:.2f} m" for n, a in enumerate(found, start=1)]
@@ -157,8 +157,8 @@ def test_twenty_routes_are_all_told_apart(ring):
 
 
 def test_routes_that_share_all_their_way_show_each(ring):
-    (way, _) = hn.plan_alternatives(ring, "west", "east", 2, least_hole_m2=0.5)
-    same = Alternatives((way,) * 5, complete=True)
+    (path, _) = hn.plan_alternatives(ring, "west", "east", 2, least_hole_m2=0.5)
+    same = Alternatives((path,) * 5, complete=True)
     ax = plot_alternatives(ring.topology, same, width_in=4.0)
     picture = FigureCanvasAgg(ax.figure.figure)
     picture.draw()
@@ -188,8 +188,8 @@ def test_alternatives_on_a_map_without_rooms_and_without_a_path():
     assert "no path" in ax.get_title()
 
 
-@pytest.mark.parametrize("ends", [("0.75,1.75", "3.75,1.75"), ("west", "3.75,1.75")])
-def test_the_command_draws_all_routes(cli, tmp_path, ring, ends):
+@pytest.mark.parametrize("endpoints", [("0.75,1.75", "3.75,1.75"), ("west", "3.75,1.75")])
+def test_the_command_draws_all_routes(cli, tmp_path, ring, endpoints):
     grid = occupancy_grid(RING, resolution_m=0.5)
     image = np.where(np.flipud(grid.measured) == hn.CellClass.OCCUPIED, 0, 254).astype(np.uint8)
     (tmp_path / "m.pgm").write_bytes(b"P5\n13 7\n255\n" + image.tobytes())
@@ -200,7 +200,7 @@ def test_the_command_draws_all_routes(cli, tmp_path, ring, ends):
     rooms = ring.topology.rooms
     hn.save_rooms(tmp_path / "rooms.yaml", rooms.labels, rooms.grid)
     picture = tmp_path / "m.svg"
-    query = ("--from", ends[0], "--to", ends[1], "--alternatives", 2, "--robot-radius", 0)
+    query = ("--from", endpoints[0], "--to", endpoints[1], "--alternatives", 2, "--robot-radius", 0)
     done = cli("plan", tmp_path / "m.yaml", *query, "--plot", picture)
     assert done.code == 0
     drawn_routes = set(re.findall(r'id="(route-\d)"', picture.read_text()))

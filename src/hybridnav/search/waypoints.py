@@ -1,4 +1,4 @@
-"""The cheapest stops, one cell from each of several sets that are visited in order."""
+"""The cheapest waypoints, one cell from each of several sets that are visited in order."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.search import _stops_kernels
+from hybridnav.search import _waypoint_kernels
 from hybridnav.search.moves import legal_moves
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, LongArray
 
 
-def cheapest_stops(
+def cheapest_waypoints(
     enterable: BoolArray, sets: Sequence[LongArray], *, corner_cutting: bool = False
 ) -> list[int] | None:
     """Choose a cell from each set so that the path through them, in order, is shortest.
@@ -44,7 +44,7 @@ def cheapest_stops(
     for number, goals in enumerate(sets[1:], start=2):
         is_target = np.zeros(moves.size, dtype=np.bool_)
         is_target[goals] = True
-        cost, came = _stops_kernels.spread(
+        cost, came = _waypoint_kernels.spread(
             moves, enterable.shape[1], sources, costs, is_target, number < len(sets)
         )
         reached = goals[cost[goals] >= 0]
@@ -52,7 +52,7 @@ def cheapest_stops(
             return None
         origins.append(np.stack([reached, sources[came[reached]]], axis=1))
         sources, costs = reached, cost[reached]
-    stops = [int(sources[np.argmin(costs)])]
+    waypoints = [int(sources[np.argmin(costs)])]
     for pairs in reversed(origins):
-        stops.append(int(pairs[np.argmax(pairs[:, 0] == stops[-1]), 1]))
-    return stops[::-1]
+        waypoints.append(int(pairs[np.argmax(pairs[:, 0] == waypoints[-1]), 1]))
+    return waypoints[::-1]

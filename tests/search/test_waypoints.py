@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hybridnav.grid import CellClass
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.moves import path_length_in_cells
-from hybridnav.search.stops import cheapest_stops
+from hybridnav.search.waypoints import cheapest_waypoints
 from tests.strategies import class_grids
 
 
@@ -24,17 +24,17 @@ def test_stops_are_as_cheap_as_the_best_of_all_choices(classes, seed, n_sets):
     search = GridSearch(enterable)
     cols = classes.shape[1]
 
-    def length(stops):
+    def length(waypoints):
         total = 0.0
-        for tail, head in itertools.pairwise(stops):
+        for tail, head in itertools.pairwise(waypoints):
             found = search.search(divmod(int(tail), cols), divmod(int(head), cols))
             total += np.inf if found.cells is None else path_length_in_cells(found.cells)
         return total
 
     best = min(map(length, itertools.product(*sets)))
-    stops = cheapest_stops(enterable, sets)
-    if stops is None:
+    waypoints = cheapest_waypoints(enterable, sets)
+    if waypoints is None:
         assert best == np.inf
     else:
-        assert all(stop in members for stop, members in zip(stops, sets, strict=True))
-        assert abs(length(stops) - best) < 1e-9
+        assert all(waypoint in members for waypoint, members in zip(waypoints, sets, strict=True))
+        assert abs(length(waypoints) - best) < 1e-9

@@ -1,4 +1,4 @@
-"""Descriptions of the structures of a model: fields, with their valid shapes and values.
+"""Descriptions of the structures of a model: arrays, with their valid shapes and values.
 
 A structure is written and read through one description. An attribute added to a class is added to
 its description, whose version then goes up.
@@ -29,7 +29,7 @@ MOST = "1000*cells+100000000"
 
 
 @dataclass(frozen=True)
-class Field:
+class ArraySpec:
     """One array of a structure."""
 
     name: str
@@ -93,8 +93,8 @@ class Structure:
 
     kind: str
     version: int
-    """Version, which goes up with every change of the fields."""
-    fields: tuple[Field, ...]
+    """Version, which goes up with every change of the arrays."""
+    arrays: tuple[ArraySpec, ...]
     most: Mapping[str, _Size]
     """The sizes, and the limit of each: a number, or a term of sizes before it."""
 
@@ -104,12 +104,12 @@ class Structure:
         Parameters
         ----------
         thing
-            Object with an attribute, or an item, for each field.
+            Object with an attribute, or an item, for each array.
         sizes, values
             Numbers that shapes consist of, and others.
         """
         read = thing.__getitem__ if isinstance(thing, dict) else lambda name: getattr(thing, name)
-        arrays = {field.name: read(field.name) for field in self.fields}
+        arrays = {spec.name: read(spec.name) for spec in self.arrays}
         return Part(self.kind, self.version, sizes, values or {}, arrays)
 
     def read(self, filed: FiledPart, known: Mapping[str, int]) -> dict[str, AnyArray]:
@@ -131,19 +131,19 @@ class Structure:
         """
         self.check_version(filed)
         sizes = self._checked_sizes(filed, known)
-        for field in self.fields:
-            field.check_shape(filed, sizes)
+        for spec in self.arrays:
+            spec.check_shape(filed, sizes)
         # A deflated file of a few kilobytes could demand a lot of memory.
         size, most = sum(at.nbytes for at in filed.part.arrays.values()), evaluated(MOST, sizes)
         if size > most:
             raise refusal(filed, f"its arrays have {size} bytes, expected at most {most}")
-        if len(filed.part.arrays) > len(self.fields):
-            extra = sorted(filed.part.arrays.keys() - {field.name for field in self.fields})
+        if len(filed.part.arrays) > len(self.arrays):
+            extra = sorted(filed.part.arrays.keys() - {spec.name for spec in self.arrays})
             raise refusal(filed, f"{extra[0]:.40} is not known")
         arrays = filed.read().arrays
-        for field in self.fields:
-            field.check_values(filed, sizes, arrays[field.name])
-            arrays[field.name].flags.writeable = not field.frozen
+        for spec in self.arrays:
+            spec.check_values(filed, sizes, arrays[spec.name])
+            arrays[spec.name].flags.writeable = not spec.frozen
         return arrays
 
     def check_version(self, filed: FiledPart) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass
 from hybridnav.pyramid.arc import LevelArc
-from hybridnav.pyramid.cracks import ends_of
+from hybridnav.pyramid.cracks import endpoints_of
 from hybridnav.topology.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
 
 if TYPE_CHECKING:
@@ -188,12 +188,12 @@ class Rooms:
         """
         found = self._door_of_number.get(number)
         if found is None:
-            told = "the map has no doors"
+            known = "the map has no doors"
             if self.doors:
                 first, last = self.doors[0].number, self.doors[-1].number
-                told = f"there are {len(self.doors)}, from {first} to {last}"
+                known = f"there are {len(self.doors)}, from {first} to {last}"
             raise InvalidValueError(
-                f"no door has the number {number!r:.80}: {told}; hybridnav rooms MAP lists them"
+                f"no door has the number {number!r:.80}: {known}; hybridnav rooms MAP lists them"
             )
         return found
 
@@ -228,7 +228,7 @@ class Rooms:
         found = self._boundaries
         of_door = self._numbers == self.door(number).number
         edges = found.edges[of_door[found.boundary_of]]
-        return np.unique(ends_of(edges, self.grid.shape[1]))
+        return np.unique(endpoints_of(edges, self.grid.shape[1]))
 
     def counted(self) -> tuple[str, str, str]:
         """Describe how many rooms and doors there are, and how many of them this robot cannot use.

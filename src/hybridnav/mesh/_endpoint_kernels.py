@@ -1,4 +1,5 @@
-"""Kernels of the ends of a query: the polygons that contain them, the corners that they see."""
+"""Kernels of the endpoints of a query: the polygons that contain them, the corners that they
+see."""
 
 from __future__ import annotations
 
@@ -7,41 +8,41 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.mesh._polyanya_kernels import DONE, NO_ROOM, PAUSED
+from hybridnav.mesh._polyanya_kernels import DONE, PAUSED, WORK_FULL
 from hybridnav.mesh._view_kernels import see_from_point
 from hybridnav.search.exact import turn_of
 
 APART, MET, SPLIT = -1, 1, 0
-"""Positions of the ends of a query: not connected, in one polygon, in several."""
+"""Positions of the endpoints of a query: not connected, in one polygon, in several."""
 
 
 @njit(cache=True, nogil=True)
-def look_from_ends(mesh, where, ends, rooms, bounds):
-    """Find the corners that the ends of a query see, or the answer if that needs no corner.
+def look_from_endpoints(mesh, where, endpoints, rooms, bounds):
+    """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
 
     Parameters
     ----------
-    mesh, ends
+    mesh, endpoints
         See `successors`.
     where
-        Component of polygons, the polygon of each cell, and `cells`; see `polygons_of_ends`.
+        Component of polygons, the polygon of each cell, and `cells`; see `polygons_of_endpoints`.
     rooms
         int32 room for the polygons of start and goal, room of `see_from_point`.
     bounds
-        Receives the length and lower bound of the answer: infinite if the ends are not connected,
-        their distance if they see each other.
+        Receives the length and lower bound of the answer: infinite if the endpoints are not
+        connected, their distance if they see each other.
 
     Returns
     -------
     tuple
-        `DONE` with the answer, `NO_ROOM`, or `PAUSED`, when the room holds the corners that the
+        `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the
         goal sees and then those that the start sees; the indices at which both lists end.
     """
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     component, polygon_at, cells = where
     starts, goals, room = rooms
-    how, n_starts, n_goals = polygons_of_ends(
-        mesh, component, polygon_at, cells, ends, starts, goals
+    how, n_starts, n_goals = polygons_of_endpoints(
+        mesh, component, polygon_at, cells, endpoints, starts, goals
     )
     if how == APART:
         bounds[:] = np.inf
@@ -50,11 +51,11 @@ def look_from_ends(mesh, where, ends, rooms, bounds):
         nowhere = (0.0, 0.0, starts[:0])
         n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, room, 0)
         if n < 0:
-            return NO_ROOM, 0, 0
+            return WORK_FULL, 0, 0
         target = (tx, ty, goals[:n_goals])
         n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, room, n)
         if n_all < 0:
-            return NO_ROOM, 0, 0
+            return WORK_FULL, 0, 0
         if not is_seen:
             return PAUSED, n, n_all
     bounds[:] = math.hypot(tx - sx, ty - sy)
@@ -62,12 +63,12 @@ def look_from_ends(mesh, where, ends, rooms, bounds):
 
 
 @njit(cache=True, nogil=True)
-def polygons_of_ends(mesh, component, polygon_at, cells, ends, starts, goals):
-    """Find the polygons that contain the ends of a query.
+def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts, goals):
+    """Find the polygons that contain the endpoints of a query.
 
     Parameters
     ----------
-    mesh, ends
+    mesh, endpoints
         See `successors`.
     component
         int32 (p,) of `blocks_of`.
@@ -83,7 +84,7 @@ def polygons_of_ends(mesh, component, polygon_at, cells, ends, starts, goals):
     tuple
         `APART`, `MET` or `SPLIT`; the numbers of polygons that contain the start and the goal.
     """
-    sx, sy, tx, ty = ends
+    sx, sy, tx, ty = endpoints
     from_row, from_col, to_row, to_col = cells
     inner = _polygon_in(mesh, component, polygon_at, from_row, from_col)
     last = _polygon_in(mesh, component, polygon_at, to_row, to_col)
@@ -101,14 +102,14 @@ def polygons_of_ends(mesh, component, polygon_at, cells, ends, starts, goals):
 @njit(cache=True, nogil=True)
 def _polygon_in(mesh, component, polygon_at, row, col):
     """Return a polygon with the centre of a free cell; in a cut mesh, one of the last."""
-    cx, cy, _, first, begins, stops, _, _ = mesh
+    cx, cy, _, first, begins, finishes, _, _ = mesh
     polygon = polygon_at[row, col]
     if component[polygon] >= 0:
         return polygon
     for other in range(len(first) - 2, -1, -1):
         holds = component[other] >= 0
         for slot in range(first[other], first[other + 1]):
-            u, w = begins[slot], stops[slot]
+            u, w = begins[slot], finishes[slot]
             holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5) >= 0
         if holds:
             return other
@@ -138,7 +139,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
     int
         Number of polygons found.
     """
-    cx, cy, _, first, begins, stops, twins, polygon_of = mesh
+    cx, cy, _, first, begins, finishes, twins, polygon_of = mesh
     found[0] = inner
     n = 1
     at = 0
@@ -150,7 +151,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
             if twins[slot] < 0:
                 continue
             u = begins[slot]
-            w = stops[slot]
+            w = finishes[slot]
             # The segment from the centre to the point meets no wall: its polygons are connected.
             if not _touch(cx[u], cy[u], cx[w], cy[w], col + 0.5, row + 0.5, x, y):
                 continue
@@ -168,7 +169,7 @@ def polygons_with(mesh, inner, row, col, x, y, found):
         holds = True
         for slot in range(low, high):
             u = begins[slot]
-            w = stops[slot]
+            w = finishes[slot]
             holds = holds and turn_of(cx[u], cy[u], cx[w], cy[w], x, y) >= 0
         if holds:
             found[kept] = polygon

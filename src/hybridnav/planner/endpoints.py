@@ -34,7 +34,7 @@ _REFUSED = (
 )
 
 
-def cells_of_ends(
+def cells_of_endpoints(
     grid: OccupancyGrid, points: Points, *, allow_unexplored: bool
 ) -> tuple[Cell, Cell] | PlanStatus:
     """Return the cells of start and goal, or the status of one that is not valid."""

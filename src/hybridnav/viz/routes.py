@@ -1,4 +1,4 @@
-"""Pictures of paths through rooms: tours from stop to stop, and alternative routes."""
+"""Pictures of paths through rooms: tours from waypoint to waypoint, and alternative routes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
 from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries, swatch
 from hybridnav.viz.places import Places
-from hybridnav.viz.room_labels import RoomWriter
-from hybridnav.viz.rooms import (
+from hybridnav.viz.room_map import (
     DOOR_POINTS,
     draw_doors,
     draw_room_cells,
     room_entry,
 )
+from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from hybridnav.topology import Door, Rooms, TopologicalMap
     from hybridnav.viz.layout import Entry
 
-_TOUR_WIDTH, _STOP_POINTS = 1.6, 5.0
+_TOUR_WIDTH, _WAYPOINT_POINTS = 1.6, 5.0
 _ROUTE_WIDTH, _WIDER, _CASING = 1.6, 1.9, 0.6
 """Line widths: longer routes are wider and below the shorter ones, so that all show where they
 overlap."""
@@ -58,7 +58,7 @@ def plot_tour(
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw a tour: the rooms as in `plot_rooms`, and the paths from stop to stop.
+    """Draw a tour: the rooms as in `plot_rooms`, and the paths from waypoint to waypoint.
 
     The doors on the path have their numbers, those of `Tour.in_words`.
 
@@ -88,7 +88,7 @@ def plot_tour(
     >>> plot_tour(topology, tour, title="tour").get_title()
     'tour'
     """
-    told = f"{tour.length_m:.1f} m" if tour.solved else str(tour.status)
+    text = f"{tour.length_m:.1f} m" if tour.solved else str(tour.status)
     paths = [result.path.points for result in tour.results if result.path is not None]
     canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
     entries, _ = _draw_ground(canvas, topology, tour.legs, paths, 1.0)
@@ -96,20 +96,20 @@ def plot_tour(
         line = Line2D(*points.T, color=style.PATH, linewidth=_TOUR_WIDTH, zorder=7)
         line.set_gid("path")
         canvas.ax.add_line(line)
-        stops = Line2D(
+        waypoints = Line2D(
             *points[[0, -1]].T,
             color=style.PATH,
             marker="o",
             markerfacecolor=style.FREE,
             linestyle="none",
-            markersize=_STOP_POINTS,
+            markersize=_WAYPOINT_POINTS,
             zorder=8,
         )
-        stops.set_gid("stops")
-        canvas.ax.add_line(stops)
+        waypoints.set_gid("waypoints")
+        canvas.ax.add_line(waypoints)
     if paths:
         entries.insert(0, (Line2D([], [], color=style.PATH, lw=_TOUR_WIDTH), "path"))
-    return finish(canvas, entries, [topology.grid.name, told] if title is None else [title])
+    return finish(canvas, entries, [topology.grid.name, text] if title is None else [title])
 
 
 def plot_alternatives(
@@ -158,7 +158,7 @@ def plot_alternatives(
     if paths and topology.pyramid.rooms is not None:
         guide = Guide(topology.rooms)
         legs = [leg for path in paths for leg in guide.legs(path)]
-    ends = list(paths[0].points[[0, -1]]) if paths else []
+    endpoints = list(paths[0].points[[0, -1]]) if paths else []
     lines = [path.points for path in paths]
     ground, labels = _draw_ground(canvas, topology, legs, lines, style.PALE)
     entries: list[Entry] = []
@@ -169,11 +169,11 @@ def plot_alternatives(
         canvas.ax.add_line(line)
         sample = Line2D([], [], color=colour, linestyle=dashes or "-", lw=2.2 * canvas.sizes.line)
         entries.append((sample, f"route {number + 1}, {path.length_m:.2f} m"))
-    markers = [Marker(name, end) for name, end in zip(("start", "goal"), ends, strict=False)]
+    markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
     along = np.concatenate(lines) if lines else np.empty((0, 2))
     draw_markers(canvas, markers, along, labels=labels)
-    told = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
-    words = [topology.grid.name, told] if title is None else [title]
+    text = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
+    words = [topology.grid.name, text] if title is None else [title]
     return finish(canvas, entries + ground, words)
 
 
@@ -220,7 +220,9 @@ def _draw_ground(
     passed = list({leg.door.number: leg.door for leg in legs if leg.door is not None}.values())
     doors = _drawn_doors(rooms, passed)
     writer = RoomWriter(canvas, grid, rooms.labels)
-    writer.labels.keep_free([end for line in lines for end in line[[0, -1]]], 0.6 * _STOP_POINTS)
+    writer.labels.keep_free(
+        [end for line in lines for end in line[[0, -1]]], 0.6 * _WAYPOINT_POINTS
+    )
     writer.labels.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     writer.number_doors(passed, always=True)
     named_first = {leg.room for leg in legs if leg.room is not None}

@@ -15,7 +15,7 @@ from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.colouring import colour_vertices
 from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries, swatch
-from hybridnav.viz.room_labels import RoomWriter
+from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -127,8 +127,8 @@ def draw_room_cells(
 
 def room_entry(left_out: int, strength: float = 1.0) -> Entry:
     """Return the legend's entry for rooms, with the number of those without names."""
-    told = f"rooms ({left_out} without their name)" if left_out else "rooms"
-    return swatch(style.PLACES, strength), told
+    text = f"rooms ({left_out} without their name)" if left_out else "rooms"
+    return swatch(style.PLACES, strength), text
 
 
 def _colours(label_of: IntArray, n_rooms: int, strength: float) -> ByteArray:
@@ -157,7 +157,7 @@ def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> lis
         Description of the omitted doors, for the legend.
     """
     entries: list[Entry] = []
-    for gid, passable, told in (
+    for gid, passable, text in (
         ("doors", True, f"doors ({left_out})" if left_out else "doors"),
         ("narrow-doors", False, "doors too narrow for the robot"),
     ):
@@ -179,5 +179,5 @@ def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> lis
         dots.set_gid(gid)
         if passable or at:
             canvas.ax.add_line(dots)
-            entries.append((sample, told))
+            entries.append((sample, text))
     return entries

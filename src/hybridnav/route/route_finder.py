@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @copies_alike
-class Walks:
+class RouteFinder:
     """The places and arcs that paths pass.
 
     Parameters
@@ -28,9 +28,9 @@ class Walks:
 
     Examples
     --------
-    >>> from hybridnav.route import Walks
+    >>> from hybridnav.route import RouteFinder
     >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
-    >>> walks = Walks(hn.TopologicalMap(pyramid))
+    >>> walks = RouteFinder(hn.TopologicalMap(pyramid))
     >>> walks.of(np.array([[0, col] for col in range(30)]))
     ([0, 1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
     """
@@ -72,11 +72,11 @@ class Walks:
         place = self._place_of[flat]
         places, arcs = [int(place[0])], []
         for step in np.flatnonzero(place[1:] != place[:-1]).tolist():
-            way = [int(flat[step]), int(flat[step + 1])]
-            side = self._side(cells[step].tolist(), cells[step + 1].tolist())
-            if side is not None:
-                way.insert(1, side)
-            for tail, head in itertools.pairwise(way):
+            flat_cells = [int(flat[step]), int(flat[step + 1])]
+            side_cell = self._side_cell(cells[step].tolist(), cells[step + 1].tolist())
+            if side_cell is not None:
+                flat_cells.insert(1, side_cell)
+            for tail, head in itertools.pairwise(flat_cells):
                 if self._place_of[tail] != self._place_of[head]:
                     arcs.append(self._arc_between(tail, head))
                     places.append(int(self._place_of[head]))
@@ -93,15 +93,15 @@ class Walks:
         edges, arcs = self._table
         return int(arcs[np.searchsorted(edges, edge)])
 
-    def _side(self, tail: list[int], head: list[int]) -> int | None:
+    def _side_cell(self, tail: list[int], head: list[int]) -> int | None:
         """Return the side cell that a diagonal passes; None if both are occupied, and for a step
         along a side."""
         if tail[0] == head[0] or tail[1] == head[1]:
             return None
-        ends = {int(self._place_of[cell[0] * self._cols + cell[1]]) for cell in (tail, head)}
-        sides = tail[0] * self._cols + head[1], head[0] * self._cols + tail[1]
-        passable = [side for side in sides if self._place_of[side] >= 0]
-        own = (side for side in passable if int(self._place_of[side]) in ends)
+        endpoints = {int(self._place_of[cell[0] * self._cols + cell[1]]) for cell in (tail, head)}
+        side_cells = tail[0] * self._cols + head[1], head[0] * self._cols + tail[1]
+        passable = [side_cell for side_cell in side_cells if self._place_of[side_cell] >= 0]
+        own = (side_cell for side_cell in passable if int(self._place_of[side_cell]) in endpoints)
         return next(own, passable[0] if passable else None)
 
 
@@ -110,7 +110,7 @@ class RouteOfCells:
     """The route of one cell path, which is found when somebody reads it."""
 
     topology: TopologicalMap
-    walks: Walks
+    walks: RouteFinder
     cells: LongArray
     """int64 (n, 2), legal moves."""
 

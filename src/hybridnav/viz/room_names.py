@@ -166,5 +166,5 @@ def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -
         if part.size and part.max() > 0:
             at = np.add(np.unravel_index(int(part.argmax()), part.shape), low)
             found.append((-float(part.max()), tuple(at.tolist())))
-    corner = tuple(side.start for side in window)
+    corner = tuple(span.start for span in window)
     return [grid.frame.points_of(np.add(at, corner)) for _, at in sorted(found)]

@@ -27,7 +27,7 @@ class RoomRoute:
 class RoomSearch:
     """Search of the room level for the routes that are shortest through the middles of rooms.
 
-    An arc costs `through_m`, the way from the surviving cell of one room across its boundary to
+    An arc costs `through_m`, the length from the surviving cell of one room across its boundary to
     that of the next. That is no bound on a path from elsewhere, but there is a route wherever there
     is a path, for rooms are connected.
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray, IntArray, PathLike
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.grid.rooms import Point
+    from hybridnav.grid.room_labels import Point
 
 _ROOM_KEYS = ("name", "polygon", "polygons", "seed", "point")
 _OUTSIDE_CELLS = 1.0
