@@ -272,3 +272,8 @@ def test_to_yaml_gives_every_key():
     assert tree["planner"].keys() == PlannerSettings.model_fields.keys()
     assert list(tree) == ["description", "pyramid", "planner"]
     assert "description: Büro\n" in hn.Preset(description="Büro").to_yaml()
+
+
+def test_the_old_name_of_a_refinement_is_refused_with_the_new_one() -> None:
+    with pytest.raises(hn.PresetError, match=r"planner\.refine: gates is now called none: write"):
+        hn.load_preset("portals", overrides=["planner.refine=gates"])
