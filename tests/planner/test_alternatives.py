@@ -342,6 +342,6 @@ def test_the_command_line_tells_no_more_from_gave_up(cli, two_doors_file, monkey
     assert "gave up" not in cli(*query).out
     assert cli(*query, "--json").answer["alternatives_complete"] is True
     impatient = partial(hn.plan_alternatives, most_states=100)
-    monkeypatch.setattr("hybridnav.planner.alternatives.plan_alternatives", impatient)
+    monkeypatch.setattr(hn, "plan_alternatives", impatient)
     assert "routes     the search gave up: there may be more\n" in cli(*query).out
     assert cli(*query, "--json").answer["alternatives_complete"] is False

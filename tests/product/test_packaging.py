@@ -317,5 +317,5 @@ def test_a_wheel_made_from_the_source_distribution_is_the_same(wheel, tmp_path):
     with zipfile.ZipFile(wheel) as first, zipfile.ZipFile(again) as second:
         crcs = [{info.filename: info.CRC for info in z.infolist()} for z in (first, second)]
     assert crcs[0] == crcs[1]
-    assert (folder / "tests" / "test_packaging.py").is_file()
+    assert (folder / "tests" / "product" / "test_packaging.py").is_file()
     assert (folder / "maps" / "office" / "office.pgm").is_file()

@@ -20,9 +20,9 @@ class TroubledQuery(Query):
     def __getattribute__(self, name: str) -> Any:
         # Nobody but the fork asks for the corridors.
         if name == "corridors":
-            from hybridnav.refine.ompl import answer, chain
+            from hybridnav.refine.ompl import attempts, chain
 
-            where, function = (answer, "simplify") if self.after_path else (chain, "attempt")
+            where, function = (attempts, "simplify") if self.after_path else (chain, "attempt")
             setattr(where, function, lambda *_args, **_named: _trouble(self.trouble))
         return super().__getattribute__(name)
 

@@ -208,10 +208,20 @@ def contractible(
 def open_candidates(origin, base_edge, arcs, ranks, seed, keys, survivors_of_edge, best):
     """Fill `keys` with some arcs in the order of their ranks; let either end of each survive.
 
-    `arcs`, int64 (n,), are edges, `ranks`, int64 (n,), their attributes, at most `ATTRIBUTE_MAX`,
-    the least first; `origin`, int32 (2 n_edges,), and `base_edge`, int32 (n_edges,), are those of
-    the darts, `seed` orders equal ranks. Out: `keys`, uint64 (n,); `survivors_of_edge`, uint8 by
-    edge, which end may survive; `best`, uint64 by vertex, its least key.
+    Parameters
+    ----------
+    origin, base_edge
+        int32 (2 n_edges,) and int32 (n_edges,), those of the darts.
+    arcs, ranks
+        int64 (n,), edges, and their attributes, at most `ATTRIBUTE_MAX`, the least first.
+    seed
+        Orders equal ranks.
+    keys
+        uint64 (n,), filled.
+    survivors_of_edge
+        uint8 (n_edges,), changed: which end of each of these edges may survive.
+    best
+        uint64 (n_vertices,), filled: the least key of each vertex.
     """
     for v in range(best.size):
         best[v] = _NO_KEY

@@ -40,6 +40,9 @@ class DualGraphPyramid:
     >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
     >>> [level.n_vertices for level in pyramid]
     [671, 327, 166, 73, 33, 14, 10]
+    >>> above = pyramid.with_regions(300)
+    >>> [above[at].n_vertices for at in (above.place_level, above.region_level, -1)]
+    [10, 4, 3]
     """
 
     grid: OccupancyGrid
@@ -170,14 +173,6 @@ class DualGraphPyramid:
         ------
         InvalidValueError
             When the number is not a whole number >= 1.
-
-        Examples
-        --------
-        >>> import hybridnav as hn
-        >>> grid = hn.load_map("maps/office/office.yaml", robot_radius_m=0.25)
-        >>> pyramid = hn.DualGraphPyramid.build(grid).with_regions(22_000)
-        >>> [pyramid[at].n_vertices for at in (pyramid.place_level, pyramid.region_level, -1)]
-        [156, 78, 51]
         """
         if isinstance(most_cells, bool) or not isinstance(most_cells, int) or most_cells < 1:
             raise InvalidValueError(

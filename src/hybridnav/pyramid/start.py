@@ -30,10 +30,15 @@ class Start(NamedTuple):
     """The level at which a decimation starts; its arrays are worked on in place."""
 
     record: Record
+    """What is contracted and removed at each level; the levels below are filled."""
     darts: Darts
+    """The plane graph of the level."""
     vertices: Vertices
+    """Its vertices: surviving cells and classes."""
     level: int
+    """Index of the level."""
     cols: int
+    """Columns of the grid."""
 
 
 def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:

@@ -200,11 +200,11 @@ def finish(
     canvas: Canvas, entries: Sequence[Entry], words: Sequence[str], *, framed: bool = False
 ) -> Axes:
     """Add title, scale bar and legend, and a thin frame or none, and return the axes."""
-    if framed:
-        frame_axes(canvas)
-    else:
+    if not framed:
         canvas.ax.set_axis_off()
     add_title(canvas, words)
+    if framed:
+        frame_axes(canvas)
     bar = add_scale_bar(canvas)
     legend = add_legend(canvas, entries, bar=bar, below=0.35 * canvas.sizes.font)
     fit_height(canvas, legend)
