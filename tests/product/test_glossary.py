@@ -28,8 +28,9 @@ def _named(name: str) -> Any:
     """Return what a name below the package stands for: a module, or something in one."""
     found: Any = hn
     for part in name.split("."):
-        if isinstance(found, type) and part in getattr(found, "__dataclass_fields__", {}):
-            return found.__dataclass_fields__[part]
+        fields = getattr(found, "__dataclass_fields__", {})
+        if part in fields:
+            return fields[part]
         if not hasattr(found, part):
             importlib.import_module(f"{found.__name__}.{part}")
         found = getattr(found, part)
