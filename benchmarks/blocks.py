@@ -57,7 +57,7 @@ def main() -> None:
         for distance_m in (1.0, 2.0, 4.0):
             for linkage in LINKAGES:
                 places, seconds = measure(grid, distance_m, linkage)
-                with mock.patch("hybridnav.pyramid.decimation.max_power", return_value=0):
+                with mock.patch("hybridnav.pyramid.start.max_power", return_value=0):
                     plain, plain_seconds = measure(grid, distance_m, linkage)
                 changes[linkage].append(places / plain - 1)
                 print(
