@@ -1,4 +1,4 @@
-"""Copies and pickles that preserve read-only arrays."""
+"""Read-only arrays, and copies and pickles that preserve them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _T = TypeVar("_T")
+_Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 _State = tuple[dict[str, Any], tuple[bool, ...], tuple[str, ...], tuple[str, ...]]
 _LOCK = type(threading.Lock())
+
+
+def frozen(array: _Array) -> _Array:
+    """Make an array read-only, and return it."""
+    array.flags.writeable = False
+    return array
 
 
 def copies_alike(cls: type[_T]) -> type[_T]:

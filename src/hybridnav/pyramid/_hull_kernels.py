@@ -1,4 +1,4 @@
-"""Kernels of convex hulls of receptive fields, as cells."""
+"""Kernels of convex hulls of receptive fields, as cells, and of distances between fields."""
 
 from __future__ import annotations
 
@@ -100,3 +100,35 @@ def hull_distances(start, points, arcs):
                 cols = np.int64(points[i, 1] - points[j, 1])
                 squared[a] = max(squared[a], rows * rows + cols * cols)
     return squared
+
+
+@njit(cache=True, nogil=True)
+def far_corner(cells, u, boxes, v):
+    """Return the squared distance from the surviving cell of u to the far corner of v's box."""
+    row, col = cells[u, 0], cells[u, 1]
+    rows = np.int64(max(row - boxes[v, 0], boxes[v, 2] - row))
+    cols = np.int64(max(col - boxes[v, 1], boxes[v, 3] - col))
+    return rows * rows + cols * cols
+
+
+@njit(cache=True, nogil=True)
+def field_within(cells, u, hull_start, hull_points, v, limit):
+    """Return whether the field of v lies nearer to the surviving cell of u than the limit."""
+    for i in range(hull_start[v], hull_start[v + 1]):
+        rows = np.int64(hull_points[i, 0] - cells[u, 0])
+        cols = np.int64(hull_points[i, 1] - cells[u, 1])
+        if rows * rows + cols * cols >= limit:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def near_enough(u, v, hull_start, hull_points, limit):
+    """Return whether every two cells of two fields lie nearer to each other than the limit."""
+    for i in range(hull_start[u], hull_start[u + 1]):
+        for j in range(hull_start[v], hull_start[v + 1]):
+            rows = np.int64(hull_points[i, 0] - hull_points[j, 0])
+            cols = np.int64(hull_points[i, 1] - hull_points[j, 1])
+            if rows * rows + cols * cols >= limit:
+                return False
+    return True

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav.pyramid._hull_kernels import far_corner, field_within, near_enough
 
 FIRST_MAY_SURVIVE = 1
 SECOND_MAY_SURVIVE = 2
@@ -62,38 +63,6 @@ def make_key(attribute, base_edge, seed, position):
     h ^= h >> np.uint64(16)
     high = np.uint64(min(attribute, ATTRIBUTE_MAX)) << np.uint64(51)
     return high | h >> np.uint64(11) << np.uint64(30) | np.uint64(position)
-
-
-@njit(cache=True, nogil=True)
-def far_corner(cells, u, boxes, v):
-    """Return the squared distance from the surviving cell of u to the far corner of v's box."""
-    row, col = cells[u, 0], cells[u, 1]
-    rows = np.int64(max(row - boxes[v, 0], boxes[v, 2] - row))
-    cols = np.int64(max(col - boxes[v, 1], boxes[v, 3] - col))
-    return rows * rows + cols * cols
-
-
-@njit(cache=True, nogil=True)
-def field_within(cells, u, hull_start, hull_points, v, limit):
-    """Return whether the field of v lies nearer to the surviving cell of u than the limit."""
-    for i in range(hull_start[v], hull_start[v + 1]):
-        rows = np.int64(hull_points[i, 0] - cells[u, 0])
-        cols = np.int64(hull_points[i, 1] - cells[u, 1])
-        if rows * rows + cols * cols >= limit:
-            return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def near_enough(u, v, hull_start, hull_points, limit):
-    """Return whether every two cells of two fields lie nearer to each other than the limit."""
-    for i in range(hull_start[u], hull_start[u + 1]):
-        for j in range(hull_start[v], hull_start[v + 1]):
-            rows = np.int64(hull_points[i, 0] - hull_points[j, 0])
-            cols = np.int64(hull_points[i, 1] - hull_points[j, 1])
-            if rows * rows + cols * cols >= limit:
-                return False
-    return True
 
 
 @njit(cache=True, nogil=True)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
+from hybridnav._copies import copies_alike, frozen
 from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels, _hull_kernels
@@ -20,8 +20,6 @@ from hybridnav.search.fields import field_distances
 from hybridnav.search.moves import STRAIGHT, length_in_cells
 
 _SOUTH = 3
-
-_Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -72,7 +70,7 @@ class Level:
         field_of, survivors = _field_kernels.label_fields(
             record.vertex_end, record.vertex_parent, self.index
         )
-        return _frozen(field_of), _frozen(survivors)
+        return frozen(field_of), frozen(survivors)
 
     @property
     def field_of(self) -> IntArray:
@@ -82,7 +80,7 @@ class Level:
     @cached_property
     def cells(self) -> LongArray:
         """int64 (n_vertices, 2), surviving cell of each vertex as (row, col)."""
-        return _frozen(np.stack(divmod(self._labels[1], self._grid.shape[1]), axis=1))
+        return frozen(np.stack(divmod(self._labels[1], self._grid.shape[1]), axis=1))
 
     @property
     def n_vertices(self) -> int:
@@ -92,14 +90,14 @@ class Level:
     @cached_property
     def classes(self) -> ByteArray:
         """uint8 (n_vertices,), `CellClass` of each field."""
-        return _frozen(self._grid.classes.ravel()[self._labels[1]])
+        return frozen(self._grid.classes.ravel()[self._labels[1]])
 
     @cached_property
     def _extents(self) -> tuple[LongArray, IntArray]:
         areas, boxes = _field_kernels.field_extents(
             self._labels[0], self._grid.shape[1], self.n_vertices
         )
-        return _frozen(areas), _frozen(boxes)
+        return frozen(areas), frozen(boxes)
 
     @cached_property
     def _cells_by_field(self) -> tuple[LongArray, LongArray]:
@@ -146,7 +144,7 @@ class Level:
     def base_edges(self) -> LongArray:
         """int64 (n_arcs,), base edge that represents each arc: 2 * flat cell, + 1 for north."""
         end = self._record.edge_end
-        return _frozen(np.flatnonzero(end >= min(2 * self.index + 2, SURVIVES)))
+        return frozen(np.flatnonzero(end >= min(2 * self.index + 2, SURVIVES)))
 
     @property
     def n_arcs(self) -> int:
@@ -156,13 +154,13 @@ class Level:
     @cached_property
     def base_pairs(self) -> LongArray:
         """int64 (n_arcs, 2, 2), the two cells (row, col) of the base edge of each arc."""
-        return _frozen(cell_pairs(self.base_edges, self._grid.shape[1]))
+        return frozen(cell_pairs(self.base_edges, self._grid.shape[1]))
 
     @cached_property
     def arcs(self) -> IntArray:
         """int32 (n_arcs, 2), the vertices that each arc joins: where darts 2a and 2a + 1 start."""
         rows, cols = np.moveaxis(self.base_pairs, -1, 0)
-        return _frozen(self.field_of[rows, cols])
+        return frozen(self.field_of[rows, cols])
 
     @property
     def is_self_loop(self) -> BoolArray:
@@ -315,7 +313,7 @@ class Level:
         centre of a cell of the other; for a self-loop the diameter of its field. In metres."""
         start, points = _hull_kernels.field_hulls(self._labels[0], self._grid.shape[1], self.boxes)
         squared = _hull_kernels.hull_distances(start, points, self.arcs)
-        return _frozen(np.sqrt(squared) * self._grid.resolution_m)
+        return frozen(np.sqrt(squared) * self._grid.resolution_m)
 
     @cached_property
     def through_m(self) -> FloatArray:
@@ -333,7 +331,7 @@ class Level:
         across = distance[first] + distance[second] + STRAIGHT
         least = np.full(self.n_arcs, np.iinfo(np.int64).max)
         np.minimum.at(least, arc, across)
-        return _frozen(length_in_cells(least) * self._grid.resolution_m)
+        return frozen(length_in_cells(least) * self._grid.resolution_m)
 
     def boundary(self, arc: int) -> LongArray:
         """Return the cell pairs of the boundary of one arc.
@@ -374,7 +372,7 @@ class Level:
         """
         edges, arc = self.boundary_table
         middles = middles_of(sides_of(edges, self._grid.shape[1]), arc, self.n_arcs)
-        return _frozen(self._grid.frame.points_of_grid(middles))
+        return frozen(self._grid.frame.points_of_grid(middles))
 
     @cached_property
     def n_cracks(self) -> LongArray:
@@ -384,7 +382,7 @@ class Level:
         long the line is along which two fields meet.
         """
         counts: LongArray = np.bincount(self.boundary_table[1], minlength=self.n_arcs)
-        return _frozen(counts)
+        return frozen(counts)
 
     @cached_property
     def boundary_table(self) -> tuple[LongArray, LongArray]:
@@ -416,8 +414,3 @@ class Level:
         faces = cell, cell - (1 if base_edge & 1 else cols)
         parts = [_field_kernels.edges_to_rim(face, *where) for face in faces]
         return np.concatenate([*parts, [base_edge]])
-
-
-def _frozen(array: _Array) -> _Array:
-    array.flags.writeable = False
-    return array

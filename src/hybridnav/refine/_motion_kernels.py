@@ -17,9 +17,13 @@ from hybridnav.refine._curve_kernels import LARGEST_HEADING, shortest_word
 from hybridnav.refine._spin_kernels import body_spins, free_turn
 from hybridnav.refine._sweep_kernels import (
     OPEN,
-    arc_runs,
+    ROUNDING,
+    STAND,
+    WIDEST,
     body_fits,
     body_sweeps,
+    cover,
+    following,
     in_map,
     moved,
     rounded,
@@ -208,6 +212,54 @@ def body_drives_straight(marks, place, body, x0, y0, yaw0, x1, y1, yaw1, backwar
 
 
 @njit(cache=True, nogil=True)
+def _sliver_stands(marks, a_row, a_col, b_row, b_col, margin):
+    """Return whether all cells nearer to a segment than a margin may be stood on."""
+    rows, cols = marks.shape
+    low, high = min(a_row, b_row) - margin, max(a_row, b_row) + margin
+    if low < 0 or high > rows:
+        return False
+    if min(a_col, b_col) < margin or max(a_col, b_col) > cols - margin:
+        return False
+    column = np.empty((1, 2))
+    for row in range(math.floor(low), math.ceil(high)):
+        column[0, 0], column[0, 1] = np.inf, -np.inf
+        cover(column, row, row + 1, a_row, a_col, b_row, b_col, margin)
+        for col in range(math.floor(column[0, 0] - margin), math.ceil(column[0, 1] + margin)):
+            if marks[row, col] < STAND:
+                return False
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _arc_runs(marks, row, col, heading, turn, radius):
+    """Return whether a point may run along an arc."""
+    part, level = 0, 0
+    while True:
+        share = 1.0 / (1 << level)
+        angle = turn * share
+        a_row, a_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, part * share)
+        b_row, b_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, (part + 1) * share)
+        margin = abs(radius) * angle * angle / 8
+        if margin <= ROUNDING:
+            if not runs(marks, rounded(a_row), rounded(a_col), rounded(b_row), rounded(b_col)):
+                return False
+            free = True
+        else:
+            free = margin <= WIDEST and _sliver_stands(marks, a_row, a_col, b_row, b_col, margin)
+        if free:
+            part, level = following(part, level)
+            if level == 0:
+                return True
+            continue
+        mid_row, mid_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, (part + 0.5) * share)
+        mid_row, mid_col = rounded(mid_row), rounded(mid_col)
+        if not in_map(marks, mid_row, mid_col) or not stands(marks, mid_row, mid_col):
+            return False
+        part <<= 1
+        level += 1
+
+
+@njit(cache=True, nogil=True)
 def body_drives(
     marks,
     place,
@@ -258,7 +310,7 @@ def body_drives(
             signed = radius * place[7] if kinds[k] > 0 else -radius * place[7]
             turn = length / signed
             d_row = d_col = 0.0
-            if not abs(turn) <= _LONGEST_TURN or not arc_runs(
+            if not abs(turn) <= _LONGEST_TURN or not _arc_runs(
                 marks, row, col, heading, turn, signed
             ):
                 return False

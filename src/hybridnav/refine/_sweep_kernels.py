@@ -127,7 +127,7 @@ def place(corners, row, col, heading, placed):
 
 
 @njit(cache=True, nogil=True)
-def _cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
+def cover(columns, first, end, a_row, a_col, b_row, b_col, margin):
     """Widen the columns that each row sees by those of an edge.
 
     Parameters
@@ -228,17 +228,17 @@ def rows_seen(rows, before, after, first, last, margin, moves, columns):
         for j in range(1, hull.shape[0]):
             i_row, i_col = hull[j - 1]
             j_row, j_col = hull[j]
-            _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+            cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
         last = first
     i = last - 1
     for j in range(first, last):
         i_row, i_col, j_row, j_col = before[i, 0], before[i, 1], before[j, 0], before[j, 1]
-        _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+        cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
         if moves == SHIFTS:
             i_row, i_col = after[j, 0], after[j, 1]
-            _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+            cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
             j_row, j_col = after[i, 0], after[i, 1]
-            _cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
+            cover(columns, low_row, end_row, i_row, i_col, j_row, j_col, margin)
         i = j
     return low_row, end_row
 
@@ -370,53 +370,5 @@ def body_sweeps(body, row, col, heading, d_row, d_col, turn, radius):
             place(corners, mid_row, mid_col, mid_heading, middle)
             if not is_free(ahead, offsets, middle, middle, 0.0, STAYS, columns):
                 return False
-        part <<= 1
-        level += 1
-
-
-@njit(cache=True, nogil=True)
-def _sliver_stands(marks, a_row, a_col, b_row, b_col, margin):
-    """Return whether all cells nearer to a segment than a margin may be stood on."""
-    rows, cols = marks.shape
-    low, high = min(a_row, b_row) - margin, max(a_row, b_row) + margin
-    if low < 0 or high > rows:
-        return False
-    if min(a_col, b_col) < margin or max(a_col, b_col) > cols - margin:
-        return False
-    column = np.empty((1, 2))
-    for row in range(math.floor(low), math.ceil(high)):
-        column[0, 0], column[0, 1] = np.inf, -np.inf
-        _cover(column, row, row + 1, a_row, a_col, b_row, b_col, margin)
-        for col in range(math.floor(column[0, 0] - margin), math.ceil(column[0, 1] + margin)):
-            if marks[row, col] < STAND:
-                return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def arc_runs(marks, row, col, heading, turn, radius):
-    """Return whether a point may run along an arc."""
-    part, level = 0, 0
-    while True:
-        share = 1.0 / (1 << level)
-        angle = turn * share
-        a_row, a_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, part * share)
-        b_row, b_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, (part + 1) * share)
-        margin = abs(radius) * angle * angle / 8
-        if margin <= ROUNDING:
-            if not runs(marks, rounded(a_row), rounded(a_col), rounded(b_row), rounded(b_col)):
-                return False
-            free = True
-        else:
-            free = margin <= WIDEST and _sliver_stands(marks, a_row, a_col, b_row, b_col, margin)
-        if free:
-            part, level = following(part, level)
-            if level == 0:
-                return True
-            continue
-        mid_row, mid_col, _ = moved(row, col, heading, 0.0, 0.0, turn, radius, (part + 0.5) * share)
-        mid_row, mid_col = rounded(mid_row), rounded(mid_col)
-        if not in_map(marks, mid_row, mid_col) or not stands(marks, mid_row, mid_col):
-            return False
         part <<= 1
         level += 1
