@@ -145,7 +145,7 @@ def plan(
         raise UsageError(f"--alternatives needs a preset without OMPL, not {settings.name}")
     request = Request(
         source=Source(map_file, settings, reading, keep, keep_in),
-        waypoints=[first, *map(_parsed_stop, via or ()), last],
+        waypoints=[first, *map(_parsed_waypoint, via or ()), last],
         closing=closing,
         rooms_file=rooms_file,
         at=where,
@@ -166,10 +166,10 @@ def _one_of(option: str, point: Any, other: str, text: str | None) -> Waypoint:
     if (point is None) == (text is None):
         what = "missing option" if point is None else "only one is taken, of"
         raise UsageError(f"{what} '--{option}' or '--{other}'; see hybridnav plan --help")
-    return _parsed_stop(text) if text is not None else point
+    return _parsed_waypoint(text) if text is not None else point
 
 
-def _parsed_stop(text: str) -> Waypoint:
+def _parsed_waypoint(text: str) -> Waypoint:
     """Return a point if the text is two numbers, or three with a heading, else a name."""
     point = read_point(text)
     if point is None:

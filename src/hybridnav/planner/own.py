@@ -51,12 +51,12 @@ def own_refiner(name: str, grid: OccupancyGrid, *, allow_unexplored: bool) -> Re
         made = own(grid, allow_unexplored=allow_unexplored)
     except Exception as error:
         call = f"{own.__name__}(grid, allow_unexplored={allow_unexplored})"
-        raise _refused(name, f"{call} fails, {_told(error)}") from error
+        raise _refused(name, f"{call} fails, {_one_line(error)}") from error
     try:
         inspect.signature(made.refine).bind((0, 0), (0, 0), None)
     except (AttributeError, TypeError, ValueError) as error:
         expected = "expected a method refine(start, goal, corridor)"
-        raise _refused(name, f"it is no refiner, {_told(error)}: {expected}") from error
+        raise _refused(name, f"it is no refiner, {_one_line(error)}: {expected}") from error
     return CheckedRefiner(name, made, grid, allow_unexplored=allow_unexplored)
 
 
@@ -66,7 +66,7 @@ def _class_of(name: str) -> Any:
     try:
         found = getattr(import_module(module), attribute, None)
     except (Exception, SystemExit) as error:
-        raise _refused(name, f"module {module} cannot be imported, {_told(error)}") from error
+        raise _refused(name, f"module {module} cannot be imported, {_one_line(error)}") from error
     if not inspect.isclass(found):
         what = "has nothing of that name" if found is None else f"has a {type(found).__name__}"
         raise _refused(name, f"module {module} {what}, expected a class {attribute}")
@@ -148,7 +148,7 @@ def _refused(name: str, why: str) -> PresetError:
     return PresetError(f"planner.refine: {name}: {why}")
 
 
-def _told(error: BaseException) -> str:
+def _one_line(error: BaseException) -> str:
     """Return a foreign error in one line."""
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]} ..."

@@ -99,7 +99,7 @@ class HybridPlanner:
 
     @property
     def needs_headings(self) -> bool:
-        """Whether ends are `(x, y, yaw)`, as with OMPL in a space with headings."""
+        """Whether endpoints are `(x, y, yaw)`, as with OMPL in a space with headings."""
         return self._ompl is not None and self._ompl.ompl.has_heading
 
     def plan(

@@ -232,7 +232,7 @@ def _filled(layout: Layout, moves: ByteArray) -> dict[str, NDArray[Any]]:
 
 
 def _scratch(largest: int) -> tuple[NDArray[Any], ...]:
-    """Return work arrays of `fill_field` for fields of at most `size` cells."""
+    """Return work arrays of `fill_field` for fields of at most `largest` cells."""
     lanes = kernels.LANES
     return (
         np.empty((largest + 1) * lanes, np.int32),

@@ -73,7 +73,7 @@ class MaxDistanceSearch:
         CoarseRoute | None
             None where no route joins them.
         """
-        walk = self._search.search(start, goal)
-        if walk.vertices is None:
+        found = self._search.search(start, goal)
+        if found.vertices is None:
             return None
-        return CoarseRoute(walk.vertices, walk.arcs, walk.expanded)
+        return CoarseRoute(found.vertices, found.arcs, found.expanded)

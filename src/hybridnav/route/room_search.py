@@ -88,11 +88,11 @@ class RoomSearch:
             return None
         # Both are sorted by area: the first pair has the largest parts.
         at_first, at_last = np.argwhere(joined)[0].tolist()
-        walk = self._search.search(int(first[at_first]), int(last[at_last]))
-        assert walk.vertices is not None  # noqa: S101 - both lie in one component
-        labels = self._rooms.label_of_vertex[walk.vertices].tolist()
+        found = self._search.search(int(first[at_first]), int(last[at_last]))
+        assert found.vertices is not None  # noqa: S101 - both lie in one component
+        labels = self._rooms.label_of_vertex[found.vertices].tolist()
         names = tuple(self._rooms.name_of(label) for label in labels)
-        return RoomRoute(names, tuple(walk.arcs.tolist()))
+        return RoomRoute(names, tuple(found.arcs.tolist()))
 
     def _vertices_of(self, name: str) -> LongArray:
         """Return the parts of a room that may be entered, free ones first, then by area."""

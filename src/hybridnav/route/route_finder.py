@@ -1,4 +1,4 @@
-"""The walk of a cell path through the topological map."""
+"""The route of a cell path: the places and arcs that it passes."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class RouteFinder:
     --------
     >>> from hybridnav.route import RouteFinder
     >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(np.zeros((1, 30))))
-    >>> walks = RouteFinder(hn.TopologicalMap(pyramid))
-    >>> walks.of(np.array([[0, col] for col in range(30)]))
+    >>> finder = RouteFinder(hn.TopologicalMap(pyramid))
+    >>> finder.of(np.array([[0, col] for col in range(30)]))
     ([0, 1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
     """
 
@@ -110,13 +110,13 @@ class RouteOfCells:
     """The route of one cell path, which is found when somebody reads it."""
 
     topology: TopologicalMap
-    walks: RouteFinder
+    finder: RouteFinder
     cells: LongArray
     """int64 (n, 2), legal moves."""
 
     def route(self) -> Route:
         """Return the ids of the places and arcs that the path passes."""
-        places, arcs = self.walks.of(self.cells)
+        places, arcs = self.finder.of(self.cells)
         place_ids, arc_ids = self.topology.place_ids, self.topology.arc_ids
         passed = [int(arc_ids[arc]) if arc >= 0 else -1 for arc in arcs]
         return Route(tuple(place_ids[places].tolist()), tuple(passed))
