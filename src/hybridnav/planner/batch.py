@@ -90,7 +90,7 @@ def _met(
     grid: OccupancyGrid,
     found: CellPlans | None,
 ) -> BoolArray:
-    """Return which queries meet closed cells with an end, or with their paths, bool (n,).
+    """Return which queries meet closed cells with an endpoint, or with their paths, bool (n,).
 
     Only paths of cells are given; None for others.
     """

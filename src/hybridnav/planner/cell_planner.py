@@ -53,7 +53,7 @@ class CellQueries(NamedTuple):
     points: tuple[FloatArray, FloatArray]
     """float64 (n, 2) each, starts and goals, `(x, y)` in metres, map frame."""
     closed: ClosedCells | None = None
-    """Cells that no path may enter, None for none."""
+    """Closed cells; a start or a goal may be one. None for none."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -175,22 +175,23 @@ def contractible(
 
 @njit(cache=True, nogil=True)
 def open_candidates(origin, base_edge, arcs, ranks, seed, keys, survivors_of_edge, best):
-    """Fill `keys` with some arcs in the order of their ranks; let either end of each survive.
+    """Fill `keys` with the keys of some arcs by their ranks; let either endpoint of each survive.
 
     Parameters
     ----------
     origin, base_edge
-        int32 (2 n_edges,) and int32 (n_edges,), those of the darts.
+        int32 (2 n_edges,) and (n_edges,), as in `Darts`.
     arcs, ranks
-        int64 (n,), edges, and their attributes, at most `ATTRIBUTE_MAX`, the least first.
+        int64 (n,), edges that may be contracted, and their attributes, at most `ATTRIBUTE_MAX`: the
+        least first.
     seed
-        Orders equal ranks.
+        uint64, orders equal ranks.
     keys
-        uint64 (n,), filled.
+        uint64 (n,), filled in.
     survivors_of_edge
-        uint8 (n_edges,), changed: which end of each of these edges may survive.
+        uint8 (n_edges,), receives that either endpoint of these arcs may survive.
     best
-        uint64 (n_vertices,), filled: the least key of each vertex.
+        uint64 (n_vertices,), receives the least key of each vertex.
     """
     for v in range(best.size):
         best[v] = _NO_KEY

@@ -30,13 +30,13 @@ class Start(NamedTuple):
     """The level at which a decimation starts; its arrays are worked on in place."""
 
     record: Record
-    """What is contracted and removed at each level; the levels below are filled."""
+    """The record, complete up to this level."""
     darts: Darts
-    """The plane graph of the level."""
+    """Darts of the level."""
     vertices: Vertices
-    """Its vertices: surviving cells and classes."""
+    """Vertices of the level."""
     level: int
-    """Index of the level."""
+    """Index of the level; 0 is the base."""
     cols: int
     """Columns of the grid."""
 
