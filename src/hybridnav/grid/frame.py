@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray, LongArray
 
-_FAR = 1e150
+_LARGEST_M = 1e150
+"""Coordinates beyond are taken for this one, so that no product of them overflows."""
 LEAST_RESOLUTION_M, MOST_RESOLUTION_M = 1e-4, 1e3
 """Sides that a cell may have: 0.1 mm is finer than any range sensor, and a cell of 1 km is too
 coarse for any robot; other values are mistakes of units."""
@@ -187,8 +188,8 @@ class Frame:
         """
         (cosine, sine), (x0, y0) = self._turn, self.origin_m
         # Numbers at the end of their range must become "outside" without an overflow.
-        along = min(max(x, -_FAR), _FAR) - x0
-        across = min(max(y, -_FAR), _FAR) - y0
+        along = min(max(x, -_LARGEST_M), _LARGEST_M) - x0
+        across = min(max(y, -_LARGEST_M), _LARGEST_M) - y0
         row = (cosine * across - sine * along) / self.resolution_m
         return row, (cosine * along + sine * across) / self.resolution_m
 
@@ -206,7 +207,7 @@ class Frame:
             `(row, col)` along the last axis.
         """
         (cosine, sine), (x0, y0) = self._turn, self.origin_m
-        along = np.clip(points[..., 0], -_FAR, _FAR) - x0
-        across = np.clip(points[..., 1], -_FAR, _FAR) - y0
+        along = np.clip(points[..., 0], -_LARGEST_M, _LARGEST_M) - x0
+        across = np.clip(points[..., 1], -_LARGEST_M, _LARGEST_M) - y0
         row = (cosine * across - sine * along) / self.resolution_m
         return np.stack([row, (cosine * along + sine * across) / self.resolution_m], axis=-1)

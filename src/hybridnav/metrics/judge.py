@@ -28,7 +28,8 @@ _WORDS = {
     kernels.SEAM: "runs along the side between two blocked cells",
 }
 _QUANTUM = 2.0**-24
-_FAR = 2.0**28
+_OUTERMOST = 2.0**28
+"""Position in cells at which points farther away are judged: beyond any map, and exact."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def judge_path(
     steps = np.diff(path.astype(np.float64), axis=0)
     near = np.abs(steps).max(axis=1, initial=0.0) == 1
     # Halves are exact in float64, and so are the tests of segments between centres.
-    centres = np.clip(path.astype(np.float64), -_FAR, _FAR) + 0.5
+    centres = np.clip(path.astype(np.float64), -_OUTERMOST, _OUTERMOST) + 0.5
     codes = kernels.segment_codes(grid.classes, free_of, centres)[: len(steps)]
     cut = _cut_corners(grid, path, near & inside[1:], free_of)
     corners = (
@@ -223,7 +224,7 @@ def _checked_cells(cells: ArrayLike) -> LongArray:
 
 def grid_positions(frame: Frame, xy: FloatArray) -> FloatArray:
     """Return the positions (row, col) of points, rounded to 2^-24 of a cell, held near the map."""
-    positions = np.clip(frame.positions_of(xy), -_FAR, _FAR)
+    positions = np.clip(frame.positions_of(xy), -_OUTERMOST, _OUTERMOST)
     rounded: FloatArray = np.rint(positions / _QUANTUM) * _QUANTUM
     return rounded
 
