@@ -184,7 +184,7 @@ def scenario_pairs(grid: OccupancyGrid, scenarios: Iterable[Scenario]) -> list[P
     """Return the pairs of a MovingAI scenario file, with their optima as stated there.
 
     The stated optima do not hold on an inflated map, or if diagonals may cut corners: there pairs
-    have none, and pairs with an end that is not free are left out.
+    have none, and pairs with an endpoint that is not free are left out.
 
     Raises
     ------

@@ -169,7 +169,7 @@ def arcs_of(tables, corners, places):
         arc, and its head and classes (see `pack`). Each arc comes with its reverse.
     """
     begin, heads = _joined(tables, corners)
-    # An arc that only one end finds passes another corner cell: two arcs replace it.
+    # An arc that only one endpoint finds passes another corner cell: two arcs replace it.
     is_kept = np.zeros(heads.size, np.bool_)
     first = np.zeros(corners.size + 1, np.int32)
     for corner in range(corners.size):

@@ -124,7 +124,7 @@ class DetourSearch:
         """Return a shortest path in the graph of corners, or None.
 
         The result is None if there is no such graph, if closed cells make too many corners, or if
-        an end lies at a corner of a cell that is not free.
+        an endpoint lies at a corner of a cell that is not free.
         """
         search = self._search
         landmarked = search.landmarked()
