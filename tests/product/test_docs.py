@@ -172,6 +172,15 @@ def test_pages_describe_the_flow_of_data_preset_by_preset(
     assert {name: described.get(name) for name in behaviour} == behaviour
 
 
+def test_both_pages_draw_the_same_flow() -> None:
+    drawn = [
+        re.findall(r"^    \S.* --> .*$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
+        for page in ("docs/index.md", "CONTRIBUTING.md")
+    ]
+    assert drawn[0] == drawn[1]
+    assert len(drawn[0]) == 7  # the line for all, and one for each kind of preset
+
+
 def test_the_picture_of_the_layers_is_the_contract() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     picture = text.partition("```text\n")[2].partition("```")[0]
