@@ -439,11 +439,13 @@ def test_show_goes_on_above_the_places_and_names_the_levels(cli, tmp_path):
     picture = tmp_path / "regions.png"
     done = cli("show", OFFICE, "--robot-radius", 0.25, "--regions", 26420, "--plot", picture)
     rows = _table(done.out)
-    assert [row[-1] for row in rows if row[-1] in ("places", "regions")] == ["places", "regions"]
+    assert [row[-1] for row in rows if row[-1] == "places"] == ["places"]
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     pyramid = hn.DualGraphPyramid.build(grid).with_regions(26420)
     assert [int(row[1]) for row in rows] == [level.n_vertices for level in pyramid]
-    assert rows[-1][-1] == "<"
+    assert rows[pyramid.region_level][-2:] == ["regions", "<"]
+    apex = cli("show", OFFICE, "--robot-radius", 0.25, "--regions", 26420, "--level", -1)
+    assert _table(apex.out)[-1][-1] == "<"
     assert picture.stat().st_size > 10_000
     refused = cli("show", OFFICE, "--regions", 0)
     assert refused.refuses(2, "--regions")

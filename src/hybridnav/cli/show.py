@@ -35,9 +35,11 @@ from hybridnav.cli.options import (
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
 LevelOption = Annotated[
-    int,
+    int | None,
     typer.Option(
-        "--level", metavar="N", help="Level to describe and draw: 0 the base, -1 the apex."
+        "--level",
+        metavar="N",
+        help="Level to describe and draw: 0 the base, -1 the apex; by default the regions, if any.",
     ),
 ]
 RegionsOption = Annotated[
@@ -53,7 +55,7 @@ RegionsOption = Annotated[
 
 def show(
     map_file: MapArgument,
-    level: LevelOption = -1,
+    level: LevelOption = None,
     regions: RegionsOption = None,
     preset: PresetOption = None,
     overrides: SetOption = None,
@@ -74,6 +76,8 @@ def show(
     pyramid = grow_topology(model, settings, seconds).pyramid
     if regions is not None:
         pyramid = pyramid.with_regions(regions)
+    if level is None:
+        level = -1 if pyramid.region_cells is None else pyramid.region_level
     if not -len(pyramid) <= level < len(pyramid):
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
     if not model.is_filed:

@@ -18,17 +18,14 @@ if TYPE_CHECKING:
     from hybridnav.portals.options import PortalOptions
     from hybridnav.pyramid import DualGraphPyramid, Level
 
-_LARGEST = 2
-"""A field has at most so many times the cells of a region: places may be larger."""
-
 
 def routing_levels(
     pyramid: DualGraphPyramid, enterable: BoolArray, options: PortalOptions = DEFAULT_OPTIONS
 ) -> Iterator[Level]:
     """Yield the levels of a pyramid to route on, the best one first.
 
-    The first is that of the regions, or where a place has more than twice the cells of a region,
-    the next one below without such fields; then all levels below follow.
+    The first is that of the regions, or where a place is much larger than a region, the next one
+    below without such fields; then all levels below follow.
 
     Parameters
     ----------
@@ -40,10 +37,11 @@ def routing_levels(
         How many regions there are at least.
     """
     most_cells = -(-max(int(enterable.sum()), 1) // options.least_regions)
+    largest = options.largest_field_factor * most_cells
     pyramid = pyramid.with_regions(most_cells)
     for index in range(pyramid.region_level, -1, -1):
         level = pyramid[index]
-        if np.bincount(level.field_of[enterable]).max(initial=0) <= _LARGEST * most_cells:
+        if np.bincount(level.field_of[enterable]).max(initial=0) <= largest:
             yield level
 
 

@@ -17,9 +17,12 @@ class PortalOptions:
     Parameters
     ----------
     least_regions
-        A region has at most so great a part of the cells that may be entered. Fewer, larger regions
-        have fewer border cells, but start and goal lie in the same one more often, which is then
-        searched cell by cell.
+        Least number of regions: none has more than this part of the cells that may be entered.
+        Fewer, larger regions have fewer border cells, but start and goal lie in the same one more
+        often, which is then searched cell by cell.
+    largest_field_factor
+        A level is left out if a field has more than this many times the cells that a region may
+        have: a place can be that large.
     spacing_cells
         Side of the lattice squares of portals where every border cell is a gate, in cells.
     all_border_cells_levels
@@ -52,6 +55,7 @@ class PortalOptions:
     """
 
     least_regions: int = 10
+    largest_field_factor: int = 2
     spacing_cells: int = 16
     all_border_cells_levels: int = 2
     sparse_spacings_cells: tuple[int, ...] = (16, 32, 64, 128, 256)
@@ -89,6 +93,7 @@ def _is_real(value: object) -> bool:
 
 _WHOLE = {
     "least_regions": 1,
+    "largest_field_factor": 1,
     "spacing_cells": 1,
     "all_border_cells_levels": 0,
     "rows_at_once": 1,
