@@ -43,6 +43,8 @@ _LINKAGES: dict[Linkage, int] = {
 _ROUNDING = 1e-9
 _FARTHEST = 2.0**62
 _NO_LIMIT = int(_FARTHEST)
+_NO_HULLS = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
+"""Hulls where distances do not count."""
 
 
 def squared_limit(merge_distance_m: float, resolution_m: float) -> int:
@@ -167,7 +169,7 @@ class _Decimation:
         self._linkage = linkage
         self._limit = limit
         self._seed = np.uint64((seed * 0x9E3779B1 + 0x7F4A7C15) & 0xFFFFFFFF)
-        self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
+        self._hulls = _NO_HULLS
         self._steering: Steering | None = None
         self.record, self._darts, self._vertices, self._level, self._cols = start
         self._loops = [0]
@@ -205,7 +207,7 @@ class _Decimation:
     def lift_limit(self) -> None:
         """Let vertices merge however far apart they are."""
         self._limit = _NO_LIMIT
-        self._hulls = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
+        self._hulls = _NO_HULLS
 
     def steer(self, steering: Steering) -> None:
         """Let a steering decide from here on which arcs are contracted, in place of distances."""

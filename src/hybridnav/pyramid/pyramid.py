@@ -182,7 +182,7 @@ class DualGraphPyramid:
             return self
         if self._below is not None:
             return self._below.with_regions(most_cells)
-        # A model holds what it builds.
+        # Loading a model needs no decimation.
         from hybridnav.pyramid.decimation import go_on_above  # noqa: PLC0415
 
         record, stats = go_on_above(
