@@ -29,6 +29,8 @@ Entry = tuple[Any, str]
 
 BAR_SHARE = 0.2
 """Greatest length of the scale bar, as a share of the view's width."""
+_HINTING = 1.06
+"""Letters on whole pixels are so much wider than their outlines, at most."""
 _NARROWER = (0.9, 0.8, 0.7, 0.6, 0.5)
 """Shares of the room that are tried for a title, to make its lines equally long."""
 _HANDLE, _GAP, _BETWEEN = 2.2, 0.6, 1.6  # legend measures, in font sizes
@@ -147,7 +149,7 @@ def add_legend(canvas: Canvas, entries: Sequence[Entry], *, bar: float, below: f
         Points below the axes at which items other than the scale bar end.
     """
     font = canvas.sizes.font
-    widths = [text_width(label, font) for _, label in entries]
+    widths = [_HINTING * text_width(label, font) for _, label in entries]
     columns = _columns(widths, font, _room_over(canvas))
     beside = _columns(widths, font, canvas.map_width - bar - 2 * font)
     rows, rows_beside = (-(-len(entries) // max(n, 1)) for n in (columns, beside))

@@ -118,20 +118,12 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
     'places'
     """
     level = places.level if isinstance(places, TopologicalMap) else places
-    grid, drawn = level.grid, Places(level)
-    canvas = Canvas.opened(ax, width_in, known_view(grid))
-    draw_cells(canvas, grid, level.field_of, drawn.colours())
-    entries = ground_entries(grid)
-    swatches = [(drawn.free, style.PLACES, "free places")]
-    swatches.append((~drawn.free, style.UNEXPLORED_PLACES, "unexplored places"))
-    entries[:0] = [(swatch(colours), label) for mask, colours, label in swatches if mask.any()]
-    if level.n_vertices <= MAX_VERTICES_WITH_ARCS:
-        if arcs:
-            draw_arcs(canvas, drawn, self_loops=self_loops)
-            entries.insert(0, (arc_handle(canvas.sizes), "position, arc"))
-        draw_dots(canvas, drawn)
+    canvas, drawn = Canvas.opened(ax, width_in, known_view(level.grid)), Places(level)
+    entries = _draw_fields(canvas, drawn, "places")
+    if arcs and level.n_vertices <= MAX_VERTICES_WITH_ARCS:
+        entries.insert(0, _draw_arcs(canvas, drawn, self_loops=self_loops))
     n_free = int(drawn.free.sum())
-    words = [grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]
+    words = [level.grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]
     _finish(canvas, entries, words if title is None else [title])
     return canvas.ax
 
@@ -139,7 +131,7 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
 def plot_level(
     level: Level, *, ax: Axes | None = None, width_in: float = style.FULL_WIDTH_IN
 ) -> Axes:
-    """Draw one level of a pyramid as `plot_places` does, with its index in the title.
+    """Draw the fields of one level of a pyramid as `plot_places` draws places.
 
     Parameters
     ----------
@@ -162,9 +154,30 @@ def plot_level(
     >>> plot_level(pyramid[3]).get_aspect()
     1.0
     """
+    canvas, drawn = Canvas.opened(ax, width_in, known_view(level.grid)), Places(level)
+    entries = _draw_fields(canvas, drawn, "fields")
+    if level.n_vertices <= MAX_VERTICES_WITH_ARCS:
+        entries.insert(0, _draw_arcs(canvas, drawn))
     sizes = f"{level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
-    title = f"{level.grid.name}, level {level.index}: {sizes}"
-    return plot_places(level, ax=ax, title=title, width_in=width_in)
+    _finish(canvas, entries, [f"{level.grid.name}, level {level.index}: {sizes}"])
+    return canvas.ax
+
+
+def _draw_fields(canvas: Canvas, drawn: Places, noun: str) -> list[Entry]:
+    """Draw fields and their positions; return the legend entries, which call them by the noun."""
+    draw_cells(canvas, drawn.level.grid, drawn.level.field_of, drawn.colours())
+    if drawn.level.n_vertices <= MAX_VERTICES_WITH_ARCS:
+        draw_dots(canvas, drawn)
+    swatches = [(drawn.free, style.PLACES, f"free {noun}")]
+    swatches.append((~drawn.free, style.UNEXPLORED_PLACES, f"unexplored {noun}"))
+    entries = [(swatch(colours), label) for mask, colours, label in swatches if mask.any()]
+    return entries + ground_entries(drawn.level.grid)
+
+
+def _draw_arcs(canvas: Canvas, drawn: Places, *, self_loops: bool = False) -> Entry:
+    """Draw the arcs; return their legend entry."""
+    draw_arcs(canvas, drawn, self_loops=self_loops)
+    return arc_handle(canvas.sizes), "position, arc"
 
 
 def ground_entries(grid: OccupancyGrid) -> list[Entry]:
