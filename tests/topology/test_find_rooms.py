@@ -231,6 +231,7 @@ def test_no_room_is_nobodys_partner():
     agreed = compare_rooms(np.array([0, 0, 1, 1]), np.array([-1, -1, 4, 4]))
     assert agreed.partners.tolist() == [-1, 4]
     assert agreed.recall.tolist() == [0.0, 1.0]
+    assert agreed.iou.tolist() == [0.0, 1.0]
     assert agreed.n_found == 1
 
 
