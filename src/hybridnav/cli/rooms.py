@@ -155,6 +155,7 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                 "rooms": list(door.rooms),
                 "position_m": [round(number, 6) for number in door.position],
                 "width_m": round(door.width_m, 6),
+                "kind": door.kind,
                 "passable": door.passable,
                 "is_gap": door.is_gap,
             }
@@ -197,4 +198,5 @@ def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
 
 def _door(door: Door, other: str | None) -> str:
     narrow = "" if door.passable else ", too narrow"
-    return f"{other or '-'} ({door.number}: {door.width_m:.2f} m{narrow})"
+    opening = "opening " if door.is_opening else ""
+    return f"{other or '-'} ({opening}{door.number}: {door.width_m:.2f} m{narrow})"

@@ -164,7 +164,9 @@ def in_words(legs: Sequence[Leg]) -> list[str]:
         else:
             into = f"into {following.room or NOWHERE}"
             if leg.door is not None:
-                into = f"to door {leg.door.number} ({leg.door.width_m:.1f} m wide), {into}"
+                into = (
+                    f"to {leg.door.kind} {leg.door.number} ({leg.door.width_m:.1f} m wide), {into}"
+                )
                 if length_m < _AT_ONCE_M:
                     metres, into = "at", into.removeprefix("to ")
             turn = f", then {leg.turn}" if leg.turn and following.length_m >= _SLIVER_M else ""

@@ -16,13 +16,22 @@ from hybridnav.pyramid.start import kinds_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from hybridnav._typing import FloatArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.grid.room_labels import Point
 
 LEAST_DOOR_M = 0.3
-"""Width below which a boundary counts as a gap, in metres: a scan's noise makes many. Gaps have
+"""Passage below which a boundary counts as a gap, in metres: a scan's noise makes many. Gaps have
 numbers too, after those of all doors; lists and pictures count them and leave them out."""
+MOST_DOOR_M = 2.0
+"""Width above which a boundary counts as an opening, in metres: double doors are narrower."""
+_DIRECTIONS = 36
+"""Directions in which the extent of a boundary is measured: at most 0.1 % are lost between two."""
+_SAME_WIDTH = 1.3
+"""A disc of at most so many times the width of a boundary lies between its jambs."""
+_ASIDE_M = 0.2
+"""Clearance below which the endpoints of a boundary may run along a wall: an outline that lies
+beside a door by less is no wider than the door."""
 _SAME_DOOR_M = 1.0
 """How far from a boundary a known point of it may lie, in metres: people move corners."""
 _NEAREST_CRACKS = 64
@@ -50,8 +59,15 @@ class RoomBoundaries:
     middles: FloatArray
     """float64 (n_boundaries, 2), the point in the middle of each, `(x, y)` in metres."""
     widths_m: FloatArray
+    """float64 (n_boundaries,), distance between the two points of each that lie farthest apart,
+    without ends that run along a wall."""
+    passages_m: FloatArray
     """float64 (n_boundaries,), diameter of the largest disc round a point of each that no occupied
     cell enters; its length where no cell is occupied."""
+    between_jambs: BoolArray
+    """bool (n_boundaries,), boundaries that end beside cells that are not free, on both endpoints,
+    or whose disc is no wider than they are: the others close into a ring, or end in free space
+    where three rooms meet."""
     resolution_m: float
     """Side of a cell in metres."""
 
@@ -90,18 +106,25 @@ class RoomBoundaries:
         label_of = rooms.label_of.ravel()
         labels = np.stack([label_of[first[begins]], label_of[second[begins]]], axis=1)
         sides = grid.frame.points_of_grid(sides_of(edges, cols))
+        aside = _ASIDE_M / grid.resolution_m
         count = len(begins)
         widest = np.zeros(count)
-        clear = clearance_m.ravel()
-        np.maximum.at(widest, boundary_of, np.minimum(clear[first], clear[second]))
+        clear = np.minimum(clearance_m.ravel()[first], clearance_m.ravel()[second])
+        np.maximum.at(widest, boundary_of, clear)
         length_m = np.bincount(boundary_of, minlength=count) * grid.resolution_m
+        passages_m = np.where(np.isfinite(widest), 2 * widest, length_m)
+        widths = _widths(edges, cols, boundary_of, clear / grid.resolution_m, aside)
+        jambs = np.bincount(boundary_of, _jambs(edges, free.reshape(rows, cols)), count)
+        filled = passages_m <= (_SAME_WIDTH * widths + 1) * grid.resolution_m
         return cls(
             edges,
             boundary_of,
             labels,
             sides,
             middles_of(sides, boundary_of, count),
-            np.where(np.isfinite(widest), 2 * widest, length_m),
+            widths * grid.resolution_m,
+            passages_m,
+            (jambs >= 2) | filled,  # noqa: PLR2004 - one at either end
             grid.resolution_m,
         )
 
@@ -126,7 +149,7 @@ class RoomBoundaries:
         for number, boundary in self._nearest(known, pairs):
             numbers[boundary] = number
         fresh = np.flatnonzero(numbers == 0)
-        fresh = fresh[np.argsort(self.widths_m[fresh] < LEAST_DOOR_M, kind="stable")]
+        fresh = fresh[np.argsort(self.passages_m[fresh] < LEAST_DOOR_M, kind="stable")]
         numbers[fresh] = np.arange(len(fresh)) + max(known, default=0) + 1
         return numbers
 
@@ -162,6 +185,53 @@ class RoomBoundaries:
                 found[number] = at
                 taken.add(at)
         return list(found.items())
+
+
+def _widths(
+    edges: LongArray, cols: int, boundary_of: LongArray, clearance: FloatArray, aside: float
+) -> FloatArray:
+    """Return the width of each boundary in cells.
+
+    The middle part is measured, which lies off the walls, and what lies between its endpoints and
+    them is added: between two posts all of it, beside a wall only the distance to that.
+    """
+    extents = _extents(edges, cols, boundary_of)
+    widest = np.zeros(len(extents))
+    np.maximum.at(widest, boundary_of, clearance)
+    middle = clearance >= np.minimum(aside, widest / 2)[boundary_of]
+    endpoints = np.full(len(extents), np.inf)
+    np.minimum.at(endpoints, boundary_of[middle], clearance[middle])
+    inner = _extents(edges[middle], cols, boundary_of[middle])
+    widths: FloatArray = np.minimum(extents, inner + 2 * np.maximum(endpoints - 0.5, 0.0))
+    return widths
+
+
+def _extents(edges: LongArray, cols: int, boundary_of: LongArray) -> FloatArray:
+    """Return the greatest extent of each boundary in any direction, in cells."""
+    if not len(edges):
+        return np.zeros(0)
+    along = np.where((edges & 1)[:, None] == 1, [0.0, 0.5], [0.5, 0.0])  # sides lie across edges
+    middles = sides_of(edges, cols)
+    order = np.argsort(boundary_of, kind="stable")
+    begins = np.flatnonzero(np.diff(boundary_of[order], prepend=-1))
+    extents = np.zeros(len(begins))
+    for angle_rad in np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS):
+        direction = np.array([np.cos(angle_rad), np.sin(angle_rad)])
+        at, half = (middles @ direction)[order], np.abs(along @ direction)[order]
+        highest = np.maximum.reduceat(at + half, begins)
+        extents = np.maximum(extents, highest - np.minimum.reduceat(at - half, begins))
+    return extents
+
+
+def _jambs(edges: LongArray, free: BoolArray) -> LongArray:
+    """Return how many of the endpoints of each side touch a cell that is not free, or the rim."""
+    around = np.pad(free, 1)
+    blocks = around[:-1, :-1] & around[:-1, 1:] & around[1:, :-1] & around[1:, 1:]
+    row, col = np.divmod(edges >> 1, free.shape[1])
+    upward = (edges & 1).astype(np.int64)
+    low = blocks[row + upward, col + 1 - upward]
+    jambs: LongArray = 2 - low.astype(np.int64) - blocks[row + 1, col + 1]
+    return jambs
 
 
 def measured_clearance_m(grid: OccupancyGrid) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,7 +13,12 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass
 from hybridnav.pyramid.arc import LevelArc
 from hybridnav.pyramid.cracks import endpoints_of
-from hybridnav.topology.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
+from hybridnav.topology.doors import (
+    LEAST_DOOR_M,
+    MOST_DOOR_M,
+    RoomBoundaries,
+    measured_clearance_m,
+)
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
@@ -41,11 +47,25 @@ class Door:
     position: tuple[float, float]
     """A point on the boundary, in its middle; `(x, y)` in metres, map frame."""
     width_m: float
-    """Diameter of the largest disc round a point of the boundary that no occupied cell enters:
-    between two door posts, the distance between them."""
+    """Distance between the endpoints of the boundary: between two door posts, that between them."""
     arcs: tuple[LevelArc, ...]
     """Its arcs at the room level: none where the map's robot radius closes it,
     several where inflated obstacles divide it."""
+    passage_m: float = math.inf
+    """Diameter of the largest disc round a point of the boundary that no occupied cell enters: what
+    furniture leaves of its width, or the room before and behind it."""
+    between_jambs: bool = True
+    """Whether both endpoints of the boundary lie beside cells that are not free."""
+
+    @property
+    def is_opening(self) -> bool:
+        """Whether it is wider than 2 m or not between jambs: no door that could be shut."""
+        return self.width_m > MOST_DOOR_M or not self.between_jambs
+
+    @property
+    def kind(self) -> str:
+        """What people call it: "door" or "opening"."""
+        return "opening" if self.is_opening else "door"
 
     @property
     def passable(self) -> bool:
@@ -55,8 +75,8 @@ class Door:
 
     @property
     def is_gap(self) -> bool:
-        """Whether it is narrower than 0.3 m: lists and pictures count gaps and leave them out."""
-        return self.width_m < LEAST_DOOR_M
+        """Whether its passage is below 0.3 m: lists and pictures count gaps and leave them out."""
+        return self.passage_m < LEAST_DOOR_M
 
 
 class Rooms:
@@ -174,6 +194,8 @@ class Rooms:
                 (float(found.middles[at, 0]), float(found.middles[at, 1])),
                 float(found.widths_m[at]),
                 tuple(LevelArc(self.level.index, arc) for arc in arcs[at]),
+                float(found.passages_m[at]),
+                bool(found.between_jambs[at]),
             )
             for at in np.argsort(numbers).tolist()
         )
