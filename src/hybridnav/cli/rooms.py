@@ -93,7 +93,7 @@ def rooms(
     if rooms_file is not None and finds:
         option = "--least-area" if method is None else "--method"
         raise UsageError(f"{option} is for rooms that are found, --rooms reads them")
-    checked = _checked_method("walls" if method is None else method)
+    checked = _checked_method("judged" if method is None else method)
     area_m2 = 1.0 if least_area_m2 is None else least_area_m2
     settings = read_settings(preset, None, robot_radius_m, None, map_file=map_file)
     seconds: dict[str, float] = {}

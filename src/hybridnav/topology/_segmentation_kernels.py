@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hybridnav._jit import njit
@@ -127,3 +129,60 @@ def grow_labels(label_of, region, most_steps):
                     queue[tail] = to_row * cols + to_col
                     tail += 1
             head += 1
+
+
+@njit(cache=True, nogil=True)
+def sharpness(rows, cols, angles):
+    """How sharp the projections of points on two square axes are at each angle, float64."""
+    found = np.zeros(len(angles))
+    side = int(math.hypot(np.abs(rows).max(), np.abs(cols).max())) + 2
+    one, other = np.zeros(2 * side + 1, np.int64), np.zeros(2 * side + 1, np.int64)
+    for k in range(len(angles)):
+        cosine, sine = math.cos(angles[k]), math.sin(angles[k])
+        one[:] = 0
+        other[:] = 0
+        for i in range(len(rows)):
+            one[side + math.floor(rows[i] * cosine - cols[i] * sine)] += 1
+            other[side + math.floor(cols[i] * cosine + rows[i] * sine)] += 1
+        for b in range(2 * side):
+            found[k] += float(one[b] + one[b + 1]) ** 2 + float(other[b] + other[b + 1]) ** 2
+    return found
+
+
+@njit(cache=True, nogil=True)
+def cut_along(wall, free, slope, within, lengths, share, cut):
+    """Set the cells of the gaps between walls that continue each other on a line.
+
+    Lines rise by `slope` rows a column, one through each cell. The lengths are those of
+    `gaps_in_rows` in cells: the longest gap, a door, the window, the least wall on either side and
+    on both. At least half of a gap lies `within`.
+    """
+    longest, door, window, side, both = lengths
+    rows, cols = wall.shape
+    shift = np.empty(cols, np.int64)
+    for col in range(cols):
+        shift[col] = round(slope * col)
+    walls = np.zeros(cols + 1, np.int64)
+    for line in range(-shift.max(), rows - shift.min()):
+        for col in range(cols):
+            row = line + shift[col]
+            walls[col + 1] = walls[col] + (0 <= row < rows and wall[row, col])
+        if walls[cols] == 0:
+            continue
+        last = -1
+        for col in range(cols):
+            if walls[col + 1] == walls[col]:
+                continue
+            gap = col - last - 1
+            before = walls[last + 1] - walls[max(0, last + 1 - window)]
+            behind = walls[min(cols, col + window)] - walls[col]
+            held = gap <= door or min(before, behind) >= side
+            if last >= 0 and 0 < gap <= longest and held and before + behind >= both:
+                n_free = n_within = 0
+                for at in range(last + 1, col):
+                    n_free += free[line + shift[at], at]
+                    n_within += within[line + shift[at], at]
+                if n_free >= share * gap and 2 * n_within >= gap:
+                    for at in range(last + 1, col):
+                        cut[line + shift[at], at] = True
+            last = col

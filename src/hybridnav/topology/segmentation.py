@@ -13,6 +13,8 @@ from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.grid.names import Segmentation
 from hybridnav.grid.room_labels import MAX_ROOMS
 from hybridnav.topology import _segmentation_kernels
+from hybridnav.topology.cutting import Ground, fine_segments
+from hybridnav.topology.judging import Forest, JudgedSegments
 from hybridnav.topology.merging import Segments, grown, least_cells
 from hybridnav.topology.segments import (
     LEAST_SEGMENT_M2,
@@ -38,6 +40,10 @@ _LARGEST_LEAST_M2 = 1e9
 """Least areas beyond it are taken for a mistake."""
 _SPLINTER_M2 = 0.5
 """Smaller segments are merged first: they would be convex with anything."""
+SPECK_M2 = 0.25
+"""Segments below it go to a neighbour before boundaries are judged."""
+LEAST_LIKELY = 0.5
+"""Segments of one room: the least probability at which they merge."""
 _SOLIDITY = 0.8
 _OPEN = 0.65
 _STRAIGHT: dict[Segmentation, float] = {"walls": 0.35, "watershed": 0.35, "contraction": _SOLIDITY}
@@ -49,7 +55,7 @@ people edit then run inside walls, not along the free cells' steps."""
 
 
 def find_rooms(
-    grid: OccupancyGrid, *, method: Segmentation = "walls", least_area_m2: float = 1.0
+    grid: OccupancyGrid, *, method: Segmentation = "judged", least_area_m2: float = 1.0
 ) -> RoomLabels:
     """Find the rooms of a map.
 
@@ -58,11 +64,13 @@ def find_rooms(
     grid
         The map. Its cells count as they were measured: the robot's radius changes no room.
     method
-        Where free space is cut: `"walls"`, along the lines of walls that continue behind an
-        opening, and at pinched passages; `"watershed"`, along the watersheds of the distance
-        transform; `"contraction"`, where boundaries resist the contraction of a pyramid. The
-        segments are then merged in the same way, where their union is nearly convex and hardly
-        walled.
+        How free space is cut and merged again. `"judged"`: finely, along the lines of walls in
+        every local direction and at narrow passages; segments then merge where a small forest,
+        learnt from people's rooms, judges by the evidence on a boundary that both lie in one room.
+        The other methods merge segments where their union is nearly convex and hardly walled; they
+        cut `"walls"` along the lines of walls that continue behind an opening, and at pinched
+        passages; `"watershed"` along the watersheds of the distance transform; `"contraction"`
+        where boundaries resist the contraction of a pyramid.
     least_area_m2
         In square metres of free cells, positive, at most 1e9. Smaller segments go to the neighbour
         with the longest open border; without one they are no room. Free space outside the building
@@ -92,17 +100,9 @@ def find_rooms(
             "least area must be a positive number of square metres, at most "
             f"{_LARGEST_LEAST_M2:g}, got {least_area_m2}"
         )
-    outside = _outside(grid)
-    grid = _walled(grid)
-    cut = np.where(outside, np.int32(NO_ROOM), _segments(grid, method, least_area_m2))
-    segments = Segments(cut, grid.resolution_m)
-    segments.merge_small(min(least_area_m2, _SPLINTER_M2))
-    segments.merge_convex(
-        least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
-    )
-    segments.merge_small(least_area_m2)
+    found = _judged if method == "judged" else _convex
     least = least_cells(least_area_m2, grid.resolution_m**2)
-    labels = _in_reading_order(segments.label_of, least)
+    labels = _in_reading_order(found(grid, method, least_area_m2), least)
     n_rooms = int(labels.max(initial=NO_ROOM)) + 1
     if n_rooms > MAX_ROOMS:
         raise InvalidValueError(
@@ -136,6 +136,51 @@ def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
     return divided
 
 
+def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> IntArray:
+    """Cut free space finely, and merge the segments by a judge of their boundaries.
+
+    Parameters
+    ----------
+    grid
+        The map; cells count as they were measured.
+    forest
+        The judge.
+    least_area_m2
+        As of `find_rooms`.
+
+    Returns
+    -------
+    IntArray
+        int32 (rows, cols), a room for each free cell of the building, -1 elsewhere.
+    """
+    outside = outside_of(grid)
+    ground = Ground.of(grid, outside)
+    segments = JudgedSegments(fine_segments(ground), ground)
+    segments.merge_small(min(SPECK_M2, least_area_m2))
+    segments.merge_likely(forest.judge, LEAST_LIKELY)
+    segments.merge_small(least_area_m2)
+    free = (grid.measured == CellClass.FREE) & ~outside
+    return np.where(free, segments.label_of, np.int32(NO_ROOM))
+
+
+def _judged(grid: OccupancyGrid, _method: Segmentation, least_area_m2: float) -> IntArray:
+    return judged_rooms(grid, Forest.shipped(), least_area_m2)
+
+
+def _convex(grid: OccupancyGrid, method: Segmentation, least_area_m2: float) -> IntArray:
+    """Segments merged where their union is nearly convex."""
+    outside = outside_of(grid)
+    grid = _walled(grid)
+    cut = np.where(outside, np.int32(NO_ROOM), _segments(grid, method, least_area_m2))
+    segments = Segments(cut, grid.resolution_m)
+    segments.merge_small(min(least_area_m2, _SPLINTER_M2))
+    segments.merge_convex(
+        least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
+    )
+    segments.merge_small(least_area_m2)
+    return segments.label_of
+
+
 def _segments(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> IntArray:
     """Return the segments into which free space is cut."""
     if method == "walls":
@@ -160,7 +205,7 @@ def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     return np.where(wall, into_walls, inside)
 
 
-def _outside(grid: OccupancyGrid) -> BoolArray:
+def outside_of(grid: OccupancyGrid) -> BoolArray:
     """Return the free cells outside the building, which belong to no room.
 
     They are connected along sides, reach all four sides of the map, and fill at least half of its
