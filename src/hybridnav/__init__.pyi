@@ -1,4 +1,5 @@
 from .config import Preset as Preset, load_preset as load_preset, preset_names as preset_names
+from .costs import CostLayer as CostLayer
 from .errors import (
     CacheWarning as CacheWarning,
     HybridNavError as HybridNavError,

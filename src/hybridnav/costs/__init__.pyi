@@ -1,0 +1,4 @@
+from .integral import cost_along as cost_along
+from .layer import CostLayer as CostLayer, MOST_FACTOR as MOST_FACTOR, UNIT_BITS as UNIT_BITS
+
+__all__: list[str]

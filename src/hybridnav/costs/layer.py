@@ -1,0 +1,365 @@
+"""Layers of costs: a factor for each cell, by which a metre in it costs more than a metre."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from hybridnav._copies import copies_alike, frozen
+from hybridnav.costs import masks
+from hybridnav.costs.inflation import HIGHEST, inflated_costs
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from hybridnav._typing import AnyArray, BoolArray, LongArray
+    from hybridnav.grid import Frame, OccupancyGrid
+
+UNIT_BITS = 14
+"""Factors are whole multiples of 2^-14."""
+MOST_FACTOR = 1000.0
+"""Largest factor of a cell."""
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class CostLayer:
+    """A factor for each cell of a map, and the cells that are closed.
+
+    A move from cell a to cell b costs its length times (f(a) + f(b)) / 2: the exact integral of the
+    factors along the move. Costs are symmetric and never below the length, so that every bound on
+    lengths is one on costs.
+
+    Two layers are joined by `first | second`, which takes the larger factor of each cell, as the
+    layers of Nav2's costmap are, or by `first * second`, for factors that do not depend on each
+    other: a wall is to be avoided in a slow zone too. What either layer closes is closed.
+
+    Parameters
+    ----------
+    factors
+        Shape `(rows, cols)`, row 0 at the lowest y: numbers from 1 to 1000. Rounded down to
+        multiples of 2^-14, so that integers can count costs exactly.
+    closed
+        bool (rows, cols), cells that may not be entered, as in a keepout zone; None for none.
+    source
+        Origin of the factors, which results record: plain values for JSON.
+
+    Raises
+    ------
+    InvalidValueError
+        When the factors are no numbers from 1 to 1000, or the arrays have other shapes.
+
+    Examples
+    --------
+    >>> layer = hn.CostLayer(np.array([[1.0, 1.5, 3.0]]))
+    >>> (layer | hn.CostLayer(np.array([[2.0, 1.0, 1.0]]))).factors
+    array([[2. , 1.5, 3. ]], dtype=float32)
+    >>> (layer * layer).factors
+    array([[1.  , 2.25, 9.  ]], dtype=float32)
+    """
+
+    factors: NDArray[np.float32]
+    closed: BoolArray | None = None
+    source: dict[str, Any] = field(default_factory=lambda: {"kind": "array"})
+
+    def __post_init__(self) -> None:
+        factors = _checked_factors(self.factors)
+        object.__setattr__(self, "factors", frozen(factors))
+        if self.closed is not None:
+            closed = np.array(self.closed)
+            if closed.dtype != np.bool_ or closed.shape != factors.shape:
+                raise InvalidValueError(
+                    f"closed cells must be bool of the shape {factors.shape} of the factors, got "
+                    f"{closed.dtype} of shape {closed.shape}"
+                )
+            object.__setattr__(self, "closed", frozen(closed) if closed.any() else None)
+
+    @classmethod
+    def clearance(
+        cls,
+        grid: OccupancyGrid,
+        *,
+        inflation_radius_m: float = 0.70,
+        scaling: float = 3.0,
+        inscribed_radius_m: float | None = None,
+        multiplier: float = 2.0,
+    ) -> CostLayer:
+        """Make the layer of Nav2's inflation: factors that fall off with distance from obstacles.
+
+        The cost of a cell is that of `computeCost` in `nav2_costmap_2d/inflation_layer.hpp`:
+        254 in an occupied cell, 253 up to the inscribed radius, then, truncated to a whole number,
+        252 exp(-scaling (distance - inscribed radius)) up to the inflation radius, rounded up to
+        whole cells; 0 beyond. The factor is 1 + multiplier * cost / 252. Distances are Euclidean,
+        between the centres of cells, from the cells measured as occupied: those that the robot's
+        radius blocks are no obstacles. Unexplored cells are none either; their own factor is that
+        of a free cell (in Nav2 `inflate_around_unknown: false`, `inflate_unknown: true`).
+
+        Parameters
+        ----------
+        grid
+            The map.
+        inflation_radius_m
+            Distance in metres up to which cells cost more, `inflation_radius`, finite, >= 0.
+        scaling
+            `cost_scaling_factor`, 1 / m, finite, >= 0. The defaults of both are those of Nav2's
+            bringup.
+        inscribed_radius_m
+            Distance in metres from which the cost falls off, finite, >= 0; None for the robot's
+            radius.
+        multiplier
+            Factor above 1 of a cell that costs 252, finite, >= 0.
+
+        Raises
+        ------
+        InvalidValueError
+            When a value is out of range.
+
+        Examples
+        --------
+        >>> grid = hn.OccupancyGrid(np.array([[1.0, 0, 0, 0, 0]]), hn.Frame(0.25))
+        >>> layer = hn.CostLayer.clearance(grid, inflation_radius_m=0.75)
+        >>> layer.factors.round(2)
+        array([[3.02, 3.01, 1.94, 1.44, 1.  ]], dtype=float32)
+        """
+        inscribed_m = grid.robot_radius_m if inscribed_radius_m is None else inscribed_radius_m
+        settings = {
+            "inflation_radius_m": inflation_radius_m,
+            "scaling": scaling,
+            "inscribed_radius_m": inscribed_m,
+            "multiplier": multiplier,
+        }
+        values = {name: _checked_setting(name, value) for name, value in settings.items()}
+        per_cost = _checked_multiplier(values["multiplier"]) / HIGHEST
+        costs = inflated_costs(
+            grid, values["inflation_radius_m"], values["scaling"], values["inscribed_radius_m"]
+        )
+        factor_of = _rounded(1 + per_cost * np.arange(256))
+        return cls(factor_of[costs], source={"kind": "clearance", **values})
+
+    @classmethod
+    def speed_mask(  # noqa: PLR0913 - the last four have defaults
+        cls,
+        grid: OccupancyGrid,
+        values: ArrayLike,
+        frame: Frame | None = None,
+        *,
+        base: float = 100.0,
+        multiplier: float = -1.0,
+        unit: Literal["percent", "m/s"] = "percent",
+        full_speed_mps: float | None = None,
+    ) -> CostLayer:
+        """Make the layer of a speed mask of Nav2: a metre costs as much more as it takes longer.
+
+        The speed limit of a cell is `base + multiplier * value`, as Nav2's `SpeedFilter` computes
+        it; the factor is full speed / limit. Value 0, unknown (-1), cells outside the mask, and
+        limits out of range or of 0 limit nothing.
+
+        Parameters
+        ----------
+        grid
+            The map.
+        values
+            Integers (rows, cols) from 0 to 100, or -1, row 0 at the lowest y: the cells of a mask.
+        frame
+            Place of the mask in the map frame; None for that of the map. The cell of the mask in
+            which the centre of a map cell lies counts for it.
+        base, multiplier
+            Those of Nav2's `CostmapFilterInfo`. The defaults are those of Nav2's tutorial.
+        unit
+            `"percent"` of full speed (filter type 1) or `"m/s"` (type 2).
+        full_speed_mps
+            Full speed in m/s; goes with the unit m/s.
+
+        Raises
+        ------
+        InvalidValueError
+            When the mask or a setting is out of range.
+
+        Examples
+        --------
+        >>> grid = hn.OccupancyGrid(np.zeros((1, 3)), robot_radius_m=0)
+        >>> hn.CostLayer.speed_mask(grid, [[0, 50, 75]]).factors
+        array([[1., 2., 4.]], dtype=float32)
+        """
+        limits = masks.checked_speeds(base, multiplier, unit, full_speed_mps)
+        factor_of = _rounded(limits.factors(MOST_FACTOR))
+        on_map = masks.on_map(grid, masks.checked_values(values), frame)
+        return cls(factor_of[on_map], source={"kind": "speed mask", **limits.source})
+
+    @classmethod
+    def keepout_mask(
+        cls,
+        grid: OccupancyGrid,
+        values: ArrayLike,
+        frame: Frame | None = None,
+        *,
+        multiplier: float = 2.0,
+    ) -> CostLayer:
+        """Make the layer of a keepout mask of Nav2: closed zones, and lanes of preference.
+
+        A value costs round(2.54 value), as Nav2's `KeepoutFilter` converts it. Cells that cost 253
+        or more are closed; the others have the factor 1 + multiplier * cost / 252. Unknown values
+        (-1) and cells outside the mask cost nothing. The robot's centre keeps out of closed cells;
+        its radius is not added.
+
+        Parameters
+        ----------
+        grid
+            The map.
+        values, frame
+            As in `speed_mask`.
+        multiplier
+            Factor above 1 of a cell that costs 252, finite, >= 0.
+
+        Raises
+        ------
+        InvalidValueError
+            When the mask or the multiplier is out of range.
+
+        Examples
+        --------
+        >>> grid = hn.OccupancyGrid(np.zeros((1, 3)), robot_radius_m=0)
+        >>> layer = hn.CostLayer.keepout_mask(grid, [[0, 50, 100]])
+        >>> layer.factors.round(2), layer.closed
+        (array([[1.  , 2.01, 1.  ]], dtype=float32), array([[False, False,  True]]))
+        """
+        value = _checked_multiplier(_checked_setting("multiplier", multiplier))
+        costs = masks.keepout_costs()
+        factor_of = _rounded(1 + np.where(costs > HIGHEST, 0, value / HIGHEST * costs))
+        on_map = masks.on_map(grid, masks.checked_values(values), frame)
+        source = {"kind": "keepout mask", "multiplier": value}
+        return cls(factor_of[on_map], costs[on_map] > HIGHEST, source)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        rows, cols = self.factors.shape
+        return rows, cols
+
+    @cached_property
+    def units(self) -> NDArray[np.int32]:
+        """int32 (rows, cols), the factors in units of 2^-14."""
+        return frozen((self.factors * np.float32(1 << UNIT_BITS)).astype(np.int32))
+
+    @cached_property
+    def closed_flat(self) -> LongArray:
+        """int64 (n,), the closed cells as `row * cols + col`, in order."""
+        closed = np.empty(0, dtype=np.int64) if self.closed is None else np.flatnonzero(self.closed)
+        return frozen(closed)
+
+    def check_fits(self, grid: OccupancyGrid) -> None:
+        """Raise `InvalidValueError` if a map has another number of cells."""
+        if self.shape != grid.shape:
+            (rows, cols), (map_rows, map_cols) = self.shape, grid.shape
+            raise InvalidValueError(
+                f"costs of {cols} x {rows} cells are not those of a map of {map_cols} x {map_rows} "
+                "cells: make them for this map"
+            )
+
+    def cost_of_cells(self, cells: AnyArray) -> float:
+        """Return the cost of a path of 8-neighbour moves, in cells.
+
+        Parameters
+        ----------
+        cells
+            Integers (n, 2), (row, col), n >= 1.
+
+        Examples
+        --------
+        >>> hn.CostLayer(np.array([[1.0, 2.0, 2.0]])).cost_of_cells(np.array([[0, 0], [0, 1]]))
+        1.5
+        """
+        units = self.units[cells[:, 0], cells[:, 1]].astype(np.int64)
+        sums = units[:-1] + units[1:]
+        diagonal = int(sums[(cells[1:] != cells[:-1]).all(axis=1)].sum())
+        straight = int(sums.sum()) - diagonal
+        return (straight + diagonal * math.sqrt(2.0)) / (2 << UNIT_BITS)
+
+    def __or__(self, other: CostLayer) -> CostLayer:
+        """Return the layer of the larger factors."""
+        return self._joined(other, "maximum")
+
+    def __mul__(self, other: CostLayer) -> CostLayer:
+        """Return the layer of the products of the factors."""
+        return self._joined(other, "product")
+
+    def _joined(self, other: CostLayer, how: Literal["maximum", "product"]) -> CostLayer:
+        if not isinstance(other, CostLayer):
+            return NotImplemented
+        if self.shape != other.shape:
+            raise InvalidValueError(
+                f"layers of costs of shapes {self.shape} and {other.shape} cannot be joined: make "
+                "both for one map"
+            )
+        first, second = self.factors.astype(np.float64), other.factors.astype(np.float64)
+        factors = np.maximum(first, second) if how == "maximum" else first * second
+        closed = [each.closed for each in (self, other) if each.closed is not None]
+        parts = [
+            part
+            for each in (self, other)
+            for part in (each.source["of"] if each.source["kind"] == how else [each.source])
+        ]
+        union = np.logical_or.reduce(closed) if closed else None
+        return CostLayer(_rounded(factors), union, {"kind": how, "of": parts})
+
+
+def _rounded(factors: AnyArray) -> NDArray[np.float32]:
+    """Return factors, rounded down to units; float32 holds these exactly."""
+    units = np.floor(np.asarray(factors, dtype=np.float64) * (1 << UNIT_BITS))
+    rounded: NDArray[np.float32] = (units / (1 << UNIT_BITS)).astype(np.float32)
+    return rounded
+
+
+def _checked_factors(given: ArrayLike) -> NDArray[np.float32]:
+    """Return the factors as a new float32 array in units.
+
+    Raises
+    ------
+    InvalidValueError
+        When they are no numbers from 1 to 1000 of two dimensions.
+    """
+    try:
+        array = np.asarray(given)
+        numbers = array.astype(np.float64) if array.dtype.kind in "iuf" else None
+    except (TypeError, ValueError, OverflowError):
+        numbers = None
+    if numbers is None or numbers.ndim != 2 or numbers.size == 0:  # noqa: PLR2004
+        shape = "no array of numbers" if numbers is None else f"shape {numbers.shape}"
+        raise InvalidValueError(
+            f"factors must be numbers of shape (rows, cols), one for each cell, got {shape}"
+        )
+    wrong = ~((numbers >= 1) & (numbers <= MOST_FACTOR))
+    if wrong.any():
+        row, col = np.unravel_index(int(wrong.argmax()), numbers.shape)
+        raise InvalidValueError(
+            f"factors must be numbers from 1 to {MOST_FACTOR:g}, got {numbers[row, col]:g} in cell "
+            f"({row}, {col}): close a cell with `closed`, or scale the factors"
+        )
+    return _rounded(numbers)
+
+
+def _checked_setting(name: str, value: Any) -> float:
+    """Return a finite number >= 0."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (math.isfinite(number) and number >= 0) or isinstance(value, bool):
+        raise InvalidValueError(f"{name} must be a finite number >= 0, got {value!r:.80}")
+    return number
+
+
+def _checked_multiplier(multiplier: float) -> float:
+    """Return a multiplier with which no factor is too large."""
+    most = (MOST_FACTOR - 1) * HIGHEST / 254
+    if multiplier > most:
+        raise InvalidValueError(
+            f"multiplier must be at most {math.floor(most)}, so that no factor is above "
+            f"{MOST_FACTOR:g}, got {multiplier:g}"
+        )
+    return multiplier

@@ -1,0 +1,229 @@
+"""Layers of costs: Nav2's inflation by a table of its formula, masks, refusals, joining."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from tests.strategies import examples
+
+# nav2_costmap_2d/inflation_layer.hpp, InflationLayer::computeCost, worked out by hand for
+# nav2_bringup's inflation_radius 0.70 and cost_scaling_factor 3.0, cells of 0.05 m and an inscribed
+# radius of 0.25 m: cells from the obstacle -> cost.
+#   0: LETHAL_OBSTACLE; up to 5 (0.25 m): INSCRIBED_INFLATED_OBSTACLE;
+#   then (unsigned char)(252 * exp(-3.0 * (0.05 n - 0.25))): 252 * 0.860708 = 216.898, ...
+NAV2 = {0: 254, 1: 253, 5: 253, 6: 216, 7: 186, 8: 160, 9: 138, 10: 119, 11: 102, 12: 88, 13: 75,
+        14: 65, 15: 0}  # fmt: skip
+# Off the axes, (rows, columns) -> cost: sqrt(5^2 + 5^2) = 7.07107 cells, 0.353553 m, and so on.
+NAV2_OFF_AXIS = {(3, 4): 253, (4, 4): 228, (5, 5): 184, (9, 9): 79, (6, 8): 119, (10, 10): 0}
+
+
+def one_obstacle(side: int = 41, resolution_m: float = 0.05, radius_m: float = 0.25) -> Any:
+    probability = np.zeros((side, side))
+    probability[side // 2, side // 2] = 1.0
+    return hn.OccupancyGrid(probability, hn.Frame(resolution_m), robot_radius_m=radius_m)
+
+
+def factor(cost: int, multiplier: float = 2.0) -> float:
+    """Factor of a cost, rounded down to 2^-14."""
+    return math.floor((1 + multiplier * cost / 252) * 2**14) / 2**14
+
+
+def test_clearance_is_nav2s_inflation_cell_by_cell() -> None:
+    factors = hn.CostLayer.clearance(one_obstacle()).factors
+    for cells, cost in NAV2.items():
+        assert factors[20, 20 + cells] == factors[20 - cells, 20] == factor(cost)
+    for (rows, cols), cost in NAV2_OFF_AXIS.items():
+        assert factors[20 + rows, 20 - cols] == factor(cost)
+
+
+@pytest.mark.parametrize("radius_m", [0.0, 0.1, 0.4])
+def test_distances_are_from_measured_obstacles_whatever_the_robots_radius(radius_m: float) -> None:
+    factors = hn.CostLayer.clearance(one_obstacle(radius_m=radius_m), inscribed_radius_m=0.25)
+    assert (factors.factors == hn.CostLayer.clearance(one_obstacle()).factors).all()
+
+
+def test_the_inscribed_radius_is_the_robots_by_default() -> None:
+    for radius_m in (0.0, 0.1, 0.4):
+        layer = hn.CostLayer.clearance(one_obstacle(radius_m=radius_m))
+        assert layer.source["inscribed_radius_m"] == radius_m
+        given_m = hn.CostLayer.clearance(one_obstacle(), inscribed_radius_m=radius_m)
+        assert (layer.factors == given_m.factors).all()
+
+
+def nav2_cost(cells: float, resolution_m: float, inscribed_m: float, scaling: float) -> int:
+    if cells == 0:
+        return 254
+    if cells * resolution_m <= inscribed_m:
+        return 253
+    return int(252 * math.exp(-1.0 * scaling * (cells * resolution_m - inscribed_m)))
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([0.025, 0.05, 0.1]),
+    st.sampled_from([0.0, 0.22, 0.25]),
+    st.sampled_from([0.3, 0.55, 0.7, 1.0]),
+    st.sampled_from([0.0, 1.5, 3.0, 10.0]),
+)
+@settings(max_examples=examples(60))
+def test_every_cell_has_the_cost_of_its_nearest_obstacle(
+    seed: int, resolution_m: float, inscribed_m: float, inflation_m: float, scaling: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    probability = rng.choice([0.0, 0.5, 1.0], (14, 15), p=[0.75, 0.2, 0.05])
+    grid = hn.OccupancyGrid(probability, hn.Frame(resolution_m))
+    layer = hn.CostLayer.clearance(
+        grid,
+        inflation_radius_m=inflation_m,
+        scaling=scaling,
+        inscribed_radius_m=inscribed_m,
+        multiplier=5.0,
+    )
+    obstacles = np.argwhere(probability == 1.0)
+    reach = math.ceil(inflation_m / resolution_m)  # Costmap2D::cellDistance
+    for row, col in np.ndindex(*grid.shape):
+        cells = min((math.hypot(row - r, col - c) for r, c in obstacles), default=math.inf)
+        cost = nav2_cost(cells, resolution_m, inscribed_m, scaling) if cells <= reach else 0
+        assert layer.factors[row, col] == factor(cost, 5.0)
+
+
+def test_unexplored_cells_are_no_obstacles_and_cost_as_free_ones() -> None:
+    probability = np.zeros((3, 30))
+    probability[1, 0], probability[1, 20:] = 1.0, 0.5
+    grid = hn.OccupancyGrid(probability, hn.Frame(0.05))
+    free = hn.OccupancyGrid(np.where(probability == 0.5, 0.0, probability), hn.Frame(0.05))
+    assert (hn.CostLayer.clearance(grid).factors == hn.CostLayer.clearance(free).factors).all()
+
+
+def test_a_map_without_obstacles_costs_its_lengths() -> None:
+    grid = hn.OccupancyGrid(np.zeros((4, 5)))
+    assert (hn.CostLayer.clearance(grid).factors == 1).all()
+
+
+def test_speed_masks_cost_the_time_that_they_take() -> None:
+    grid = hn.OccupancyGrid(np.zeros((1, 6)), robot_radius_m=0)
+    values = [[0, 50, 80, 100, -1, 75]]
+    percent = hn.CostLayer.speed_mask(grid, values)
+    assert percent.factors.tolist() == [[1, 2, 5, 1, 1, 4]]  # a limit of 0 % is none, as in Nav2
+    metres = hn.CostLayer.speed_mask(
+        grid, values, base=0.0, multiplier=0.01, unit="m/s", full_speed_mps=0.8
+    )
+    expected = [[1, 1.6, 1, 1, 1, 0.8 / 0.75]]
+    assert np.abs(metres.factors - expected).max() < 2**-14
+    assert (metres.factors <= np.float32(expected)).all()
+
+
+def test_keepout_masks_close_cells_and_weigh_lanes() -> None:
+    grid = hn.OccupancyGrid(np.zeros((1, 5)), robot_radius_m=0)
+    layer = hn.CostLayer.keepout_mask(grid, [[0, 20, 99, 100, -1]])
+    assert layer.closed is not None
+    # round(2.54 * 20) = 51, round(2.54 * 99) = 251, 254 is lethal.
+    assert layer.closed.tolist() == [[False, False, False, True, False]]
+    assert layer.closed_flat.tolist() == [3]
+    assert layer.factors.tolist() == [[1, factor(51), factor(251), 1, 1]]
+
+
+def test_a_mask_of_another_frame_counts_where_centres_lie() -> None:
+    frame = hn.Frame(0.5, (10.0, -3.0), math.radians(90))
+    grid = hn.OccupancyGrid(np.zeros((4, 6)), frame, robot_radius_m=0)
+    values = np.zeros((7, 9), np.int64)
+    mask_frame = hn.Frame(0.3, (8.5, -2.6), math.radians(10))
+    values[1:5, 2:7] = 50
+    layer = hn.CostLayer.speed_mask(grid, values, mask_frame)
+    for cell in np.ndindex(*grid.shape):
+        x, y = frame.points_of(cell).tolist()
+        row, col = mask_frame.cell_of(x, y)
+        inside = 0 <= row < 7 and 0 <= col < 9
+        assert layer.factors[cell] == (2 if inside and values[row, col] == 50 else 1)
+    assert 1 in layer.factors
+    assert 2 in layer.factors
+
+
+def test_layers_are_joined_and_record_their_sources() -> None:
+    first = hn.CostLayer(np.array([[1.0, 2.0, 3.0]]), np.array([[True, False, False]]))
+    second = hn.CostLayer(np.array([[4.0, 1.5, 1.0]]), np.array([[False, False, True]]))
+    for joined, expected, kind in (
+        (first | second, [[4, 2, 3]], "maximum"),
+        (first * second, [[4, 3, 3]], "product"),
+    ):
+        assert joined.factors.tolist() == expected
+        assert joined.closed is not None
+        assert joined.closed.tolist() == [[True, False, True]]
+        assert joined.source == {"kind": kind, "of": [{"kind": "array"}] * 2}
+    assert len((first | second | first).source["of"]) == 3
+
+
+def test_factors_are_rounded_down_to_units() -> None:
+    layer = hn.CostLayer(np.array([[1.0, 1.1, 999.99999]]))
+    assert (layer.factors <= [[1.0, 1.1, 999.99999]]).all()
+    assert layer.units.tolist() == [[2**14, math.floor(1.1 * 2**14), math.floor(999.99999 * 2**14)]]
+
+
+ARRAYS: list[tuple[Any, str]] = [
+    ([[1.0, math.nan]], "factors must be numbers from 1 to 1000, got nan in cell (0, 1)"),
+    ([[math.inf, 1.0]], "factors must be numbers from 1 to 1000, got inf in cell (0, 0)"),
+    ([[1.0], [-2.0]], "factors must be numbers from 1 to 1000, got -2 in cell (1, 0)"),
+    ([[0.999, 1.0]], "factors must be numbers from 1 to 1000, got 0.999 in cell (0, 0)"),
+    ([[1e9]], "factors must be numbers from 1 to 1000, got 1e+09 in cell (0, 0)"),
+    (
+        [1.0, 2.0],
+        "factors must be numbers of shape (rows, cols), one for each cell, got shape (2,)",
+    ),
+    ([[]], "factors must be numbers of shape (rows, cols), one for each cell, got shape (1, 0)"),
+    ([["high"]], "factors must be numbers of shape (rows, cols)"),
+    ([[1.0], [1.0, 2.0]], "factors must be numbers of shape (rows, cols)"),
+    ([[1 + 2j]], "factors must be numbers of shape (rows, cols)"),
+    ([[True]], "factors must be numbers of shape (rows, cols)"),
+    (None, "factors must be numbers of shape (rows, cols)"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), ARRAYS)
+def test_unusable_factors_are_refused_in_one_line(given: Any, message: str) -> None:
+    with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
+        hn.CostLayer(given)
+    assert "\n" not in str(refused.value)
+
+
+CALLS: list[tuple[str, Any, str]] = [
+    ("clearance", {"scaling": math.nan}, "scaling must be a finite number >= 0, got nan"),
+    ("clearance", {"multiplier": -1}, "multiplier must be a finite number >= 0, got -1"),
+    ("clearance", {"multiplier": 1e6}, "multiplier must be at most 991"),
+    ("clearance", {"inflation_radius_m": math.inf}, "inflation_radius_m must be a finite number"),
+    ("clearance", {"inscribed_radius_m": "x"}, "inscribed_radius_m must be a finite number >= 0"),
+    ("speed_mask", {"values": [[101, 0]]}, "0 to 100, or -1 for unknown, got 101 in cell (0, 0)"),
+    ("speed_mask", {"values": [[0.5, 0.0]]}, "a mask must be integers of shape (rows, cols)"),
+    ("speed_mask", {"values": [[0, 0, 0]]}, "a mask of shape (1, 3) is not that of a map of shape"),
+    ("speed_mask", {"unit": "m/s"}, "full_speed_mps is needed with the unit m/s"),
+    ("speed_mask", {"full_speed_mps": 1.0}, "full_speed_mps does not go with the unit percent"),
+    ("speed_mask", {"unit": "mph"}, "the unit of speed limits is percent or m/s, got 'mph'"),
+    ("speed_mask", {"base": math.nan}, "base must be a finite number, got nan"),
+    ("keepout_mask", {"multiplier": math.inf}, "multiplier must be a finite number >= 0, got inf"),
+]
+
+
+@pytest.mark.parametrize(("name", "wrong", "message"), CALLS)
+def test_unusable_settings_are_refused_in_one_line(name: str, wrong: Any, message: str) -> None:
+    grid = hn.OccupancyGrid(np.zeros((1, 2)), robot_radius_m=0)
+    settings = {} if name == "clearance" else {"values": [[0, 0]]}
+    with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
+        getattr(hn.CostLayer, name)(grid, **settings | wrong)
+    assert "\n" not in str(refused.value)
+
+
+def test_layers_of_other_shapes_and_closed_cells_of_other_kinds_are_refused() -> None:
+    layer = hn.CostLayer(np.ones((2, 3)))
+    with pytest.raises(hn.InvalidValueError, match="cannot be joined"):
+        layer | hn.CostLayer(np.ones((3, 2)))
+    with pytest.raises(hn.InvalidValueError, match="closed cells must be bool of the shape"):
+        hn.CostLayer(np.ones((2, 3)), np.zeros((2, 3)))
+    with pytest.raises(hn.InvalidValueError, match="costs of 3 x 2 cells are not those of a map"):
+        layer.check_fits(hn.OccupancyGrid(np.zeros((3, 3))))
