@@ -13,7 +13,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
-from hybridnav.search import _kernels
+from hybridnav.search import _astar_kernels, _kernels
 from hybridnav.search.fields import field_distances
 from hybridnav.search.grid_search import GridSearch, move_tables
 from hybridnav.search.moves import (
@@ -119,7 +119,7 @@ def test_one_object_serves_many_searches(seed: int, density: float) -> None:
     enterable = rng.random((11, 12)) >= density
     assume(enterable.any())
     search = GridSearch(enterable)
-    set_generation(search, _kernels.GENERATIONS - 6)
+    set_generation(search, _astar_kernels.GENERATIONS - 6)
     # Twelve searches cross the point where the generations start anew.
     for _ in range(12):
         check_search(search, enterable, (random_cell(enterable, rng), random_cell(enterable, rng)))
@@ -136,7 +136,7 @@ def test_generations_that_start_anew_forget_the_cheaper_paths_of_the_first_ones(
     enterable = drawn("....", ".##.", "....") == CellClass.FREE
     search = GridSearch(enterable)
     check_search(search, enterable, ((0, 0), (2, 3)))
-    set_generation(search, _kernels.GENERATIONS)
+    set_generation(search, _astar_kernels.GENERATIONS)
     check_search(search, enterable, ((2, 3), (0, 0)))
     check_search(search, enterable, ((0, 0), (2, 3)))
 
@@ -217,7 +217,7 @@ def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
     search = GridSearch(enterable, corner_cutting=corner_cutting)
     # Room for one cell in each bucket to begin with: most searches must start over.
     with search._works.lent() as work:
-        work.waiting = np.empty(_kernels.BUCKETS, dtype=np.int32)
+        work.waiting = np.empty(_astar_kernels.BUCKETS, dtype=np.int32)
     for _ in range(4):
         endpoints = random_cell(inside, rng), random_cell(inside, rng)
         check_search(search, enterable, endpoints, corridor, corner_cutting=corner_cutting)
@@ -294,7 +294,7 @@ def test_blocked_cells_open_again_after_a_search_that_fails(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(_kernels, "astar", interrupted)
+        patch.setattr(_astar_kernels, "astar", interrupted)
         with pytest.raises(KeyboardInterrupt):
             search.search((0, 0), (3, 4), blocked=np.arange(5, 10))
     check_search(search, enterable, ((0, 0), (3, 4)))

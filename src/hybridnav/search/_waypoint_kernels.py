@@ -12,11 +12,23 @@ from hybridnav.search._move_kernels import COL_STEP, DIAGONAL, ROW_STEP, STRAIGH
 
 @guarded
 @njit(cache=True, nogil=True)
-def spread(moves, cols, sources, costs, is_target, all_targets):
+def spread(moves, units, cols, sources, costs, is_target, all_targets):
     """Run Dijkstra's algorithm from cells with costs of their own.
 
     Return the cost of each cell, -1 if it was not settled, and its source (an index into
     `sources`). The search ends at the first settled target, or at the last one with `all_targets`.
+
+    Parameters
+    ----------
+    moves, cols
+        uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
+    units
+        int32 (n_cells,), the factor of each cell in units, or None: then costs are lengths (the
+        kernel is compiled for both).
+    sources, costs
+        int64 (n,) each, flat cells and what they cost.
+    is_target, all_targets
+        bool (n_cells,), and whether all of these are to be settled.
     """
     cost = np.full(moves.size, np.int64(-1), np.int64)
     came = np.full(moves.size, np.int32(-1), np.int32)
@@ -45,7 +57,10 @@ def spread(moves, cols, sources, costs, is_target, all_targets):
             if moves[cell] >> k & 1 == 0:
                 continue
             to = cell + ROW_STEP[k] * cols + COL_STEP[k]
-            further = at + (DIAGONAL if k & 1 else STRAIGHT)
+            step = DIAGONAL if k & 1 else STRAIGHT
+            if units is not None:
+                step *= np.int64(units[cell]) + units[to]
+            further = at + step
             if cost[to] < 0 and further < best[to]:
                 best[to] = further
                 came[to] = came[cell]

@@ -4,7 +4,7 @@ P. E. Hart, N. J. Nilsson, B. Raphael: A formal basis for the heuristic determin
 cost paths, 1968. The open list is that of E. A. Dinic, 1978, by f in place of g. Successors are
 pruned by the direction of arrival as D. Harabor and A. Grastien do (Online graph pruning for
 pathfinding on grid maps, 2011), without jumps: N. R. Sturtevant and S. Rabin call that canonical
-A* (Canonical orderings on grids, 2016).
+A* (Canonical orderings on grids, 2016). With factors in the cells all moves ahead are successors.
 """
 
 from __future__ import annotations
@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.search import _kernels
+from hybridnav.search import _astar_kernels as _kernels
+from hybridnav.search import _weighted_kernels as _weighted
 from hybridnav.search._move_kernels import legal_moves, trace_cells
+from hybridnav.search._open_kernels import BUCKET_FULL
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._typing import BoolArray, ByteArray, LongArray
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
 
 Cell = tuple[int, int]
 
@@ -30,6 +32,8 @@ KERNEL = _kernels.astar
 """The kernel whose compiled form shows that a search was run before."""
 _UNLIMITED = 1 << 62
 _ROOM = 1024
+_MOST_UNITS = 1 << 24
+"""More than any cell has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +47,51 @@ class CellPath:
 class _Work:
     """Work arrays of one search: a record for each cell, and the open list."""
 
-    def __init__(self, n_cells: int) -> None:
-        self.records = np.zeros(n_cells, dtype=np.uint32)
-        self.waiting = np.empty(_kernels.BUCKETS * _ROOM, dtype=np.int32)
+    def __init__(self, n_cells: int, weights: _Weights | None = None) -> None:
+        weighted = weights is not None
+        self.records = np.zeros(n_cells, dtype=np.int64 if weighted else np.uint32)
+        n_buckets = _kernels.BUCKETS if weights is None else weights.n_buckets
+        self.waiting = np.empty(n_buckets * _ROOM, dtype=np.int32)
         self.generation = 0
+        self._last = _weighted.GENERATIONS if weighted else _kernels.GENERATIONS
+
+    def next_generation(self) -> int:
+        """Return the number of the next search; its records hold nothing of earlier ones."""
+        if self.generation == self._last:
+            self.records.fill(0)
+            self.generation = 0
+        self.generation += 1
+        return self.generation
+
+
+class _Weights:
+    """The factors of the cells in units, and what they determine.
+
+    Parameters
+    ----------
+    units
+        int32 (rows, cols).
+    enterable
+        bool (rows, cols), the cells whose units matter.
+    """
+
+    def __init__(self, units: IntArray, enterable: BoolArray) -> None:
+        # Kernels are compiled for each memory layout, and again for read-only arrays.
+        self.units = np.ascontiguousarray(units).ravel().view()
+        self.units.flags.writeable = False
+        of_enterable = units[enterable]
+        least = int(of_enterable.min(initial=_MOST_UNITS))
+        most = int(of_enterable.max(initial=least))
+        self.scales = 2 * least, _weighted.bucket_shift(least)
+        self.n_buckets = _weighted.n_buckets(least, most)
 
 
 class GridSearch:
     """A* on the cells of one grid; threads may share it.
 
     It holds one byte a cell for the legal moves. Each search that runs at the same time as others
-    takes four bytes a cell for its records, some 32 kB for its open list, which grows as needed,
-    and one byte a cell if it had blocked cells.
+    takes four bytes a cell for its records (eight with units), some 32 kB for its open list, which
+    grows as needed, and one byte a cell if it had blocked cells.
 
     Moves go to the 8 neighbours; a diagonal needs both side cells enterable (no corner cutting).
     Moves are judged once, on the whole grid; a corridor limits only the cells stood on.
@@ -65,14 +102,24 @@ class GridSearch:
         bool (rows, cols), cells that paths may use; start and goal must be among them.
     corner_cutting
         Whether a diagonal needs no side cell enterable.
+    units
+        int32 (rows, cols), the factor of each cell in units, from 1 to 2^24: a move costs its
+        length times the sum of the units of its two cells. None makes costs lengths.
     """
 
-    def __init__(self, enterable: BoolArray, *, corner_cutting: bool = False) -> None:
+    def __init__(
+        self,
+        enterable: BoolArray,
+        *,
+        corner_cutting: bool = False,
+        units: IntArray | None = None,
+    ) -> None:
         self._cols = enterable.shape[1]
         self._corner_cutting = corner_cutting
         moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
         self._moves = moves.ravel()
-        self._works = Pool(partial(_Work, enterable.size))
+        self._weights = None if units is None else _Weights(units, enterable)
+        self._works = Pool(partial(_Work, enterable.size, self._weights))
         self._moves_to_edit: Pool[ByteArray] = Pool(partial(np.copy, self._moves))
 
     @property
@@ -91,7 +138,7 @@ class GridSearch:
         limit: int | None = None,
         blocked: LongArray | None = None,
     ) -> CellPath:
-        """Find a shortest path between the centres of two cells.
+        """Find a path of the least cost between the centres of two cells.
 
         Parameters
         ----------
@@ -102,7 +149,8 @@ class GridSearch:
         in_corridor
             bool, whether the cells of each label may be stood on; goes with `field_of`.
         limit
-            Integer cost: only cheaper paths are searched; None for all.
+            Integer cost: only cheaper paths are searched; None for all. Lengths are counted in
+            `STRAIGHT` and `DIAGONAL`.
         blocked
             int64 (n,), flat cells of the grid that this search may not enter, or pass on a diagonal
             unless corners may be cut; the time is proportional to n.
@@ -128,32 +176,56 @@ class GridSearch:
         limit: int,
         corridor: tuple[NDArray[np.int16 | np.int32] | None, BoolArray | None],
     ) -> CellPath:
-        """Find a shortest path between two flat cells; see `search`."""
-        tables = move_tables(corner_cutting=self._corner_cutting)
+        """Find a path of the least cost between two flat cells; see `search`."""
         with self._works.lent() as work:
-            cost = _kernels.BUCKET_FULL
-            while cost == _kernels.BUCKET_FULL:
-                if work.generation == _kernels.GENERATIONS:
-                    work.records.fill(0)
-                    work.generation = 0
-                work.generation += 1
-                cost, expanded = _kernels.astar(
-                    moves,
-                    self._cols,
-                    endpoints,
-                    limit,
-                    *tables,
-                    *corridor,
-                    work.records,
-                    work.generation,
-                    work.waiting,
-                )
-                if cost == _kernels.BUCKET_FULL:
+            cost = BUCKET_FULL
+            while cost == BUCKET_FULL:
+                generation = work.next_generation()
+                of_work = *corridor, work.records, generation, work.waiting
+                if self._weights is None:
+                    tables = move_tables(corner_cutting=self._corner_cutting)
+                    cost, expanded = _kernels.astar(
+                        moves, self._cols, endpoints, limit, *tables, *of_work
+                    )
+                else:
+                    cost, expanded = _weighted.weighted_astar(
+                        moves,
+                        self._weights.units,
+                        self._cols,
+                        endpoints,
+                        limit,
+                        self._weights.scales,
+                        moves_ahead(),
+                        *of_work,
+                        self._weights.n_buckets,
+                    )
+                if cost == BUCKET_FULL:
                     work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
             if cost < 0:
                 return CellPath(None, int(expanded))
             cells: LongArray = trace_cells(work.records, self._cols, *endpoints)
         return CellPath(cells, int(expanded))
+
+
+@lru_cache
+def moves_ahead() -> NDArray[np.uint32]:
+    """Return the legal moves by direction of arrival that turn by at most 90 degrees.
+
+    Returns
+    -------
+    NDArray
+        uint32 (9 * 256,), as the successors of `move_tables`.
+    """
+    mask = np.arange(256, dtype=np.uint32)
+    successors = np.zeros((9, 256), dtype=np.uint32)
+    for d in range(8):
+        for turn in (0, 7, 1, 6, 2):
+            k = (d + turn) & 7
+            _put_first(successors[d], mask >> k & 1 == 1, k)
+    for k in range(8):
+        _put_first(successors[8], mask >> k & 1 == 1, k)
+    successors.flags.writeable = False
+    return successors.ravel()
 
 
 @lru_cache

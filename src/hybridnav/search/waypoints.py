@@ -12,13 +12,17 @@ from hybridnav.search.moves import legal_moves
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav._typing import BoolArray, IntArray, LongArray
 
 
 def cheapest_waypoints(
-    enterable: BoolArray, sets: Sequence[LongArray], *, corner_cutting: bool = False
+    enterable: BoolArray,
+    sets: Sequence[LongArray],
+    *,
+    corner_cutting: bool = False,
+    units: IntArray | None = None,
 ) -> list[int] | None:
-    """Choose a cell from each set so that the path through them, in order, is shortest.
+    """Choose a cell from each set so that the path through them, in order, is cheapest.
 
     Dijkstra's algorithm runs from set to set: the search for the next set begins with the costs of
     the cells of the last one.
@@ -32,6 +36,8 @@ def cheapest_waypoints(
         Two or more sets, int64 (n,), of flat enterable cells.
     corner_cutting
         Whether a diagonal needs no side cell.
+    units
+        int32 (rows, cols), the factor of each cell in units; None makes costs lengths.
 
     Returns
     -------
@@ -39,13 +45,14 @@ def cheapest_waypoints(
         A flat cell of each set; None if one of them cannot be reached.
     """
     moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+    weights = None if units is None else np.ascontiguousarray(units).ravel()
     sources, costs = sets[0], np.zeros(len(sets[0]), dtype=np.int64)
     origins: list[LongArray] = []
     for number, goals in enumerate(sets[1:], start=2):
         is_target = np.zeros(moves.size, dtype=np.bool_)
         is_target[goals] = True
         cost, came = _waypoint_kernels.spread(
-            moves, enterable.shape[1], sources, costs, is_target, number < len(sets)
+            moves, weights, enterable.shape[1], sources, costs, is_target, number < len(sets)
         )
         reached = goals[cost[goals] >= 0]
         if len(reached) == 0:
