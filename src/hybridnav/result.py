@@ -17,7 +17,15 @@ from hybridnav.poses import Motion
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, FloatArray, LongArray, SignArray
 
-Metric = Literal["octile", "any-angle", "clearance-weighted", "dubins", "reeds-shepp"]
+Metric = Literal[
+    "octile",
+    "weighted",
+    "any-angle",
+    "any-angle-weighted",
+    "clearance-weighted",
+    "dubins",
+    "reeds-shepp",
+]
 
 
 class PlanStatus(StrEnum):
@@ -272,7 +280,7 @@ class PlanResult:
     settings: dict[str, Any] = field(default_factory=dict)
     """Preset, and settings of the pyramid."""
     weighted_cost: float | None = None
-    """Cost in a metric other than the length; None for the length."""
+    """Cost in a metric other than the length, as with costs of cells; None for the length."""
     refinement: Refinement | None = None
     """History of the path, with OMPL only."""
     start: tuple[float, ...] | None = None

@@ -3,6 +3,8 @@
 from hybridnav.config.ompl import OmplSettings
 from hybridnav.config.preset import (
     DEFAULT_ROBOT_RADIUS_M,
+    ClearanceSettings,
+    CostSettings,
     PlannerSettings,
     Preset,
     PyramidSettings,
@@ -12,6 +14,8 @@ from hybridnav.config.preset import (
 
 __all__ = [
     "DEFAULT_ROBOT_RADIUS_M",
+    "ClearanceSettings",
+    "CostSettings",
     "OmplSettings",
     "PlannerSettings",
     "Preset",

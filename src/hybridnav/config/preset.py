@@ -101,6 +101,40 @@ class PyramidSettings(_Section):
     """Radius by which occupied cells are inflated, in metres."""
 
 
+class ClearanceSettings(_Section):
+    """Section `planner.costs.clearance`: factors by Nav2's inflation, see `CostLayer.clearance`.
+
+    Examples
+    --------
+    >>> from hybridnav.config import ClearanceSettings
+    >>> ClearanceSettings(multiplier=3.0).scaling
+    3.0
+    """
+
+    inflation_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 0.70
+    """Distance from obstacles up to which cells cost more, in metres."""
+    scaling: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 3.0
+    """How quickly costs fall off, 1 / m: `cost_scaling_factor`."""
+    inscribed_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] | None = None
+    """Distance from which they fall off, in metres; null for the radius of the robot."""
+    multiplier: Annotated[_Float, Field(ge=0, le=991)] = 2.0
+    """Factor above 1 of a cell at the inscribed radius."""
+
+
+class CostSettings(_Section):
+    """Section `planner.costs`: what makes a metre in a cell cost more than a metre.
+
+    Examples
+    --------
+    >>> from hybridnav.config import CostSettings
+    >>> print(CostSettings().clearance)
+    None
+    """
+
+    clearance: ClearanceSettings | None = None
+    """Distance from obstacles; null for no such costs."""
+
+
 class PlannerSettings(_Section):
     """Section `planner`: coarse search, corridor, refinement.
 
@@ -137,6 +171,16 @@ class PlannerSettings(_Section):
     """Whether the path is shortened to an any-angle one."""
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
+    costs: CostSettings | None = None
+    """With `refine: grid-astar`, factors by which metres cost more; the path is the cheapest one.
+    null makes costs lengths."""
+
+    def refusal_of_costs(self) -> str | None:
+        """Return why these settings cannot plan by costs, None if they can."""
+        if self.refine == "grid-astar":
+            return None
+        what = f"coarse: {self.coarse} knows lengths only" if self.refine == "none" else self.refine
+        return f"{what}; costs go with refine: grid-astar, as in preset grid-astar"
 
     @model_validator(mode="before")
     @classmethod
@@ -147,6 +191,9 @@ class PlannerSettings(_Section):
 
     @model_validator(mode="after")
     def _go_together(self) -> Self:
+        has_costs = self.costs is not None and self.costs.clearance is not None
+        if has_costs and (why := self.refusal_of_costs()):
+            raise PydanticCustomError("costs_refused", "{why}", {"why": why})
         if self.ompl is not None and self.refine != "ompl":
             raise PydanticCustomError("ompl_needed", "section ompl goes with refine: ompl")
         if self.refine == "ompl":

@@ -134,7 +134,7 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
     ------
     InvalidValueError
         When the count or the area is out of range, an end is not valid, a closed item is not on the
-        map, the planner refines with OMPL, or its grid allows corner cutting.
+        map, the planner refines with OMPL or plans by costs, or its grid allows corner cutting.
 
     Examples
     --------
@@ -151,6 +151,10 @@ def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
         raise InvalidValueError(
             "alternatives are paths of the grid: ask a preset without OMPL for them, "
             f"not {planner.preset.name}"
+        )
+    if planner.costs is not None:
+        raise InvalidValueError(
+            "alternatives are shortest paths, and this planner plans by costs: ask one without"
         )
     check_names(planner.topology, [start, goal])
     closed = planner.closed(blocked)

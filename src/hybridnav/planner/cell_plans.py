@@ -14,7 +14,7 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.planner.cell_planner import CellPlan, CellPlans
 from hybridnav.result import PlanStats, Route
-from hybridnav.search.moves import octile_distance_in_cells, path_length_in_cells
+from hybridnav.search.moves import octile_distance_in_cells
 
 if TYPE_CHECKING:
     import numpy as np
@@ -46,9 +46,8 @@ def round_closed(plan: CellPlan, query: CellQuery, refiner: GridRefiner) -> Cell
     expanded = plan.stats.expanded + found.expanded
     if found.cells is None:
         return CellPlan(None, stats=PlanStats(expanded=expanded, seconds=seconds))
-    length = path_length_in_cells(found.cells)
     stats = replace(plan.stats, expanded=expanded, seconds=seconds)
-    return CellPlan(found.cells, length_cells=length, bound_cells=length, stats=stats)
+    return CellPlan(found.cells, bound_cells=refiner.cost_in_cells(found.cells), stats=stats)
 
 
 class WholeMap:
@@ -57,14 +56,13 @@ class WholeMap:
     Parameters
     ----------
     refiner
-        The search of cells.
+        The search of cells, with its costs.
     own
         A refiner to use in its place where nothing is closed; None for none.
     """
 
-    metric: Metric = "octile"
-
     def __init__(self, refiner: GridRefiner, own: Refiner | None = None) -> None:
+        self.metric: Metric = "octile" if refiner.costs is None else "weighted"
         self._refiner = refiner
         self._own = own
 
@@ -83,7 +81,7 @@ class WholeMap:
         """Find a shortest path; see `CellPlanner`."""
         began = time.perf_counter()
         cells, expanded = (self._own or self._refiner).refine(*query.cells, None)
-        bound = math.inf if cells is None else path_length_in_cells(cells)
+        bound = self._refiner.cost_in_cells(cells)
         if self._own is not None:  # it proves nothing
             bound = octile_distance_in_cells(*query.cells)
         seconds = {"refine": time.perf_counter() - began}
@@ -113,14 +111,12 @@ class MaxDistance:
     topology
         The map.
     refiner
-        The search of cells.
+        The search of cells, with its costs.
     settings
         Whether unexplored cells may be entered, and the corridor.
     own
         A refiner to use in its place where nothing is closed; None for none.
     """
-
-    metric: Metric = "octile"
 
     def __init__(
         self,
@@ -129,6 +125,7 @@ class MaxDistance:
         settings: PlannerSettings,
         own: Refiner | None = None,
     ) -> None:
+        self.metric: Metric = "octile" if refiner.costs is None else "weighted"
         self._topology = topology
         self._refiner = refiner
         self._own = own

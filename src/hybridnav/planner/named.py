@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.config import PlannerSettings
+    from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.topology import TopologicalMap
@@ -34,15 +35,26 @@ _FACING_M = 1.0
 """Length of path that determines the heading of a robot at a waypoint with a name."""
 
 
-def points_of_waypoints(
+class _Space(NamedTuple):
+    """What a search between waypoints moves in."""
+
+    topology: TopologicalMap
+    enterable: BoolArray
+    """bool (rows, cols), cells that may be entered."""
+    units: IntArray | None
+    """int32 (rows, cols), factors in units; None for lengths."""
+
+
+def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
     topology: TopologicalMap,
     settings: PlannerSettings,
     waypoints: Sequence[ArrayLike | str],
     *,
     at: At = "anywhere",
     closed: ClosedCells | None = None,
+    costs: CostLayer | None = None,
 ) -> list[ArrayLike]:
-    """Return a point for each waypoint, so that the path through all of them is shortest.
+    """Return a point for each waypoint, so that the path through all of them is cheapest.
 
     Parameters
     ----------
@@ -58,6 +70,8 @@ def points_of_waypoints(
         Position in a room: anywhere, or at the room's point.
     closed
         Cells that are closed for this query.
+    costs
+        Costs of the cells; None makes costs lengths.
 
     Returns
     -------
@@ -80,9 +94,10 @@ def points_of_waypoints(
         enterable = enterable.copy()
         enterable.ravel()[closed.flat] = False
     fixed: list[Any] = [_point_of(topology, waypoint, at) for waypoint in waypoints]
-    points = _chosen(topology, enterable, waypoints, fixed, _radius_m(settings))
+    space = _Space(topology, enterable, None if costs is None else costs.units)
+    points = _chosen(space, waypoints, fixed, _radius_m(settings))
     if settings.ompl is not None and settings.ompl.has_heading:
-        return _facing_along_paths(topology, enterable, waypoints, points)
+        return _facing_along_paths(space, waypoints, points)
     return points
 
 
@@ -136,15 +151,15 @@ def check_waypoints(
 
 
 def _chosen(
-    topology: TopologicalMap,
-    enterable: BoolArray,
+    space: _Space,
     waypoints: Sequence[ArrayLike | str],
     fixed: list[Any],
     radius_m: float,
 ) -> list[Any]:
-    """Return the given points, and for rooms the points that make the path shortest."""
+    """Return the given points, and for rooms the points that make the path cheapest."""
     if all(point is not None for point in fixed):
         return fixed
+    topology, enterable, units = space
     grid = topology.grid
     rooms = {
         waypoint: _where_it_fits(grid, _cells_in_room(topology, enterable, waypoint), radius_m)
@@ -163,7 +178,8 @@ def _chosen(
     ]
     found = None
     if all(map(len, sets)):
-        found = cheapest_waypoints(enterable, sets, corner_cutting=grid.corner_cutting)
+        cutting = grid.corner_cutting
+        found = cheapest_waypoints(enterable, sets, corner_cutting=cutting, units=units)
     if found is None:
         return [
             topology.rooms.point_of(str(waypoint)) if point is None else point
@@ -176,14 +192,12 @@ def _chosen(
 
 
 def _facing_along_paths(
-    topology: TopologicalMap,
-    enterable: BoolArray,
-    waypoints: Sequence[ArrayLike | str],
-    points: list[Any],
+    space: _Space, waypoints: Sequence[ArrayLike | str], points: list[Any]
 ) -> list[Any]:
-    """Return the points, with headings along a shortest path of cells for waypoints with names."""
+    """Return the points, with headings along a cheapest path of cells for waypoints with names."""
+    topology, enterable, units = space
     grid = topology.grid
-    search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
+    search = GridSearch(enterable, corner_cutting=grid.corner_cutting, units=units)
     cells = [_cell_at(topology, enterable, point) for point in points]
     arriving = [math.nan]
     leaving = []

@@ -11,6 +11,7 @@ from hybridnav.route.route_finder import RouteFinder, RouteOfCells
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.config import Preset
+    from hybridnav.costs import CostLayer
     from hybridnav.planner.cell_planner import CellPlan
     from hybridnav.result import Metric, Path
     from hybridnav.topology import TopologicalMap
@@ -27,11 +28,16 @@ class Outcomes:
         The map.
     preset
         The preset of the planner.
+    costs
+        The costs that it plans by; None for lengths.
     """
 
-    def __init__(self, topology: TopologicalMap, preset: Preset) -> None:
+    def __init__(
+        self, topology: TopologicalMap, preset: Preset, costs: CostLayer | None = None
+    ) -> None:
         self._topology = topology
         self._preset = preset
+        self._costs = costs
         self._route_finder = RouteFinder(topology)
 
     def answer(self, status: PlanStatus, poses: Poses, **outcome: Any) -> PlanResult:
@@ -52,8 +58,15 @@ class Outcomes:
             PlanStatus.NO_PATH, poses, metric=metric, lower_bound=bound, stats=plan.stats
         )
 
-    def solved(
-        self, plan: CellPlan, poses: Poses, path: Path, metric: Metric, bound_m: float
+    def solved(  # noqa: PLR0913 - the last has a default
+        self,
+        plan: CellPlan,
+        poses: Poses,
+        path: Path,
+        metric: Metric,
+        bound_m: float,
+        *,
+        weighted_cost: float | None = None,
     ) -> PlanResult:
         """Return the result of a plan with a path."""
         return self.answer(
@@ -63,6 +76,7 @@ class Outcomes:
             path=path,
             route_source=plan.route or self.route_of(path),
             lower_bound=bound_m,
+            weighted_cost=weighted_cost,
             stats=plan.stats,
         )
 
@@ -75,6 +89,7 @@ class Outcomes:
     @cached_property
     def _settings(self) -> dict[str, Any]:
         pyramid = self._topology.pyramid
+        costs = {} if self._costs is None else {"costs": self._costs.source}
         return {
             "preset": self._preset.name,
             "planner": self._preset.planner.model_dump(),
@@ -84,4 +99,5 @@ class Outcomes:
                 "seed": pyramid.seed,
                 "robot_radius_m": pyramid.grid.robot_radius_m,
             },
+            **costs,
         }

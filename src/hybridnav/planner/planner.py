@@ -14,6 +14,7 @@ from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
+from hybridnav.planner.costs import CostFinish, costs_of
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point, read_points, read_pose
 from hybridnav.planner.outcome import Outcomes
 from hybridnav.planner.radius import check_radius
@@ -27,11 +28,12 @@ if TYPE_CHECKING:
 
     from hybridnav._progress import Progress
     from hybridnav._typing import FloatArray, PathLike
+    from hybridnav.costs import CostLayer
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlan, Prepared
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
-    from hybridnav.result import PlanBatch, PlanResult
+    from hybridnav.result import Metric, PlanBatch, PlanResult
     from hybridnav.topology import TopologicalMap
 
 Smooth = Literal["none", "line-of-sight"]
@@ -53,13 +55,18 @@ class HybridPlanner:
         Name of a preset, path to a preset file, or a `Preset`.
     prepared
         `prepared` of another planner of the same map and preset, to use; None to build anew.
+    costs
+        A factor for each cell, by which a metre in it costs more, joined with the costs that the
+        preset names. The path is the cheapest one, and its result has the metric `weighted`. Only
+        for presets with `refine: grid-astar`.
 
     Raises
     ------
     PresetError
         When the preset does not exist or is not valid, or names a refiner that cannot be used.
     InvalidValueError
-        When the map has the default radius, not chosen by the caller, and the preset names another.
+        When the map has the default radius, not chosen by the caller, and the preset names another;
+        when the costs are those of another map, or the preset cannot plan by costs.
 
     Examples
     --------
@@ -76,14 +83,21 @@ class HybridPlanner:
         *,
         preset: PathLike | Preset = "shortest",
         prepared: Prepared | None = None,
+        costs: CostLayer | None = None,
     ) -> None:
         self.topology = topology
         self.preset = load_preset(preset)
         check_radius(topology.grid, self.preset)
         settings = self.preset.planner
-        self._cells = cell_planner(topology, settings, prepared)
+        self.costs = costs_of(topology.grid, self.preset, costs)
+        """The costs that it plans by, None for lengths."""
+        self._cells = cell_planner(topology, settings, prepared, self.costs)
         self._closures = Closures(topology)
-        self._outcomes = Outcomes(topology, self.preset)
+        self._outcomes = Outcomes(topology, self.preset, self.costs)
+        self._finish: CostFinish | None = None
+        if self.costs is not None:
+            allowed = settings.allow_unexplored
+            self._finish = CostFinish(topology.grid, self.costs, allow_unexplored=allowed)
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
             # Loads modules for these presets only, or reports which one to install.
@@ -122,8 +136,9 @@ class HybridPlanner:
             yaw)`, radians counter-clockwise from the x axis, and named endpoints face along the
             path; in other spaces the third number is ignored.
         smooth
-            `"line-of-sight"` shortens the path to an any-angle one; None as in the preset. Without
-            effect for `shortest` and OMPL, whose paths are any-angle ones.
+            `"line-of-sight"` shortens the path to an any-angle one, by costs without raising them;
+            None as in the preset. Without effect for `shortest` and OMPL, whose paths are any-angle
+            ones.
         blocked
             Closures for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
             mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. If they
@@ -149,9 +164,13 @@ class HybridPlanner:
 
             check_names(self.topology, [start, goal])
             blocked = self.closed(blocked)
-            settings = self.preset.planner
             start, goal = points_of_waypoints(
-                self.topology, settings, [start, goal], at=at, closed=blocked
+                self.topology,
+                self.preset.planner,
+                [start, goal],
+                at=at,
+                closed=self.closed_for_all(blocked),
+                costs=self.costs,
             )
         poses = self._pose("start", start), self._pose("goal", goal)
         return self._between(poses, self._finish_asked_for(smooth), self.closed(blocked), began)
@@ -169,7 +188,8 @@ class HybridPlanner:
         cells = cells_of_endpoints(grid, endpoints, allow_unexplored=allowed)
         if isinstance(cells, PlanStatus):
             return self._outcomes.answer(cells, poses)
-        if closed is not None and (refused := closed.refusal(cells, grid.shape)):
+        shut = self.closed_for_all(closed)
+        if shut is not None and (refused := shut.refusal(cells, grid.shape)):
             return self._outcomes.answer(refused, poses)
         plan = self._cells.plan(CellQuery(cells, endpoints, closed))
         if plan.cells is None:
@@ -244,6 +264,8 @@ class HybridPlanner:
     ) -> PlanResult:
         """Return the result of a path of the planner of cell paths."""
         assert plan.cells is not None  # noqa: S101 - the caller has looked
+        if self._finish is not None:
+            return self._by_costs(self._finish, plan, poses, finish, closed)
         grid = self.topology.grid
         bound = plan.bound_cells * grid.resolution_m
         points, metric = plan.points, self._cells.metric
@@ -264,6 +286,29 @@ class HybridPlanner:
             bound = length_m * (plan.bound_cells / plan.length_cells)
         path = Path(plan.cells, points, length_m)
         return self._outcomes.solved(plan, poses, path, metric, min(bound, length_m))
+
+    def _by_costs(
+        self,
+        costs: CostFinish,
+        plan: CellPlan,
+        poses: tuple[FloatArray, FloatArray],
+        finish: Smooth,
+        closed: ClosedCells | None,
+    ) -> PlanResult:
+        """Return the result of a cheapest path of cells."""
+        assert plan.cells is not None  # noqa: S101 - the caller has looked
+        metric: Metric = "weighted"
+        if finish == "line-of-sight":
+            began = time.perf_counter()
+            metric = "any-angle-weighted"
+            path, cost_m = costs.line(plan.cells, poses, closed)
+            plan.stats.seconds["smooth"] = time.perf_counter() - began
+            bound = self._cells.bound(plan, (poses[0][:2], poses[1][:2]))
+        else:
+            path, cost_m = costs.cell_path(plan.cells)
+            bound = plan.bound_cells * self.topology.grid.resolution_m
+        bound = min(bound, cost_m)
+        return self._outcomes.solved(plan, poses, path, metric, bound, weighted_cost=cost_m)
 
     def _pose(self, name: str, given: ArrayLike) -> FloatArray:
         """Return a position and, with OMPL, heading; float64 (2,) or (3,)."""
@@ -327,3 +372,7 @@ class HybridPlanner:
         if blocked is None or isinstance(blocked, ClosedCells):
             return blocked
         return self._closures.of(blocked)
+
+    def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
+        """Return the closed cells of a query with those that the costs close for all queries."""
+        return closed if self._finish is None else self._finish.with_closed(closed)

@@ -10,6 +10,7 @@ from hybridnav.refine import GridRefiner
 
 if TYPE_CHECKING:
     from hybridnav.config import PlannerSettings
+    from hybridnav.costs import CostLayer
     from hybridnav.planner.cell_planner import CellPlanner, Prepared
     from hybridnav.topology import TopologicalMap
 
@@ -17,7 +18,10 @@ _T = TypeVar("_T")
 
 
 def cell_planner(
-    topology: TopologicalMap, settings: PlannerSettings, prepared: Prepared | None
+    topology: TopologicalMap,
+    settings: PlannerSettings,
+    prepared: Prepared | None,
+    costs: CostLayer | None = None,
 ) -> CellPlanner:
     """Make the planner of cell paths for some settings.
 
@@ -31,6 +35,8 @@ def cell_planner(
         Section `planner` of a preset.
     prepared
         Structures that another planner of the same map and settings has built; None for none.
+    costs
+        Costs of the cells, with settings that can plan by them; None for lengths.
 
     Raises
     ------
@@ -40,7 +46,7 @@ def cell_planner(
         When the settings name a refiner of the user's own that cannot be used.
     """
     grid, coarse = topology.grid, settings.coarse
-    refiner = GridRefiner(grid, allow_unexplored=settings.allow_unexplored)
+    refiner = GridRefiner(grid, allow_unexplored=settings.allow_unexplored, costs=costs)
     if coarse == "portals":
         from hybridnav.planner.cell_plans import OverPortals  # noqa: PLC0415
         from hybridnav.portals import BuiltPortals  # noqa: PLC0415

@@ -193,7 +193,7 @@ def plan_tour(
         space with headings, points are `(x, y, yaw)`, and names face along the path.
     at
         Position in a room: `"anywhere"`, chosen for all waypoints together so that the whole cell
-        path is shortest, or at the room's `"point"`.
+        path is cheapest, or at the room's `"point"`.
     smooth, blocked
         As in `HybridPlanner.plan`.
 
@@ -221,7 +221,12 @@ def plan_tour(
     check_names(planner.topology, waypoints)
     closed = planner.closed(blocked)
     points = points_of_waypoints(
-        planner.topology, planner.preset.planner, waypoints, at=at, closed=closed
+        planner.topology,
+        planner.preset.planner,
+        waypoints,
+        at=at,
+        closed=planner.closed_for_all(closed),
+        costs=planner.costs,
     )
     results: list[PlanResult] = []
     for pair in itertools.pairwise(points):

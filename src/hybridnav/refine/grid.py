@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 from hybridnav.search.grid_search import Cell, GridSearch
+from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
+    from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
     from hybridnav.route import Corridor
 
@@ -28,7 +31,7 @@ class Refiner(Protocol):
 
 
 class GridRefiner:
-    """Grid A* on the cells of a corridor: optimal there in the octile metric.
+    """Grid A* on the cells of a corridor: optimal there, in the octile metric or by costs.
 
     Parameters
     ----------
@@ -36,6 +39,8 @@ class GridRefiner:
         The map; its blocked and occupied cells are never entered.
     allow_unexplored
         Whether unexplored cells may be entered.
+    costs
+        Costs of the cells; closed ones are never entered. None makes costs lengths.
 
     Examples
     --------
@@ -49,15 +54,35 @@ class GridRefiner:
            [1, 3]])
     """
 
-    def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        *,
+        allow_unexplored: bool = False,
+        costs: CostLayer | None = None,
+    ) -> None:
         self.grid = grid
+        self.costs = costs
         self._allow_unexplored = allow_unexplored
 
     @cached_property
     def search(self) -> GridSearch:
         """The search of cells, built on first use."""
         enterable = self.grid.enterable(allow_unexplored=self._allow_unexplored)
-        return GridSearch(enterable, corner_cutting=self.grid.corner_cutting)
+        if self.costs is None:
+            return GridSearch(enterable, corner_cutting=self.grid.corner_cutting)
+        enterable.flat[self.costs.closed_flat] = False
+        corner_cutting, units = self.grid.corner_cutting, self.costs.units
+        return GridSearch(enterable, corner_cutting=corner_cutting, units=units)
+
+    def cost_in_cells(self, cells: LongArray | None) -> float:
+        """Return the cost of a path of cells in cells, infinite for none: without costs its
+        length."""
+        if cells is None:
+            return math.inf
+        return (
+            path_length_in_cells(cells) if self.costs is None else self.costs.cost_of_cells(cells)
+        )
 
     def refine(
         self, start: Cell, goal: Cell, corridor: Corridor | None
