@@ -46,6 +46,8 @@ RETURNED = {
     "metrics.RoomAgreement",
     "metrics.Summary",
     "metrics.Verdict",
+    "overlay.Overlay",
+    "overlay.OverlayPath",
     "portals.BuiltPortals",
     "portals.PortalAnswers",
     "portals.Portals",

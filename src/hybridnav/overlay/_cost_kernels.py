@@ -1,0 +1,178 @@
+"""Kernels of the costs of moves, integers, and of the cells of a field with their moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import njit
+from hybridnav.overlay._lane_kernels import FAR
+from hybridnav.search.moves import COL_STEP, ROW_STEP
+
+_ROOT = 1482910
+"""sqrt 2 in units of 1 / 2^20, rounded down."""
+
+
+@njit(cache=True, nogil=True)
+def move_cost(units, direction):
+    """Return the cost of a move from the sum of the units of its two cells, rounded down."""
+    units = np.int64(units)
+    return units * _ROOT >> 20 if direction & 1 else units
+
+
+@njit(cache=True, nogil=True)
+def least_cost(cell, goal, ground):
+    """Return a lower bound on the cost between two flat cells: no obstacles, least units.
+
+    It is consistent: a move changes it by at most its own cost.
+    """
+    cols, least_units = ground.cols, ground.least_units
+    rows = abs(cell // cols - goal // cols)
+    across = abs(cell % cols - goal % cols)
+    diagonal = min(rows, across)
+    straight = max(rows, across) - diagonal
+    return straight * 2 * least_units + diagonal * (2 * least_units * _ROOT >> 20)
+
+
+@njit(cache=True, nogil=True)
+def clique_place(i, j):
+    """Return the place of the distance between nodes i and j in a clique: the lower triangle."""
+    return (i * (i + 1) >> 1) + j if i >= j else (j * (j + 1) >> 1) + i
+
+
+@njit(cache=True, nogil=True)
+def cost_between(ground, cell, other):
+    """Return the cost of the move between two flat cells side by side, FAR if it is not legal."""
+    moves, _, units, cols, _ = ground
+    for k in range(8):
+        if moves[cell] >> k & 1 and cell + ROW_STEP[k] * cols + COL_STEP[k] == other:
+            return np.int32(move_cost(units[cell] + units[other], k))
+    return FAR
+
+
+@njit(cache=True, nogil=True)
+def field_moves(ground, cells, place_of):
+    """Return the moves between the cells of one field, for searches in lanes.
+
+    Parameters
+    ----------
+    ground
+        See `Ground`.
+    cells
+        int64 (n,), the flat cells of the field, ascending.
+    place_of
+        int32 (rows * cols,), changed: the place of each of these cells in `cells`.
+
+    Returns
+    -------
+    tuple
+        uint32 ((n + 1) * 8,), the places that moves lead to, n for none, and int32 of the same
+        shape, their costs.
+    """
+    moves, field_of, units, cols, _ = ground
+    n = cells.size
+    for i in range(n):
+        place_of[cells[i]] = i
+    near = np.full((n + 1) * 8, n, np.uint32)
+    cost = np.zeros((n + 1) * 8, np.int32)
+    for i in range(n):
+        cell = cells[i]
+        for k in range(8):
+            if moves[cell] >> k & 1:
+                other = cell + ROW_STEP[k] * cols + COL_STEP[k]
+                if field_of[other] == field_of[cell]:
+                    near[8 * i + k] = place_of[other]
+                    cost[8 * i + k] = move_cost(units[cell] + units[other], k)
+    return near, cost
+
+
+@njit(cache=True, nogil=True)
+def crossing_cells(moves, label, cols):
+    """Return bool (rows * cols,), the cells with a move to a cell of another label."""
+    is_crossing = np.zeros(moves.size, np.bool_)
+    for cell in range(moves.size):
+        for k in range(8):
+            if moves[cell] >> k & 1:
+                if label[cell + ROW_STEP[k] * cols + COL_STEP[k]] != label[cell]:
+                    is_crossing[cell] = True
+                    break
+    return is_crossing
+
+
+@njit(cache=True, nogil=True)
+def crossing_moves(ground, label, cells, node_of):
+    """Return the moves between fields of one level: start of each node's, nodes, costs.
+
+    Parameters
+    ----------
+    ground
+        See `Ground`.
+    label
+        int32 (rows * cols,), the field of this level of each cell.
+    cells
+        int32 (n,), the flat cells of the nodes.
+    node_of
+        int32 (rows * cols,), the number of the node on each of these cells.
+    """
+    moves, _, units, cols, _ = ground
+    n = cells.size
+    start = np.zeros(n + 1, np.int64)
+    for turn in range(2):
+        if turn == 1:
+            start = np.cumsum(start)
+            to = np.empty(start[n], np.int32)
+            cost = np.empty(start[n], np.int32)
+        for i in range(n):
+            at = start[i]
+            for k in range(8):
+                if moves[cells[i]] >> k & 1:
+                    other = cells[i] + ROW_STEP[k] * cols + COL_STEP[k]
+                    if label[other] != label[cells[i]]:
+                        if turn == 0:
+                            start[i + 1] += 1
+                        else:
+                            to[at] = node_of[other]
+                            cost[at] = move_cost(units[cells[i]] + units[other], k)
+                            at += 1
+    return start, to, cost
+
+
+@njit(cache=True, nogil=True)
+def boxes_of(field_of, cols, n_fields):
+    """Return the rows and columns that hold each field, int32 (fields, 4): first, last + 1."""
+    box = np.zeros((n_fields, 4), np.int32)
+    for cell in range(field_of.size):
+        field = field_of[cell]
+        if field < 0:
+            continue
+        row, col = cell // cols, cell % cols
+        if box[field, 1] == 0:
+            box[field, 0], box[field, 2], box[field, 3] = row, col, col + 1
+        box[field, 1] = row + 1
+        box[field, 2] = min(box[field, 2], col)
+        box[field, 3] = max(box[field, 3], col + 1)
+    return box
+
+
+@njit(cache=True, nogil=True)
+def renew_moves(levels, ground, fields, box):
+    """Compute the costs of the moves between fields again, from the nodes inside a box.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`; its costs of moves are changed.
+    ground
+        See `Ground`.
+    fields
+        int32 (k,), fields of all levels that have cells in the box.
+    box
+        Its first row, the one after the last, and the columns alike.
+    """
+    for field in fields:
+        for node in range(levels.node_at[field], levels.node_at[field + 1]):
+            cell = np.int64(levels.cell_of[node])
+            row, col = cell // ground.cols, cell % ground.cols
+            if box[0] <= row < box[1] and box[2] <= col < box[3]:
+                for at in range(levels.move_at[node], levels.move_at[node + 1]):
+                    other = np.int64(levels.cell_of[levels.move_to[at]])
+                    levels.move_cost[at] = cost_between(ground, cell, other)

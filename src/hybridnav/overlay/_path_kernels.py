@@ -1,0 +1,250 @@
+"""Kernels of the cells of a path, from the nodes of the highest level that it passes downwards."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import njit
+from hybridnav.overlay._cost_kernels import clique_place
+from hybridnav.overlay._field_kernels import append_back, forget, spread
+from hybridnav.overlay._lane_kernels import FAR, NO_PATH
+from hybridnav.overlay._node_kernels import START
+from hybridnav.search.arrays import grow
+
+
+@njit(cache=True, nogil=True)
+def append(nodes, n, node):
+    """Append a node; return the array, a new one if there was no room."""
+    if n == nodes.size:
+        nodes = grow(nodes)
+    nodes[n] = node
+    return nodes
+
+
+@njit(cache=True, nogil=True)
+def _walk(levels, span, row, node, last, nodes, n):
+    """Append the nodes of a shortest path to a node, from their distances to it.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    span
+        The first node and the one after the last that the path may pass.
+    row
+        int32 (nodes of the span,), their distances to the last one.
+    node, last
+        Where the path begins and ends.
+    nodes, n
+        int64 (room,) and how many of them are filled.
+
+    Returns
+    -------
+    tuple
+        `nodes`, in a new array if there was no room, and their number, without the first node.
+    """
+    first = span[0]
+    while node != last:
+        rest, following = row[node - first], np.int64(-1)
+        for at in range(levels.move_at[node], levels.move_at[node + 1]):
+            other = levels.move_to[at]
+            if span[0] <= other < span[1]:
+                if levels.move_cost[at] + row[other - first] == rest:
+                    following = np.int64(other)
+                    break
+        if following < 0:
+            field = levels.field_of[node]
+            begin, end = levels.node_at[field], levels.node_at[field + 1]
+            at = levels.clique_at[field]
+            for other in range(begin, end):
+                cost = levels.clique[at + clique_place(node - begin, other - begin)]
+                if other != node and cost + row[other - first] == rest:
+                    following = np.int64(other)
+                    break
+        node = following
+        nodes = append(nodes, n, node)
+        n += 1
+    return nodes, n
+
+
+@njit(cache=True, nogil=True)
+def over_top(levels, top, first, last):
+    """Return the nodes of the last level on a shortest path between two of them; see `Top`."""
+    span = (levels.node_at[levels.level_at[-2]], levels.node_at[levels.level_at[-1]])
+    nodes = np.empty(64, np.int64)
+    nodes[0] = first
+    nodes, n = _walk(levels, span, top.distance[last - span[0]], first, last, nodes, 1)
+    return nodes[:n]
+
+
+@njit(cache=True, nogil=True)
+def back_over_cliques(before, last):
+    """Return the nodes that led to the last one; see `over_cliques`."""
+    nodes, n, node = np.empty(64, np.int64), 0, np.int64(last)
+    while node != START:
+        nodes = append(nodes, n, node)
+        n += 1
+        mark = np.int64(before[node])
+        node = mark if mark >= 0 or mark == START else ~mark
+    return nodes[:n][::-1].copy()
+
+
+@njit(cache=True, nogil=True)
+def _inside(levels, field):
+    """Return the nodes of the level below inside a field: the first, and the one after the last."""
+    return (
+        levels.node_at[levels.inner_at[field]],
+        levels.node_at[levels.inner_at[field + 1]],
+    )
+
+
+@njit(cache=True, nogil=True)
+def _row_of(levels, node):
+    """Return the distances from a node to the nodes of the level below inside its field."""
+    field = levels.field_of[node]
+    span = _inside(levels, field)
+    width = span[1] - span[0]
+    at = levels.table_at[field] + (node - levels.node_at[field]) * width
+    return levels.table[at : at + width]
+
+
+@njit(cache=True, nogil=True)
+def _entry(levels, node, child, below):
+    """Return the node of a field of the level below over which a path from inside it led to a node.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    node
+        Node of the upper level.
+    child
+        The field of the level below, inside the node's field.
+    below
+        int64 (n,), the distances to the nodes of `child`.
+    """
+    row = _row_of(levels, node)
+    span = _inside(levels, levels.field_of[node])
+    first, last = levels.node_at[child], levels.node_at[child + 1]
+    best, found = np.int64(NO_PATH), first
+    for inner in range(first, last):
+        total = below[inner - first] + row[inner - span[0]]
+        if row[inner - span[0]] < FAR and total < best:
+            best, found = total, np.int64(inner)
+    return found
+
+
+@njit(cache=True, nogil=True)
+def descend(levels, level, upper, children, reaches):
+    """Return the nodes of a path with those of one level replaced by nodes of the level below.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    level
+        The level, > 0.
+    upper
+        int64 (n,), n >= 1, nodes of this level and of levels below.
+    children
+        The fields of start and goal on the level below.
+    reaches
+        Two int64 (n,), the distances inside them, from the start and to the goal.
+    """
+    begin = levels.node_at[levels.level_at[level]]
+    first, last = upper[0], upper[-1]
+    nodes, n = np.empty(2 * upper.size + 64, np.int64), 1
+    nodes[0] = first
+    if first >= begin:
+        nodes[0] = _entry(levels, first, children[0], reaches[0])
+        span, row = _inside(levels, levels.field_of[first]), _row_of(levels, first)
+        nodes, n = _walk(levels, span, row, nodes[0], np.int64(levels.below[first]), nodes, 1)
+    for i in range(1, upper.size):
+        before, node = upper[i - 1], upper[i]
+        field = levels.field_of[node]
+        if node >= begin and levels.field_of[before] == field:
+            start, end = np.int64(levels.below[before]), np.int64(levels.below[node])
+            span, row = _inside(levels, field), _row_of(levels, node)
+            nodes, n = _walk(levels, span, row, start, end, nodes, n)
+        else:
+            nodes = append(nodes, n, levels.below[node] if node >= begin else node)
+            n += 1
+    if last >= begin:
+        tail = np.empty(64, np.int64)
+        tail[0] = _entry(levels, last, children[1], reaches[1])
+        span, row = _inside(levels, levels.field_of[last]), _row_of(levels, last)
+        tail, m = _walk(levels, span, row, tail[0], np.int64(levels.below[last]), tail, 1)
+        for i in range(m - 2, -1, -1):
+            nodes = append(nodes, n, tail[i])
+            n += 1
+    return nodes[:n]
+
+
+@njit(cache=True, nogil=True)
+def append_field_path(ground, ends, limit, distance, touched, cells, n):
+    """Append the cells of a shortest path inside a field, without its first one.
+
+    Parameters
+    ----------
+    ground
+        See `Ground`.
+    ends
+        Its two flat cells.
+    limit
+        A cost that it does not exceed.
+    distance, touched
+        Work arrays, see `spread`.
+    cells, n
+        int64 (room,) and how many of them are filled.
+
+    Returns
+    -------
+    tuple
+        `cells` and `touched`, in new arrays if there was no room; the number of cells filled and of
+        cells expanded.
+    """
+    touched, count, expanded = spread(ground, ends[0], ends[1], limit, distance, touched)
+    begin = n
+    cells, n = append_back(ground, distance, ends[1], cells, n)
+    cells[begin:n] = cells[begin:n][::-1].copy()
+    forget(distance, touched, count)
+    return cells, touched, n, expanded
+
+
+@njit(cache=True, nogil=True)
+def append_cells(ground, levels, nodes, distance, touched, cells, n):
+    """Append the cells of a path over nodes of the finest level, without that of the first one.
+
+    Parameters
+    ----------
+    ground, levels
+        See `Ground` and `Levels`.
+    nodes
+        int64 (m,), m >= 1.
+    distance, touched
+        Work arrays, see `spread`.
+    cells, n
+        int64 (room,) and how many of them are filled.
+
+    Returns
+    -------
+    tuple
+        As `append_field_path`.
+    """
+    expanded = 0
+    for i in range(1, nodes.size):
+        before, node = nodes[i - 1], nodes[i]
+        field = levels.field_of[node]
+        if levels.field_of[before] != field:
+            cells = append(cells, n, levels.cell_of[node])
+            n += 1
+            continue
+        first = levels.node_at[field]
+        place = levels.clique_at[field] + clique_place(before - first, node - first)
+        limit = levels.clique[place]
+        ends = (np.int64(levels.cell_of[before]), np.int64(levels.cell_of[node]))
+        cells, touched, n, more = append_field_path(
+            ground, ends, limit, distance, touched, cells, n
+        )
+        expanded += more
+    return cells, touched, n, expanded

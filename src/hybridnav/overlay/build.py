@@ -1,0 +1,326 @@
+"""The multilevel overlay: fields, the costs inside them level by level, and their changes.
+
+D. Delling, A. V. Goldberg, T. Pajor, R. F. Werneck: Customizable route planning, 2011. Fields do
+not depend on costs; what depends on them is computed again when they change.
+"""
+
+from __future__ import annotations
+
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._copies import copies_alike
+from hybridnav._progress import no_progress
+from hybridnav.errors import InvalidValueError
+from hybridnav.overlay import _cost_kernels as kernels
+from hybridnav.overlay.changes import change_in, fields_around
+from hybridnav.overlay.layout import lay_out
+from hybridnav.overlay.tables import PathsTooLongError, compute_top, fill_cliques, fill_tables
+from hybridnav.search.moves import legal_moves
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from hybridnav._progress import Progress
+    from hybridnav._typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.overlay.changes import Change
+    from hybridnav.overlay.layout import Ground, Levels, Top
+
+UNIT_BITS = 14
+"""A factor of 1 is 2^14 units, a straight move over such cells costs 2^15."""
+MOST_FACTOR = 4096.0
+"""Largest factor: the costs of moves must be small beside those of paths."""
+TOP_BYTES_PER_CELL = 40.0
+"""Most bytes for each cell of the distances between the nodes of the last level, unless asked
+otherwise."""
+_SIDES = 4
+
+
+@copies_alike
+class Overlay:
+    """Costs between the border cells of fields on several levels, exact at any time.
+
+    `update` changes costs in a box of cells: the fields that it touches get their new costs at
+    once. The tables of the fields around them become stale: until `renew`, searches go through the
+    levels below there, guided by the former tables as long as these are lower bounds. Updates wait
+    until the searches of other threads have ended.
+
+    Parameters
+    ----------
+    ground, levels
+        Cells, and levels with the cliques of the finest fields.
+    factor
+        float32 or float64 (rows, cols), the factors as given.
+    top_bytes
+        Most bytes of the distances between the nodes of the last level.
+    """
+
+    def __init__(
+        self, ground: Ground, levels: Levels, factor: FloatArray, top_bytes: float
+    ) -> None:
+        self.ground = ground
+        self.levels = levels
+        self.factor = factor
+        self.version = 0
+        """How often costs have changed."""
+        self.shape = (factor.shape[0], factor.shape[1])
+        self._top_bytes = top_bytes
+        self.top: Top = compute_top(levels, -1.0)
+        self._readers = 0
+        self._lock = threading.Lock()
+        self._writing = threading.Lock()
+
+    @property
+    def cost_unit(self) -> float:
+        """Cost in cells of one unit of the integer costs."""
+        return 1 / (2 << UNIT_BITS)
+
+    @property
+    def memory_bytes(self) -> int:
+        """Bytes of all arrays."""
+        arrays: list[AnyArray] = [*self.ground[:3], *self.levels, self.factor, self.top.distance]
+        return sum(array.nbytes for array in arrays)
+
+    @property
+    def is_current(self) -> bool:
+        """Whether no table waits for `renew`."""
+        return not self.levels.is_stale.any() and (
+            self.top.is_current or self.top.distance.size == 0
+        )
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Keep updates away while a search runs; searches do not wait for each other."""
+        with self._lock:
+            self._readers += 1
+            if self._readers == 1:
+                self._writing.acquire()
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._readers -= 1
+                if self._readers == 0:
+                    self._writing.release()
+
+    def is_open(self, cell: tuple[int, int]) -> bool:
+        """Return whether a path may enter a cell now."""
+        flat = cell[0] * self.shape[1] + cell[1]
+        return bool(self.ground.field_of[flat] >= 0 and self.ground.units[flat] > 0)
+
+    def cost_of(self, cells: LongArray) -> float:
+        """Return the cost of a path in cells, by the factors as given.
+
+        Parameters
+        ----------
+        cells
+            int64 (n, 2), (row, col) of the cells passed.
+        """
+        straight = (np.diff(cells, axis=0) == 0).any(axis=1)
+        length = np.where(straight, 1.0, np.sqrt(2.0))
+        factor = self.factor[cells[:, 0], cells[:, 1]].astype(np.float64)
+        return float((length * (factor[1:] + factor[:-1])).sum() / 2)
+
+    def update(
+        self,
+        factor: FloatArray,
+        *,
+        closed: BoolArray | None = None,
+        changed: tuple[int, int, int, int] | None = None,
+    ) -> None:
+        """Change the costs of the cells in a box; the next answer is exact for the new ones.
+
+        Parameters
+        ----------
+        factor
+            Any float (rows, cols), the factor of each cell, from 1 to 4096 where it may be entered.
+        closed
+            bool (rows, cols), cells that may not be entered for now, of those for which the overlay
+            was built; None for none.
+        changed
+            First row, last row + 1, first column, last column + 1 of the box outside of which
+            nothing is read; None for the whole map.
+
+        Raises
+        ------
+        InvalidValueError
+            When factors, closed cells or the box are not as described.
+        PathsTooLongError
+            When a path inside one of the finest fields costs more than 16,000 cells; nothing has
+            changed then.
+        """
+        rows, cols = self._box(changed)
+        field_of = self.ground.field_of.reshape(self.shape)[rows, cols]
+        shut = field_of < 0
+        if closed is not None:
+            if closed.shape != self.shape or closed.dtype != np.bool_:
+                raise InvalidValueError(
+                    f"closed has shape {closed.shape} and type {closed.dtype}: give one bool for "
+                    f"each of {self.shape} cells"
+                )
+            shut = shut | closed[rows, cols]
+        units = units_of(factor, self.shape, ~shut, (rows, cols))
+        with self._writing:
+            change = change_in(self.ground, self.shape, (rows, cols), units)
+            if len(change.touched):
+                self._apply(change)
+                self.version += 1
+            if factor.dtype != np.float32 and self.factor.dtype == np.float32:
+                self.factor = self.factor.astype(np.float64)
+            self.factor[rows, cols] = np.where(shut, 1.0, factor[rows, cols])
+
+    def renew(self, progress: Progress = no_progress) -> None:
+        """Compute all stale tables again, so that queries are as fast as before any update."""
+        with self._writing:
+            if not self.is_current:
+                fill_tables(self.levels, progress)
+                self.top = compute_top(self.levels, self._top_bytes)
+        n_steps = len(self.levels.level_at)
+        progress(n_steps, n_steps)
+
+    def _box(self, changed: tuple[int, int, int, int] | None) -> tuple[slice, slice]:
+        if changed is None:
+            return slice(0, self.shape[0]), slice(0, self.shape[1])
+        sides = tuple(changed)
+        fits = len(sides) == _SIDES and all(isinstance(side, int | np.integer) for side in sides)
+        if not fits or not (
+            0 <= sides[0] <= sides[1] <= self.shape[0]
+            and 0 <= sides[2] <= sides[3] <= self.shape[1]
+        ):
+            raise InvalidValueError(
+                f"changed is {changed!r:.80}: give first row, last row + 1, first column, last "
+                f"column + 1 inside {self.shape} cells"
+            )
+        return slice(int(sides[0]), int(sides[1])), slice(int(sides[2]), int(sides[3]))
+
+    def _apply(self, change: Change) -> None:
+        """Bring costs up to date, those that a change touches, and mark the tables around them."""
+        ground, levels = self.ground, self.levels
+        units, moves = ground.units.reshape(self.shape), ground.moves.reshape(self.shape)
+        before = units[change.window].copy(), moves[change.window].copy()
+        units[change.window], moves[change.window] = change.units, change.moves
+        try:
+            fill_cliques(ground, levels, change.touched)
+        except PathsTooLongError:
+            units[change.window], moves[change.window] = before
+            fill_cliques(ground, levels, change.touched)
+            raise
+        is_open = change.units > 0
+        least = min(ground.least_units, int(change.units[is_open].min(initial=ground.least_units)))
+        self.ground = ground._replace(least_units=least)
+        rows, cols = change.window
+        beside = np.concatenate(fields_around(levels, change.beside))
+        window = (rows.start, rows.stop, cols.start, cols.stop)
+        kernels.renew_moves(levels, self.ground, beside, window)
+        for fields in fields_around(levels, change.touched)[1:]:
+            levels.is_stale[fields] = True
+        lowered = fields_around(levels, change.lowered)
+        for fields in lowered[1:]:
+            levels.is_lowered[fields] = levels.is_stale[fields] | levels.is_lowered[fields]
+        nodes = [
+            np.arange(levels.node_at[field], levels.node_at[field + 1], dtype=np.int32)
+            for field in lowered[-1]
+        ]
+        all_lowered = np.unique(np.concatenate([self.top.lowered, *nodes]))
+        self.top = self.top._replace(is_current=False, lowered=all_lowered)
+
+
+def build_overlay(
+    enterable: BoolArray,
+    labels: Sequence[IntArray],
+    factor: FloatArray | None = None,
+    *,
+    top_bytes: float | None = None,
+    progress: Progress = no_progress,
+) -> Overlay:
+    """Build the overlay of some nested partitions of the cells.
+
+    Parameters
+    ----------
+    enterable
+        bool (rows, cols), the cells that paths may use.
+    labels
+        int32 (rows, cols) for each level, the finest first: the field of each of these cells, -1
+        elsewhere; each field lies in one field of the next level.
+    factor
+        Any float (rows, cols), from 1 to 4096: a move costs its length times the mean of its two
+        cells; None for 1 everywhere. Rounded down to 1 / 2^14.
+    top_bytes
+        Most bytes of the distances between the border cells of the last level: with more, queries
+        search these nodes. None for 40 for each cell that may be entered.
+    progress
+        Called after each level with the number of steps done and of all.
+
+    Raises
+    ------
+    InvalidValueError
+        When fields are not nested, a cell is in no field, or a factor is out of range.
+    PathsTooLongError
+        When a path inside one of the finest fields costs more than 16,000 cells.
+
+    Examples
+    --------
+    >>> from hybridnav.overlay import OverlaySearch, build_overlay
+    >>> free = np.ones((4, 8), dtype=bool)
+    >>> halves = np.arange(8, dtype=np.int32) // 4 + np.zeros((4, 1), dtype=np.int32)
+    >>> overlay = build_overlay(free, [halves])
+    >>> OverlaySearch(overlay).path((0, 0), (0, 7)).cost_cells
+    7.0
+    """
+    for label in labels:
+        if label.shape != enterable.shape or (label[enterable] < 0).any():
+            raise InvalidValueError("every cell that may be entered must be in a field")
+    given: FloatArray = np.ones(enterable.shape) if factor is None else factor
+    whole = slice(0, enterable.shape[0]), slice(0, enterable.shape[1])
+    units = units_of(given, (enterable.shape[0], enterable.shape[1]), enterable, whole)
+    moves = legal_moves(np.ascontiguousarray(enterable), False)
+    inside = [np.where(enterable, label, -1) for label in labels]
+    ground, levels = lay_out(moves, units, inside)
+    fill_cliques(ground, levels, np.arange(levels.level_at[1], dtype=np.int32))
+    progress(1, len(labels) + 1)
+    if top_bytes is None:
+        top_bytes = TOP_BYTES_PER_CELL * max(int(enterable.sum()), 1)
+    kept = np.where(enterable, given, np.ones(1, dtype=given.dtype))
+    kept = kept.astype(np.float32 if given.dtype == np.float32 else np.float64, copy=False)
+    overlay = Overlay(ground, levels, kept, top_bytes)
+    overlay.renew(progress)
+    return overlay
+
+
+def units_of(
+    factor: FloatArray, shape: tuple[int, int], enterable: BoolArray, box: tuple[slice, slice]
+) -> IntArray:
+    """Return the factors of the cells in a box in units, rounded down, 0 where not enterable.
+
+    Parameters
+    ----------
+    factor
+        Any float (rows, cols).
+    shape
+        Rows and columns of the map.
+    enterable
+        bool, the cells of the box that may be entered.
+    box
+        Its rows and columns.
+
+    Raises
+    ------
+    InvalidValueError
+        When the shape is another one, or a factor of a cell that may be entered is out of range.
+    """
+    if factor.shape != shape:
+        raise InvalidValueError(
+            f"factors have shape {factor.shape}, the map has {shape}: give one per cell"
+        )
+    own = np.where(enterable, factor[box], 1.0)
+    if not ((own >= 1) & (own <= MOST_FACTOR)).all():
+        bad = own[~((own >= 1) & (own <= MOST_FACTOR))][0]
+        raise InvalidValueError(
+            f"a factor of a free cell is {bad}, expected a number from 1 to {MOST_FACTOR:.0f}: "
+            "close cells that must not be entered"
+        )
+    units: IntArray = np.where(enterable, np.floor(own * (1 << UNIT_BITS)), 0).astype(np.int32)
+    return units

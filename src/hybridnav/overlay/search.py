@@ -1,0 +1,118 @@
+"""Paths of least cost on a multilevel overlay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._copies import copies_alike
+from hybridnav.overlay import _query_kernels as kernels
+from hybridnav.overlay._lane_kernels import FAR, NO_PATH
+from hybridnav.overlay.layout import NodeWork
+from hybridnav.search.pool import Pool
+
+if TYPE_CHECKING:
+    from hybridnav._typing import LongArray
+    from hybridnav.overlay.build import Overlay
+
+KERNEL = kernels.shortest
+"""The kernel whose compiled form shows that a search was run before."""
+
+Cell = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class OverlayPath:
+    """A path of least cost between two cells; its cells are None if there is none."""
+
+    cells: LongArray | None
+    """int64 (n, 2), (row, col) of the cells passed."""
+    cost_cells: float
+    """Cost of the path in cells, of the factors as given; infinite for none."""
+    lower_bound_cells: float
+    """No path costs less: the least cost in units of the rounded factors, which are not larger."""
+    expanded: int
+    """Cells that searches inside fields expanded."""
+    expanded_border_cells: int
+    """Border cells that searches over cliques expanded."""
+
+
+class _Work:
+    """Work arrays of one query."""
+
+    def __init__(self, n_cells: int, n_nodes: int) -> None:
+        self.cells = np.full((2, n_cells), FAR, dtype=np.int32)
+        self.nodes = NodeWork(
+            distance=np.full(n_nodes, NO_PATH, dtype=np.int64),
+            before=np.empty(n_nodes, dtype=np.int32),
+            ahead=np.full(n_nodes, -1, dtype=np.int64),
+            seen=np.empty(n_nodes, dtype=np.int32),
+            counts=np.zeros(1, dtype=np.int64),
+        )
+
+
+@copies_alike
+class OverlaySearch:
+    """Search of an overlay; threads may share it, also while another one updates the overlay.
+
+    Parameters
+    ----------
+    overlay
+        Fields and costs.
+
+    Examples
+    --------
+    >>> from hybridnav.overlay import OverlaySearch, build_overlay
+    >>> free, factor = np.ones((3, 6), dtype=bool), np.ones((3, 6))
+    >>> factor[1, 2:4] = 3.0
+    >>> halves = np.arange(6, dtype=np.int32) // 3 + np.zeros((3, 1), dtype=np.int32)
+    >>> overlay = build_overlay(free, [halves], factor)
+    >>> path = OverlaySearch(overlay).path((1, 0), (1, 5))
+    >>> round(path.cost_cells, 3), len(path.cells)
+    (5.828, 6)
+    >>> overlay.update(np.ones((3, 6)), changed=(1, 2, 2, 4))
+    >>> OverlaySearch(overlay).path((1, 0), (1, 5)).cost_cells
+    5.0
+    """
+
+    def __init__(self, overlay: Overlay) -> None:
+        self._overlay = overlay
+        n_nodes = len(overlay.levels.cell_of)
+        self._works = Pool(partial(_Work, overlay.ground.moves.size, n_nodes))
+
+    def path(self, start: Cell, goal: Cell, *, epsilon: float = 0.0) -> OverlayPath:
+        """Find a path of least cost between two cells that may be entered.
+
+        Parameters
+        ----------
+        start, goal
+            (row, col); there is no path from or to a closed cell.
+        epsilon
+            The search ends once no path can be cheaper by more than this part, >= 0.
+        """
+        overlay = self._overlay
+        with overlay.reading():
+            if not (overlay.is_open(start) and overlay.is_open(goal)):
+                return OverlayPath(None, math.inf, math.inf, 0, 0)
+            cols = overlay.shape[1]
+            ends = (start[0] * cols + start[1], goal[0] * cols + goal[1])
+            with self._works.lent() as work:
+                cost, bound, flat, expanded, expanded_nodes = kernels.shortest(
+                    overlay.ground,
+                    overlay.levels,
+                    overlay.top,
+                    ends,
+                    float(epsilon),
+                    work.cells,
+                    work.nodes,
+                )
+            if cost >= NO_PATH:
+                return OverlayPath(None, math.inf, math.inf, int(expanded), int(expanded_nodes))
+            cells = np.stack([flat // cols, flat % cols], axis=1)
+            lower_bound = float(bound) * overlay.cost_unit
+            real = overlay.cost_of(cells)
+        return OverlayPath(cells, real, lower_bound, int(expanded), int(expanded_nodes))

@@ -1,0 +1,96 @@
+"""Costs on a multilevel overlay against Dijkstra's algorithm of scipy."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.overlay import OverlaySearch, PathsTooLongError, build_overlay
+from tests.overlay.judge import WeightedJudge
+from tests.strategies import examples
+
+SIZES = [(4,), (4, 8), (3, 9, 18), (5, 40), (2, 4, 8, 16)]
+
+
+def nested(free, sizes):
+    """Squares of cells as fields, one size for each level; each size divides the next."""
+    rows, cols = np.indices(free.shape)
+    return [
+        np.where(free, rows // size * 1000 + cols // size, -1).astype(np.int32) for size in sizes
+    ]
+
+
+def world(seed, shape, share):
+    rng = np.random.default_rng(seed)
+    free = rng.random(shape) > share
+    factor = 1 + np.where(rng.random() < 0.3, 0, 3) * rng.random(shape)
+    return free, ndimage.uniform_filter(factor, 3) if rng.random() < 0.5 else factor
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    sizes=st.sampled_from(SIZES),
+    share=st.sampled_from([0.0, 0.15, 0.3, 0.45]),
+    has_top=st.booleans(),
+    epsilon=st.sampled_from([0.0, 0.0, 0.02, 0.5]),
+)
+@settings(max_examples=examples(80), deadline=None)
+def test_paths_cost_what_dijkstra_finds(seed, sizes, share, has_top, epsilon):
+    free, factor = world(seed, (23, 31), share)
+    overlay = build_overlay(free, nested(free, sizes), factor, top_bytes=1e9 if has_top else 0)
+    search, judge = OverlaySearch(overlay), WeightedJudge(free, factor)
+    cells = np.argwhere(free)
+    rng = np.random.default_rng(seed)
+    for start, goal in cells[rng.integers(len(cells), size=(12, 2))].tolist():
+        judge.check(search.path(start, goal, epsilon=epsilon), start, goal, epsilon=epsilon)
+
+
+def test_costs_of_one_need_no_array():
+    free = np.ones((9, 9), dtype=np.bool_)
+    search = OverlaySearch(build_overlay(free, nested(free, [3])))
+    assert search.path((0, 0), (8, 8)).cost_cells == pytest.approx(8 * np.sqrt(2))
+
+
+def test_fields_that_are_not_nested_are_refused():
+    free = np.ones((6, 6), dtype=np.bool_)
+    with pytest.raises(InvalidValueError, match="must lie in one field of the next level"):
+        build_overlay(free, [*nested(free, [2]), *nested(free, [3])])
+
+
+@pytest.mark.parametrize("bad", [0.5, np.nan, np.inf, -1.0, 5000.0])
+def test_factors_out_of_range_are_refused(bad):
+    free = np.ones((6, 6), dtype=np.bool_)
+    factor = np.ones((6, 6))
+    factor[2, 2] = bad
+    with pytest.raises(InvalidValueError, match="expected a number from 1 to 4096"):
+        build_overlay(free, nested(free, [3]), factor)
+    overlay = build_overlay(free, nested(free, [3]))
+    with pytest.raises(InvalidValueError, match="expected a number from 1 to 4096"):
+        overlay.update(factor)
+
+
+def test_factors_of_another_shape_are_refused():
+    free = np.ones((6, 6), dtype=np.bool_)
+    with pytest.raises(InvalidValueError, match=r"the map has \(6, 6\)"):
+        build_overlay(free, nested(free, [3]), np.ones((6, 5)))
+
+
+def test_paths_that_do_not_fit_are_refused_and_change_nothing():
+    """A corridor of 24 cells whose factors add up to more than 16,000 cells."""
+    free = np.ones((1, 24), dtype=np.bool_)
+    overlay = build_overlay(free, nested(free, [12, 24]))
+    search = OverlaySearch(overlay)
+    with pytest.raises(PathsTooLongError, match="use smaller fields"):
+        overlay.update(np.full((1, 24), 4000.0))
+    assert search.path((0, 0), (0, 23)).lower_bound_cells == 23
+
+
+def test_long_paths_over_fields_that_fit_are_found():
+    """Each field is crossed at less than 16,000 cells, all at more than 32 bits hold."""
+    free = np.ones((1, 60), dtype=np.bool_)
+    factor = np.full((1, 60), 3000.0)
+    overlay = build_overlay(free, nested(free, [4, 12]), factor)
+    found = OverlaySearch(overlay).path((0, 0), (0, 59))
+    assert found.lower_bound_cells == found.cost_cells == 59 * 3000
