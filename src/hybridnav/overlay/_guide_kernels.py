@@ -93,6 +93,44 @@ def _from_last_level(levels, ground, top, target, node, work):
 
 
 @njit(cache=True, nogil=True)
+def _inside_stale(levels, ground, top, target, around, work):
+    """Note the bounds of all nodes inside a stale field of the last level, by its former table.
+
+    Parameters
+    ----------
+    levels, ground, top, target, work
+        See `ahead_of`.
+    around
+        The field; its costs were not lowered.
+
+    Notes
+    -----
+    A path leaves the field at one of its nodes, or the goal lies inside. Then the distance is not
+    less than the difference of those from a node of the field, as for landmarks.
+    """
+    goal, field, tail, _ = target
+    first, last = levels.node_at[around], levels.node_at[around + 1]
+    begin = levels.node_at[levels.inner_at[around]]
+    width = levels.node_at[levels.inner_at[around + 1]] - begin
+    least, most = np.full(width, NO_PATH, np.int64), np.zeros(width, np.int64)
+    for node in range(first, last):
+        rest = _from_last_level(levels, ground, top, target, node, work)
+        at = levels.table_at[around] + (node - first) * width
+        row = levels.table[at : at + width]
+        to_goal = tail[node - first] if around == field else np.int64(NO_PATH)
+        for i in range(width):
+            stored = np.int64(row[i])
+            total = rest + stored if stored < FAR else np.int64(NO_PATH)
+            apart = stored - to_goal if stored < FAR else np.int64(0)
+            least[i] = min(least[i], total)
+            most[i] = max(most[i], apart)
+    for i in range(width):
+        without = least_cost(levels.cell_of[begin + i], goal, ground)
+        inside = max(most[i], without) if around == field else np.int64(NO_PATH)
+        _note(begin + i, max(min(least[i], inside), without), work)
+
+
+@njit(cache=True, nogil=True)
 def ahead_of(levels, ground, top, target, is_guided, node, work):
     """Return a lower bound on the distance from a node to the goal; see `aim`.
 
@@ -111,23 +149,11 @@ def ahead_of(levels, ground, top, target, is_guided, node, work):
     """
     if work.ahead[node] >= 0:
         return work.ahead[node]
-    bound = np.int64(least_cost(levels.cell_of[node], target[0], ground))
-    if not is_guided or top.distance.size == 0:
-        return _note(node, bound, work)
-    field = levels.field_of[node]
-    around = levels.parent[field]
-    if around < 0:
-        return _from_last_level(levels, ground, top, target, node, work)
-    is_blind = around == target[1] or levels.is_lowered[around] or levels.parent[around] >= 0
-    if not is_blind:
-        least = np.int64(NO_PATH)
-        first, last = levels.node_at[around], levels.node_at[around + 1]
-        begin = levels.node_at[levels.inner_at[around]]
-        width = levels.node_at[levels.inner_at[around + 1]] - begin
-        for way_out in range(first, last):
-            at = levels.table_at[around] + (way_out - first) * width + node - begin
-            if levels.table[at] < FAR:
-                rest = _from_last_level(levels, ground, top, target, way_out, work)
-                least = min(least, rest + levels.table[at])
-        bound = max(bound, least)
-    return _note(node, bound, work)
+    if is_guided and top.distance.size > 0:
+        around = levels.parent[levels.field_of[node]]
+        if around < 0:
+            return _from_last_level(levels, ground, top, target, node, work)
+        if not levels.is_lowered[around] and levels.parent[around] < 0:
+            _inside_stale(levels, ground, top, target, around, work)
+            return work.ahead[node]
+    return _note(node, least_cost(levels.cell_of[node], target[0], ground), work)

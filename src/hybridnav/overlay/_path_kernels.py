@@ -181,14 +181,14 @@ def descend(levels, level, upper, children, reaches):
 
 
 @njit(cache=True, nogil=True)
-def append_field_path(ground, ends, limit, distance, touched, cells, n):
+def append_field_path(ground, endpoints, limit, distance, touched, cells, n):
     """Append the cells of a shortest path inside a field, without its first one.
 
     Parameters
     ----------
     ground
         See `Ground`.
-    ends
+    endpoints
         Its two flat cells.
     limit
         A cost that it does not exceed.
@@ -203,9 +203,9 @@ def append_field_path(ground, ends, limit, distance, touched, cells, n):
         `cells` and `touched`, in new arrays if there was no room; the number of cells filled and of
         cells expanded.
     """
-    touched, count, expanded = spread(ground, ends[0], ends[1], limit, distance, touched)
+    touched, count, expanded = spread(ground, endpoints[0], endpoints[1], limit, distance, touched)
     begin = n
-    cells, n = append_back(ground, distance, ends[1], cells, n)
+    cells, n = append_back(ground, distance, endpoints[1], cells, n)
     cells[begin:n] = cells[begin:n][::-1].copy()
     forget(distance, touched, count)
     return cells, touched, n, expanded
@@ -242,9 +242,9 @@ def append_cells(ground, levels, nodes, distance, touched, cells, n):
         first = levels.node_at[field]
         place = levels.clique_at[field] + clique_place(before - first, node - first)
         limit = levels.clique[place]
-        ends = (np.int64(levels.cell_of[before]), np.int64(levels.cell_of[node]))
+        endpoints = (np.int64(levels.cell_of[before]), np.int64(levels.cell_of[node]))
         cells, touched, n, more = append_field_path(
-            ground, ends, limit, distance, touched, cells, n
+            ground, endpoints, limit, distance, touched, cells, n
         )
         expanded += more
     return cells, touched, n, expanded

@@ -1,4 +1,4 @@
-"""Kernel of a query on a multilevel overlay: up from both ends, across, and down to the cells."""
+"""Kernel of a query on a multilevel overlay: up the levels, across, and down."""
 
 from __future__ import annotations
 
@@ -81,9 +81,9 @@ def _across(levels, top, ground, around, reaches, goal, best, epsilon, work):
         inner = levels.inner_at[around[0][level + 1]], levels.inner_at[around[0][level + 1] + 1]
         span = (np.int64(levels.node_at[inner[0]]), np.int64(levels.node_at[inner[1]]))
         fields = (around[0][level], around[1][level])
-        ends = (reaches[0][level], reaches[1][level])
+        both = (reaches[0][level], reaches[1][level])
         total, proved, end, count = over_cliques(
-            levels, ground, top, span, fields, ends, target, best, epsilon, work
+            levels, ground, top, span, fields, both, target, best, epsilon, work
         )
         expanded += count
         bound = min(bound, proved)
@@ -93,9 +93,9 @@ def _across(levels, top, ground, around, reaches, goal, best, epsilon, work):
     if not top.is_current:
         span = (np.int64(0), np.int64(-1))
         fields = (around[0][highest[0]], around[1][highest[1]])
-        ends = (reaches[0][highest[0]], reaches[1][highest[1]])
+        both = (reaches[0][highest[0]], reaches[1][highest[1]])
         total, proved, end, count = over_cliques(
-            levels, ground, top, span, fields, ends, target, best, epsilon, work
+            levels, ground, top, span, fields, both, target, best, epsilon, work
         )
         expanded += count
         bound = min(bound, proved)
@@ -107,14 +107,14 @@ def _across(levels, top, ground, around, reaches, goal, best, epsilon, work):
 
 @guarded
 @njit(cache=True, nogil=True)
-def shortest(ground, levels, top, ends, epsilon, cell_work, node_work):
+def shortest(ground, levels, top, endpoints, epsilon, cell_work, node_work):
     """Find a path of least cost between two cells.
 
     Parameters
     ----------
     ground, levels, top
         See `Ground`, `Levels` and `Top`.
-    ends
+    endpoints
         Two flat cells of fields.
     epsilon
         The search ends once no path can be cheaper by more than this part.
@@ -129,7 +129,7 @@ def shortest(ground, levels, top, ends, epsilon, cell_work, node_work):
         The cost, NO_PATH for no path, and a lower bound on it; int64 (n,) flat cells of the path;
         the numbers of cells and of nodes expanded.
     """
-    start, goal = ends
+    start, goal = endpoints
     n_levels = len(levels.level_at) - 1
     from_start, to_goal = cell_work[0], cell_work[1]
     touched, n_touched, expanded = spread(
@@ -167,8 +167,8 @@ def shortest(ground, levels, top, ends, epsilon, cell_work, node_work):
         return cost, bound, cells[: n + 1], expanded, n_expanded
     while level > 0:
         children = (around[0][level - 1], around[1][level - 1])
-        ends = (reaches[0][level - 1], reaches[1][level - 1])
-        nodes = descend(levels, level, nodes, children, ends)
+        both = (reaches[0][level - 1], reaches[1][level - 1])
+        nodes = descend(levels, level, nodes, children, both)
         level -= 1
     first, last = levels.cell_of[nodes[0]], levels.cell_of[nodes[-1]]
     cells, n = append_back(ground, from_start, first, cells, n)

@@ -56,7 +56,21 @@ def _through_clique(levels, field, distance, first, improved, is_new, is_old):
 
 @njit(cache=True, nogil=True)
 def _across(levels, field, distance, first, last, is_new, is_old):
-    """Lower the distances at the far ends of the moves that leave a field, within first..last."""
+    """Lower the distances at the far ends of the moves that leave a field.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    field
+        A field of the level.
+    distance
+        int32 (n * LANES,), changed.
+    first, last
+        Node of row 0 of `distance`, and the one after that of its last row.
+    is_new, is_old
+        See `_through_clique`.
+    """
     for node in range(levels.node_at[field], levels.node_at[field + 1]):
         if not is_old[node - first]:
             continue

@@ -33,7 +33,7 @@ UNIT_BITS = 14
 """A factor of 1 is 2^14 units, a straight move over such cells costs 2^15."""
 MOST_FACTOR = 4096.0
 """Largest factor: the costs of moves must be small beside those of paths."""
-TOP_BYTES_PER_CELL = 40.0
+TOP_BYTES_PER_CELL = 50.0
 """Most bytes for each cell of the distances between the nodes of the last level, unless asked
 otherwise."""
 _SIDES = 4
@@ -250,9 +250,14 @@ def build_overlay(
         cells; None for 1 everywhere. Rounded down to 1 / 2^14.
     top_bytes
         Most bytes of the distances between the border cells of the last level: with more, queries
-        search these nodes. None for 40 for each cell that may be entered.
+        search these nodes. None for 50 for each cell that may be entered.
     progress
         Called after each level with the number of steps done and of all.
+
+    Returns
+    -------
+    Overlay
+        Fields and costs, ready for `OverlaySearch`.
 
     Raises
     ------

@@ -26,6 +26,7 @@ class Ground(NamedTuple):
     units: IntArray
     """int32 (rows * cols,), the factor of each cell; a straight move costs the sum of two."""
     cols: int
+    """Columns of the map."""
     least_units: int
     """The least of `units` on cells that may be entered."""
 

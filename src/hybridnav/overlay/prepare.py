@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import DualGraphPyramid
     from hybridnav.topology import TopologicalMap
 
-_LEAST_GROWTH = 4
+_LEAST_GROWTH = 3
 """Least factor between the sizes of fields of two levels: closer levels save nothing."""
-_LEAST_FIELDS = 3
+_LEAST_FIELDS = 4
+"""Fields above the finest hold at most this part of the cells: fewer fields save nothing either."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,12 @@ class OverlayOptions:
     --------
     >>> from hybridnav.overlay import OverlayOptions
     >>> OverlayOptions(field_cells=(500, 10_000)).region_cells
-    40000
+    80000
     """
 
-    field_cells: tuple[int, ...] = (1_500, 40_000, 1_000_000)
-    region_cells: int = 40_000
-    top_bytes_per_cell: float = 40.0
+    field_cells: tuple[int, ...] = (2_000, 80_000, 1_000_000)
+    region_cells: int = 80_000
+    top_bytes_per_cell: float = 50.0
 
     def __post_init__(self) -> None:
         rising = self.field_cells[:1] and all(
@@ -100,6 +101,11 @@ def prepare_overlay(
     progress
         Called after each level with the number of steps done and of all.
 
+    Returns
+    -------
+    Overlay
+        Fields and costs, ready for `OverlaySearch`.
+
     Raises
     ------
     InvalidValueError
@@ -112,8 +118,8 @@ def prepare_overlay(
     >>> from hybridnav.overlay import OverlaySearch, prepare_overlay
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
     >>> search = OverlaySearch(prepare_overlay(topology))
-    >>> search.path((2, 2), (2, 8)).cost_cells
-    6.0
+    >>> search.path((8, 3), (8, 20)).cost_cells
+    17.0
     """
     enterable = topology.grid.enterable(allow_unexplored=allow_unexplored)
     return build_overlay(
@@ -148,7 +154,10 @@ def overlay_fields(
     sizes = [size.vertices for size in pyramid.stats.sizes]
     found: list[IntArray] = []
     before = 0.0
-    for most in options.field_cells:
+    for cells in options.field_cells:
+        most = cells if not found else min(cells, int(enterable.sum()) / _LEAST_FIELDS)
+        if before * _LEAST_GROWTH > most:
+            continue
         index = len(sizes) - 1
         while index > 0 and sizes[0] > most * sizes[index]:
             index -= 1
@@ -158,8 +167,7 @@ def overlay_fields(
             index -= 1
             field_of = pyramid[index].field_of
             size = _typical_size(field_of[enterable])
-        n_fields = len(np.unique(field_of[enterable]))
-        if not found or (size >= _LEAST_GROWTH * before and n_fields >= _LEAST_FIELDS):
+        if size >= _LEAST_GROWTH * before:
             found.append(field_of)
             before = size
     return found
