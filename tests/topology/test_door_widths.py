@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from hybridnav.viz import plot_rooms
 from tests.strategies import occupancy_grid
 from tests.topology.test_room_level import named
 
@@ -57,3 +58,17 @@ def test_rooms_that_meet_in_the_open_have_no_door_between_them():
     between = [d for d in doors_of(free, label_of) if d.rooms in {("r1", "r2"), ("r2", "r1")}]
     assert [door.kind for door in between] == ["opening"]
     assert between[0].width_m == pytest.approx(1.5)
+
+
+def test_lists_and_pictures_tell_doors_from_openings():
+    free, label_of = bay(75)
+    free[22, 20:29], label_of[22, 20:29] = True, 2
+    free[23:62, 10:50], label_of[23:62, 10:50] = True, 2
+    grid = occupancy_grid(free.astype(np.uint8), resolution_m=RESOLUTION_M)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=named(label_of)))
+    assert topology.rooms.counted()[1] == "1 doors, 1 openings"
+    drawn = {line.get_gid(): line for line in plot_rooms(topology).lines}
+    positions = {door.kind: door.position for door in topology.rooms.doors}
+    for kind in ("door", "opening"):
+        assert tuple(drawn[f"{kind}s"].get_xydata()[0]) == pytest.approx(positions[kind])
+    assert drawn["doors"].get_marker() != drawn["openings"].get_marker()

@@ -47,6 +47,7 @@ class Leg:
             "room": self.room,
             "length_m": self.length_m,
             "door": None if self.door is None else self.door.number,
+            "door_kind": None if self.door is None else self.door.kind,
             "door_width_m": None if self.door is None else self.door.width_m,
             "door_m": None if self.door is None else list(self.door.position),
             "turn": self.turn,

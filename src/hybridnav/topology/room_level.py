@@ -253,22 +253,28 @@ class Rooms:
         return np.unique(endpoints_of(edges, self.grid.shape[1]))
 
     def counted(self) -> tuple[str, str, str]:
-        """Describe how many rooms and doors there are, and how many of them this robot cannot use.
+        """Describe how many rooms, doors and openings there are, and how many of them this robot
+        cannot use.
 
         Returns
         -------
         tuple of str
             Such as "22 rooms, 1 of them too small for 0.25 m", "71 doors, 12 of them too narrow for
-            0.25 m", and "43 gaps below 0.3 m", which are not among the doors; empty without any.
+            0.25 m, 9 openings", and "43 gaps below 0.3 m", which are not among the doors; empty
+            without any.
         """
-        doors = [door for door in self.doors if not door.is_gap]
-        small = len(self.names) - int(np.count_nonzero(self.fits))
-        narrow = sum(not door.passable for door in doors)
-        n_gaps = len(self.doors) - len(doors)
-        radius = f"for {self.grid.robot_radius_m:g} m"
+        wide = [door for door in self.doors if not door.is_gap]
+        openings = [door for door in wide if door.is_opening]
+        doors = [door for door in wide if not door.is_opening]
+        n_gaps = len(self.doors) - len(wide)
+        small = f"too small for {self.grid.robot_radius_m:g} m"
+        narrow = f"too narrow for {self.grid.robot_radius_m:g} m"
+        passages = _counted("doors", [door.passable for door in doors], narrow)
+        if openings:
+            passages += ", " + _counted("openings", [door.passable for door in openings], narrow)
         return (
-            f"{len(self.names)} rooms" + (f", {small} of them too small {radius}" if small else ""),
-            f"{len(doors)} doors" + (f", {narrow} of them too narrow {radius}" if narrow else ""),
+            _counted("rooms", self.fits.tolist(), small),
+            passages,
             f"{n_gaps} gaps below {LEAST_DOOR_M:g} m" if n_gaps else "",
         )
 
@@ -305,6 +311,12 @@ class Rooms:
         inside = self.labels.label_of == self.labels.index(name)
         cells: LongArray = np.argwhere(inside & (self.grid.measured == CellClass.FREE))
         return cells
+
+
+def _counted(things: str, usable: list[bool], why_not: str) -> str:
+    """Return how many things there are, and how many are not usable, and why."""
+    unusable = usable.count(False)
+    return f"{len(usable)} {things}" + (f", {unusable} of them {why_not}" if unusable else "")
 
 
 def room_areas_m2(labels: RoomLabels, grid: OccupancyGrid) -> FloatArray:

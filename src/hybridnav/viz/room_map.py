@@ -45,7 +45,8 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     A name that does not fit its room, or would hide another, is written smaller or left out; the
     legend counts those left out. Doors have their numbers if there is room for them.
 
-    Doors that are too narrow for the map's robot radius are hollow dots. Gaps, doors narrower than
+    Openings are squares: they are wider than 2 m or not between jambs. Those of both kinds that are
+    too narrow for the map's robot radius are hollow dots. Gaps, doors narrower than
     0.3 m, are left out; the legend counts them, and the numbers stay.
 
     Parameters
@@ -145,7 +146,8 @@ def _colours(label_of: IntArray, n_rooms: int, strength: float) -> ByteArray:
 
 
 def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> list[Entry]:
-    """Draw doors as dots, hollow ones where the robot does not pass; return the legend's entries.
+    """Draw doors as dots and openings as squares, hollow dots where the robot does not pass; return
+    the legend's entries.
 
     Parameters
     ----------
@@ -157,18 +159,30 @@ def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> lis
         Description of the omitted doors, for the legend.
     """
     entries: list[Entry] = []
-    for gid, passable, text in (
-        ("doors", True, f"doors ({left_out})" if left_out else "doors"),
-        ("narrow-doors", False, "doors too narrow for the robot"),
+    passed = [door for door in doors if door.passable]
+    for gid, marker, shown, text in (
+        (
+            "doors",
+            "o",
+            [door for door in passed if not door.is_opening],
+            f"doors ({left_out})" if left_out else "doors",
+        ),
+        ("openings", "s", [door for door in passed if door.is_opening], "openings"),
+        (
+            "narrow-doors",
+            "o",
+            [door for door in doors if not door.passable],
+            "doors too narrow for the robot",
+        ),
     ):
-        at = [door.position for door in doors if door.passable == passable]
+        at = [door.position for door in shown]
         dots, sample = (
             Line2D(
                 [x for x, _ in points],
                 [y for _, y in points],
                 color=style.PATH,
-                marker="o",
-                markerfacecolor=style.PATH if passable else style.FREE,
+                marker=marker,
+                markerfacecolor=style.FREE if gid == "narrow-doors" else style.PATH,
                 markeredgewidth=0.8 * canvas.sizes.line,
                 markersize=2 * DOOR_POINTS * canvas.sizes.line,
                 linestyle="none",
@@ -177,7 +191,7 @@ def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> lis
             for points in (at, [])
         )
         dots.set_gid(gid)
-        if passable or at:
+        if gid == "doors" or at:
             canvas.ax.add_line(dots)
             entries.append((sample, text))
     return entries
