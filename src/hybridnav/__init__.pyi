@@ -28,8 +28,10 @@ from .io import (
     example_map as example_map,
     load as load,
     load_blocked as load_blocked,
+    load_keepout_mask as load_keepout_mask,
     load_map as load_map,
     load_rooms as load_rooms,
+    load_speed_mask as load_speed_mask,
     save as save,
     save_rooms as save_rooms,
 )

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.costs import cost_along
+from tests.layers import grid_of, layer_of
 from tests.strategies import examples
 
 ROWS, COLS = 6, 8
@@ -59,8 +60,8 @@ coordinates = st.one_of(
 @settings(max_examples=examples(150), deadline=None)
 def test_the_cost_is_the_exact_integral(points: Any, seed: int) -> None:
     factors = np.floor(np.random.default_rng(seed).uniform(1, 9, (ROWS, COLS)) * 2**14) / 2**14
-    grid = hn.OccupancyGrid(np.zeros((ROWS, COLS)), robot_radius_m=0)
-    layer = hn.CostLayer(factors)
+    grid = grid_of(np.zeros((ROWS, COLS)), robot_radius_m=0)
+    layer = layer_of(factors)
     rounded = [tuple(math.floor(c * 2**24 + 0.5) / 2**24 for c in point) for point in points]
     cost = cost_along(grid, layer, points)
     assert cost == pytest.approx(by_shapely(factors, rounded), rel=1e-9, abs=1e-9)
@@ -78,8 +79,8 @@ def test_paths_of_cells_cost_what_their_moves_cost(seed: int) -> None:
             cells.append(cells[-1] + step)
     path = np.array(cells)
     frame = hn.Frame(0.05, (3.0, -2.0), 0.4)
-    grid = hn.OccupancyGrid(np.zeros((21, 21)), frame, robot_radius_m=0)
-    layer = hn.CostLayer(rng.uniform(1, 5, (21, 21)))
+    grid = grid_of(np.zeros((21, 21)), frame, robot_radius_m=0)
+    layer = layer_of(rng.uniform(1, 5, (21, 21)))
     along = layer.factors[path[:, 0], path[:, 1]].astype(float)
     lengths = np.hypot(*np.diff(path, axis=0).T) * 0.05
     moves = float((lengths * (along[1:] + along[:-1]) / 2).sum())
@@ -88,8 +89,8 @@ def test_paths_of_cells_cost_what_their_moves_cost(seed: int) -> None:
 
 
 def test_a_point_costs_nothing_and_a_diagonal_passes_no_side_cell() -> None:
-    grid = hn.OccupancyGrid(np.zeros((2, 2)), robot_radius_m=0)
-    layer = hn.CostLayer(np.array([[1.0, 900.0], [900.0, 3.0]]))
+    grid = grid_of(np.zeros((2, 2)), robot_radius_m=0)
+    layer = layer_of(np.array([[1.0, 900.0], [900.0, 3.0]]))
     assert cost_along(grid, layer, [(0.3, 0.4)]) == 0
     assert cost_along(grid, layer, [(0.5, 0.5), (1.5, 1.5)]) == pytest.approx(2 * math.sqrt(2))
     assert cost_along(grid, layer, [(1.0, 0.0), (1.0, 1.0)]) == 900
@@ -108,6 +109,6 @@ def test_a_point_costs_nothing_and_a_diagonal_passes_no_side_cell() -> None:
     ],
 )
 def test_unusable_points_are_refused(points: Any, message: str) -> None:
-    grid = hn.OccupancyGrid(np.zeros((2, 2)), robot_radius_m=0)
+    grid = grid_of(np.zeros((2, 2)), robot_radius_m=0)
     with pytest.raises(hn.InvalidValueError, match=re.escape(message)):
-        cost_along(grid, hn.CostLayer(np.ones((2, 2))), points)
+        cost_along(grid, layer_of(np.ones((2, 2))), points)

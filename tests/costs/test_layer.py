@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from tests.layers import grid_of, layer_of
 from tests.strategies import examples
 
 # nav2_costmap_2d/inflation_layer.hpp, InflationLayer::computeCost, worked out by hand for
@@ -28,7 +29,7 @@ NAV2_OFF_AXIS = {(3, 4): 253, (4, 4): 228, (5, 5): 184, (9, 9): 79, (6, 8): 119,
 def one_obstacle(side: int = 41, resolution_m: float = 0.05, radius_m: float = 0.25) -> Any:
     probability = np.zeros((side, side))
     probability[side // 2, side // 2] = 1.0
-    return hn.OccupancyGrid(probability, hn.Frame(resolution_m), robot_radius_m=radius_m)
+    return grid_of(probability, hn.Frame(resolution_m), robot_radius_m=radius_m)
 
 
 def factor(cost: int, multiplier: float = 2.0) -> float:
@@ -79,7 +80,7 @@ def test_every_cell_has_the_cost_of_its_nearest_obstacle(
 ) -> None:
     rng = np.random.default_rng(seed)
     probability = rng.choice([0.0, 0.5, 1.0], (14, 15), p=[0.75, 0.2, 0.05])
-    grid = hn.OccupancyGrid(probability, hn.Frame(resolution_m))
+    grid = grid_of(probability, hn.Frame(resolution_m))
     layer = hn.CostLayer.clearance(
         grid,
         inflation_radius_m=inflation_m,
@@ -98,18 +99,18 @@ def test_every_cell_has_the_cost_of_its_nearest_obstacle(
 def test_unexplored_cells_are_no_obstacles_and_cost_as_free_ones() -> None:
     probability = np.zeros((3, 30))
     probability[1, 0], probability[1, 20:] = 1.0, 0.5
-    grid = hn.OccupancyGrid(probability, hn.Frame(0.05))
-    free = hn.OccupancyGrid(np.where(probability == 0.5, 0.0, probability), hn.Frame(0.05))
+    grid = grid_of(probability, hn.Frame(0.05))
+    free = grid_of(np.where(probability == 0.5, 0.0, probability), hn.Frame(0.05))
     assert (hn.CostLayer.clearance(grid).factors == hn.CostLayer.clearance(free).factors).all()
 
 
 def test_a_map_without_obstacles_costs_its_lengths() -> None:
-    grid = hn.OccupancyGrid(np.zeros((4, 5)))
+    grid = grid_of(np.zeros((4, 5)))
     assert (hn.CostLayer.clearance(grid).factors == 1).all()
 
 
 def test_speed_masks_cost_the_time_that_they_take() -> None:
-    grid = hn.OccupancyGrid(np.zeros((1, 6)), robot_radius_m=0)
+    grid = grid_of(np.zeros((1, 6)), robot_radius_m=0)
     values = [[0, 50, 80, 100, -1, 75]]
     percent = hn.CostLayer.speed_mask(grid, values)
     assert percent.factors.tolist() == [[1, 2, 5, 1, 1, 4]]  # a limit of 0 % is none, as in Nav2
@@ -118,11 +119,11 @@ def test_speed_masks_cost_the_time_that_they_take() -> None:
     )
     expected = [[1, 1.6, 1, 1, 1, 0.8 / 0.75]]
     assert np.abs(metres.factors - expected).max() < 2**-14
-    assert (metres.factors <= np.float32(expected)).all()
+    assert (metres.factors <= np.array(expected, np.float32)).all()
 
 
 def test_keepout_masks_close_cells_and_weigh_lanes() -> None:
-    grid = hn.OccupancyGrid(np.zeros((1, 5)), robot_radius_m=0)
+    grid = grid_of(np.zeros((1, 5)), robot_radius_m=0)
     layer = hn.CostLayer.keepout_mask(grid, [[0, 20, 99, 100, -1]])
     assert layer.closed is not None
     # round(2.54 * 20) = 51, round(2.54 * 99) = 251, 254 is lethal.
@@ -133,7 +134,7 @@ def test_keepout_masks_close_cells_and_weigh_lanes() -> None:
 
 def test_a_mask_of_another_frame_counts_where_centres_lie() -> None:
     frame = hn.Frame(0.5, (10.0, -3.0), math.radians(90))
-    grid = hn.OccupancyGrid(np.zeros((4, 6)), frame, robot_radius_m=0)
+    grid = grid_of(np.zeros((4, 6)), frame, robot_radius_m=0)
     values = np.zeros((7, 9), np.int64)
     mask_frame = hn.Frame(0.3, (8.5, -2.6), math.radians(10))
     values[1:5, 2:7] = 50
@@ -148,8 +149,8 @@ def test_a_mask_of_another_frame_counts_where_centres_lie() -> None:
 
 
 def test_layers_are_joined_and_record_their_sources() -> None:
-    first = hn.CostLayer(np.array([[1.0, 2.0, 3.0]]), np.array([[True, False, False]]))
-    second = hn.CostLayer(np.array([[4.0, 1.5, 1.0]]), np.array([[False, False, True]]))
+    first = layer_of(np.array([[1.0, 2.0, 3.0]]), np.array([[True, False, False]]))
+    second = layer_of(np.array([[4.0, 1.5, 1.0]]), np.array([[False, False, True]]))
     for joined, expected, kind in (
         (first | second, [[4, 2, 3]], "maximum"),
         (first * second, [[4, 3, 3]], "product"),
@@ -162,7 +163,7 @@ def test_layers_are_joined_and_record_their_sources() -> None:
 
 
 def test_factors_are_rounded_down_to_units() -> None:
-    layer = hn.CostLayer(np.array([[1.0, 1.1, 999.99999]]))
+    layer = layer_of(np.array([[1.0, 1.1, 999.99999]]))
     assert (layer.factors <= [[1.0, 1.1, 999.99999]]).all()
     assert layer.units.tolist() == [[2**14, math.floor(1.1 * 2**14), math.floor(999.99999 * 2**14)]]
 
@@ -189,7 +190,7 @@ ARRAYS: list[tuple[Any, str]] = [
 @pytest.mark.parametrize(("given", "message"), ARRAYS)
 def test_unusable_factors_are_refused_in_one_line(given: Any, message: str) -> None:
     with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
-        hn.CostLayer(given)
+        layer_of(given)
     assert "\n" not in str(refused.value)
 
 
@@ -212,7 +213,7 @@ CALLS: list[tuple[str, Any, str]] = [
 
 @pytest.mark.parametrize(("name", "wrong", "message"), CALLS)
 def test_unusable_settings_are_refused_in_one_line(name: str, wrong: Any, message: str) -> None:
-    grid = hn.OccupancyGrid(np.zeros((1, 2)), robot_radius_m=0)
+    grid = grid_of(np.zeros((1, 2)), robot_radius_m=0)
     settings = {} if name == "clearance" else {"values": [[0, 0]]}
     with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
         getattr(hn.CostLayer, name)(grid, **settings | wrong)
@@ -220,10 +221,10 @@ def test_unusable_settings_are_refused_in_one_line(name: str, wrong: Any, messag
 
 
 def test_layers_of_other_shapes_and_closed_cells_of_other_kinds_are_refused() -> None:
-    layer = hn.CostLayer(np.ones((2, 3)))
+    layer = layer_of(np.ones((2, 3)))
     with pytest.raises(hn.InvalidValueError, match="cannot be joined"):
-        layer | hn.CostLayer(np.ones((3, 2)))
+        layer | layer_of(np.ones((3, 2)))
     with pytest.raises(hn.InvalidValueError, match="closed cells must be bool of the shape"):
-        hn.CostLayer(np.ones((2, 3)), np.zeros((2, 3)))
+        layer_of(np.ones((2, 3)), np.zeros((2, 3)))
     with pytest.raises(hn.InvalidValueError, match="costs of 3 x 2 cells are not those of a map"):
-        layer.check_fits(hn.OccupancyGrid(np.zeros((3, 3))))
+        layer.check_fits(grid_of(np.zeros((3, 3))))

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.costs import cost_along
 from hybridnav.metrics import segment_faults
+from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.search.test_weighted import weighted
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -36,7 +37,7 @@ def random_layer(shape: tuple[int, int], rng: np.random.Generator) -> hn.CostLay
     else:
         factors = 1 + np.add.outer(np.arange(shape[0]), np.arange(shape[1])) / 7
     closed = rng.random(shape) < rng.choice([0.0, 0.05])
-    return hn.CostLayer(factors, closed)
+    return layer_of(factors, closed)
 
 
 def scene(classes: Any, seed: int) -> tuple[Any, ...]:
@@ -118,8 +119,8 @@ def test_the_any_angle_finish_never_raises_the_cost(
 
 
 def test_without_obstacles_and_costs_the_finish_is_the_straight_line() -> None:
-    grid = hn.OccupancyGrid(np.zeros((30, 40)), robot_radius_m=0)
-    layer = hn.CostLayer(np.ones(grid.shape))
+    grid = grid_of(np.zeros((30, 40)), robot_radius_m=0)
+    layer = layer_of(np.ones(grid.shape))
     planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)
     result = planner.plan((1.2, 2.3), (37.1, 20.4), smooth="line-of-sight")
     assert result.path is not None
@@ -133,7 +134,7 @@ def corridor_map() -> hn.OccupancyGrid:
     probability[[0, -1]] = probability[:, [0, -1]] = 1.0
     probability[1:20, 40] = probability[25:40, 40] = 1.0
     probability[20:25, 40] = 0.0
-    return hn.OccupancyGrid(probability, hn.Frame(0.1), robot_radius_m=0.1)
+    return grid_of(probability, hn.Frame(0.1), robot_radius_m=0.1)
 
 
 def test_the_preset_names_clearance_and_results_record_it() -> None:
@@ -158,7 +159,7 @@ def test_the_preset_names_clearance_and_results_record_it() -> None:
     assert answer["cost"] == answer["lower_bound"] == first.cost
     assert answer["length_m"] < answer["cost"]
     assert answer["settings"]["costs"] == source
-    both = hn.HybridPlanner(topology, preset=preset, costs=hn.CostLayer(np.full(grid.shape, 2.0)))
+    both = hn.HybridPlanner(topology, preset=preset, costs=layer_of(np.full(grid.shape, 2.0)))
     assert both.costs is not None
     assert (both.costs.factors == np.maximum(layer.factors, 2)).all()
 
@@ -210,10 +211,10 @@ def test_the_corridor_of_paper_is_searched_by_costs() -> None:
 
 
 def test_cells_that_costs_close_are_blocked_for_all_queries() -> None:
-    grid = hn.OccupancyGrid(np.zeros((9, 9)), robot_radius_m=0)
+    grid = grid_of(np.zeros((9, 9)), robot_radius_m=0)
     closed = np.zeros(grid.shape, np.bool_)
     closed[2:7, 4] = True
-    layer = hn.CostLayer(np.ones(grid.shape), closed)
+    layer = layer_of(np.ones(grid.shape), closed)
     planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)
     assert planner.plan((4.5, 4.5), (0.5, 0.5)).status is hn.PlanStatus.START_BLOCKED
     assert planner.plan((0.5, 0.5), (4.5, 4.5)).status is hn.PlanStatus.GOAL_BLOCKED
@@ -221,7 +222,7 @@ def test_cells_that_costs_close_are_blocked_for_all_queries() -> None:
         result = planner.plan((1.5, 4.5), (7.5, 4.5), smooth=smooth)
         assert result.path is not None
         assert not closed[tuple(result.path.cells.T)].any()
-        shut = hn.OccupancyGrid(closed.astype(float), robot_radius_m=0)
+        shut = grid_of(closed.astype(float), robot_radius_m=0)
         assert segment_faults(shut, result.path.points) == ()
     assert not planner.plan(
         (1.5, 4.5), (7.5, 4.5), blocked={"cells": [(r, 4) for r in (0, 1, 7, 8)]}
@@ -230,14 +231,14 @@ def test_cells_that_costs_close_are_blocked_for_all_queries() -> None:
 
 def test_tours_choose_the_cells_of_rooms_by_costs_and_sum_them() -> None:
     probability = np.zeros((20, 31))
-    grid = hn.OccupancyGrid(probability, robot_radius_m=0)
+    grid = grid_of(probability, robot_radius_m=0)
     labels = np.full(grid.shape, -1, np.int32)
     labels[:, :10], labels[:, 20:] = 0, 1
     rooms = hn.RoomLabels(("west", "east"), labels)
     factors = np.full(grid.shape, 9.0)
     factors[16] = 1.0  # the only cheap way between the rooms
     topology = topology_of(grid, rooms)
-    layer = hn.CostLayer(factors)
+    layer = layer_of(factors)
     planner = hn.HybridPlanner(topology, preset="grid-astar", costs=layer)
     result = planner.plan("west", "east")
     assert result.path is not None
@@ -258,7 +259,7 @@ def test_tours_choose_the_cells_of_rooms_by_costs_and_sum_them() -> None:
 @pytest.mark.parametrize("preset", ["shortest", "octile", "portals"])
 def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) -> None:
     topology = topology_of(hn.example_map("figure1"))
-    layer = hn.CostLayer(np.ones(topology.grid.shape))
+    layer = layer_of(np.ones(topology.grid.shape))
     message = f"preset {preset} cannot plan by costs: coarse: "
     with pytest.raises(hn.InvalidValueError, match=re.escape(message)) as refused:
         hn.HybridPlanner(topology, preset=preset, costs=layer)
@@ -270,7 +271,7 @@ def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) ->
 @pytest.mark.parametrize(
     ("costs", "message"),
     [
-        (hn.CostLayer(np.ones((3, 4))), "costs of 4 x 3 cells are not those of a map of"),
+        (layer_of(np.ones((3, 4))), "costs of 4 x 3 cells are not those of a map of"),
         (np.ones((3, 4)), "costs must be a CostLayer, got a ndarray"),
     ],
 )

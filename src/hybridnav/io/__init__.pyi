@@ -2,6 +2,7 @@ from .blocked import load_blocked as load_blocked
 from .examples import example_map as example_map
 from .maps import load as load, load_map as load_map
 from .models import Model as Model, save as save
+from .masks import load_keepout_mask as load_keepout_mask, load_speed_mask as load_speed_mask
 from .movingai import (
     Scenario as Scenario,
     load_movingai_map as load_movingai_map,

@@ -90,17 +90,8 @@ def load_ros_map(
     >>> load_ros_map("tiny.yaml").frame.resolution_m
     0.1
     """
-    check_max_cells(max_cells)
     description = _read_description(Path(path), free_threshold, occupied_threshold)
-    raster = read_raster(
-        description.image,
-        what=f"{description.where}: image",
-        check_size=partial(
-            check_size,
-            max_cells=max_cells,
-            where=f"{description.where}: image {printable(description.image)}",
-        ),
-    )
+    raster = _read_image(description, max_cells)
     probability = _probability(raster, description)
     grid = OccupancyGrid(
         probability,
@@ -120,6 +111,54 @@ def load_ros_map(
             stacklevel=3,
         )
     return grid
+
+
+def read_mask(path: PathLike, *, max_cells: int) -> tuple[NDArray[np.int8], Frame]:
+    """Read a map of map_server as the values of a `nav_msgs/OccupancyGrid`.
+
+    Parameters
+    ----------
+    path
+        The YAML file.
+    max_cells
+        The most cells that the map may have.
+
+    Returns
+    -------
+    tuple
+        int8 (rows, cols), from 0 to 100, -1 for unknown, row 0 at the lowest y; and the place of
+        the cells. Trinary maps hold 0, 100 and -1; in the mode `scale` occupancies between the
+        thresholds are spread over 0 to 100.
+
+    Raises
+    ------
+    MapNotFoundError, MapError, InvalidValueError
+        As in `load_ros_map`.
+    """
+    description = _read_description(Path(path), None, None)
+    occupancy = _probability(_read_image(description, max_cells), description)
+    low, high = np.float32(description.free_threshold), np.float32(description.occupied_threshold)
+    if description.mode == "raw":
+        between = np.rint(occupancy * 100)
+    elif description.mode == "scale":
+        between = np.clip(np.rint((occupancy - low) / (high - low) * 100), 0, 100)
+    else:
+        between = np.where(occupancy >= high, 100, np.where(occupancy <= low, 0, math.nan))
+    return np.where(np.isnan(between + occupancy), -1, between).astype(np.int8), description.frame
+
+
+def _read_image(description: _Description, max_cells: int) -> Raster:
+    """Return the image of a map, unless it holds too many cells."""
+    check_max_cells(max_cells)
+    return read_raster(
+        description.image,
+        what=f"{description.where}: image",
+        check_size=partial(
+            check_size,
+            max_cells=max_cells,
+            where=f"{description.where}: image {printable(description.image)}",
+        ),
+    )
 
 
 def files_of(path: Path) -> list[Path]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from hybridnav._typing import PathLike
+    from hybridnav.costs import CostLayer
     from hybridnav.grid import RoomLabels
     from hybridnav.io.models.container import FiledPart, Part
     from hybridnav.planner import HybridPlanner
@@ -129,7 +130,11 @@ class Model:
         return self._grown(self.fitted(None).pyramid, self.rooms)
 
     def planner(
-        self, preset: PathLike | Preset | None = None, *, topology: TopologicalMap | None = None
+        self,
+        preset: PathLike | Preset | None = None,
+        *,
+        topology: TopologicalMap | None = None,
+        costs: CostLayer | None = None,
     ) -> HybridPlanner:
         """Make a planner, with everything that the model holds for its preset.
 
@@ -142,6 +147,8 @@ class Model:
             or `shortest` where there is none.
         topology
             A topological map of `grid`; None for that of the model.
+        costs
+            As in `HybridPlanner`.
 
         Returns
         -------
@@ -167,7 +174,7 @@ class Model:
         if topology.grid is self.grid:
             key = made_for(preset.planner, topology)
             prepared = search_of(self._filed, preset.planner.coarse, key, self._sizes)
-        return HybridPlanner(topology, preset=preset, prepared=prepared)
+        return HybridPlanner(topology, preset=preset, prepared=prepared, costs=costs)
 
     def grown(self, settings: PyramidSettings, rooms: RoomLabels | None) -> TopologicalMap:
         """Return the topological map of some settings and rooms.
