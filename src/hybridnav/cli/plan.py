@@ -9,6 +9,7 @@ import typer
 
 from hybridnav.cli.blocked import BlockedOption, parsed_closing
 from hybridnav.cli.common import Reading, check_picture, read_settings
+from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.keep import KeepInOption, KeepOption, Source
 from hybridnav.cli.options import (
@@ -111,6 +112,7 @@ def plan(
     alternatives: AlternativesOption = 1,
     least_hole_m2: LeastHoleOption = 1.0,
     blocked: BlockedOption = None,
+    costs: CostsOption = None,
     preset: PresetOption = None,
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
@@ -133,8 +135,14 @@ def plan(
     check_picture(plot)
     where = _checked_at(at, alternatives)
     _check_least_hole(least_hole_m2)
+    given = parsed_costs(costs)
     settings = read_settings(
-        preset, overrides, robot_radius_m, seed, smooth=smooth, map_file=map_file
+        preset or (PRESET if given else None),
+        [*given.overrides, *(overrides or ())],
+        robot_radius_m,
+        seed,
+        smooth=smooth,
+        map_file=map_file,
     )
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     closing = parsed_closing(blocked)
@@ -147,6 +155,7 @@ def plan(
         source=Source(map_file, settings, reading, keep, keep_in),
         waypoints=[first, *map(_parsed_waypoint, via or ()), last],
         closing=closing,
+        costs=given,
         rooms_file=rooms_file,
         at=where,
         alternatives=alternatives,

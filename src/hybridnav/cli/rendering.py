@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 Waypoint = str | tuple[float, ...]
 """A name, or `(x, y)` or `(x, y, yaw)` in metres and radians, map frame."""
+_BY_COSTS = frozenset({"weighted", "any-angle-weighted"})
+"""Metrics of paths by costs, which are metres as lengths are."""
 _OPTIMAL = 1e-9
 """Gap of a path that equals its bound, lengths being sums of rounded numbers."""
 
@@ -92,8 +94,14 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
         stated = f"ends {short_m:.2f} m short of the goal after {figures['length_m']:.2f} m"
         lines.append(f"path       {stated}")
     elif figures["length_m"] is not None:
-        lines.append(f"length     {figures['length_m']:.2f} m ({figures['metric']})")
+        by_costs = figures["metric"] in _BY_COSTS
+        lines.append(
+            f"length     {figures['length_m']:.2f} m{'' if by_costs else _in_metric(figures)}"
+        )
+        if by_costs:
+            lines.append(f"cost       {figures['cost']:.2f} m{_in_metric(figures)}")
         bound, stated = _rounded_bound(figures["lower_bound"], figures["gap"])
+        stated = stated.replace("long", "dear") if by_costs else stated
         lines.append(f"bound      {bound} m, the path is {stated}")
     if figures["steps"] is not None:
         lines.append(f"steps      {'; '.join(figures['steps'])}")
@@ -111,6 +119,10 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
     return lines + _whole_grid_lines(figures)
 
 
+def _in_metric(figures: dict[str, Any]) -> str:
+    return f" ({figures['metric']})"
+
+
 def _whole_grid_lines(figures: dict[str, Any]) -> list[str]:
     """Describe the plan on the whole grid, if it was asked for.
 
@@ -124,7 +136,8 @@ def _whole_grid_lines(figures: dict[str, Any]) -> list[str]:
     cells, seconds = figures["grid_expanded"], figures["grid_seconds"]
     took = f"{cells:,} cells expanded on the whole map, {seconds:.3f} s"
     if figures["optimum_m"] is None:
-        return [f"grid       {figures['grid_length_m']:.2f} m (octile), {took}"]
+        metric = "weighted" if figures["metric"] in _BY_COSTS else "octile"
+        return [f"grid       {figures['grid_length_m']:.2f} m ({metric}), {took}"]
     loss = f", loss {figures['loss'] * 100:.2f} %" if figures["loss"] is not None else ""
     return [f"optimum    {figures['optimum_m']:.2f} m{loss}", f"grid       {took}"]
 
@@ -147,7 +160,11 @@ def _tour_lines(figures: dict[str, Any]) -> list[str]:
 def _measured(figures: dict[str, Any]) -> list[str]:
     """Describe the length, the cost if the metric weighs the length, and the bound."""
     length_m, metric = figures["length_m"], figures["metric"]
-    if figures["cost"] == length_m:
+    by_costs = metric in _BY_COSTS
+    if by_costs:
+        cost = f"cost       {figures['cost']:.2f} m ({metric})"
+        lines = [f"length     {length_m:.2f} m", cost]
+    elif figures["cost"] == length_m:
         lines = [f"length     {length_m:.2f} m ({metric})"]
     else:
         lines = [f"length     {length_m:.2f} m", f"cost       {figures['cost']:.2f} ({metric})"]
@@ -155,7 +172,8 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     if bound > 0:
         gap = figures["cost"] / bound - 1
     least, stated = _rounded_bound(bound, gap)
-    unit = "m " if figures["cost"] == length_m else ""
+    stated = stated.replace("long", "dear") if by_costs else stated
+    unit = "m " if by_costs or figures["cost"] == length_m else ""
     return [
         *lines,
         f"bound      {least} {unit}({metric}), this path is {stated} between its waypoints",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav.cli.blocked import Closing
+    from hybridnav.cli.costs import Costs
     from hybridnav.cli.keep import Source
     from hybridnav.cli.rendering import Waypoint
     from hybridnav.planner.named import At
@@ -44,6 +45,7 @@ class Request:
     waypoints: list[Waypoint]
     """The start, what lies between, the goal."""
     closing: Closing
+    costs: Costs
     rooms_file: Path | None
     at: At
     alternatives: int
@@ -69,7 +71,7 @@ class Request:
         model, key = self.source.load(seconds, rooms_file=rooms_file, needs_rooms=self.is_tour)
         grid = model.grid
         check_room_to_be(grid, allow_unexplored=settings.planner.allow_unexplored)
-        closed = self.closing.read(grid)
+        closed, costs = self.closing.read(grid), self.costs.read(grid)
         status = outside(grid, self.waypoints) if self.plot is None else None
         if status is not None:
             refused = refused_result(status, settings, self.waypoints)
@@ -78,7 +80,7 @@ class Request:
             return False
         topology = self._grown(model, rooms_file, seconds)
         with stage("preparing the planner", seconds, "prepare"):
-            planner = model.planner(settings, topology=topology)
+            planner = model.planner(settings, topology=topology, costs=costs)
         outcome = self._planned(planner, closed, seconds)
         self.source.keep(planner, key)
         found = self._alternatives(planner, closed, seconds)
@@ -86,7 +88,7 @@ class Request:
         if found is not None:
             beside = _alternatives_figures(topology, found)
         elif self.compare and isinstance(outcome, hn.PlanResult):
-            beside = _compared(self._on_whole_grid(topology, closed), outcome)
+            beside = _compared(self._on_whole_grid(topology, closed, costs), outcome)
         self._respond(grid, outcome, beside, seconds)
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
@@ -153,13 +155,17 @@ class Request:
             )
 
     def _on_whole_grid(
-        self, topology: hn.TopologicalMap, closed: hn.Blocked | None
+        self,
+        topology: hn.TopologicalMap,
+        closed: hn.Blocked | None,
+        costs: hn.CostLayer | None,
     ) -> hn.PlanResult:
         settings = self.source.settings
         whole = settings.planner.model_copy(update=_GRID_SEARCH)
         preset = settings.model_copy(update={"name": "grid-astar", "planner": whole})
         start, goal = (waypoint[:2] for waypoint in self.waypoints)
-        return hn.HybridPlanner(topology, preset=preset).plan(start, goal, blocked=closed)
+        planner = hn.HybridPlanner(topology, preset=preset, costs=costs)
+        return planner.plan(start, goal, blocked=closed)
 
     def _beside_refusal(self, refused: hn.PlanResult) -> dict[str, Any]:
         """Return the figures of what was asked for beside a plan that was refused."""
@@ -195,14 +201,14 @@ class Request:
 
 def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[str, Any]:
     """Return the figures of a plan on the whole grid, and the loss of a result against it."""
-    length_m, loss = grid_result.cost if grid_result.solved else None, None
+    cost, loss = grid_result.cost if grid_result.solved else None, None
     alike = result is None or result.metric == grid_result.metric
-    if length_m is not None and result is not None and result.solved and alike:
-        loss = result.cost / length_m - 1 if length_m > 0 else 0.0
+    if cost is not None and result is not None and result.solved and alike:
+        loss = result.cost / cost - 1 if cost > 0 else 0.0
     return {
-        "optimum_m": length_m if alike else None,
+        "optimum_m": cost if alike else None,
         "loss": loss,
-        "grid_length_m": length_m,
+        "grid_length_m": grid_result.path.length_m if grid_result.path is not None else None,
         "grid_expanded": grid_result.stats.expanded,
         "grid_seconds": round(sum(grid_result.stats.seconds.values()), 6),
     }
