@@ -4,6 +4,7 @@ Drawn on matplotlib figures without pyplot or display.
 """
 
 from hybridnav.viz.charts import method_styles, plot_losses, plot_speed
+from hybridnav.viz.costs import plot_costs
 from hybridnav.viz.dual import plot_dual
 from hybridnav.viz.kernels import plot_kernels
 from hybridnav.viz.levels import plot_levels
@@ -21,6 +22,7 @@ from hybridnav.viz.topology import plot_topology
 __all__ = [
     "method_styles",
     "plot_alternatives",
+    "plot_costs",
     "plot_dual",
     "plot_figure1",
     "plot_kernels",

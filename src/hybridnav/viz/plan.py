@@ -61,7 +61,7 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     title
         Title instead of the map's name, length, loss and places; empty for none.
     optimum_m
-        Length of an optimal path of the same metric in metres, for the loss in the title.
+        Cost of an optimal path of the same metric in metres, for the loss in the title.
     width_in
         Width of a new figure in inches, 3.3 for one column of a paper; its height follows.
 
@@ -180,10 +180,11 @@ def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None
     words = [topology.grid.name]
     if result.path is None:
         return [*words, str(result.status)]
-    length = result.path.length_m
-    words.append(f"path {length:.1f} m")
+    words.append(f"path {result.path.length_m:.1f} m")
+    if result.metric in {"weighted", "any-angle-weighted"}:
+        words.append(f"cost {result.cost:.1f} m")
     if optimum_m is not None:
-        loss = length / optimum_m - 1 if optimum_m > 0 else 0.0
+        loss = result.cost / optimum_m - 1 if optimum_m > 0 else 0.0
         words.append(f"loss {round(loss, 3) + 0.0:.1%}")  # no "-0.0%" from rounding
     if result.route is None:
         return words

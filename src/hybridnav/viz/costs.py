@@ -1,0 +1,158 @@
+"""Pictures of costs: the factor of each cell, with paths over it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from hybridnav.grid import CellClass
+from hybridnav.metrics.judge import checked_points
+from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.layout import add_legend, add_title, fit_height
+from hybridnav.viz.maps import ground_entries
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
+
+    from hybridnav.costs import CostLayer
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.viz.layout import Entry
+
+_LEVELS = 254
+"""Colours of factors; two more are those of closed and unexplored cells."""
+_DECADE = 10.0
+"""Factor beyond which colours follow the logarithm."""
+_CLOSED = "#7b3294"
+_SHADES = (0.1, 0.33, 0.6, 0.85)
+"""Parts of the colour map that follow white: its darkest end would look like a wall."""
+_LABELS, _BAR, _BAR_HEIGHT = 3.4, 3.0, 0.8
+"""Heights of the labels below the map, of the colour bar with its labels and of the bar itself, in
+font sizes."""
+_TICKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+_BAR_LEFT, _BAR_WIDTH = 0.3, 0.4
+"""Place of the bar below the map, in widths of the map."""
+_PATHS = ("#0b3c8c", "#007f5f", *style.ROUTES[2:])
+"""Colours of paths: the red of other pictures would vanish on costs."""
+
+
+def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
+    grid: OccupancyGrid,
+    layer: CostLayer,
+    *,
+    paths: Mapping[str, ArrayLike] | None = None,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw the factors of the free cells as colours with a bar, over the walls of a map.
+
+    Parameters
+    ----------
+    grid
+        The map. The picture is cropped to its known part; its axes are metres of the map frame.
+    layer
+        Costs of its cells. White is the factor 1; closed cells have a colour of their own. If a
+        factor is above 10, colours follow the logarithm.
+    paths
+        Paths to draw by their labels, `(x, y)` in metres, shape (n, 2) each, at most 5; None for
+        none.
+    ax
+        Axes to draw on; by default new ones in a new figure.
+    title
+        Title instead of the map's name and the range of factors; empty for none.
+    width_in
+        Width of a new figure in inches; its height follows.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    InvalidValueError
+        When the layer is one of another map, or a path is no finite array of shape (n, 2).
+
+    Examples
+    --------
+    >>> from hybridnav.viz import plot_costs
+    >>> grid = hn.example_map("figure1")
+    >>> ax = plot_costs(grid, hn.CostLayer.clearance(grid), title="clearance")
+    >>> ax.get_title()
+    'clearance'
+    """
+    layer.check_fits(grid)
+    canvas = Canvas.opened(ax, width_in, known_view(grid))
+    is_free = grid.classes == CellClass.FREE
+    most = max(float(layer.factors[is_free].max(initial=1.0)), 1.0 + 1e-3)
+    scale: Normalize = LogNorm(1.0, most) if most > _DECADE else Normalize(1.0, most)
+    colours_of_costs = [style.FREE, *colormaps["YlOrRd"](_SHADES)]
+    shades = LinearSegmentedColormap.from_list("factors", colours_of_costs)
+    drawn = np.round(scale(layer.factors).clip(0, 1) * (_LEVELS - 1)).astype(np.uint8)
+    drawn[grid.classes == CellClass.UNEXPLORED] = _LEVELS
+    if layer.closed is not None:
+        drawn[layer.closed] = _LEVELS + 1
+    levels = np.round(shades(np.linspace(0, 1, _LEVELS))[:, :3] * 255).astype(np.uint8)
+    colours = np.concatenate([levels, style.rgb(style.UNEXPLORED, _CLOSED)])
+    draw_cells(canvas, grid, drawn, colours)
+    entries = ground_entries(grid)
+    if (grid.classes == CellClass.UNEXPLORED).any():
+        entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
+    if layer.closed is not None:
+        entries.append((Patch(fc=_CLOSED), "closed"))
+    entries += _draw_paths(canvas, paths or {})
+    words = [grid.name, f"metres cost 1 to {most:.3g} times as much"]
+    _finish(canvas, entries, words if title is None else [title], ScalarMappable(scale, shades))
+    return canvas.ax
+
+
+def _draw_paths(canvas: Canvas, paths: Mapping[str, ArrayLike]) -> list[Entry]:
+    """Draw paths as lines with a pale rim; return their legend entries."""
+    entries: list[Entry] = []
+    for (label, points), colour in zip(paths.items(), _PATHS, strict=False):
+        line = checked_points(points)
+        width = 1.6 * canvas.sizes.line
+        canvas.add_lines([line], colors=style.FREE, linewidths=2.2 * width, zorder=6)
+        canvas.add_lines([line], colors=colour, linewidths=width, zorder=7, gid="path")
+        entries.append((Line2D([], [], color=colour, lw=width), label))
+    return entries
+
+
+def _finish(canvas: Canvas, entries: list[Entry], words: list[str], shown: ScalarMappable) -> None:
+    """Add the title, axes in metres, legend and colour bar."""
+    ax, font = canvas.ax, canvas.sizes.font
+    ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
+    ax.set_xlabel("x in metres", fontsize=font, labelpad=0.3 * font)
+    ax.set_ylabel("y in metres", fontsize=font, labelpad=0.3 * font)
+    for spine in ax.spines.values():
+        spine.set(linewidth=0.6, color=style.ARC)
+    add_title(canvas, words)
+    fit_height(canvas, add_legend(canvas, entries, bar=0, below=(_LABELS + _BAR) * font))
+    points = float(ax.get_window_extent().height) * 72 / ax.figure.dpi
+    place = (
+        _BAR_LEFT,
+        -(_LABELS + _BAR_HEIGHT) * font / points,
+        _BAR_WIDTH,
+        _BAR_HEIGHT * font / points,
+    )
+    bar = ax.figure.colorbar(
+        shown, cax=ax.inset_axes(place), orientation="horizontal", format="{x:g}"
+    )
+    if isinstance(shown.norm, LogNorm):
+        bar.set_ticks([tick for tick in _TICKS if tick <= (shown.norm.vmax or 1)])
+        bar.minorticks_off()
+    bar.ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
+    bar.ax.text(
+        -0.03, 0.5, "factor", transform=bar.ax.transAxes, fontsize=font, ha="right", va="center"
+    )
+    bar.outline.set_linewidth(0.6)
