@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 class CostLine:
     """Shortener of cell paths of one grid that never raises their cost; it holds a byte a cell.
 
-    The points of the new path are start, goal, and centres of cells of the old path. Of the paths
-    that skip some of these, a dynamic program finds the cheapest, where a segment skips up to 23;
-    it is repeated on the points that are left. Costs are exact integrals of the factors along the
+    The points of the new path are start, goal, and centres of cells of the old path. A dynamic
+    program finds the cheapest path that leaves out some of these, up to 23 a segment; it is
+    repeated on the points that are left. Costs are exact integrals of the factors along the
     segments (`costs.cost_along`), and new segments are tested exactly, so a path never leaves the
     union of the closed squares of the enterable cells.
 
