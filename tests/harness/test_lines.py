@@ -319,6 +319,13 @@ def test_a_preset_in_another_metric_is_refused_in_one_line(cli, tmp_path, settin
     assert not (tmp_path / "run").exists()
 
 
+def test_a_preset_with_costs_is_refused_in_one_line(cli, tmp_path):
+    arguments = ["--preset", "paper", "--set", "planner.costs.clearance={}"]
+    done = cli("evaluate", FIGURE, *arguments, "-o", tmp_path / "run")
+    assert done.refuses(2, "planner.costs makes something else small")
+    assert "preset paper" in done.err
+
+
 def test_lines_go_not_with_corner_cutting():
     smooth = load_preset("paper", overrides=["planner.smooth=line-of-sight"])
     settings = RunSettings(maps=("x.yaml",), presets=("paper", smooth), corner_cutting=True)

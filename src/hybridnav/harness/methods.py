@@ -99,13 +99,18 @@ def preset_spec(
     smoothed = preset.planner.smooth == LINE_OF_SIGHT
     return MethodSpec(
         f"{preset.name}+{LINE_OF_SIGHT}" if smoothed else preset.name,
-        preset.model_dump(exclude={"description"}),
+        preset.model_dump(exclude={"description": True, "planner": {"costs"}}),
         pyramid | _given(merge_distance_m, seed),
     )
 
 
 def _check_metric(preset: Preset) -> None:
-    ompl = preset.planner.ompl
+    ompl, costs = preset.planner.ompl, preset.planner.costs
+    if costs is not None and costs.clearance is not None:
+        raise InvalidValueError(
+            f"preset {preset.name}: the harness measures lengths, and planner.costs makes "
+            "something else small: it evaluates presets without costs"
+        )
     if ompl is None:
         return
     if ompl.has_heading:
