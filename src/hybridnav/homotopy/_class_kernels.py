@@ -20,8 +20,11 @@ MOST_STATES = 1 << _STATE_BITS
 """More states have no numbers that fit into a key of the heap."""
 _OPEN, _EXPANDED, _WINDING = 0, 1, 2
 
-FOUND, EXHAUSTED, LIMITED = 0, 1, 2
-"""Why a search ended: all classes asked for, no more classes, no more room."""
+_STATES, _KEYS, GOALS = 0, 1, 2
+"""Places of the counts of `Open.used`."""
+
+FOUND, EXHAUSTED, LIMITED, PAUSED = 0, 1, 2, 3
+"""Why a search ended: all classes asked for, no more classes, no more room; or it can go on."""
 
 
 class Letters(NamedTuple):
@@ -160,7 +163,7 @@ def _after(tree, letters, of_edge, word, cell, direction, cols):
     tree, letters
         `Tree` and `Letters`.
     of_edge
-        See `find_classes`.
+        See `Plane`.
     word
         Vertex of the tree.
     cell, direction, cols
@@ -202,7 +205,7 @@ def _winds(states, tree, letters, of_edge, moves, head, state, apart, cols):
     Parameters
     ----------
     states, tree, letters, of_edge, moves, cols
-        See `find_classes`.
+        See `Plane`.
     head
         int32 (n_cells,), the last state at each cell, -1 for none.
     state
@@ -276,121 +279,173 @@ def _pop(heap, n):
     return least
 
 
+class Plane(NamedTuple):
+    """The map of a search, and its goal.
+
+    `moves`, uint8 (n_cells,), are the legal moves of each flat cell, and `cols` the columns of the
+    grid. `left` is the exact integer cost from each flat cell to the goal, -1 for no path: a
+    consistent estimate, so that each state is taken at its least cost among paths that do not wind.
+    `of_edge`, int32 (2 n_cells,), is the signed number of the word of each base edge: 2 c for the
+    step from cell c to the east, 2 c + 1 to the north; `letters` are the numbered words.
+    """
+
+    moves: np.ndarray
+    cols: int
+    left: np.ndarray
+    of_edge: np.ndarray
+    letters: Letters
+    goal: int
+    apart: int
+    """Cells within which a path that comes back to itself winds."""
+
+
+class Open(NamedTuple):
+    """What a search has met so far.
+
+    `head`, int32 (n_cells,), is the last state at each cell, -1 for none; `heap`, int64, holds the
+    keys of states that wait; `goals`, int64, the states at the goal in the order of cost. `used`,
+    int64 (3,), counts states, keys and goals.
+    """
+
+    head: np.ndarray
+    heap: np.ndarray
+    goals: np.ndarray
+    used: np.ndarray
+
+    @classmethod
+    def of_room(cls, n_cells: int, room: int, wanted: int) -> Open:
+        """Return what a search needs that has met nothing."""
+        head = np.full(n_cells, -1, np.int32)
+        heap, goals = np.empty(2 * room, np.int64), np.empty(wanted, np.int64)
+        return cls(head, heap, goals, np.zeros(3, np.int64))
+
+
 @guarded
 @njit(cache=True, nogil=True)
-def find_classes(moves, cols, endpoints, left, of_edge, letters, wanted, apart, states, tree):
-    """Find shortest paths of the first classes that do not wind, and why there are no more.
+def begin(plane, states, waiting, start):
+    """Put the state of the start into the heap, if a path leads from there to the goal."""
+    if plane.left[start] < 0:
+        return
+    states.cell[0], states.word[0], states.cost[0], states.before[0] = start, 0, 0, -1
+    states.status[0], states.other[0] = _OPEN, -1
+    waiting.head[start] = 0
+    waiting.heap[0] = _STATE_MASK
+    waiting.used[_STATES] = waiting.used[_KEYS] = 1
+
+
+@njit(cache=True, nogil=True)
+def _place(states, state):
+    """Fill in the depth, the jump and the run of a state that is taken from the heap."""
+    before = np.int64(states.before[state])
+    if before < 0:
+        states.depth[state], states.jump[state], states.run[state] = 0, state, state
+        return
+    states.depth[state] = states.depth[before] + 1
+    # Skew-binary jumps (E. W. Myers 1983): any earlier state in a logarithm of steps.
+    jump = states.jump[before]
+    further = states.jump[jump]
+    even = states.depth[before] - states.depth[jump] == states.depth[jump] - states.depth[further]
+    states.jump[state] = further if even else before
+    same = states.word[before] == states.word[state]
+    states.run[state] = states.run[before] if same else state
+
+
+@njit(cache=True, nogil=True)
+def _is_winding(plane, states, tree, head, state):
+    """Return whether a path has come back, as `_winds` does; all along a path that is found."""
+    letters, of_edge, moves, cols = plane.letters, plane.of_edge, plane.moves, plane.cols
+    apart = plane.apart
+    # Farther off than the cell itself only now and then.
+    reach = apart if states.depth[state] % apart == 0 else 0
+    winds = _winds(states, tree, letters, of_edge, moves, head, state, reach, cols)
+    if winds == 0 and states.cell[state] == plane.goal:
+        passed = np.int64(state)
+        while winds == 0 and passed >= 0:
+            winds = _winds(states, tree, letters, of_edge, moves, head, passed, apart, cols)
+            passed = np.int64(states.before[passed])
+    return winds
+
+
+@njit(cache=True, nogil=True)
+def _expand(plane, states, tree, waiting, state, origin):
+    """Put the states one step behind a state into the heap; return whether there was room."""
+    head, heap, used = waiting.head, waiting.heap, waiting.used
+    moves, cols, left = plane.moves, plane.cols, plane.left
+    letters, of_edge = plane.letters, plane.of_edge
+    cell, word = np.int64(states.cell[state]), np.int64(states.word[state])
+    if used[_STATES] + 8 > states.cell.size or used[_KEYS] + 8 > heap.size:
+        return False
+    for k in range(8):
+        if not moves[cell] >> k & 1:
+            continue
+        there = _after(tree, letters, of_edge, word, cell, k, cols)
+        if there < 0:
+            return False
+        to = cell + ROW_STEP[k] * cols + COL_STEP[k]
+        cost = states.cost[state] + (DIAGONAL if k & 1 else STRAIGHT)
+        known = np.int64(head[to])
+        while known >= 0 and states.word[known] != there:
+            known = np.int64(states.other[known])
+        if known < 0:
+            known = used[_STATES]
+            used[_STATES] += 1
+            states.cell[known], states.word[known] = to, there
+            states.status[known], states.other[known] = _OPEN, head[to]
+            head[to] = known
+        elif states.status[known] != _OPEN or states.cost[known] <= cost:
+            continue
+        states.cost[known], states.before[known] = cost, state
+        _push(heap, used[_KEYS], cost + left[to] - origin << _STATE_BITS | _STATE_MASK - known)
+        used[_KEYS] += 1
+    return True
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def find_classes(plane, states, tree, waiting, limit):
+    """Go on with a search for the shortest paths of the first classes that do not wind.
 
     Parameters
     ----------
-    moves, cols
-        uint8 (n_cells,), the legal moves of each flat cell, and the columns of the grid.
-    endpoints
-        Flat cells of start and goal.
-    left
-        The exact integer cost from each flat cell to the goal, -1 for no path: a consistent
-        estimate, so that each state is taken at its least cost among paths that do not wind.
-    of_edge
-        int32 (2 n_cells,), the signed number of the word of each base edge: 2 c for the step from
-        cell c to the east, 2 c + 1 to the north.
-    letters
-        `Letters`, the numbered words.
-    wanted, apart
-        Number of classes, and the cells within which a path that comes back to itself winds.
-    states, tree
-        `States` and `Tree` with room; filled in.
+    plane
+        `Plane`.
+    states, tree, waiting
+        `States`, `Tree` and `Open` after `begin`, or after an earlier call that was `PAUSED`.
+    limit
+        States that are taken from the heap before the search pauses.
 
     Returns
     -------
-    tuple
-        The states at the goal in the order of cost; `FOUND`, `EXHAUSTED` or `LIMITED`.
+    int
+        `FOUND`, `EXHAUSTED`, `LIMITED` or `PAUSED`.
     """
-    start, goal = endpoints
-    head = np.full(moves.size, np.int32(-1), np.int32)
-    room = states.cell.size
-    heap = np.empty(2 * room, np.int64)
-    goals = np.empty(wanted, np.int64)
-    n_goals = n_states = n_heap = 0
-    reason = EXHAUSTED
-    origin = left[start]
-    if origin >= 0:
-        states.cell[0], states.word[0], states.cost[0], states.before[0] = start, 0, 0, -1
-        states.status[0], states.other[0] = _OPEN, -1
-        head[start] = 0
-        heap[0] = _STATE_MASK
-        n_states = n_heap = 1
-    while n_heap > 0:
+    used, goals = waiting.used, waiting.goals
+    origin = plane.left[states.cell[0]] if used[_STATES] > 0 else np.int64(0)
+    while used[_KEYS] > 0:
+        if limit == 0:
+            return PAUSED
+        limit -= 1
         # The newest state comes first among those of equal cost.
-        state = _STATE_MASK - (_pop(heap, n_heap) & _STATE_MASK)
-        n_heap -= 1
+        state = _STATE_MASK - (_pop(waiting.heap, used[_KEYS]) & _STATE_MASK)
+        used[_KEYS] -= 1
         if states.status[state] != _OPEN:
             continue
-        cell, word = np.int64(states.cell[state]), np.int64(states.word[state])
-        before = np.int64(states.before[state])
-        if before < 0:
-            states.depth[state], states.jump[state], states.run[state] = 0, state, state
-        else:
-            states.depth[state] = states.depth[before] + 1
-            # Skew-binary jumps (E. W. Myers 1983): any earlier state in a logarithm of steps.
-            jump = states.jump[before]
-            further = states.jump[jump]
-            even = (
-                states.depth[before] - states.depth[jump]
-                == states.depth[jump] - states.depth[further]
-            )
-            states.jump[state] = further if even else before
-            states.run[state] = states.run[before] if states.word[before] == word else state
-        # Farther off than the cell itself only now and then, and all along a path that is found.
-        reach = apart if states.depth[state] % apart == 0 else 0
-        winds = _winds(states, tree, letters, of_edge, moves, head, state, reach, cols)
-        if winds == 0 and cell == goal:
-            passed = np.int64(state)
-            while winds == 0 and passed >= 0:
-                winds = _winds(states, tree, letters, of_edge, moves, head, passed, apart, cols)
-                passed = np.int64(states.before[passed])
-        if winds != 0:
+        _place(states, state)
+        winds = _is_winding(plane, states, tree, waiting.head, state)
+        if winds < 0:
+            return LIMITED
+        if winds > 0:
             states.status[state] = _WINDING
-            if winds < 0:
-                reason = LIMITED
-                break
             continue
         states.status[state] = _EXPANDED
-        if cell == goal:
-            goals[n_goals] = state
-            n_goals += 1
-            if n_goals == wanted:
-                reason = FOUND
-                break
-            continue
-        if n_states + 8 > room or n_heap + 8 > heap.size:
-            reason = LIMITED
-            break
-        for k in range(8):
-            if not moves[cell] >> k & 1:
-                continue
-            there = _after(tree, letters, of_edge, word, cell, k, cols)
-            if there < 0:
-                reason = LIMITED
-                break
-            to = cell + ROW_STEP[k] * cols + COL_STEP[k]
-            cost = states.cost[state] + (DIAGONAL if k & 1 else STRAIGHT)
-            known = np.int64(head[to])
-            while known >= 0 and states.word[known] != there:
-                known = np.int64(states.other[known])
-            if known < 0:
-                known = n_states
-                n_states += 1
-                states.cell[known], states.word[known] = to, there
-                states.status[known], states.other[known] = _OPEN, head[to]
-                head[to] = known
-            elif states.status[known] != _OPEN or states.cost[known] <= cost:
-                continue
-            states.cost[known], states.before[known] = cost, state
-            _push(heap, n_heap, cost + left[to] - origin << _STATE_BITS | _STATE_MASK - known)
-            n_heap += 1
-        if reason == LIMITED:
-            break
-    return goals[:n_goals], reason
+        if states.cell[state] == plane.goal:
+            goals[used[GOALS]] = state
+            used[GOALS] += 1
+            if used[GOALS] == goals.size:
+                return FOUND
+        elif not _expand(plane, states, tree, waiting, state, origin):
+            return LIMITED
+    return EXHAUSTED
 
 
 @njit(cache=True, nogil=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
+from time import perf_counter
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -25,6 +27,10 @@ Cell = tuple[int, int]
 
 MOST_STATES = 1_000_000
 """Default number of pairs of a cell and a word that a search examines before it gives up."""
+TIME_LIMIT_S = 10.0
+"""Default number of seconds after which a search gives up."""
+_SLICE = 256
+"""States that a search takes between looks at the clock: some milliseconds."""
 _LARGEST_GAP_M = 1.0
 """A path that comes back nearer to itself than this winds, however large holes are that count."""
 
@@ -51,6 +57,8 @@ class ClassPaths:
     """Whether these are as many as requested, or all; False if the search gave up."""
     shortest_cells: float
     """Octile length of a shortest path from start to goal, infinite where there is none."""
+    is_late: bool = False
+    """Whether it gave up because its time was over."""
 
 
 def alternative_search(
@@ -156,7 +164,7 @@ class AlternativeSearch:
         self._enterable = np.ascontiguousarray(self.classes.enterable_cells)
         self._dead_ends: DeadEnds | None = None
 
-    def paths(
+    def paths(  # noqa: PLR0913 - independent limits of one search
         self,
         start: Cell,
         goal: Cell,
@@ -164,6 +172,7 @@ class AlternativeSearch:
         *,
         closed: LongArray | None = None,
         most_states: int = MOST_STATES,
+        time_limit_s: float = TIME_LIMIT_S,
     ) -> ClassPaths:
         """Find paths of different classes.
 
@@ -179,17 +188,16 @@ class AlternativeSearch:
         most_states
             Pairs of a cell and a word that are looked at before the search gives up, from 1 to
             2^26; each takes 85 bytes while the search runs.
+        time_limit_s
+            Seconds before the search gives up; infinite for no limit.
 
         Raises
         ------
         InvalidValueError
-            When `most_states` is out of range.
+            When `most_states` is out of range, or the time limit is not a number above 0.
         """
-        if not 1 <= most_states <= _class_kernels.MOST_STATES:
-            raise InvalidValueError(
-                f"most_states is {most_states!r:.80}, expected a number from 1 to "
-                f"{_class_kernels.MOST_STATES}: leave it out for {MOST_STATES}"
-            )
+        _check(most_states, time_limit_s)
+        until = perf_counter() + time_limit_s
         cols = self._enterable.shape[1]
         enterable = self._enterable
         if closed is not None:
@@ -200,29 +208,27 @@ class AlternativeSearch:
         left = field_distances(enterable.astype(np.uint8), label, np.array([last]))
         shortest = float(length_in_cells(left[[first]])[0]) if left[first] >= 0 else math.inf
         apart = self._apart if shortest == math.inf else min(self._apart, int(shortest / 2))
+        apart = max(1, apart)
+        moves = legal_moves(self._dead_ends_of(enterable, apart).left(start, goal), False).ravel()
+        of_edge = self.classes.cell_words.of_edge
+        plane = _class_kernels.Plane(moves, cols, left, of_edge, self._letters, last, apart)
         states = _class_kernels.States.of_room(most_states)
         tree = _class_kernels.Tree.of_room(most_states)
-        dead_ends = self._dead_ends_of(enterable, max(1, apart))
-        goals, reason = _class_kernels.find_classes(
-            legal_moves(dead_ends.left(start, goal), False).ravel(),
-            cols,
-            (first, last),
-            left,
-            self.classes.cell_words.of_edge,
-            self._letters,
-            count,
-            max(1, apart),
-            states,
-            tree,
-        )
+        waiting = _class_kernels.Open.of_room(enterable.size, most_states, count)
+        _class_kernels.begin(plane, states, waiting, first)
+        reason, is_late = _class_kernels.PAUSED, False
+        while reason == _class_kernels.PAUSED and not is_late:
+            reason = _class_kernels.find_classes(plane, states, tree, waiting, _SLICE)
+            is_late = reason == _class_kernels.PAUSED and perf_counter() >= until
         found = []
-        for state in goals.tolist():
+        for state in waiting.goals[: waiting.used[_class_kernels.GOALS]].tolist():
             flat = _class_kernels.path_to(states, state)
             word = tuple(_class_kernels.word_at(tree, states.word[state]).tolist())
             length = float(length_in_cells(states.cost[[state]])[0])
             cells = np.stack(np.divmod(flat, cols), axis=1)
             found.append(ClassPath(cells, word, length))
-        return ClassPaths(tuple(found), reason != _class_kernels.LIMITED, shortest)
+        is_whole = reason in {_class_kernels.FOUND, _class_kernels.EXHAUSTED}
+        return ClassPaths(tuple(found), is_whole, shortest, is_late)
 
     def _dead_ends_of(self, enterable: BoolArray, apart: int) -> DeadEnds:
         """Return the dead ends: cells that no shortest path of a class enters. They are kept while
@@ -233,6 +239,20 @@ class AlternativeSearch:
         if dead_ends is None or dead_ends.reach != apart:
             self._dead_ends = dead_ends = DeadEnds(enterable, apart)
         return dead_ends
+
+
+def _check(most_states: int, time_limit_s: float) -> None:
+    """Refuse limits that are out of range."""
+    if not 1 <= most_states <= _class_kernels.MOST_STATES:
+        raise InvalidValueError(
+            f"most_states is {most_states!r:.80}, expected a number from 1 to "
+            f"{_class_kernels.MOST_STATES}: leave it out for {MOST_STATES}"
+        )
+    if not (isinstance(time_limit_s, Real) and time_limit_s > 0):
+        raise InvalidValueError(
+            f"time_limit_s is {time_limit_s!r:.80}, expected a number of seconds above 0: "
+            f"leave it out for {TIME_LIMIT_S:g}"
+        )
 
 
 _MOST_KEPT = 4
