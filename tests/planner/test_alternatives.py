@@ -1,12 +1,12 @@
-"""Alternatives: other doors and other sides of obstacles, not the same route by other cells, and
-not round and round."""
+"""Alternatives by homotopy: other sides of obstacles, not the same route by other cells, and not
+round and round."""
 
 import gc
 import math
 import weakref
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -22,6 +22,8 @@ from hybridnav.route import RouteFinder
 from tests.oracle.rays import Rays
 from tests.planner.test_named_plans import map_file  # noqa: F401 - the fixture
 from tests.strategies import class_grids, drawn, occupancy_grid
+
+by_homotopy = partial(hn.plan_alternatives, by="homotopy")
 
 TWO_DOORS = drawn(
     "##############",
@@ -55,44 +57,66 @@ def rows_crossed(alternatives):
 
 @pytest.mark.parametrize("preset", ["grid-astar", "shortest", "portals", "paper"])
 def test_the_second_route_takes_the_other_door(preset):
-    found = hn.plan_alternatives(planner_of(TWO_DOORS, preset), (1.5, 1.5), (12.5, 2.5), 3)
+    found = by_homotopy(planner_of(TWO_DOORS, preset), (1.5, 1.5), (12.5, 2.5), 3)
     assert rows_crossed(found) == [{2}, {6}]
     assert found[0].path.length_m < found[1].path.length_m
     assert found[0].word != found[1].word
 
 
 def test_a_hole_that_is_too_small_makes_no_second_route():
-    found = hn.plan_alternatives(
-        planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 3, least_hole_m2=6.5
-    )
+    found = by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 3, least_hole_m2=6.5)
     assert rows_crossed(found) == [{2}]
 
 
 def test_without_a_path_there_are_no_alternatives():
     walled = TWO_DOORS.copy()
     walled[:, 6] = 0
-    assert len(hn.plan_alternatives(planner_of(walled), (1.5, 1.5), (12.5, 2.5), 3)) == 0
+    assert len(by_homotopy(planner_of(walled), (1.5, 1.5), (12.5, 2.5), 3)) == 0
 
 
 @pytest.mark.parametrize("count", [0, 21, 2.5, "3", None])
 def test_counts_out_of_range_are_refused(count):
     with pytest.raises(hn.InvalidValueError, match="from 1 to 20"):
-        hn.plan_alternatives(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), count)
+        by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), count)
 
 
 def test_a_search_that_gives_up_says_so_and_starts_with_a_shortest_path():
     endpoints = (1.5, 1.5), (12.5, 6.5)
     planner = planner_of(TWO_DOORS, "paper", merge_distance_m=6.0)
     optimum = planner_of(TWO_DOORS).plan(*endpoints).cost
-    whole = hn.plan_alternatives(planner, *endpoints, 3)
+    whole = by_homotopy(planner, *endpoints, 3)
     assert whole.complete
     assert len(whole) == 2
     for room in (1, 20, 100):
-        found = hn.plan_alternatives(planner, *endpoints, 3, most_states=room)
+        found = by_homotopy(planner, *endpoints, 3, most_states=room)
         assert not found.complete
         assert found[0].path.length_m == pytest.approx(optimum)
         assert [other.word for other in found] == [other.word for other in whole][: len(found)]
-    assert hn.plan_alternatives(planner, *endpoints, 1, most_states=100).complete
+    assert by_homotopy(planner, *endpoints, 1, most_states=100).complete
+
+
+@pytest.mark.parametrize("seconds", [0, -1.0, math.nan, "3", None])
+def test_a_time_limit_that_is_none_is_refused(seconds):
+    with pytest.raises(hn.InvalidValueError, match="a number of seconds above 0: leave it out"):
+        by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 2, time_limit_s=seconds)
+
+
+def test_a_search_stops_in_time_with_a_shortest_path(monkeypatch):
+    """The clock strikes after some slices: what was found by then is kept."""
+    classes = np.ones((40, 40), np.uint8)
+    classes[2:38:3, 2:38:3] = 0
+    planner = planner_of(classes, merge_distance_m=30.0)
+    ends = (0.5, 0.5), (39.5, 39.5)
+    whole = by_homotopy(planner, *ends, 20)
+    assert whole.complete
+    looks = iter(range(10**6))
+    monkeypatch.setattr("hybridnav.homotopy.search.perf_counter", lambda: float(next(looks)))
+    late = by_homotopy(planner, *ends, 20, time_limit_s=2.5, most_states=1 << 22)
+    assert late.complete is False
+    assert late.note == "the search stopped after 2.5 s (time_limit_s): there may be more"
+    assert 1 <= len(late) < 20
+    for other, known in zip(late, whole, strict=False):
+        assert other.path.length_m == pytest.approx(known.path.length_m)
 
 
 @pytest.mark.parametrize("most_states", [0, -1, 1 << 27])
@@ -100,9 +124,7 @@ def test_a_search_of_no_or_too_many_states_is_refused(most_states):
     with pytest.raises(
         hn.InvalidValueError, match=r"expected a number from 1 to \d+: leave it out"
     ):
-        hn.plan_alternatives(
-            planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 2, most_states=most_states
-        )
+        by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 2, most_states=most_states)
 
 
 def test_the_search_on_a_map_is_kept_while_the_map_is():
@@ -125,7 +147,7 @@ def test_one_obstacle_has_two_sides_and_no_turns_round_it():
     classes[6:9, 11:14] = 0
     planner = planner_of(classes, merge_distance_m=30.0)
     assert planner.topology.n_places == 1
-    found = hn.plan_alternatives(planner, (1.5, 6.5), (23.5, 6.5), 20)
+    found = by_homotopy(planner, (1.5, 6.5), (23.5, 6.5), 20)
     assert len(found) == 2
     assert {min(a.path.cells[:, 0].max(), 9) for a in found} == {6, 9}
 
@@ -138,8 +160,8 @@ def test_no_route_goes_into_a_room_round_a_table_and_out_again():
     classes[8:10, 18:21] = 1
     classes[16:22, 16:24] = 0
     planner = planner_of(classes, resolution_m=0.25)
-    assert len(hn.plan_alternatives(planner, (0.4, 0.4), (9.6, 0.4), 5)) == 1
-    inside = hn.plan_alternatives(planner, (0.4, 0.4), (5.0, 7.0), 5)
+    assert len(by_homotopy(planner, (0.4, 0.4), (9.6, 0.4), 5)) == 1
+    inside = by_homotopy(planner, (0.4, 0.4), (5.0, 7.0), 5)
     assert len(inside) == 2
 
 
@@ -171,7 +193,7 @@ def test_alternatives_are_legal_paths_of_different_classes_the_optimum_first(cla
     grid = planner.topology.grid
     points = grid.frame.points_of(endpoints)
     best = planner.plan(*points)
-    found = hn.plan_alternatives(planner, points[0], points[1], 4, least_hole_m2=0.0)
+    found = by_homotopy(planner, points[0], points[1], 4, least_hole_m2=0.0)
     assert bool(found) == best.solved
     if found:
         assert found[0].path.length_m == pytest.approx(best.cost)
@@ -238,7 +260,7 @@ def test_no_shorter_class_that_does_not_wind_is_left_out(resolution_m, least_hol
 
 
 def test_start_and_goal_in_one_cell_have_one_path():
-    found = hn.plan_alternatives(planner_of(TWO_DOORS), (1.5, 1.5), (1.6, 1.6), 3)
+    found = by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (1.6, 1.6), 3)
     assert [other.path.length_m for other in found] == [0.0]
 
 
@@ -285,25 +307,46 @@ def test_a_preset_with_ompl_is_refused(cli, map_file):  # noqa: F811
     pytest.importorskip("ompl")
     planner = planner_of(TWO_DOORS, "ompl-rrtconnect")
     with pytest.raises(hn.InvalidValueError, match="without OMPL"):
-        hn.plan_alternatives(planner, (1.5, 1.5), (12.5, 2.5), 2)
-    query = ("plan", map_file, "--from", "kitchen", "--to", "lab", "--alternatives", "2")
+        by_homotopy(planner, (1.5, 1.5), (12.5, 2.5), 2)
+    query: tuple[Any, ...] = (
+        "plan",
+        map_file,
+        "--from",
+        "kitchen",
+        "--to",
+        "lab",
+        "--by",
+        "homotopy",
+    )
+    query += ("--alternatives", "2")
     assert cli(*query, "--preset", "ompl-rrtconnect").refuses(2, "without OMPL")
 
 
 def test_the_command_line_lists_alternatives(cli, map_file):  # noqa: F811
-    query = ("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
-    done = cli(*query, "--alternatives", "3")
+    query: tuple[Any, ...] = (
+        "plan",
+        map_file,
+        "--from",
+        "kitchen",
+        "--to",
+        "lab",
+        "--robot-radius",
+        "0",
+    )
+    query += ("--by", "homotopy")
+    done = cli(*query, "--alternatives", "3", "--at", "point")
     assert done.code == 0
-    way = "by kitchen (door 1), hall (door 2), lab"
-    # From point to point: nearest cells lie in doorways, where there are no other routes.
-    assert f"route 1    7.41 m (octile), class -, {way}" in done.out
+    passed = "by kitchen (door 1), hall (door 2), lab"
+    assert f"route 1    7.41 m (octile), {passed}" in done.out
     assert "route 2" not in done.out
-    nearest = cli(*query, "--alternatives", "3", "--at", "anywhere")
-    assert f"route 1    4.00 m (octile), class -, {way}" in nearest.out
+    assert "routes     1 of 3: no other path passes an obstacle on another side" in done.out
+    nearest = cli(*query, "--alternatives", "3")
+    assert f"route 1    4.00 m (octile), {passed}" in nearest.out
     answer = cli(*query, "--alternatives", "3", "--json").answer
     assert [len(route["points"]) > 1 for route in answer["alternatives"]] == [True]
     assert cli(*query, "--alternatives", "0").code == 2
     assert cli(*query, "--alternatives", "2", "--via", "hall").refuses(2, "--via")
+    assert cli(*query, "--alternatives", "2", "--by", "words").refuses(2, "doors or homotopy")
 
 
 @pytest.fixture
@@ -320,13 +363,23 @@ def two_doors_file(tmp_path):
 
 def test_the_command_line_leads_through_either_door(cli, two_doors_file):
     endpoints = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
-    query = ("plan", two_doors_file, *endpoints, "--robot-radius", "0", "--alternatives", "3")
+    query: tuple[Any, ...] = (
+        "plan",
+        two_doors_file,
+        *endpoints,
+        "--robot-radius",
+        "0",
+        "--alternatives",
+        "3",
+    )
+    query += ("--by", "homotopy")
     done = cli(*query)
+    assert "class" not in done.out
     lines = [line for line in done.out.splitlines() if line.startswith("route ")]
     # Ten straight steps and one diagonal; and up to the other door and down again.
     lengths = [10 + math.sqrt(2), 4 + 5 * math.sqrt(2) + 2 + 4 * math.sqrt(2)]
     assert len(lines) == 2
-    assert lines[0].startswith(f"route 1    {lengths[0]:.2f} m (octile), class ")
+    assert lines[0].startswith(f"route 1    {lengths[0]:.2f} m (octile)")
     routes = cli(*query, "--json").answer["alternatives"]
     ways = [[y for x, y in route["points"] if 6 < x < 8] for route in routes]
     assert [set(way) for way in ways] == [{2.5}, {6.5}]
@@ -336,12 +389,30 @@ def test_the_command_line_leads_through_either_door(cli, two_doors_file):
     assert "route 2" not in small
 
 
-def test_the_command_line_tells_no_more_from_gave_up(cli, two_doors_file, monkeypatch):
+def test_the_command_line_states_that_the_search_stopped(cli, two_doors_file, monkeypatch):
     endpoints = ("--start", "1.5,1.5", "--goal", "12.5,2.5")
-    query = ("plan", two_doors_file, *endpoints, "--robot-radius", "0", "--alternatives", "3")
-    assert "gave up" not in cli(*query).out
+    query: tuple[Any, ...] = (
+        "plan",
+        two_doors_file,
+        *endpoints,
+        "--robot-radius",
+        "0",
+        "--alternatives",
+        "3",
+    )
+    query += ("--by", "homotopy")
+    assert "may be more" not in cli(*query).out
     assert cli(*query, "--json").answer["alternatives_complete"] is True
-    impatient = partial(hn.plan_alternatives, most_states=100)
-    monkeypatch.setattr(hn, "plan_alternatives", impatient)
-    assert "routes     the search gave up: there may be more\n" in cli(*query).out
-    assert cli(*query, "--json").answer["alternatives_complete"] is False
+    limits: dict[str, tuple[Any, str]] = {
+        "most_states": (100, "100 states"),
+        "time_limit_s": (1e-9, "1e-09 s"),
+    }
+    whole = hn.plan_alternatives
+    monkeypatch.setattr("hybridnav.homotopy.search._SLICE", 8)
+    for name, (limit, shown) in limits.items():
+        monkeypatch.setattr(hn, "plan_alternatives", partial(whole, **cast("Any", {name: limit})))
+        told = f"routes     the search stopped after {shown} ({name}): there may be more\n"
+        assert told in cli(*query).out
+        answer = cli(*query, "--json").answer
+        assert answer["alternatives_complete"] is False
+        assert "stopped" in answer["alternatives_note"]

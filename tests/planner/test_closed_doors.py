@@ -246,13 +246,15 @@ def test_alternatives_go_by_no_door_that_is_shut(planners: dict[str, hn.HybridPl
     topology = planner.topology
     cols = topology.grid.shape[1]
     start, goal = topology.grid.frame.points_of([(9, 2), (9, 12)])
-    opened = hn.plan_alternatives(planner, start, goal, 3, least_hole_m2=0.3)
+    opened = hn.plan_alternatives(planner, start, goal, 3, by="homotopy", least_hole_m2=0.3)
     words = [other.word for other in opened]
     for door in topology.rooms.doors:
         shut = crossings(topology, door)
         still = {other.word for other in opened if not moves_of([other.path], cols) & shut}
         assert 1 <= len(still) <= 2
-        found = hn.plan_alternatives(planner, start, goal, 3, least_hole_m2=0.3, blocked=door)
+        found = hn.plan_alternatives(
+            planner, start, goal, 3, by="homotopy", least_hole_m2=0.3, blocked=door
+        )
         assert still <= {other.word for other in found}
         assert not moves_of([other.path for other in found], cols) & shut
         assert found[0].path.length_m == planner.plan(start, goal, blocked=door).cost
@@ -260,7 +262,7 @@ def test_alternatives_go_by_no_door_that_is_shut(planners: dict[str, hn.HybridPl
     assert closed.complete
     assert not closed
     # What was closed for one query is open for the next.
-    again = hn.plan_alternatives(planner, start, goal, 3, least_hole_m2=0.3)
+    again = hn.plan_alternatives(planner, start, goal, 3, by="homotopy", least_hole_m2=0.3)
     assert [other.word for other in again] == words
 
 
@@ -282,7 +284,9 @@ def test_alternatives_keep_off_closed_cells_and_begin_with_the_optimum(
     cells = cells[(cells < grid.shape).all(axis=1)]
     closed = Blocked(cells=cells)
     best = planner.plan(start, goal, blocked=closed)
-    found = hn.plan_alternatives(planner, start, goal, 3, least_hole_m2=0.0, blocked=closed)
+    found = hn.plan_alternatives(
+        planner, start, goal, 3, by="homotopy", least_hole_m2=0.0, blocked=closed
+    )
     assert bool(found) == best.solved
     enterable = grid.enterable()
     enterable[tuple(cells.T)] = False

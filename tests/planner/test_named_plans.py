@@ -332,10 +332,13 @@ def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):
 def test_every_length_and_cost_names_its_metric(cli, map_file):
     query = ("plan", map_file, "--from", "sink", "--to", "lab", "--robot-radius", "0")
     done = cli(*query, "--alternatives", "2")
-    lines = [line for line in done.out.splitlines() if line.startswith(("length", "route"))]
+    lines = [line for line in done.out.splitlines() if line.startswith(("length", "route "))]
     assert len(lines) > 1
     assert " m (any-angle)" in lines[0]
-    assert all(" m (octile)" in line for line in lines[1:])
+    assert all(" m (any-angle)" in line for line in lines[1:])
+    classes = cli(*query, "--alternatives", "2", "--by", "homotopy")
+    assert "\nroute 1    " in classes.out
+    assert " m (octile), by " in classes.out
     pytest.importorskip("ompl")
     weigh = ("--set", "planner.ompl.objective=clearance", "--set", "planner.ompl.clearance_m=3")
     done = cli(*query, "--at", "point", "--preset", "ompl-rrtconnect", *weigh)

@@ -132,7 +132,7 @@ def routes_of(ax):
 
 
 def test_all_alternatives_are_drawn_each_in_its_colour(ring):
-    found = hn.plan_alternatives(ring, "west", (3.75, 1.75), 3)
+    found = hn.plan_alternatives(ring, "west", (3.75, 1.75), 3, at="point")
     assert len(found) == 2
     ax = plot_alternatives(ring.topology, found)
     lines = routes_of(ax)
@@ -142,7 +142,10 @@ def test_all_alternatives_are_drawn_each_in_its_colour(ring):
     # Where they share cells, the shorter lies on the longer, which shows on both its sides.
     assert lines[0].get_zorder() > lines[1].get_zorder()
     assert lines[0].get_linewidth() < lines[1].get_linewidth()
-    told = [f"route {n}, {a.path.length_m:.2f} m" for n, a in enumerate(found, start=1)]
+    told = [
+        f"route {n}, {a.path.length_m:.2f} m, by door {a.doors[0]}"
+        for n, a in enumerate(found, start=1)
+    ]
     assert legend(ax)[:2] == told
     doors = {door.number for door in ring.topology.rooms.doors}
     assert set(texts(ax, r"door-\d+")) == {f"door-{number}" for number in doors}
@@ -157,7 +160,9 @@ def test_twenty_routes_are_all_told_apart(ring):
 
 
 def test_routes_that_share_all_their_way_show_each(ring):
-    (path, _) = hn.plan_alternatives(ring, "west", "east", 2, least_hole_m2=0.5)
+    (path, _) = hn.plan_alternatives(
+        ring, "west", "east", 2, by="homotopy", at="point", least_hole_m2=0.5
+    )
     same = Alternatives((path,) * 5, complete=True)
     ax = plot_alternatives(ring.topology, same, width_in=4.0)
     picture = FigureCanvasAgg(ax.figure.figure)
@@ -178,7 +183,7 @@ def test_alternatives_on_a_map_without_rooms_and_without_a_path():
     grid = occupancy_grid(RING, resolution_m=0.5)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
     planner = hn.HybridPlanner(topology)
-    found = hn.plan_alternatives(planner, (0.75, 1.75), (3.75, 1.75), 2)
+    found = hn.plan_alternatives(planner, (0.75, 1.75), (3.75, 1.75), 2, by="homotopy")
     ax = plot_alternatives(topology, found, title="")
     assert (len(routes_of(ax)), ax.get_title()) == (2, "")
     assert "places" in legend(ax)
@@ -201,7 +206,7 @@ def test_the_command_draws_all_routes(cli, tmp_path, ring, endpoints):
     hn.save_rooms(tmp_path / "rooms.yaml", rooms.labels, rooms.grid)
     picture = tmp_path / "m.svg"
     query = ("--from", endpoints[0], "--to", endpoints[1], "--alternatives", 2, "--robot-radius", 0)
-    done = cli("plan", tmp_path / "m.yaml", *query, "--plot", picture)
+    done = cli("plan", tmp_path / "m.yaml", *query, "--at", "point", "--plot", picture)
     assert done.code == 0
     drawn_routes = set(re.findall(r'id="(route-\d)"', picture.read_text()))
     assert drawn_routes == {f"route-{n}" for n in (1, 2)}

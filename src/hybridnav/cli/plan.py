@@ -27,12 +27,13 @@ from hybridnav.cli.options import (
     SetOption,
     SmoothOption,
 )
-from hybridnav.cli.request import Request
+from hybridnav.cli.request import Request, Wanted
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 
 if TYPE_CHECKING:
     from hybridnav.cli.rendering import Waypoint
+    from hybridnav.planner.alternatives import By
     from hybridnav.planner.named import At
 
 Point = tuple[float, ...]
@@ -68,11 +69,11 @@ ViaOption = Annotated[
     ),
 ]
 AtOption = Annotated[
-    str | None,
+    str,
     typer.Option(
         "--at",
         metavar="WHERE",
-        help="Where in a room: anywhere (the nearest cell), or its point (with --alternatives).",
+        help="Where in a room: anywhere (the nearest cell), or its point.",
     ),
 ]
 AlternativesOption = Annotated[
@@ -82,7 +83,40 @@ AlternativesOption = Annotated[
         metavar="N",
         min=1,
         max=20,
-        help="Up to N routes by other doors or on other sides of obstacles.",
+        help="Up to N routes by other doors, the plain plan first.",
+    ),
+]
+ByOption = Annotated[
+    str,
+    typer.Option(
+        "--by",
+        metavar="WHAT",
+        help="What makes routes differ: doors, or homotopy (sides of obstacles, exact).",
+    ),
+]
+OverlapOption = Annotated[
+    float,
+    typer.Option(
+        "--max-overlap",
+        metavar="SHARE",
+        min=0,
+        max=1,
+        help="Share that a route by doors may have in common with a shorter one.",
+    ),
+]
+StretchOption = Annotated[
+    float,
+    typer.Option(
+        "--max-stretch",
+        metavar="FACTOR",
+        min=1,
+        help="Length of a route by doors over that of the first, at most.",
+    ),
+]
+InsideOption = Annotated[
+    bool,
+    typer.Option(
+        "--inside-rooms", help="Also routes by the same doors, on other sides of obstacles."
     ),
 ]
 LeastHoleOption = Annotated[
@@ -91,7 +125,7 @@ LeastHoleOption = Annotated[
         "--least-hole",
         metavar="A",
         min=0,
-        help="Square metres of an obstacle whose two sides make two routes.",
+        help="Square metres of an obstacle whose two sides make two routes, by homotopy.",
     ),
 ]
 CompareOption = Annotated[
@@ -107,9 +141,13 @@ def plan(
     origin: FromOption = None,
     to: ToOption = None,
     via: ViaOption = None,
-    at: AtOption = None,
+    at: AtOption = "anywhere",
     rooms_file: RoomsOption = None,
     alternatives: AlternativesOption = 1,
+    by: ByOption = "doors",
+    max_overlap: OverlapOption = 0.8,
+    max_stretch: StretchOption = 2.0,
+    inside_rooms: InsideOption = False,
     least_hole_m2: LeastHoleOption = 1.0,
     blocked: BlockedOption = None,
     costs: CostsOption = None,
@@ -133,7 +171,7 @@ def plan(
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     check_picture(plot)
-    where = _checked_at(at, alternatives)
+    where = _checked_at(at)
     _check_least_hole(least_hole_m2)
     given = parsed_costs(costs)
     settings = read_settings(
@@ -149,8 +187,12 @@ def plan(
     first, last = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
-    if settings.planner.refine == "ompl" and alternatives > 1:
-        raise UsageError(f"--alternatives needs a preset without OMPL, not {settings.name}")
+    wanted = Wanted(
+        alternatives, _checked_by(by), max_overlap, max_stretch, inside_rooms, least_hole_m2
+    )
+    if settings.planner.refine == "ompl" and wanted.needs_grid:
+        option = "--by homotopy" if by == "homotopy" else "--inside-rooms"
+        raise UsageError(f"{option} needs a preset without OMPL, not {settings.name}")
     request = Request(
         source=Source(map_file, settings, reading, keep, keep_in),
         waypoints=[first, *map(_parsed_waypoint, via or ()), last],
@@ -158,8 +200,7 @@ def plan(
         costs=given,
         rooms_file=rooms_file,
         at=where,
-        alternatives=alternatives,
-        least_hole_m2=least_hole_m2,
+        wanted=wanted,
         compare=compare,
         plot=plot,
         as_json=as_json,
@@ -188,14 +229,20 @@ def _parsed_waypoint(text: str) -> Waypoint:
     return point
 
 
-def _checked_at(at: str | None, alternatives: int) -> At:
-    if at is None:
-        return "anywhere" if alternatives == 1 else "point"
+def _checked_at(at: str) -> At:
     if at == "anywhere":
         return "anywhere"
     if at == "point":
         return "point"
     raise UsageError(f"--at must be anywhere or point, got {at!r:.80}")
+
+
+def _checked_by(by: str) -> By:
+    if by == "doors":
+        return "doors"
+    if by == "homotopy":
+        return "homotopy"
+    raise UsageError(f"--by must be doors or homotopy, got {by!r:.80}")
 
 
 def _check_least_hole(area_m2: float) -> None:

@@ -148,12 +148,14 @@ def _tour_lines(figures: dict[str, Any]) -> list[str]:
     for number, line in enumerate(figures["words"]):
         lines.append(f"{'' if number else 'words':<10} {line}")
     for number, other in enumerate(figures.get("alternatives", ()), start=1):
-        word = " ".join(f"{letter:+d}" for letter in other["word"]) or "-"
         rooms = f", by {', '.join(other['rooms'])}" if other["rooms"] else ""
+        shared = (
+            f", {other['overlap']:.0%} in common" if number > 1 and other["word"] is None else ""
+        )
         length = f"{other['length_m']:.2f} m ({other['metric']})"
-        lines.append(f"route {number:<4} {length}, class {word}{rooms}")
-    if not figures.get("alternatives_complete", True):
-        lines.append("routes     the search gave up: there may be more")
+        lines.append(f"route {number:<4} {length}{shared}{rooms}")
+    if figures.get("alternatives_note"):
+        lines.append(f"routes     {figures['alternatives_note']}")
     return lines
 
 

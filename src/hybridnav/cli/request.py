@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.cli.costs import Costs
     from hybridnav.cli.keep import Source
     from hybridnav.cli.rendering import Waypoint
+    from hybridnav.planner.alternatives import By
     from hybridnav.planner.named import At
 
 _GRID_SEARCH = {
@@ -38,6 +39,23 @@ _GRID_SEARCH = {
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """What is asked for beside the plan: alternatives, as for `plan_alternatives`."""
+
+    count: int
+    by: By
+    max_overlap: float
+    max_stretch: float
+    inside_rooms: bool
+    least_hole_m2: float
+
+    @property
+    def needs_grid(self) -> bool:
+        """Whether paths of cells are searched."""
+        return self.count > 1 and (self.by == "homotopy" or self.inside_rooms)
+
+
+@dataclass(frozen=True)
 class Request:
     """What a command line asks for: a plan between two points, or a tour described in rooms."""
 
@@ -48,8 +66,7 @@ class Request:
     costs: Costs
     rooms_file: Path | None
     at: At
-    alternatives: int
-    least_hole_m2: float
+    wanted: Wanted
     compare: bool
     plot: Path | None
     as_json: bool
@@ -61,7 +78,7 @@ class Request:
             any(isinstance(waypoint, str) for waypoint in self.waypoints)
             or self.closing.needs_rooms
         )
-        has_more = len(self.waypoints) > 2 or self.alternatives > 1  # noqa: PLR2004 - start and goal
+        has_more = len(self.waypoints) > 2 or self.wanted.count > 1  # noqa: PLR2004 - start and goal
         return names_rooms or has_more or self.rooms_file is not None
 
     def run(self) -> bool:
@@ -86,7 +103,7 @@ class Request:
         found = self._alternatives(planner, closed, seconds)
         beside: dict[str, Any] = {}
         if found is not None:
-            beside = _alternatives_figures(topology, found)
+            beside = _alternatives_figures(found)
         elif self.compare and isinstance(outcome, hn.PlanResult):
             beside = _compared(self._on_whole_grid(topology, closed, costs), outcome)
         self._respond(grid, outcome, beside, seconds)
@@ -140,16 +157,20 @@ class Request:
     def _alternatives(
         self, planner: hn.HybridPlanner, closed: hn.Blocked | None, seconds: dict[str, float]
     ) -> hn.Alternatives | None:
-        """Find routes of different classes between the two waypoints, if asked for."""
-        if self.alternatives == 1:
+        """Find alternatives between the two waypoints, if asked for."""
+        if self.wanted.count == 1:
             return None
         with stage("finding alternatives", seconds, "alternatives"):
             return hn.plan_alternatives(
                 planner,
                 self.waypoints[0],
                 self.waypoints[-1],
-                self.alternatives,
-                least_hole_m2=self.least_hole_m2,
+                self.wanted.count,
+                by=self.wanted.by,
+                max_overlap=self.wanted.max_overlap,
+                max_stretch=self.wanted.max_stretch,
+                inside_rooms=self.wanted.inside_rooms,
+                least_hole_m2=self.wanted.least_hole_m2,
                 at=self.at,
                 blocked=closed,
             )
@@ -169,8 +190,8 @@ class Request:
 
     def _beside_refusal(self, refused: hn.PlanResult) -> dict[str, Any]:
         """Return the figures of what was asked for beside a plan that was refused."""
-        if self.alternatives > 1:
-            return {"alternatives": [], "alternatives_complete": True}
+        if self.wanted.count > 1:
+            return _alternatives_figures(hn.Alternatives((), complete=True))
         return _compared(refused, None) if self.compare else {}
 
     def _respond(
@@ -214,26 +235,21 @@ def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[
     }
 
 
-def _alternatives_figures(topology: hn.TopologicalMap, found: hn.Alternatives) -> dict[str, Any]:
-    """Return routes with the rooms and doors that they pass, and whether there may be more."""
+def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
+    """Return alternatives with the rooms and doors that they pass, and whether they are all."""
     # Loads numba, which help and wrong usage can do without.
-    from hybridnav.planner.itinerary import NOWHERE, Guide  # noqa: PLC0415
+    from hybridnav.planner.itinerary import NOWHERE  # noqa: PLC0415
 
-    guide = Guide(topology.rooms)
     routes = []
-    for alternative in found:
-        legs = guide.legs(alternative.path)
-        passed = [
-            f"{leg.room or NOWHERE}" + (f" (door {leg.door.number})" if leg.door else "")
-            for leg in legs
+    for number, other in enumerate(found):
+        rooms = [
+            (leg.room or NOWHERE) + (f" (door {leg.door.number})" if leg.door else "")
+            for leg in other.tour.legs
         ]
-        routes.append(
-            {
-                "metric": "octile",
-                "length_m": alternative.path.length_m,
-                "word": list(alternative.word),
-                "rooms": passed,
-                "points": alternative.path.points.round(6).tolist(),
-            }
-        )
-    return {"alternatives": routes, "alternatives_complete": found.complete}
+        stretch = other.tour.length_m / found[0].tour.length_m if number else 1.0
+        routes.append(other.to_dict() | {"rooms": rooms, "stretch": stretch})
+    return {
+        "alternatives": routes,
+        "alternatives_complete": found.complete,
+        "alternatives_note": found.note,
+    }

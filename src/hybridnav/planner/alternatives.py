@@ -1,55 +1,86 @@
-"""Paths of different homotopy classes between two points."""
+"""Alternatives: paths between two points that differ for people."""
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from dataclasses import dataclass, replace
+from numbers import Real
+from typing import TYPE_CHECKING, Any, Literal, get_args, overload
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.homotopy.search import MOST_STATES, alternative_search
-from hybridnav.planner.named import At, check_names, points_of_waypoints
-from hybridnav.result import Path
-from hybridnav.search.grid_search import GridSearch
-from hybridnav.search.moves import path_length_in_cells
+from hybridnav.homotopy.search import MOST_STATES, TIME_LIMIT_S
+from hybridnav.planner.by_classes import ClassEffort, ClassTours
+from hybridnav.planner.by_doors import Chosen, DoorTours, Limits
+from hybridnav.planner.tour import Tour, plan_tour
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import LongArray
     from hybridnav.homotopy.classes import Word
     from hybridnav.planner.blocked import Closable
+    from hybridnav.planner.named import At
     from hybridnav.planner.planner import HybridPlanner
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.result import Path, PlanResult
 
+By = Literal["doors", "homotopy"]
+"""Difference between two paths: the doors that they pass, or the sides of obstacles."""
 MOST = 20
 """Most alternatives of one query."""
 
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """A path and its class.
+    """A plan with its words, and how much of its path it shares with another.
 
     Examples
     --------
-    >>> probability = np.zeros((5, 5))
-    >>> probability[1:4, 1:4] = 1.0
-    >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
-    >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid))
-    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3)
-    >>> found[0].word == found[1].word
-    False
+    >>> probability = np.zeros((3, 7))
+    >>> probability[1, 1:6] = 1.0
+    >>> rooms = hn.RoomLabels(("west", "east"), np.tile([0, 0, 0, 1, 1, 1, 1], (3, 1)))
+    >>> grid = hn.OccupancyGrid(probability, robot_radius_m=0)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    >>> found = hn.plan_alternatives(hn.HybridPlanner(topology), (0.5, 1.5), (6.5, 1.5), 3)
+    >>> [(other.doors, round(other.path.length_m, 2)) for other in found]
+    [((1,), 6.83), ((2,), 6.83)]
     """
 
-    path: Path
-    word: Word
-    """Reduced word of its homotopy class; equal for paths that differ only by cells."""
+    tour: Tour
+    """The plan. Its lower bound holds for every path between its endpoints, not only for those by
+    the same doors: the gap states by how much the alternative can be longer than the optimum."""
+    overlap: float = 0.0
+    """Share of its length in common with one before it, the greatest one; 0 for the first."""
+    word: Word | None = None
+    """Reduced word of its homotopy class, by homotopy; None by doors."""
+
+    @property
+    def result(self) -> PlanResult:
+        """The result of the plan."""
+        return self.tour.results[0]
+
+    @property
+    def path(self) -> Path:
+        """The path."""
+        path = self.result.path
+        assert path is not None  # noqa: S101 - alternatives are solved
+        return path
+
+    @property
+    def doors(self) -> tuple[int, ...]:
+        """Numbers of the doors passed, in order."""
+        return tuple(leg.door.number for leg in self.tour.legs if leg.door is not None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for strict JSON: those of the tour, `doors`, `overlap` and `word`."""
+        word = None if self.word is None else list(self.word)
+        doors = {"doors": list(self.doors), "overlap": self.overlap, "word": word}
+        return self.tour.to_dict() | doors
 
 
 @dataclass(frozen=True, eq=False)
 class Alternatives(Sequence[Alternative]):
-    """Paths of different classes, the shortest first, and whether they are complete.
+    """Alternatives of one query, and whether they are all.
 
     Examples
     --------
@@ -57,16 +88,18 @@ class Alternatives(Sequence[Alternative]):
     >>> probability[1:4, 1:4] = 1.0
     >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
     >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid))
-    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3)
+    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3, by="homotopy")
     >>> len(found), found.complete
     (2, True)
     """
 
     found: tuple[Alternative, ...]
-    """The paths; none if no path exists."""
+    """The alternatives; none if no path exists."""
     complete: bool
-    """Whether these are as many as requested, or all that exist; False if the search gave up, so
-    that there may be more."""
+    """Whether these are as many as requested, or all within the limits; False if the search
+    stopped before, so that there may be more."""
+    note: str = ""
+    """The reason why there are fewer than requested, one line; empty if there are not."""
 
     @overload
     def __getitem__(self, index: int) -> Alternative: ...
@@ -79,130 +112,177 @@ class Alternatives(Sequence[Alternative]):
         return self.found[index]
 
     def __len__(self) -> int:
-        """Return the number of paths found."""
+        """Return the number of alternatives found."""
         return len(self.found)
 
 
-def plan_alternatives(  # noqa: PLR0913 - the last four have defaults
+def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     planner: HybridPlanner,
     start: ArrayLike | str,
     goal: ArrayLike | str,
     count: int,
     *,
-    least_hole_m2: float = 1.0,
-    at: At = "point",
+    by: By = "doors",
+    max_overlap: float = 0.8,
+    max_stretch: float = 2.0,
+    inside_rooms: bool = False,
+    at: At = "anywhere",
     blocked: Closable | None = None,
+    least_hole_m2: float = 1.0,
     most_states: int = MOST_STATES,
+    time_limit_s: float = TIME_LIMIT_S,
 ) -> Alternatives:
-    """Plan paths of different homotopy classes: by another door, on the other side of an obstacle.
+    """Plan paths between the same two points that differ for people.
 
-    The paths are octile for every preset, because only the lengths of cell paths are known for
-    classes. The first is a shortest one, the planner's own if that is octile and shortest. The
-    others follow by length, each a shortest path of its class. Winding paths are left out: after a
-    circle round a hole they return to an earlier point, or within sight of it along a row or a
-    column, nearer than the side of a square hole of the least area (at least one cell, at most 1 m
-    and half the shortest path).
+    By doors, two paths differ by the sequence of doors that they pass. The first is the plain plan.
+    Then sequences are tried in the order of their length on the graph of doors, which measures the
+    paths inside rooms: for each pair of doors of a room, the shortest sequence that passes both in
+    turn, unless it passes a room twice. Each that keeps to the limits is planned by the preset of
+    the planner while the doors that lead off it are closed, and the path has to keep to the limits
+    too. At most four sequences for each requested alternative are planned.
+
+    By homotopy, two paths differ if they pass an obstacle on two sides. All are octile paths,
+    whatever the preset: the first is a shortest one, the planner's own if that is octile and
+    shortest, and each other is a shortest path of its class on the whole map. They have no limits.
+    Winding paths are left out: after a circle round a hole they return to an earlier point, or
+    within sight of it along a row or a column, nearer than the side of a square hole of the least
+    area (at least one cell, at most 1 m and half the shortest path).
 
     Parameters
     ----------
     planner
-        Planner of the first path; not with OMPL.
+        Planner of all paths; by homotopy not with OMPL.
     start, goal
-        Points `(x, y)` in metres, or names as in `HybridPlanner.plan`.
+        Points `(x, y)` in metres, or names as in `HybridPlanner.plan`. All alternatives have the
+        endpoints of the plain plan.
     count
         Most alternatives, the first included, from 1 to 20.
-    least_hole_m2
-        Holes of a smaller area do not count: obstacles and, unless they may be entered, unexplored
-        islands, with all that they surround, in square metres.
+    by
+        `"doors"`, for people, on a map with rooms; or `"homotopy"`, exact.
+    max_overlap
+        Greatest share of its length, from 0 to 1, that an alternative by doors has in common with a
+        shorter one: what lies within a robot's diameter (at least a cell) of the other path, and
+        all between the same two doors of one room.
+    max_stretch
+        Greatest length of an alternative by doors over that of the first, at least 1.
+    inside_rooms
+        Whether paths by the same doors count as alternatives too if they pass an obstacle inside a
+        room on two sides. Then only what lies near the other path is in common. Not with OMPL.
     at
-        Position in a named room. With `"anywhere"`, all alternatives start and end at the cells
-        that suit the shortest path.
+        Position in a named room, as in `HybridPlanner.plan`.
     blocked
         Closures for this query, as in `HybridPlanner.plan`. They make no holes: paths on both sides
         of a closed area are of one class if nothing else lies between them.
+    least_hole_m2
+        By homotopy and inside rooms, holes of a smaller area do not count: obstacles and, unless
+        they may be entered, unexplored islands, with all that they surround, in square metres.
     most_states
-        Pairs of a cell and a class that are looked at before the search gives up, from 1 to 2^26;
-        more take more time and memory.
+        By homotopy and inside rooms, pairs of a cell and a class that are looked at before the
+        search stops, from 1 to 2^26; more take more time and memory.
+    time_limit_s
+        By homotopy and inside rooms, seconds before the search stops.
 
     Returns
     -------
     Alternatives
-        Paths of different classes, the shortest first; none if no path exists. Fewer than `count`
-        if there are no more, or, with `complete` False, if the search gave up.
+        The first, then the others by length; none if no path exists. If there are fewer than
+        requested, its `note` states the reason.
 
     Raises
     ------
     InvalidValueError
-        When the count or the area is out of range, an end is not valid, a closed item is not on the
-        map, the planner refines with OMPL or plans by costs, or its grid allows corner cutting.
+        When an option is out of range, an end is not valid, a closed item is not on the map, the
+        planner plans by costs, or, by homotopy and inside rooms, the planner refines with OMPL or
+        its grid allows corner cutting.
 
     Examples
     --------
     >>> probability = np.zeros((5, 5))
     >>> probability[1:4, 1:4] = 1.0
     >>> pyramid = hn.DualGraphPyramid.build(hn.OccupancyGrid(probability, robot_radius_m=0))
-    >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid))
-    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3)
-    >>> [one.path.length_m for one in found]
+    >>> planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset="octile")
+    >>> found = hn.plan_alternatives(planner, (0.5, 0.5), (4.5, 4.5), 3, by="homotopy")
+    >>> [other.path.length_m for other in found]
     [8.0, 8.0]
     """
-    wanted = _checked(count)
-    if planner.preset.planner.refine == "ompl":
-        raise InvalidValueError(
-            "alternatives are paths of the grid: ask a preset without OMPL for them, "
-            f"not {planner.preset.name}"
-        )
+    limits = _checked(Limits(count, max_overlap, max_stretch))
+    if by not in get_args(By):
+        raise InvalidValueError(f"by must be 'doors' or 'homotopy', got {by!r:.80}")
     if planner.costs is not None:
         raise InvalidValueError(
             "alternatives are shortest paths, and this planner plans by costs: ask one without"
         )
-    check_names(planner.topology, [start, goal])
     closed = planner.closed(blocked)
-    endpoints = points_of_waypoints(
-        planner.topology, planner.preset.planner, [start, goal], at=at, closed=closed
-    )
-    topology = planner.topology
-    allowed = planner.preset.planner.allow_unexplored
-    search = alternative_search(topology, allow_unexplored=allowed, least_hole_m2=least_hole_m2)
-    result = planner.plan(*endpoints, smooth="none", blocked=closed)
-    own = result.path
-    if own is None:
-        return Alternatives((), complete=True)
-    first, last = (tuple(own.cells[i].tolist()) for i in (0, -1))
-    flat = None if closed is None else closed.flat
-    found = search.paths(first, last, wanted, closed=flat, most_states=most_states)
-    alternatives = {}
-    length_cells = path_length_in_cells(own.cells)
-    if result.metric == "octile" and length_cells <= found.shortest_cells * (1 + 1e-12):
-        alternatives[search.classes.word_of_path(own.cells)] = own
-    elif not found.paths:  # the search gave up before it reached the goal
-        enterable = topology.grid.enterable(allow_unexplored=allowed)
-        grid_search = GridSearch(enterable, corner_cutting=False)
-        cells = grid_search.search(first, last, blocked=flat).cells
-        if cells is not None:  # always: the planner found a path
-            word = search.classes.word_of_path(cells)
-            alternatives[word] = _path(topology, cells, found.shortest_cells)
-    for other in found.paths:
-        if len(alternatives) < wanted and other.word not in alternatives:
-            alternatives[other.word] = _path(topology, other.cells, other.length_cells)
-    return Alternatives(
-        tuple(Alternative(path, word) for word, path in alternatives.items()),
-        complete=found.complete or len(alternatives) == wanted,
-    )
-
-
-def _checked(count: int) -> int:
-    try:
-        wanted = operator.index(count)
-    except TypeError:
-        wanted = 0
-    if not 1 <= wanted <= MOST:
-        raise InvalidValueError(
-            f"alternatives must be a whole number from 1 to {MOST}, got {count!r:.80}"
+    waypoints = [start, goal]
+    classes = None
+    if by == "homotopy" or inside_rooms:
+        effort = ClassEffort(least_hole_m2, most_states, time_limit_s)
+        classes = ClassTours(planner, waypoints, closed, effort)
+    first = plan_tour(planner, waypoints, at=at, blocked=closed)
+    if not first.solved:
+        return Alternatives((), complete=True, note=f"no path was planned: {first.status}")
+    if by == "homotopy" and classes is not None:
+        found = tuple(
+            Alternative(tour, word=word) for tour, word in classes.find(first, limits.count)
         )
-    return wanted
+        note = classes.stopped or _fewer(
+            len(found), limits, "no other path passes an obstacle on another side"
+        )
+        return Alternatives(found, complete=not classes.stopped, note=note)
+    search = None
+    chosen = [Chosen(first)]
+    if planner.topology.pyramid.rooms is not None:
+        search = DoorTours(planner, first, waypoints, closed)
+        chosen = search.find(limits)
+        if classes is not None and len(chosen) < limits.count:
+            chosen = classes.inside(search, chosen, limits)
+    stopped = _stopped(search, classes) if len(chosen) < limits.count else ""
+    found = tuple(Alternative(one.tour, one.overlap) for one in chosen)
+    note = stopped or _fewer(len(found), limits, _reason(search, limits))
+    return Alternatives(found, complete=not stopped, note=note)
 
 
-def _path(topology: TopologicalMap, cells: LongArray, length_cells: float) -> Path:
-    grid = topology.grid
-    return Path(cells, grid.frame.points_of(cells), length_cells * grid.resolution_m)
+def _checked(limits: Limits) -> Limits:
+    """Return the limits if they are in range."""
+    try:
+        count = operator.index(limits.count)
+    except TypeError:
+        count = 0
+    if not 1 <= count <= MOST:
+        raise InvalidValueError(
+            f"alternatives must be a whole number from 1 to {MOST}, got {limits.count!r:.80}"
+        )
+    for name, low, high in (("max_overlap", 0.0, 1.0), ("max_stretch", 1.0, math.inf)):
+        value = getattr(limits, name)
+        if not (isinstance(value, Real) and low <= float(value) <= high):
+            most = "or more" if math.isinf(high) else f"to {high:g}"
+            raise InvalidValueError(
+                f"{name} must be a number from {low:g} {most}, got {value!r:.80}"
+            )
+    return replace(limits, count=count)
+
+
+def _stopped(search: DoorTours | None, classes: ClassTours | None) -> str:
+    """Describe which search stopped before it had looked at everything."""
+    if classes is not None and classes.stopped:
+        return classes.stopped
+    if search is not None and not search.is_complete:
+        return f"the search stopped after {search.n_planned} sequences of doors: there may be more"
+    return ""
+
+
+def _fewer(count: int, limits: Limits, reason: str) -> str:
+    """Return the reason why there are fewer alternatives than requested, empty if there are not."""
+    return "" if count >= limits.count else f"{count} of {limits.count}: {reason}"
+
+
+def _reason(search: DoorTours | None, limits: Limits) -> str:
+    """Describe why there are no more alternatives by doors."""
+    if search is None:
+        return "the map has no rooms, so no doors; by homotopy, sides of obstacles count"
+    if search.is_in_one_room:
+        return "start and goal are in one room; by homotopy, sides of obstacles count"
+    return (
+        f"every other sequence of doors shares more than {limits.max_overlap:.0%} with a shorter "
+        f"one, or is longer than {limits.max_stretch:g} times the first"
+    )

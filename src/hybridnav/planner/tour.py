@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav.planner.blocked import Closable
+    from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner, Smooth
     from hybridnav.result import Metric, PlanResult
 
@@ -180,7 +181,7 @@ def plan_tour(
     *,
     at: At = "anywhere",
     smooth: Smooth | None = None,
-    blocked: Closable | None = None,
+    blocked: Closable | ClosedCells | None = None,
 ) -> Tour:
     """Plan a tour that visits waypoints in the given order.
 
@@ -233,6 +234,23 @@ def plan_tour(
         results.append(planner.plan(*pair, smooth=smooth, blocked=closed))
         if not results[-1].solved:
             break
+    return tour_of(planner, results, waypoints)
+
+
+def tour_of(
+    planner: HybridPlanner, results: Sequence[PlanResult], waypoints: Sequence[ArrayLike | str]
+) -> Tour:
+    """Return the tour of plans from waypoint to waypoint.
+
+    Parameters
+    ----------
+    planner
+        Planner of the map; without rooms the tour has no legs.
+    results
+        Plans in order, at least one; only the last may be unsolved.
+    waypoints
+        Points or names, one more than plans if all are solved.
+    """
     topology = planner.topology
     legs: list[Leg] = []
     if results[-1].solved and topology.pyramid.rooms is not None:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
 
 
-__all__ = ["cell_pairs", "endpoints_of", "find_cracks", "middles_of", "sides_of"]
+__all__ = ["cell_pairs", "endpoints_of", "find_cracks", "middle_sides", "middles_of", "sides_of"]
 
 
 def endpoints_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
@@ -36,8 +36,8 @@ def sides_of(base_edges: LongArray, cols: int) -> FloatArray:
     return middles
 
 
-def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray:
-    """Return the point in the middle of each boundary.
+def middle_sides(sides: FloatArray, boundary: LongArray, count: int) -> LongArray:
+    """Return the side in the middle of each boundary.
 
     Parameters
     ----------
@@ -50,15 +50,20 @@ def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray
 
     Returns
     -------
-    FloatArray
-        float64 (count, 2), the side nearest the mean of all sides of its boundary, so that the
-        point lies on the boundary; ties go to the first side.
+    LongArray
+        int64 (count,), the side nearest the mean of all sides of its boundary, so that its middle
+        lies on the boundary; ties go to the first side.
     """
     sizes = np.bincount(boundary, minlength=count)
     sums = [np.bincount(boundary, weights=w, minlength=count) for w in sides.T]
     mean = np.stack(sums, axis=1) / sizes[:, None]
     squared = ((sides - mean[boundary]) ** 2).sum(axis=1)
     order = np.lexsort((squared, boundary))
-    starts = np.cumsum(sizes) - sizes
-    middles: FloatArray = sides[order[starts]]
+    found: LongArray = order[np.cumsum(sizes) - sizes]
+    return found
+
+
+def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray:
+    """Return the middle of the side that `middle_sides` returns, float64 (count, 2)."""
+    middles: FloatArray = sides[middle_sides(sides, boundary, count)]
     return middles

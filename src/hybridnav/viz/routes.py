@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.lines import Line2D
 
-from hybridnav.planner.itinerary import Guide
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
@@ -40,6 +39,8 @@ _TOUR_WIDTH, _WAYPOINT_POINTS = 1.6, 5.0
 _ROUTE_WIDTH, _WIDER, _CASING = 1.6, 1.9, 0.6
 """Line widths: longer routes are wider and below the shorter ones, so that all show where they
 overlap."""
+_MOST_DOORS = 8
+"""Doors of a route that the legend names."""
 _Dashes = tuple[float, tuple[float, ...]]
 _DASHES: tuple[_Dashes | None, ...] = (
     None,
@@ -120,11 +121,11 @@ def plot_alternatives(
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
-    """Draw routes of different homotopy classes, each in its own colour, on rooms or places.
+    """Draw alternative routes, each in its own colour, on rooms or places.
 
-    The legend shows the number of each route, 1 for the shortest, and its length. Where routes
-    overlap, the longer one is the wider line below. With rooms, all doors that the routes pass have
-    their numbers. More than five routes differ by dashes too.
+    The legend shows the number of each route, 1 for the plain plan, its length and its doors. Where
+    routes overlap, the later one is the wider line below. With rooms, all doors that the routes
+    pass have their numbers. More than five routes differ by dashes too.
 
     Parameters
     ----------
@@ -154,27 +155,34 @@ def plot_alternatives(
     """
     paths = [alternative.path for alternative in alternatives]
     canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
-    legs: list[Leg] = []
-    if paths and topology.pyramid.rooms is not None:
-        guide = Guide(topology.rooms)
-        legs = [leg for path in paths for leg in guide.legs(path)]
+    legs = [leg for alternative in alternatives for leg in alternative.tour.legs]
     endpoints = list(paths[0].points[[0, -1]]) if paths else []
     lines = [path.points for path in paths]
     ground, labels = _draw_ground(canvas, topology, legs, lines, style.PALE)
     entries: list[Entry] = []
     styles = itertools.product(_DASHES, style.ROUTES)
-    for number, (path, (dashes, colour)) in enumerate(zip(paths, styles, strict=False)):
-        line = _route_line(canvas, path.points, number, colour, dashes)
+    for number, (one, (dashes, colour)) in enumerate(zip(alternatives, styles, strict=False)):
+        line = _route_line(canvas, one.path.points, number, colour, dashes)
         line.set_gid(f"route-{number + 1}")
         canvas.ax.add_line(line)
         sample = Line2D([], [], color=colour, linestyle=dashes or "-", lw=2.2 * canvas.sizes.line)
-        entries.append((sample, f"route {number + 1}, {path.length_m:.2f} m"))
+        entries.append((sample, f"route {number + 1}, {one.path.length_m:.2f} m{_by(one.doors)}"))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
     along = np.concatenate(lines) if lines else np.empty((0, 2))
     draw_markers(canvas, markers, along, labels=labels)
     text = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
     words = [topology.grid.name, text] if title is None else [title]
     return finish(canvas, entries + ground, words)
+
+
+def _by(doors: Sequence[int]) -> str:
+    """Return the doors of a route for the legend, the first and the last of many."""
+    if not doors:
+        return ""
+    shown = [str(door) for door in doors]
+    if len(doors) > _MOST_DOORS:
+        shown = [*shown[: _MOST_DOORS - 2], "...", shown[-1]]
+    return f", by door{'s' if len(doors) > 1 else ''} {', '.join(shown)}"
 
 
 def _route_line(

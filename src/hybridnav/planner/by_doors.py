@@ -1,0 +1,264 @@
+"""Alternatives by sequences of doors: each is planned by the preset, with other doors closed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeGuard
+
+import numpy as np
+
+from hybridnav.planner.closed import ClosedCells
+from hybridnav.planner.overlap import Track, keys_of_legs
+from hybridnav.planner.tour import tour_of
+from hybridnav.route import RouteFinder, door_graph
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, LongArray
+    from hybridnav.planner.planner import HybridPlanner
+    from hybridnav.planner.tour import Tour
+    from hybridnav.route import DoorGraph, DoorRoute
+    from hybridnav.topology import Door
+
+_MOST_PLANNED = 4
+"""Sequences of doors that are planned for each alternative that is asked for, at most."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What alternatives must keep to."""
+
+    count: int
+    """Most alternatives, the first included."""
+    max_overlap: float
+    """Most that a path shares with a shorter one, from 0 to 1."""
+    max_stretch: float
+    """Greatest length over that of the first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """A tour that keeps to the limits."""
+
+    tour: Tour
+    overlap: float = 0.0
+    """Greatest share that it has in common with one before it."""
+
+
+class DoorTours:
+    """The search for tours by other doors than those of a first one.
+
+    Parameters
+    ----------
+    planner
+        Planner of each; its map has rooms.
+    first
+        The plain plan, solved.
+    waypoints
+        Start and goal, as the caller named them.
+    closed
+        Cells closed for the query; None for none.
+    """
+
+    def __init__(
+        self,
+        planner: HybridPlanner,
+        first: Tour,
+        waypoints: Sequence[ArrayLike | str],
+        closed: ClosedCells | None,
+    ) -> None:
+        self._planner, self._first = planner, first
+        self._waypoints, self._closed = waypoints, closed
+        self._rooms = planner.topology.rooms
+        grid = planner.topology.grid
+        graph = door_graph(
+            planner.topology, allow_unexplored=planner.preset.planner.allow_unexplored
+        )
+        self._graph: DoorGraph = graph if closed is None else graph.closed(closed.flat)
+        path = first.results[0].path
+        assert path is not None  # noqa: S101 - the plan is solved
+        cols = grid.shape[1]
+        self._endpoints = [int(row) * cols + int(col) for row, col in path.cells[[0, -1]]]
+        self._route_finder = RouteFinder(self._rooms)
+        self.near_m = max(2 * grid.robot_radius_m, grid.resolution_m)
+        """Distance up to which two paths count as one, in metres: a robot's diameter."""
+        self.n_planned = 0
+        """Number of sequences of doors that were planned."""
+        self.is_complete = True
+        """Whether `find` has found as many as asked for, or all that there are."""
+
+    @property
+    def is_in_one_room(self) -> bool:
+        """Whether start and goal lie in one part of one room."""
+        first, last = self._rooms.level.field_of.ravel()[self._endpoints].tolist()
+        return bool(first == last)
+
+    def find(self, limits: Limits) -> list[Chosen]:
+        """Find tours, the first one first, then by length."""
+        planned = [(Chosen(self._first), Track(self._first, self.near_m))]
+        chosen = planned
+        for route in self._candidates(limits):
+            if len(chosen) == limits.count:
+                break
+            if any(self._share(route, one.tour) > limits.max_overlap for one, _ in chosen):
+                continue
+            if self.n_planned == _MOST_PLANNED * limits.count:
+                self.is_complete = False
+                break
+            tour = self._planned(route)
+            if tour is not None and tour.length_m <= limits.max_stretch * self._first.length_m:
+                planned.append((Chosen(tour), Track(tour, self.near_m)))
+                chosen = admissible(planned, limits)
+        return [one for one, _ in chosen]
+
+    def closed_round(self, tour: Tour) -> LongArray | None:
+        """Return the cells that are closed so that only the doors of a tour lead on.
+
+        Those closed for the query are among them. The result is None if an endpoint would be.
+        """
+        path = tour.results[0].path
+        assert path is not None  # noqa: S101 - the tour is solved
+        vertices, arcs, _ = self._route_finder.crossings(path.cells)
+        return self._closed_round(vertices, arcs)
+
+    def _closed_round(self, vertices: Sequence[int], arcs: Sequence[int]) -> LongArray | None:
+        """Return the cells that leave some arcs as the only ones between some rooms.
+
+        Rooms from which no path leads back, other than through the boundary by which it came, stay
+        open: no shortest path passes them.
+
+        Parameters
+        ----------
+        vertices, arcs
+            Of the room level.
+
+        Returns
+        -------
+        LongArray | None
+            int64 (n,), flat cells, sorted, each once; None if they would close an endpoint or an
+            arc that is to stay open.
+        """
+        graph = self._graph
+        inside = np.zeros(self._rooms.level.n_vertices, dtype=np.bool_)
+        inside[list(vertices)] = True
+        n_inside = inside[graph.endpoints].sum(axis=1)
+        is_used = self._used(arcs)
+        kept = graph.middles_of(np.flatnonzero(is_used)).ravel()
+        kept = np.union1d(kept, self._endpoints)
+        shut = [np.empty(0, dtype=np.int64) if self._closed is None else self._closed.flat]
+        for arc in np.flatnonzero((n_inside == 2) & ~is_used).tolist():  # noqa: PLR2004
+            halves = sorted((graph.cells_beside(arc, half) for half in (0, 1)), key=self._breadth)
+            spared = [cells for cells in halves if not np.isin(cells, kept).any()]
+            if not spared:
+                return None
+            shut.append(spared[0])
+        leaving = np.flatnonzero(n_inside == 1)
+        halves = np.argmin(inside[graph.endpoints[leaving]], axis=1)
+        beyond = self._parts(n_inside == 0)[graph.endpoints[leaving, halves]]
+        leads_back = np.bincount(beyond)[beyond] > 1
+        for arc, half in zip(
+            leaving[leads_back].tolist(), halves[leads_back].tolist(), strict=True
+        ):
+            shut.append(graph.cells_beside(arc, half))
+        return np.unique(np.concatenate(shut))
+
+    def _planned(self, route: DoorRoute) -> Tour | None:
+        """Plan by the doors of a route; None without a path by them.
+
+        The bound is that of the first tour: it holds for every path between these endpoints.
+        """
+        shut = self._closed_round(route.vertices, route.arcs)
+        if shut is None:
+            return None
+        whole = self._first.results[0]
+        assert whole.start is not None  # noqa: S101 - the plan is solved
+        assert whole.goal is not None  # noqa: S101
+        self.n_planned += 1
+        result = self._planner.plan(whole.start, whole.goal, blocked=ClosedCells(shut))
+        if not result.solved:
+            return None
+        result = replace(result, lower_bound=min(whole.lower_bound, result.cost))
+        return tour_of(self._planner, [result], self._waypoints)
+
+    def _candidates(self, limits: Limits) -> Iterator[DoorRoute]:
+        """Return routes by sequences of doors, gaps aside, each sequence once."""
+        tried = {tuple(leg.door.number for leg in self._first.legs if _is_told(leg.door))}
+        most_m = None
+        for route in self._graph.routes(*self._endpoints):
+            most_m = most_m or limits.max_stretch * route.length_m
+            if route.length_m > most_m:
+                return
+            doors = [self._rooms.door_of_arc.get(arc) for arc in route.arcs]
+            sequence = tuple(door.number for door in doors if _is_told(door))
+            if sequence not in tried:
+                tried.add(sequence)
+                yield route
+
+    def _share(self, route: DoorRoute, tour: Tour) -> float:
+        """Return the share of a route's legs that a tour has too."""
+        doors = [self._rooms.door_of_arc.get(arc) for arc in route.arcs]
+        numbers = [None, *(None if door is None else door.number for door in doors), None]
+        labels = self._rooms.label_of_vertex[list(route.vertices)].tolist()
+        names = map(self._rooms.name_of, labels)
+        known = set(keys_of_legs(tour.legs))
+        keys = zip(numbers, names, numbers[1:], strict=False)
+        common = (leg for key, leg in zip(keys, route.legs_m, strict=True) if key in known)
+        return sum(common) / route.length_m if route.length_m > 0 else 1.0
+
+    def _used(self, arcs: Sequence[int]) -> BoolArray:
+        """Return which arcs of the graph lie on the doors of some arcs, between the same rooms."""
+        graph, doors = self._graph, self._rooms.door_of_arc
+        chosen = np.isin(graph.arcs, list(arcs))
+        pairs = np.sort(graph.endpoints, axis=1)
+        known = {
+            (*pairs[at].tolist(), doors[arc].number)
+            for at, arc in zip(np.flatnonzero(chosen).tolist(), graph.arcs[chosen], strict=True)
+            if arc in doors
+        }
+        return chosen | np.array(
+            [
+                arc in doors and (*pair, doors[arc].number) in known
+                for arc, pair in zip(graph.arcs.tolist(), pairs.tolist(), strict=True)
+            ],
+            dtype=np.bool_,
+        )
+
+    def _breadth(self, cells: LongArray) -> float:
+        """Return the sum of the clearance of some cells: least between the posts of a door."""
+        return float(self._rooms.clearance_m.ravel()[cells].sum())
+
+    def _parts(self, is_outside: BoolArray) -> LongArray:
+        """Return the connected part of each vertex of the room level, joined by some arcs."""
+        from scipy.sparse import coo_array  # noqa: PLC0415 - on demand
+        from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+        tails, heads = self._graph.endpoints[is_outside].T
+        count = self._rooms.level.n_vertices
+        joined = coo_array((np.ones(len(tails), dtype=np.int8), (tails, heads)), (count, count))
+        parts: LongArray = connected_components(joined, directed=False)[1].astype(np.int64)
+        return parts
+
+
+def admissible(planned: list[tuple[Chosen, Track]], limits: Limits) -> list[tuple[Chosen, Track]]:
+    """Return the tours that do not share too much with a shorter one, by length after the first.
+
+    Parameters
+    ----------
+    planned
+        Tours with their tracks, the first one first.
+    limits
+        What they must keep to.
+    """
+    chosen = planned[:1]
+    for one, track in sorted(planned[1:], key=lambda pair: pair[1].length_m):
+        overlap = max(track.share(other) for _, other in chosen)
+        if overlap <= limits.max_overlap and len(chosen) < limits.count:
+            chosen.append((replace(one, overlap=overlap), track))
+    return chosen
+
+
+def _is_told(door: Door | None) -> TypeGuard[Door]:
+    return door is not None and not door.is_gap

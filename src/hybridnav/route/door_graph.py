@@ -1,0 +1,362 @@
+"""Routes from door to door: the room level with the lengths of paths inside each room.
+
+Routes that differ are found as on road networks: a shortest one to every door, and from every door
+(I. Abraham, D. Delling, A. V. Goldberg, R. F. Werneck: Alternative routes in road networks, 2013).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from hybridnav.pyramid.cracks import endpoints_of, middle_sides, sides_of
+from hybridnav.search.fields import field_distances
+from hybridnav.search.moves import STRAIGHT, length_in_cells
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.topology import Rooms, TopologicalMap
+
+
+@dataclass(frozen=True)
+class DoorRoute:
+    """A route on the room level that passes no room twice."""
+
+    vertices: tuple[int, ...]
+    """Vertices of the room level, from that of the start to that of the goal."""
+    arcs: tuple[int, ...]
+    """Arcs of the room level between them, one fewer than vertices."""
+    legs_m: tuple[float, ...]
+    """Length inside each room, from the middle of one boundary to that of the next, in metres."""
+
+    @property
+    def length_m(self) -> float:
+        """Length of the route in metres."""
+        return sum(self.legs_m)
+
+
+class _Legs(NamedTuple):
+    """Paths inside one room."""
+
+    leaving: LongArray
+    """int64 (k,), the darts that leave the room."""
+    cells: LongArray
+    """int64 (k,), the flat cell in the room before each of them."""
+    costs: LongArray
+    """int64 (k, k), costs between these cells, -1 for no path."""
+
+
+class _Links(NamedTuple):
+    """Links from dart to dart, arrays of n, each inside one room and over its boundary."""
+
+    tail: LongArray
+    head: LongArray
+    cost: LongArray
+
+
+class DoorGraph:
+    """The room level as a graph of darts, each an arc passed in one direction.
+
+    A dart is linked to those that leave the room that it enters. The cost is that of the shortest
+    path of cells inside the room, between the cells in the middle of both boundaries.
+
+    Parameters
+    ----------
+    rooms
+        The rooms.
+    allow_unexplored
+        Whether unexplored parts may be passed.
+    closed
+        int64 (m,), flat cells that may not be entered, sorted, each once; None for none.
+    opened
+        The graph without closed cells, whose rooms are taken over where they meet none; None to
+        measure all rooms.
+
+    Examples
+    --------
+    >>> from hybridnav.route import DoorGraph
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+    >>> labels = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    >>> [route.legs_m for route in DoorGraph(topology.rooms).routes(0, 3)]
+    [(2.0, 1.0)]
+    """
+
+    def __init__(
+        self,
+        rooms: Rooms,
+        *,
+        allow_unexplored: bool = False,
+        closed: LongArray | None = None,
+        opened: DoorGraph | None = None,
+    ) -> None:
+        level = rooms.level
+        allowed = np.ones_like(rooms.is_free) if allow_unexplored else rooms.is_free
+        edges, arc_of = level.boundary_table
+        is_kept: BoolArray = ~level.is_self_loop & allowed[level.arcs].all(axis=1)
+        edges, arc_of = edges[is_kept[arc_of]], arc_of[is_kept[arc_of]]
+        self.arcs: LongArray = np.flatnonzero(is_kept)
+        """int64 (n,), the arcs between parts that may be entered, ascending."""
+        self.endpoints: IntArray = level.arcs[self.arcs]
+        """int32 (n, 2), the vertices of the room level on both sides of each."""
+        self._level, self._allow_unexplored = level, allow_unexplored
+        self._rooms = rooms
+        self._arc_of: LongArray = np.searchsorted(self.arcs, arc_of)
+        cells = np.stack(endpoints_of(edges, rooms.grid.shape[1]), axis=1)
+        lies_first = level.field_of.ravel()[cells[:, 0]] == self.endpoints[self._arc_of, 0]
+        self._cells: LongArray = np.where(lies_first[:, None], cells, cells[:, ::-1])
+        self._fields = _Fields(rooms, closed)
+        self._middle = self._middles(sides_of(edges, rooms.grid.shape[1]), closed)
+        self._tails = self.endpoints.ravel()  # of each dart
+        self._by_tail = np.argsort(self._tails, kind="stable")
+        self._legs: list[_Legs] = []
+        met = None if closed is None else set(self._fields.vertices_of(closed).tolist())
+        for vertex in range(level.n_vertices):
+            is_known = opened is not None and met is not None and vertex not in met
+            legs = opened._legs[vertex] if is_known and opened else self._measured(vertex)  # noqa: SLF001
+            self._legs.append(legs)
+        self._inner = _joined([_links_of(legs) for legs in self._legs])
+        self._closed: dict[bytes, DoorGraph] = {}
+
+    def cells_beside(self, arc: int, half: int) -> LongArray:
+        """Return the flat cells on one half of the boundary of an arc.
+
+        Parameters
+        ----------
+        arc
+            Index into `arcs`.
+        half
+            0 for the cells in the field of `endpoints[arc, 0]`, 1 for those in the other.
+        """
+        low, high = np.searchsorted(self._arc_of, [arc, arc + 1])
+        return np.unique(self._cells[low:high, half])
+
+    def middles_of(self, arcs: LongArray) -> LongArray:
+        """Return the flat cells on both sides of the middle of some arcs, int64 (n, 2).
+
+        They are -1 if closed cells leave nothing of the boundary. `arcs` are indices into `arcs`.
+        """
+        found: LongArray = self._middle[arcs]
+        return found
+
+    def closed(self, flat: LongArray) -> DoorGraph:
+        """Return the graph with some cells closed; those of the last closures are kept.
+
+        Parameters
+        ----------
+        flat
+            int64 (m,), flat cells, sorted, each once.
+        """
+        key = flat.tobytes()
+        found = self._closed.get(key)
+        if found is None:
+            found = self._closed[key] = DoorGraph(
+                self._rooms, allow_unexplored=self._allow_unexplored, closed=flat, opened=self
+            )
+            for oldest in list(self._closed)[:-_MOST_KEPT]:
+                self._closed.pop(oldest, None)  # another thread may have been here
+        return found
+
+    def routes(self, start: int, goal: int) -> Iterator[DoorRoute]:
+        """Find routes that pass no room twice, the shortest first.
+
+        Each is the shortest to one dart, a link to another dart, and the shortest from there: so
+        there are at most as many as links.
+
+        Parameters
+        ----------
+        start, goal
+            Flat cells that may be entered.
+
+        Yields
+        ------
+        DoorRoute
+            Each once.
+        """
+        first, last = self._fields.vertices_of(np.array([start, goal])).tolist()
+        origin = 2 * len(self.arcs)
+        links = _joined([self._inner, *self._outer(start, goal, origin)])
+        from_start, before = _shortest_from(origin, links, origin + 2)
+        backwards = _Links(links.head, links.tail, links.cost)
+        to_goal, behind = _shortest_from(origin + 1, backwards, origin + 2)
+        total = from_start[links.tail] + links.cost + to_goal[links.head]
+        # On a stretch that both trees share, every link stands for the same route.
+        is_shared = (before[links.head] == links.tail) & (behind[links.tail] == links.head)
+        via = np.flatnonzero(np.isfinite(total) & (~is_shared | (links.tail == origin)))
+        seen = set()
+        for link in via[np.argsort(total[via], kind="stable")].tolist():
+            coming = _chain(before, int(links.tail[link]))[::-1]
+            nodes = coming + _chain(behind, int(links.head[link]))
+            darts = np.array(nodes[1:-1], dtype=np.int64)
+            arcs, halves = darts >> 1, darts & 1
+            vertices = (first, *self.endpoints[arcs, 1 - halves].tolist())
+            if len(set(vertices)) < len(vertices) or tuple(nodes) in seen:
+                continue
+            seen.add(tuple(nodes))
+            assert vertices[-1] == last  # noqa: S101 - links lead into the room of the goal
+            along = np.append(from_start[coming], total[link] - to_goal[nodes[len(coming) :]])
+            legs_m = length_in_cells(np.diff(along)) * self._rooms.grid.resolution_m
+            yield DoorRoute(vertices, tuple(self.arcs[arcs].tolist()), tuple(legs_m.tolist()))
+
+    def _middles(self, sides: FloatArray, closed: LongArray | None) -> LongArray:
+        """Return the open cells on both sides of the middle of each arc, int64 (n, 2), or -1."""
+        is_open: BoolArray = np.ones(len(self._cells), dtype=np.bool_)
+        if closed is not None:
+            is_open = np.asarray(~np.isin(self._cells, closed).any(axis=1))
+        middle = np.full((len(self.arcs), 2), -1, dtype=np.int64)
+        if is_open.any():
+            arcs, dense = np.unique(self._arc_of[is_open], return_inverse=True)
+            at = middle_sides(sides[is_open], dense.astype(np.int64), len(arcs))
+            middle[arcs] = self._cells[is_open][at]
+        return middle
+
+    def _measured(self, vertex: int) -> _Legs:
+        low, high = np.searchsorted(self._tails, [vertex, vertex + 1], sorter=self._by_tail)
+        leaving = self._by_tail[low:high]
+        leaving = leaving[self._middle.ravel()[leaving] >= 0]
+        cells = self._middle.ravel()[leaving]
+        costs = np.zeros((len(cells), len(cells)), dtype=np.int64)
+        field = self._fields.window(vertex) if len(cells) > 1 else None
+        for number, cell in enumerate(cells[:-1].tolist(), start=1):
+            assert field is not None  # noqa: S101 - there are two cells
+            found = field.costs(cell, cells[number:])
+            costs[number - 1, number:] = costs[number:, number - 1] = found
+        return _Legs(leaving, cells, costs)
+
+    def _outer(self, start: int, goal: int, origin: int) -> Iterator[_Links]:
+        """Return the links from the start, and those to the goal."""
+        first, last = self._fields.vertices_of(np.array([start, goal])).tolist()
+        leaving, entering = self._legs[first], self._legs[last]
+        ones = np.ones(1, dtype=np.int64)
+        costs = self._fields.window(first).costs(start, np.append(leaving.cells, goal))
+        if first == last:
+            yield _links(origin * ones, (origin + 1) * ones, costs[-1:], 0)
+        tails = np.full_like(leaving.leaving, origin)
+        yield _links(tails, leaving.leaving, costs[:-1], STRAIGHT)
+        costs = self._fields.window(last).costs(goal, entering.cells)
+        heads = np.full_like(entering.leaving, origin + 1)
+        yield _links(entering.leaving ^ 1, heads, costs, 0)
+
+
+class _Fields:
+    """The fields of the room level, with some cells closed."""
+
+    def __init__(self, rooms: Rooms, closed: LongArray | None) -> None:
+        from scipy import ndimage  # noqa: PLC0415 - most planners need no rooms
+
+        self._field_of = rooms.level.field_of
+        self._classes = rooms.grid.classes
+        self._closed = closed
+        self._windows = ndimage.find_objects(self._field_of + 1)
+
+    def vertices_of(self, cells: LongArray) -> LongArray:
+        """Return the vertex of each flat cell, -1 for none."""
+        found: LongArray = self._field_of.ravel()[cells].astype(np.int64)
+        return found
+
+    def window(self, vertex: int) -> _Window:
+        """Return the part of the map that a field spans."""
+        spans = self._windows[vertex]
+        corner = spans[0].start, spans[1].start
+        classes = np.array(self._classes[spans], dtype=np.uint8)
+        label = np.where(self._field_of[spans] == vertex, np.int32(0), np.int32(-1))
+        if self._closed is not None:
+            rows, cols = np.divmod(self._closed, self._field_of.shape[1])
+            rows, cols = rows - corner[0], cols - corner[1]
+            met = (rows >= 0) & (rows < label.shape[0]) & (cols >= 0) & (cols < label.shape[1])
+            classes[rows[met], cols[met]] = 0
+            label[rows[met], cols[met]] = -1
+        return _Window(corner, self._field_of.shape[1], classes, label)
+
+
+class _Window(NamedTuple):
+    """The part of the map that a field spans: its lowest cell, the columns of the map, and of each
+    cell its class, 0 if closed, and its label, 0 in the field and -1 elsewhere."""
+
+    corner: tuple[int, int]
+    cols: int
+    classes: ByteArray
+    label: IntArray
+
+    def costs(self, cell: int, others: LongArray) -> LongArray:
+        """Return the integer costs of the shortest paths inside the field from a flat cell of it to
+        others, -1 for no path."""
+        rows, cols = np.divmod(np.append(cell, others), self.cols)
+        rows, cols = rows - self.corner[0], cols - self.corner[1]
+        inside = (rows >= 0) & (rows < self.label.shape[0]) & (cols >= 0)
+        inside &= cols < self.label.shape[1]
+        at = np.where(inside, rows * self.label.shape[1] + cols, 0)
+        found = field_distances(self.classes, self.label.ravel(), at[:1])
+        costs: LongArray = np.where(inside, found[at], -1)[1:]
+        return costs
+
+
+def _links(tails: LongArray, heads: LongArray, costs: LongArray, over: int) -> _Links:
+    """Return the links that a path exists for; `over` is the cost over the boundary."""
+    there = costs >= 0
+    return _Links(tails[there], heads[there], costs[there] + over)
+
+
+def _links_of(legs: _Legs) -> _Links:
+    """Return the links of all pairs of darts of one room."""
+    count = len(legs.leaving)
+    tail, head = np.nonzero(~np.eye(count, dtype=np.bool_))
+    return _links(legs.leaving[tail] ^ 1, legs.leaving[head], legs.costs[tail, head], STRAIGHT)
+
+
+def _joined(parts: list[_Links]) -> _Links:
+    return _Links(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _shortest_from(node: int, links: _Links, n_nodes: int) -> tuple[FloatArray, LongArray]:
+    """Return the cost of the shortest path to each node, and the node before it, or a negative
+    number."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - most planners need no rooms
+    from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
+
+    graph = coo_array((links.cost, (links.tail, links.head)), shape=(n_nodes, n_nodes)).tocsr()
+    costs, before = dijkstra(graph, indices=np.array([node]), return_predecessors=True)
+    return costs[0], before[0].astype(np.int64)
+
+
+def _chain(before: LongArray, node: int) -> list[int]:
+    """Return a node, the one before it, and so on to the first."""
+    nodes = [node]
+    while (node := int(before[node])) >= 0:
+        nodes.append(node)
+    return nodes
+
+
+_MOST_KEPT = 4
+_KEPT: WeakKeyDictionary[TopologicalMap, dict[bool, DoorGraph]] = WeakKeyDictionary()
+
+
+def door_graph(topology: TopologicalMap, *, allow_unexplored: bool = False) -> DoorGraph:
+    """Return the graph of doors of a map with rooms, measured for the first query.
+
+    It is kept as long as the map.
+
+    Parameters
+    ----------
+    topology
+        A map with rooms.
+    allow_unexplored
+        As in `DoorGraph`.
+
+    Returns
+    -------
+    DoorGraph
+        The same object for the same arguments.
+    """
+    kept = _KEPT.setdefault(topology, {})
+    found = kept.get(allow_unexplored)
+    if found is None:
+        found = kept[allow_unexplored] = DoorGraph(
+            topology.rooms, allow_unexplored=allow_unexplored
+        )
+    return found

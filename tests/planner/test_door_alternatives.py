@@ -1,0 +1,260 @@
+"""Alternatives by doors: other sequences of doors, the plain plan first, within their limits."""
+
+import itertools
+import math
+from typing import Any
+
+import networkx as nx
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.metrics import judge_path
+from tests.floors import random_floor
+from tests.strategies import examples, occupancy_grid
+
+PRESETS = ["shortest", "portals", "octile", "grid-astar", "paper"]
+
+
+def planner_of(floor, preset="grid-astar"):
+    return hn.HybridPlanner(floor.topology, preset=preset)
+
+
+def two_points(floor, rng):
+    free = np.argwhere(floor.classes == 1)
+    first, last = (tuple(cell) for cell in rng.choice(free, 2, replace=False).tolist())
+    return first, last
+
+
+def line_of(path):
+    return shapely.LineString(path.points if len(path.points) > 1 else path.points.repeat(2, 0))
+
+
+def doors_by_cells(floor, path):
+    """The doors that a path of cells steps through, in order."""
+    number_of = {}
+    for number, (one, other) in enumerate(floor.doors):
+        number_of[one, other] = number_of[other, one] = number
+    cells = list(map(tuple, path.cells.tolist()))
+    steps = itertools.pairwise(cells)
+    return [number_of[step] for step in steps if step in number_of]
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_each_is_the_shortest_path_by_its_doors_and_within_the_limits(seed):
+    rng = np.random.default_rng(seed)
+    floor = random_floor(rng)
+    planner = planner_of(floor)
+    grid = planner.topology.grid
+    first, last = two_points(floor, rng)
+    ends = grid.frame.points_of([first, last])
+    most, stretch = float(rng.choice([0.3, 0.5, 0.8])), float(rng.choice([1.2, 2.0, 4.0]))
+    plain = planner.plan(*ends)
+    found = hn.plan_alternatives(
+        planner, ends[0], ends[1], 4, max_overlap=most, max_stretch=stretch
+    )
+    assert bool(found) == plain.solved
+    if not found:
+        return
+    assert np.array_equal(found[0].path.points, plain.path.points)
+    sequences = [tuple(doors_by_cells(floor, other.path)) for other in found]
+    assert len(set(sequences)) == len(found)
+    lengths = [other.path.length_m for other in found]
+    assert lengths == pytest.approx(sorted(lengths))
+    for number, (other, doors) in enumerate(zip(found, sequences, strict=True)):
+        assert judge_path(grid, other.path.cells, start=first, goal=last).faults == ()
+        assert len(other.doors) == len(doors)
+        inside = floor.moves(doors=set(doors))
+        shortest = nx.dijkstra_path_length(inside, first, last)
+        assert other.path.length_m == pytest.approx(shortest)
+        assert other.path.length_m <= stretch * lengths[0] + 1e-9
+        assert other.result.lower_bound == plain.lower_bound
+        line = line_of(other.path)
+        for before in found[:number]:
+            shared_m = line.intersection(line_of(before.path).buffer(grid.resolution_m)).length
+            assert shared_m / line.length <= other.overlap + 1e-6
+        assert other.overlap <= most
+
+
+def test_no_sequence_of_doors_within_the_limits_is_shorter_than_the_second():
+    """Against all sequences of networkx, of which only those over one pair of doors are tried."""
+    rng = np.random.default_rng(11)
+    equal = compared = 0
+    for _ in range(25):
+        floor = random_floor(rng)
+        first, last = two_points(floor, rng)
+        planner = planner_of(floor)
+        ends = planner.topology.grid.frame.points_of([first, last])
+        found = hn.plan_alternatives(planner, ends[0], ends[1], 2, max_overlap=0.5, max_stretch=3.0)
+        if not found or found[0].path.length_m <= 0:
+            continue
+        best = math.inf
+        own = line_of(found[0].path).buffer(planner.topology.grid.resolution_m)
+        plain_doors = doors_by_cells(floor, found[0].path)
+        darts = floor.darts(first, last)
+        for tried, path in enumerate(nx.shortest_simple_paths(darts, "start", "goal", "weight")):
+            doors = [number for number, _ in path[1:-1]]
+            rooms = floor.rooms_passed(first, path[1:-1])
+            inside = floor.moves(doors=set(doors))
+            cells = nx.dijkstra_path(inside, first, last)
+            length = nx.path_weight(inside, cells, "weight")
+            if tried == 200 or nx.path_weight(darts, path, "weight") > 3 * found[0].path.length_m:
+                break
+            if len(set(rooms)) < len(rooms) or doors == plain_doors:
+                continue
+            line = shapely.LineString(planner.topology.grid.frame.points_of(np.array(cells)))
+            if line.intersection(own).length <= 0.45 * line.length:
+                best = length
+                break
+        second = found[1].path.length_m if len(found) > 1 else math.inf
+        if math.isfinite(best):
+            compared += 1
+            equal += second <= best + 1e-9
+    assert compared > 8
+    assert equal >= 0.8 * compared
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_first_is_the_plain_plan_of_each_preset(preset):
+    rng = np.random.default_rng(5)
+    more = 0
+    for _ in range(8):
+        floor = random_floor(rng)
+        planner = planner_of(floor, preset)
+        ends = planner.topology.grid.frame.points_of(two_points(floor, rng)) + 0.25
+        plain = planner.plan(*ends)
+        found = hn.plan_alternatives(planner, ends[0], ends[1], 3)
+        assert bool(found) == plain.solved
+        if not found:
+            continue
+        assert np.array_equal(found[0].path.points, plain.path.points)
+        assert found[0].result.lower_bound == plain.lower_bound
+        for other in found:
+            assert other.result.metric == plain.metric
+            assert other.result.start == plain.start
+            assert other.result.goal == plain.goal
+            assert other.result.lower_bound <= other.result.cost
+            assert other.tour.in_words()[0].startswith("start in room ")
+            json = other.to_dict()
+            assert json["doors"] == [leg["door"] for leg in json["legs"] if leg["door"]]
+        more += len(found) > 1
+    assert more > 2
+
+
+def test_closed_doors_and_rooms_are_closed_for_all_of_them():
+    rng = np.random.default_rng(7)
+    closed_some = 0
+    for _ in range(10):
+        floor = random_floor(rng)
+        planner = planner_of(floor, "shortest")
+        ends = planner.topology.grid.frame.points_of([(1, 1), (14, 14)])
+        opened = hn.plan_alternatives(planner, ends[0], ends[1], 3)
+        if len(opened) < 2 or not opened[1].doors:
+            continue
+        shut = opened[1].doors[0]
+        found = hn.plan_alternatives(planner, ends[0], ends[1], 3, blocked={"doors": [shut]})
+        plain = planner.plan(*ends, blocked={"doors": [shut]})
+        assert bool(found) == plain.solved
+        assert all(shut not in other.doors for other in found)
+        if found:
+            assert np.array_equal(found[0].path.points, plain.path.points)
+            closed_some += 1
+        again = hn.plan_alternatives(planner, ends[0], ends[1], 3)
+        assert [other.doors for other in again] == [other.doors for other in opened]
+    assert closed_some > 3
+
+
+# A ring of corridor, one room, round a block; an office at either end with a door of its own.
+RING = np.ones((9, 21), np.uint8)
+RING[2:7, 5:16] = 0
+RING[:, [3, 17]] = 0
+RING[4, [3, 17]] = 1
+RING_LABELS = np.where(RING == 0, -1, np.repeat([0, 1, 2], [4, 13, 4])[None]).astype(np.int32)
+
+
+@pytest.fixture(params=["shortest", "octile"])
+def ring(request):
+    rooms = hn.RoomLabels(("west", "corridor", "east"), RING_LABELS)
+    pyramid = hn.DualGraphPyramid.build(occupancy_grid(RING), merge_distance_m=3.0, rooms=rooms)
+    return hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=request.param)
+
+
+def test_both_sides_of_a_block_inside_a_room_count_only_when_asked_for(ring):
+    ends = (1.5, 4.5), (19.5, 4.5)
+    found = hn.plan_alternatives(ring, ends[0], ends[1], 3)
+    assert len(found) == 1
+    assert found.complete
+    assert found.note.startswith("1 of 3: every other sequence of doors shares more than 80%")
+    both = hn.plan_alternatives(ring, ends[0], ends[1], 3, inside_rooms=True)
+    assert len(both) == 2
+    assert both[0].doors == both[1].doors
+    assert np.array_equal(both[0].path.points, found[0].path.points)
+    middles = [np.interp(10.0, *other.path.points.T) for other in both]
+    assert min(middles) < 2.5
+    assert max(middles) > 6.5
+    assert both[1].result.metric == both[0].result.metric
+    assert both[1].path.length_m == pytest.approx(both[0].path.length_m)
+    few = hn.plan_alternatives(ring, ends[0], ends[1], 3, inside_rooms=True, max_overlap=0.1)
+    assert len(few) == 1
+
+
+def test_start_and_goal_in_one_room_have_the_plain_plan_alone(ring):
+    found = hn.plan_alternatives(ring, (4.5, 0.5), (16.5, 0.5), 3)
+    assert len(found) == 1
+    assert found.note == (
+        "1 of 3: start and goal are in one room; by homotopy, sides of obstacles count"
+    )
+    assert hn.plan_alternatives(ring, (4.5, 0.5), (16.5, 0.5), 1).note == ""
+
+
+def test_a_map_without_rooms_has_the_plain_plan_alone():
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(RING)))
+    planner = hn.HybridPlanner(topology)
+    found = hn.plan_alternatives(planner, (1.5, 4.5), (19.5, 4.5), 2)
+    plain: Any = planner.plan((1.5, 4.5), (19.5, 4.5)).path
+    assert np.array_equal(found[0].path.points, plain.points)
+    assert found.complete
+    assert found.note == (
+        "1 of 2: the map has no rooms, so no doors; by homotopy, sides of obstacles count"
+    )
+
+
+def test_without_a_path_the_note_has_the_status(ring):
+    found = hn.plan_alternatives(ring, (1.5, 4.5), (5.5, 4.5), 2)
+    assert len(found) == 0
+    assert found.note == "no path was planned: goal occupied"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"by": "words"}, "by must be 'doors' or 'homotopy', got 'words'"),
+        ({"max_overlap": 1.5}, "max_overlap must be a number from 0 to 1, got 1.5"),
+        ({"max_overlap": math.nan}, "max_overlap must be a number from 0 to 1, got nan"),
+        ({"max_stretch": 0.5}, "max_stretch must be a number from 1 or more, got 0.5"),
+        ({"max_stretch": "long"}, "max_stretch must be a number from 1 or more, got 'long'"),
+    ],
+)
+def test_options_out_of_range_are_refused(ring, options, message):
+    with pytest.raises(hn.InvalidValueError) as caught:
+        hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **options)
+    assert str(caught.value) == message
+
+
+def test_ompl_plans_by_other_doors_too():
+    pytest.importorskip("ompl")
+    rng = np.random.default_rng(5)
+    floor = random_floor(rng)
+    planner = planner_of(floor, "ompl-rrtconnect")
+    ends = planner.topology.grid.frame.points_of([(1, 1), (13, 13)])
+    found = hn.plan_alternatives(planner, ends[0], ends[1], 2, max_stretch=3.0)
+    plain = planner.plan(*ends)
+    assert found
+    assert found[0].result.start == plain.start
+    assert found[0].path.length_m == pytest.approx(plain.path.length_m)
+    with pytest.raises(hn.InvalidValueError, match="without OMPL"):
+        hn.plan_alternatives(planner, ends[0], ends[1], 2, inside_rooms=True)
