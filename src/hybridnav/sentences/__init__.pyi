@@ -1,0 +1,11 @@
+from .instruction import (
+    Instruction as Instruction,
+    Passed as Passed,
+    Space as Space,
+    Doorway as Doorway,
+    Turn as Turn,
+)
+from .language import Language as Language
+from .write import check_language as check_language, languages as languages, sentences as sentences
+
+__all__: list[str]

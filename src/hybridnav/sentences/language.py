@@ -1,0 +1,119 @@
+"""The table that a language fills in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpaceWords:
+    """A space in three places of a sentence."""
+
+    inside: str
+    """For a person in it: `in {name}`."""
+    into: str
+    """For a person who enters it: `into {name}`."""
+    itself: str
+    """As the thing that one leaves: `{name}`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandWords:
+    """The words for one hand, left or right."""
+
+    turn: str
+    """A turn of a path: `turn left`."""
+    sharp: str
+    """A turn by more than 135 degrees."""
+    face: str
+    """A turn on the spot before the first step."""
+    beside: str
+    """The place of a door: `on the left`."""
+    onward: str
+    """Behind a door to this hand: ` to the left`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Language:
+    """Templates of all sentences in one language.
+
+    A translation is one module with such a table, and a line in `hybridnav.sentences.write`.
+    Parts in braces are filled in; `{lead}` ends in a blank unless it is empty.
+
+    Examples
+    --------
+    >>> from hybridnav.sentences.english import ENGLISH
+    >>> ENGLISH.turn
+    '{inside} {lead}{turn}'
+    """
+
+    name: str
+    """Its name, for people who choose it."""
+    decimal: str
+    """Decimal mark."""
+    numbers: tuple[str, ...]
+    """Words for 2, 3, ...; larger numbers are digits."""
+    named: SpaceWords
+    """A room with a name; `{name}` stands for it."""
+    common: SpaceWords
+    """A room whose name is a common noun, in small letters."""
+    corridor: SpaceWords
+    hall: SpaceWords
+    room: SpaceWords
+    passage: SpaceWords
+    left: HandWords
+    right: HandWords
+    turn_round: str
+    """A turn back."""
+    face_round: str
+    """A turn back before the first step."""
+    start: str
+    """First sentence; `{inside}`."""
+    start_facing: str
+    """First sentence of a robot with a heading; `{inside}`, `{turn}`."""
+    after: str
+    """A distance without landmarks; `{metres}`."""
+    after_passing: str
+    """A distance with landmarks; `{metres}`, `{passed}`."""
+    passed_beside: str
+    """Landmarks at one hand; `{things}`, `{beside}`."""
+    passed_both: str
+    """The same landmarks at each hand; `{things}`."""
+    one_door: str
+    """One door that is passed."""
+    doors: str
+    """Several; `{count}`."""
+    one_opening: str
+    openings: str
+    joint: str
+    """Between two items: ` and `."""
+    turn: str
+    """A turn; `{inside}`, `{lead}`, `{turn}`."""
+    go: str
+    """Through a door; `{lead}`, `{door}`, `{into}`, `{out}`."""
+    go_turning: str
+    """The same with `{turn}` before it."""
+    leave: str
+    """Out of the first space; besides `{itself}`."""
+    leave_turning: str
+    """The same with `{turn}` before it."""
+    go_on: str
+    """Into a space without a door between; `{lead}`, `{into}`, `{out}`."""
+    go_on_turning: str
+    """The same with `{turn}` before it."""
+    door: str
+    """A door; `{number}`."""
+    door_beside: str
+    """A door at one hand; `{number}`, `{beside}`."""
+    opening: str
+    """An opening; `{number}`, `{width}`."""
+    out_turning: str
+    """End of a sentence with a turn behind a door; `{turn}`."""
+    arrive: str
+    """At a waypoint; `{lead}`, `{waypoint}`, `{inside}`."""
+    arrive_at_goal: str
+    """At a goal without a name; `{lead}`, `{inside}`."""
+    arrive_inside: str
+    """In the room that is the waypoint, some way behind its door; `{lead}`, `{inside}`."""
+    there: str
+    """End of the sentence whose door leads to the waypoint."""

@@ -1,0 +1,193 @@
+"""Sentences: one table a language, and no geometry."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import pytest
+
+import hybridnav as hn
+from hybridnav.sentences import (
+    Doorway,
+    Instruction,
+    Passed,
+    Space,
+    Turn,
+    check_language,
+    languages,
+    sentences,
+)
+
+if TYPE_CHECKING:
+    from hybridnav.sentences.instruction import Hand
+
+KITCHEN, CORRIDOR, LAB = Space("kitchen"), Space(None, "corridor"), Space("l3_404")
+AT = (1.0, 2.0)
+
+
+def instruction(kind="turn", after_m=8.0, space=CORRIDOR, **what):
+    return Instruction(kind, AT, 20.0, after_m, space, **what)
+
+
+TURN, BACK, SHARP = Turn(-1.5), Turn(math.pi), Turn(2.5)
+THREE_DOORS = Passed("right", n_doors=3)
+MANY = Passed("left", n_doors=14, n_openings=2)
+CASES = {
+    "start": (
+        instruction("start", 0.0, KITCHEN),
+        "start in the kitchen",
+        "Start in „kitchen“",
+    ),
+    "start facing": (
+        instruction("start", 0.0, LAB, turn=TURN),
+        "start in l3_404 and face right",
+        "Start in „l3_404“: nach rechts drehen",
+    ),
+    "turn": (
+        instruction(turn=TURN),
+        "in the corridor after 8 m turn right",
+        "im Flur nach 8 m rechts abbiegen",
+    ),
+    "back": (instruction(after_m=0.2, turn=BACK), "in the corridor turn round", "im Flur umkehren"),
+    "landmarks": (
+        instruction(after_m=12.4, passed=(MANY, THREE_DOORS), turn=SHARP),
+        (
+            "in the corridor after 12 m, past 14 doors and two openings on the left and three "
+            "doors on the right, turn sharply left"
+        ),
+        (
+            "im Flur nach 12 m, vorbei an 14 Türen und zwei Öffnungen links und drei Türen rechts, "
+            "scharf links abbiegen"
+        ),
+    ),
+    "both sides": (
+        instruction(after_m=9.0, passed=(Passed("left", 1), Passed("right", 1)), turn=Turn(1.2)),
+        "in the corridor after 9 m, past one door on each side, turn left",
+        "im Flur nach 9 m, vorbei an einer Tür auf jeder Seite, links abbiegen",
+    ),
+    "leave": (
+        instruction(
+            "cross", 3.6, KITCHEN, doorway=Doorway(CORRIDOR, 13, 1.0, is_first=True, onward="left")
+        ),
+        "after 4 m leave the kitchen by door 13 into the corridor, then left",
+        "nach 4 m „kitchen“ durch Tür 13 verlassen und in den Flur gehen, dann nach links",
+    ),
+    "door": (
+        instruction("cross", doorway=Doorway(LAB, 7, 0.9, beside="right", behind=Turn(1.5))),
+        "after 8 m go through door 7 on the right into l3_404 and turn left",
+        "nach 8 m durch Tür 7 (rechts) in „l3_404“ gehen, dann links abbiegen",
+    ),
+    "into a door": (
+        instruction("cross", turn=TURN, doorway=Doorway(KITCHEN, 7, 0.9)),
+        "after 8 m turn right through door 7 into the kitchen",
+        "nach 8 m rechts abbiegen und durch Tür 7 in „kitchen“ gehen",
+    ),
+    "opening": (
+        instruction("cross", doorway=Doorway(Space(None, "hall"), 78, 7.46, is_opening=True)),
+        "after 8 m go through opening 78 (7.5 m wide) into the hall",
+        "nach 8 m durch Öffnung 78 (7,5 m breit) in die Halle gehen",
+    ),
+    "no door": (
+        instruction("cross", doorway=Doorway(Space(None, "room"))),
+        "after 8 m go on into the room",
+        "nach 8 m weiter in den Raum gehen",
+    ),
+    "point": (
+        instruction("arrive", 3.0, Space(None, "passage"), waypoint="(1, 2)"),
+        "after 3 m you are at (1, 2) in the passage",
+        "nach 3 m am Ziel: (1, 2) im Durchgang",
+    ),
+    "goal": (
+        instruction("arrive", 0.7, LAB),
+        "after 1 m you are at the goal in l3_404",
+        "nach 1 m am Ziel in „l3_404“",
+    ),
+    "deep in the room": (
+        instruction("arrive", 3.0, LAB, waypoint="l3_404"),
+        "after 3 m you are there",
+        "in „l3_404“ nach 3 m am Ziel",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_an_instruction_in_both_languages(name):
+    given, english, german = CASES[name]
+    assert sentences([given]) == sentences([given], "en") == [english]
+    assert sentences([given], language="de") == [german]
+
+
+def test_an_arrival_behind_the_door_of_the_room_needs_no_line():
+    door = instruction("cross", doorway=Doorway(KITCHEN, 7, 0.9))
+    there = instruction("arrive", 0.2, KITCHEN, waypoint="kitchen")
+    assert sentences([door, there]) == [
+        "after 8 m go through door 7 into the kitchen, and you are there"
+    ]
+    assert sentences([door, there], "de")[0].endswith(", und Sie sind am Ziel")
+    elsewhere = instruction("arrive", 0.2, KITCHEN, waypoint="sink")
+    assert sentences([door, elsewhere])[1] == "you are at sink in the kitchen"
+
+
+@pytest.mark.parametrize("given", ["fr", "EN", "", "english", None, 7, "x" * 500])
+def test_an_unknown_language_is_refused_in_one_line(given):
+    with pytest.raises(hn.InvalidValueError) as refused:
+        sentences([], given)
+    assert str(refused.value).startswith("language must be one of de (Deutsch), en (English), got ")
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 160
+
+
+@pytest.mark.parametrize("code", languages())
+def test_every_template_is_used_and_filled(code):
+    """Whatever occurs: no brace is left, no blank is doubled, and no template is idle."""
+    turns = [None, Turn(1.5), TURN, SHARP, Turn(-2.5), BACK]
+    spaces = [
+        KITCHEN,
+        LAB,
+        *(Space(None, shape) for shape in ("corridor", "hall", "room", "passage")),
+    ]
+    doors = [(None, False), (3, False), (3, True)]
+    written: list[str] = []
+    for turn, space, (door, is_opening) in itertools.product(turns, spaces, doors):
+        cases: tuple[tuple[bool, Hand | None, tuple[Passed, ...]], ...] = (
+            (False, None, ()),
+            (True, "left", (Passed("left", 1, 1),)),
+            (True, "right", (Passed("right", 2, 2), Passed("left", 2, 2))),
+        )
+        for is_first, beside, passed in cases:
+            doorway = Doorway(
+                space,
+                door,
+                3.0,
+                is_opening=is_opening,
+                is_first=is_first,
+                beside=beside,
+                behind=turn if is_first else None,
+                onward=beside if turn is None else None,
+            )
+            written += sentences(
+                [
+                    instruction("start", 0.0, space, turn=turn),
+                    instruction("cross", 9.0, space, turn=turn, doorway=doorway, passed=passed),
+                    instruction("arrive", 0.0, space, waypoint=space.name),
+                    instruction("arrive", 5.0, space, waypoint="sink"),
+                    instruction("arrive", 5.0, space),
+                ],
+                code,
+            )
+            if turn is not None:
+                written += sentences([instruction(turn=turn, space=space, passed=passed)], code)
+    text = "\n".join(written)
+    assert "{" not in text
+    assert "  " not in text
+    assert not re.search(r" [,.]|\s$", text, re.MULTILINE)
+    words = check_language(code)
+    for field in fields(words):
+        value = getattr(words, field.name)
+        if isinstance(value, str) and field.name not in {"name", "decimal"}:
+            fixed = [part for part in re.split(r"\{\w+\}", value) if part.strip()]
+            assert all(part.strip() in text for part in fixed), field.name
