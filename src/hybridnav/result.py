@@ -13,9 +13,11 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.errors import PlanError
 from hybridnav.poses import Motion
+from hybridnav.sentences import sentences
 
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, FloatArray, LongArray, SignArray
+    from hybridnav.sentences import Instruction
 
 Metric = Literal[
     "octile",
@@ -182,6 +184,14 @@ class RouteSource(Protocol):
         ...
 
 
+class InstructionSource(Protocol):
+    """Data from which instructions are found when somebody reads them."""
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Find the instructions."""
+        ...
+
+
 @dataclass(frozen=True)
 class Refinement:
     """History of the path of a sampling-based planner."""
@@ -288,6 +298,8 @@ class PlanResult:
     chosen point."""
     goal: tuple[float, ...] | None = None
     """Goal of the plan, like `start`."""
+    instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
+    """The instructions, or the data to find them from."""
 
     @cached_property
     def route(self) -> Route | None:
@@ -296,10 +308,37 @@ class PlanResult:
         source = self.route_source
         return source if source is None or isinstance(source, Route) else source.route()
 
+    @cached_property
+    def instructions(self) -> tuple[Instruction, ...]:
+        """What a person does along the path; none without a path, and on a map without rooms."""
+        source = self.instruction_source
+        return source if isinstance(source, tuple) else source.instructions()
+
+    def words(self, language: str = "en") -> list[str]:
+        """Return a description of the path for a person, one sentence a line, as `Tour.words`.
+
+        Parameters
+        ----------
+        language
+            Code of a language, one of `hybridnav.sentences.languages`.
+
+        Returns
+        -------
+        list of str
+            No lines without a path, and on a map without rooms.
+
+        Raises
+        ------
+        InvalidValueError
+            When there are no sentences in this language.
+        """
+        return sentences(self.instructions, language)
+
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state with a found route, so that copies hold no map."""
-        state = {name: value for name, value in vars(self).items() if name != "route"}
-        return state | {"route_source": self.route}
+        """Return the state with what is found on demand, so that copies hold no map."""
+        found = {"route", "instructions"}
+        state = {name: value for name, value in vars(self).items() if name not in found}
+        return state | {"route_source": self.route, "instruction_source": self.instructions}
 
     @property
     def solved(self) -> bool:

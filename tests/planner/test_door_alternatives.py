@@ -138,7 +138,7 @@ def test_the_first_is_the_plain_plan_of_each_preset(preset):
             assert other.result.start == plain.start
             assert other.result.goal == plain.goal
             assert other.result.lower_bound <= other.result.cost
-            assert other.tour.in_words()[0].startswith("start in room ")
+            assert other.tour.words()[0].startswith("start in room ")
             json = other.to_dict()
             assert json["doors"] == [leg["door"] for leg in json["legs"] if leg["door"]]
         more += len(found) > 1

@@ -118,13 +118,12 @@ def test_a_tour_is_told_by_rooms_and_doors(planner):
     assert tour.length_m == pytest.approx(sum(leg.length_m for leg in tour.legs))
     doors = [leg.door for leg in tour.legs if leg.door is not None]
     assert [door.rooms for door in doors] == [("hall", "kitchen"), ("hall", "lab"), ("hall", "lab")]
-    words = tour.in_words()
-    assert words[0] == "start in kitchen"
-    assert "to door 1 (0.5 m wide), into hall" in words[1]
-    assert words[1].endswith("then left")
-    length = "2.3" if tour.metric == "any-angle" else "3.5"
-    assert words[2] == f"{length} m to door 2 (0.5 m wide), into lab, and you are there"
-    assert words[-1].endswith("into hall, and you are there")
+    words = tour.words()
+    assert words[0] == "start in the kitchen"
+    assert words[1].startswith("after 3 m leave the kitchen by door 1 into the hall")
+    assert words[1].endswith(" left")
+    assert words[2].endswith(" door 2 on the left into the lab, and you are there")
+    assert words[-1] == "turn right and leave the lab by door 2 into the hall, and you are there"
 
 
 def test_a_path_that_only_touches_a_room_is_not_told_of_it(planner):
@@ -170,7 +169,7 @@ def test_stops_have_headings_where_the_robot_has(driving):
     assert yaws[1][-1] == yaws[2][0] == pytest.approx(0.5)
     assert yaws[2][-1] == pytest.approx(math.pi / 2, abs=0.8)
     assert [own[-1] for own in yaws[:-1]] == pytest.approx([own[0] for own in yaws[1:]])
-    assert any("(8.25, 0.75)" in line for line in tour.in_words())
+    assert any("(8.25, 0.75)" in line for line in tour.words())
 
 
 def test_a_named_stop_faces_the_way_on_a_turned_map():
@@ -307,9 +306,21 @@ def test_plan_takes_names_from_the_file_beside_the_map(cli, map_file):
     done = cli("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
     assert done.code == 0
     assert "house, kitchen to lab" in done.out
-    assert "words      start in kitchen" in done.out
+    assert "words      start in the kitchen" in done.out
     assert "and you are there" in done.out
     assert done.err == ""
+
+
+def test_the_words_are_in_the_language_asked_for(cli, map_file):
+    query = ("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
+    done = cli(*query, "--language", "de")
+    assert "words      Start in „kitchen“" in done.out
+    answer = cli(*query, "--language", "de", "--json").answer
+    assert [line.strip().removeprefix("words").strip() for line in done.out.splitlines()][
+        -1 - len(answer["words"]) : -1
+    ] == answer["words"]
+    assert answer["instructions"][0]["space"] == {"name": "kitchen", "shape": "room"}
+    assert cli(*query, "--language", "fr").refuses(2, "de (Deutsch), en (English)", "'fr'")
 
 
 def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):
@@ -322,7 +333,7 @@ def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):
     points = done.answer["points"]
     assert (points[0], points[-1]) == (done.answer["start"], done.answer["goal"])
     assert len(points) == len(done.answer["headings_rad"])
-    assert done.answer["words"][-1].endswith("to (1.25, 1.25) in hall")
+    assert done.answer["words"][-1].endswith("you are at (1.25, 1.25) in the hall")
     assert sum(leg["length_m"] for leg in done.answer["legs"]) == pytest.approx(
         done.answer["length_m"]
     )

@@ -41,7 +41,7 @@ def read(thing: Any) -> dict[str, Any]:
 def test_a_tour_has_the_keys_of_a_plan_for_the_whole_way(preset: str, smooth: Any) -> None:
     tour = hn.plan_tour(planner(preset), STOPS, smooth=smooth)
     told, parts = read(tour), [read(result) for result in tour.results]
-    assert set(told) == {*parts[0], "legs", "words"}
+    assert set(told) == {*parts[0], "legs", "instructions", "words"}
     assert tour.start == (0.5, 0.5)
     assert tour.goal == (5.5, 0.5)
     assert (told["start"], told["goal"]) == ([0.5, 0.5], [5.5, 0.5])
@@ -61,7 +61,7 @@ def test_a_tour_has_the_keys_of_a_plan_for_the_whole_way(preset: str, smooth: An
         assert told[counted] == sum(part[counted] for part in parts)
     assert told["settings"] == parts[0]["settings"]
     assert told["legs"][0]["room"] == "west"
-    assert told["words"] == tour.in_words()
+    assert told["words"] == tour.words()
     assert len(told["places"]) == len(told["arcs"]) + 1
     endpoints = [part["places"][0] for part in parts], parts[-1]["places"][-1]
     assert told["places"][0] == endpoints[0][0]

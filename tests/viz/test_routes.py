@@ -91,7 +91,7 @@ def test_a_tour_numbers_the_doors_that_its_words_tell_of(ring):
     ax = plot_tour(ring.topology, tour)
     numbers = texts(ax, r"door-\d+")
     assert [text.get_text() for text in numbers.values()] == [str(n) for n in passed]
-    assert f"door {passed[0]} " in " ".join(tour.in_words())
+    assert f"door {passed[0]} " in " ".join(tour.words())
     (door,) = (d for d in ring.topology.rooms.doors if d.number == passed[0])
     assert np.hypot(*np.subtract(numbers[f"door-{passed[0]}"].get_position(), door.position)) < 0.5
 

@@ -30,6 +30,7 @@ from hybridnav.cli.options import (
 from hybridnav.cli.request import Request, Wanted
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
+from hybridnav.sentences import check_language, languages
 
 if TYPE_CHECKING:
     from hybridnav.cli.rendering import Waypoint
@@ -128,6 +129,14 @@ LeastHoleOption = Annotated[
         help="Square metres of an obstacle whose two sides make two routes, by homotopy.",
     ),
 ]
+LanguageOption = Annotated[
+    str,
+    typer.Option(
+        "--language",
+        metavar="CODE",
+        help=f"Language of the words: {', '.join(languages())}.",
+    ),
+]
 CompareOption = Annotated[
     bool,
     typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
@@ -164,6 +173,7 @@ def plan(
     keep_in: KeepInOption = None,
     compare: CompareOption = False,
     plot: PlotOption = None,
+    language: LanguageOption = "en",
     as_json: JsonOption = False,
 ) -> None:
     """Plan a route on MAP, from a point or room to another.
@@ -174,6 +184,7 @@ def plan(
     where = _checked_at(at)
     _check_least_hole(least_hole_m2)
     given = parsed_costs(costs)
+    check_language(language)
     settings = read_settings(
         preset or (PRESET if given else None),
         [*given.overrides, *(overrides or ())],
@@ -203,6 +214,7 @@ def plan(
         wanted=wanted,
         compare=compare,
         plot=plot,
+        language=language,
         as_json=as_json,
     )
     if request.is_tour and compare:

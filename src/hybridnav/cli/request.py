@@ -69,6 +69,7 @@ class Request:
     wanted: Wanted
     compare: bool
     plot: Path | None
+    language: str
     as_json: bool
 
     @property
@@ -202,6 +203,8 @@ class Request:
         seconds: dict[str, float],
     ) -> None:
         figures = outcome.to_dict() | {"map": str(self.source.map_file)}
+        if isinstance(outcome, hn.Tour):
+            figures["words"] = outcome.words(self.language)
         islands, closed = islands_figures(grid), self.closing.to_dict()
         if self.is_tour:
             waypoints = [
@@ -237,13 +240,10 @@ def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[
 
 def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
     """Return alternatives with the rooms and doors that they pass, and whether they are all."""
-    # Loads numba, which help and wrong usage can do without.
-    from hybridnav.planner.itinerary import NOWHERE  # noqa: PLC0415
-
     routes = []
     for number, other in enumerate(found):
         rooms = [
-            (leg.room or NOWHERE) + (f" (door {leg.door.number})" if leg.door else "")
+            (leg.room or f"the {leg.shape}") + (f" (door {leg.door.number})" if leg.door else "")
             for leg in other.tour.legs
         ]
         stretch = other.tour.length_m / found[0].tour.length_m if number else 1.0

@@ -1,58 +1,47 @@
-"""Paths in words: rooms and doors passed, metres per leg."""
+"""Paths by rooms and doors: their legs, and instructions for a person."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.planner.instructions import instructions_of
+from hybridnav.planner.landmarks import Landmarks
+from hybridnav.planner.legs import Leg
 from hybridnav.route import RouteFinder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import FloatArray, LongArray
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import LongArray
     from hybridnav.result import Path
-    from hybridnav.topology import Door, Rooms
+    from hybridnav.sentences import Instruction
+    from hybridnav.sentences.instruction import Shape
+    from hybridnav.topology import Rooms
 
-_LOOK_M = 1.5
-"""Distance before and behind a door at which headings are compared for a turn."""
-_TURN_RAD = math.radians(40.0)
 _SLIVER_M = 0.5
-_AT_ONCE_M = 0.1
-NOWHERE = "unnamed space"
-"""Description of cells outside rooms."""
+_LEAST_ROOM_M2 = 6.0
+_LEAST_HALL_M2 = 60.0
+_WIDEST_CORRIDOR_M = 4.0
+_LONG_SHAPE = 3.0
+"""Length over breadth from which a space is no room."""
 
 
-@dataclass(frozen=True)
-class Leg:
-    """The part of a path inside one room."""
+def waypoint_text(waypoint: ArrayLike | str) -> str:
+    """Return what sentences call a waypoint: its name, or its coordinates in metres."""
+    if isinstance(waypoint, str):
+        return waypoint
+    x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
+    return f"({x:.10g}, {y:.10g})"
 
-    room: str | None
-    """Name of the room, None outside rooms."""
-    length_m: float
-    door: Door | None = None
-    """The door at the end of the leg; None on the last leg, and at a boundary that is no door (to
-    or from unexplored cells)."""
-    turn: str = ""
-    """`"left"` or `"right"` behind the door, empty for straight on."""
-    waypoint: str | None = None
-    """Stop at the end of the leg: its name or its coordinates."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the plain values for JSON."""
-        return {
-            "room": self.room,
-            "length_m": self.length_m,
-            "door": None if self.door is None else self.door.number,
-            "door_kind": None if self.door is None else self.door.kind,
-            "door_width_m": None if self.door is None else self.door.width_m,
-            "door_m": None if self.door is None else list(self.door.position),
-            "turn": self.turn,
-            "waypoint": self.waypoint,
-        }
+def heading_of(start: Sequence[float] | None) -> float | None:
+    """Return the heading of a start `(x, y, yaw)`, None if it has none."""
+    return None if start is None or len(start) < 3 else start[2]  # noqa: PLR2004
 
 
 class Guide:
@@ -67,6 +56,7 @@ class Guide:
     def __init__(self, rooms: Rooms) -> None:
         self._rooms = rooms
         self._route_finder = RouteFinder(rooms)
+        self._landmarks = Landmarks(rooms)
 
     def legs(self, path: Path, *, waypoint: str | None = None) -> list[Leg]:
         """Divide a path into its legs.
@@ -77,7 +67,7 @@ class Guide:
             A cell path, or an any-angle one, whose length is divided in the proportions of its cell
             path.
         waypoint
-            Stop at the end of the path.
+            Waypoint at the end of the path.
 
         Returns
         -------
@@ -89,38 +79,98 @@ class Guide:
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(cells, axis=0).T))])
         scale = path.length_m / along[-1] if along[-1] > 0 else 0.0
         labels = rooms.label_of_vertex[vertices].tolist()
+        crossed = [number for number in range(len(arcs)) if labels[number] != labels[number + 1]]
         legs: list[Leg] = []
-        begun = 0.0
-        for number, (arc, step) in enumerate(zip(arcs, steps, strict=True)):
-            if labels[number] == labels[number + 1]:
-                continue
+        begun, from_step = 0.0, 0
+        for number in crossed:
+            step = steps[number]
             # A diagonal past the corner of a third room crosses two boundaries, both at its middle.
             ended = (along[step] + along[step + 1]) / 2
+            x, y = rooms.grid.frame.points_of(cells[step : step + 2]).mean(axis=0).tolist()
             legs.append(
                 Leg(
                     rooms.name_of(labels[number]),
                     float((ended - begun) * scale),
-                    rooms.door_of_arc.get(arc),
-                    self._turn(cells, along, step),
+                    rooms.door_of_arc.get(arcs[number]),
+                    endpoint=(x, y),
+                    shape=self._shape(vertices[number], cells[from_step : step + 1]),
                 )
             )
-            begun = ended
-        last = float((along[-1] - begun) * scale)
-        return _without_grazes([*legs, Leg(rooms.name_of(labels[-1]), last, waypoint=waypoint)])
+            begun, from_step = ended, step + 1
+        x, y = path.points[-1].tolist()
+        last = Leg(
+            rooms.name_of(labels[-1]),
+            float((along[-1] - begun) * scale),
+            waypoint=waypoint,
+            endpoint=(x, y),
+            shape=self._shape(vertices[-1], cells[from_step:]),
+        )
+        return _without_grazes([*legs, last])
 
-    def _turn(self, cells: LongArray, along: FloatArray, step: int) -> str:
-        """Return the side to which a path bends at a step, over a few metres."""
-        reach = _LOOK_M / self._rooms.grid.resolution_m
-        before = int(np.searchsorted(along, along[step] - reach))
-        behind = int(np.searchsorted(along, along[step + 1] + reach))
-        behind = min(behind, len(cells) - 1)
-        arriving = cells[step + 1] - cells[max(before, 0)]
-        leaving = cells[behind] - cells[step]
-        cross = float(arriving[1] * leaving[0] - arriving[0] * leaving[1])
-        angle = math.atan2(cross, float(arriving @ leaving))
-        if abs(angle) < _TURN_RAD:
-            return ""
-        return "left" if angle > 0 else "right"
+    def instructions(
+        self,
+        paths: Sequence[Path],
+        legs: Sequence[Sequence[Leg]],
+        *,
+        heading_rad: float | None = None,
+    ) -> tuple[Instruction, ...]:
+        """Return the instructions for a person who walks along paths.
+
+        Parameters
+        ----------
+        paths
+            Those of a tour in order, at least one.
+        legs
+            The legs of each.
+        heading_rad
+            Heading at the start, radians counter-clockwise from the x axis; None if there is none.
+        """
+        return tuple(instructions_of(paths, legs, self._landmarks, heading_rad))
+
+    def of(self, path: Path, waypoint: ArrayLike | str, start: Sequence[float]) -> GuidedPath:
+        """Return what the instructions of one path are found from.
+
+        Parameters
+        ----------
+        path
+            The path.
+        waypoint
+            The goal, as it was given.
+        start
+            `(x, y)`, or `(x, y, yaw)` of a robot with a heading.
+        """
+        return GuidedPath(self, path, waypoint_text(waypoint), heading_of(start))
+
+    def _shape(self, vertex: int, cells: LongArray) -> Shape:
+        """Return the shape of a vertex of the room level that has no name, for a path in it."""
+        rooms, level = self._rooms, self._rooms.level
+        if rooms.label_of_vertex[vertex] >= 0:
+            return "room"
+        area_m2 = float(level.areas[vertex]) * rooms.grid.resolution_m**2
+        if area_m2 < _LEAST_ROOM_M2:
+            return "passage"
+        field = level.receptive_field(vertex)
+        breadth_m = 2 * float(rooms.clearance_m[tuple(field.T)].max())
+        if area_m2 >= _LONG_SHAPE * breadth_m**2:
+            nearby_m = 2 * float(np.quantile(rooms.clearance_m[tuple(cells.T)], 0.75))
+            if min(breadth_m, nearby_m) <= _WIDEST_CORRIDOR_M:
+                return "corridor"
+        return "hall" if area_m2 >= _LEAST_HALL_M2 else "room"
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedPath:
+    """A path whose instructions are found when somebody reads them."""
+
+    guide: Guide
+    path: Path
+    waypoint: str
+    heading_rad: float | None
+
+    def instructions(self) -> tuple[Instruction, ...]:
+        """Find the instructions."""
+        legs = self.guide.legs(self.path, waypoint=self.waypoint)
+        return self.guide.instructions([self.path], [legs], heading_rad=self.heading_rad)
 
 
 def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:
@@ -138,43 +188,3 @@ def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:
             length_m = before.length_m + within.length_m + behind.length_m
             kept[-3:] = [replace(behind, length_m=length_m)]
     return kept
-
-
-def in_words(legs: Sequence[Leg]) -> list[str]:
-    """Return a description of a path for a person, one line a leg.
-
-    Parameters
-    ----------
-    legs
-        Legs in the order walked, at least one.
-    """
-    lines = [f"start in {legs[0].room or NOWHERE}"]
-    carried_m = 0.0
-    for leg, following in zip(legs, [*legs[1:], None], strict=True):
-        length_m, carried_m = carried_m + leg.length_m, 0.0
-        metres = f"{length_m:.1f} m"
-        if leg.waypoint is not None and leg.waypoint == leg.room and length_m < _SLIVER_M:
-            lines[-1] += ", and you are there"
-        elif leg.waypoint is not None:
-            place = f" in {leg.room}" if leg.room not in {None, leg.waypoint} else ""
-            lines.append(f"{metres} to {leg.waypoint}{place}")
-        elif following is None:
-            lines.append(f"{metres} to the goal in {leg.room or NOWHERE}")
-        elif _is_sliver(following):
-            carried_m = length_m  # a threshold without a name is not mentioned
-        else:
-            into = f"into {following.room or NOWHERE}"
-            if leg.door is not None:
-                into = (
-                    f"to {leg.door.kind} {leg.door.number} ({leg.door.width_m:.1f} m wide), {into}"
-                )
-                if length_m < _AT_ONCE_M:
-                    metres, into = "at", into.removeprefix("to ")
-            turn = f", then {leg.turn}" if leg.turn and following.length_m >= _SLIVER_M else ""
-            lines.append(f"{metres} {into}{turn}")
-    return lines
-
-
-def _is_sliver(leg: Leg) -> bool:
-    """Return whether a leg is too short to mention, as across a gap between two outlines."""
-    return leg.room is None and leg.waypoint is None and leg.length_m < _SLIVER_M

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from hybridnav.costs import CostLayer
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlan, Prepared
+    from hybridnav.planner.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import Metric, PlanBatch, PlanResult
@@ -111,6 +112,16 @@ class HybridPlanner:
         and with presets that build none."""
         return self._cells.prepared
 
+    @cached_property
+    def guide(self) -> Guide | None:
+        """The source of descriptions for a person; None on a map without rooms."""
+        if self.topology.pyramid.rooms is None:
+            return None
+        # Loads modules that plans without rooms do not need.
+        from hybridnav.planner.itinerary import Guide  # noqa: PLC0415
+
+        return Guide(self.topology.rooms)
+
     @property
     def needs_headings(self) -> bool:
         """Whether endpoints are `(x, y, yaw)`, as with OMPL in a space with headings."""
@@ -159,6 +170,7 @@ class HybridPlanner:
             the map.
         """
         began = time.perf_counter()
+        waypoint = goal
         if isinstance(start, str) or isinstance(goal, str):
             from hybridnav.planner.named import check_names, points_of_waypoints  # noqa: PLC0415 - on demand
 
@@ -173,7 +185,12 @@ class HybridPlanner:
                 costs=self.costs,
             )
         poses = self._pose("start", start), self._pose("goal", goal)
-        return self._between(poses, self._finish_asked_for(smooth), self.closed(blocked), began)
+        finish = self._finish_asked_for(smooth)
+        result = self._between(poses, finish, self.closed(blocked), began)
+        if result.path is None or not result.solved or self.guide is None:
+            return result
+        source = self.guide.of(result.path, waypoint, poses[0].tolist())
+        return replace(result, instruction_source=source)
 
     def _between(
         self,

@@ -7,12 +7,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from hybridnav.errors import InvalidValueError
-from hybridnav.planner.itinerary import Guide, Leg, in_words
+from hybridnav.planner.itinerary import heading_of, waypoint_text
 from hybridnav.planner.named import At, check_names, points_of_waypoints
 from hybridnav.result import PlanStatus
+from hybridnav.sentences import sentences
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,8 +20,10 @@ if TYPE_CHECKING:
 
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.closed import ClosedCells
+    from hybridnav.planner.legs import Leg
     from hybridnav.planner.planner import HybridPlanner, Smooth
     from hybridnav.result import Metric, PlanResult
+    from hybridnav.sentences import Instruction
 
 _COUNTS = (
     "expanded",
@@ -49,6 +50,8 @@ class Tour:
     """Plans from waypoint to waypoint, up to the first that is not solved."""
     legs: tuple[Leg, ...]
     """The tour by rooms; none unless it is solved and the map has rooms."""
+    instructions: tuple[Instruction, ...] = ()
+    """What a person does along the tour; none unless it has legs."""
 
     @property
     def status(self) -> PlanStatus:
@@ -104,8 +107,8 @@ class Tour:
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for strict JSON.
 
-        These are those of `PlanResult.to_dict` for the whole tour, `legs`, and the `words` for a
-        person.
+        These are those of `PlanResult.to_dict` for the whole tour, `legs`, `instructions`, and the
+        `words` for a person in English.
 
         Points and headings, places and arcs are those of all plans in order, with the place of a
         stop once; if the robot turns at a waypoint, its point occurs twice. Counts and seconds are
@@ -129,7 +132,8 @@ class Tour:
             **{name: sum(part[name] for part in parts) for name in _COUNTS},
             "seconds": _summed([part["seconds"] for part in parts]),
             "legs": [leg.to_dict() for leg in self.legs],
-            "words": self.in_words(),
+            "instructions": [instruction.to_dict() for instruction in self.instructions],
+            "words": self.words(),
         }
 
     def _whole(
@@ -140,9 +144,25 @@ class Tour:
             return None
         return [item for part in lists for item in part]
 
-    def in_words(self) -> list[str]:
-        """Return a description of the tour for a person; no lines without legs."""
-        return in_words(self.legs) if self.legs else []
+    def words(self, language: str = "en") -> list[str]:
+        """Return a description of the tour for a person, one sentence a line.
+
+        Parameters
+        ----------
+        language
+            Code of a language, one of `hybridnav.sentences.languages`.
+
+        Returns
+        -------
+        list of str
+            No lines without legs.
+
+        Raises
+        ------
+        InvalidValueError
+            When there are no sentences in this language.
+        """
+        return sentences(self.instructions, language)
 
 
 def _joined_points(
@@ -251,18 +271,13 @@ def tour_of(
     waypoints
         Points or names, one more than plans if all are solved.
     """
-    topology = planner.topology
-    legs: list[Leg] = []
-    if results[-1].solved and topology.pyramid.rooms is not None:
-        guide = Guide(topology.rooms)
-        for result, waypoint in zip(results, waypoints[1:], strict=True):
-            if result.path is not None:
-                legs += guide.legs(result.path, waypoint=_waypoint_text(waypoint))
-    return Tour(tuple(results), tuple(legs))
-
-
-def _waypoint_text(waypoint: ArrayLike | str) -> str:
-    if isinstance(waypoint, str):
-        return waypoint
-    x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
-    return f"({x:.10g}, {y:.10g})"
+    if not results[-1].solved or planner.guide is None:
+        return Tour(tuple(results), ())
+    paths = [result.path for result in results if result.path is not None]
+    legs = [
+        planner.guide.legs(path, waypoint=waypoint_text(waypoint))
+        for path, waypoint in zip(paths, waypoints[1:], strict=True)
+    ]
+    heading_rad = heading_of(results[0].start)
+    instructions = planner.guide.instructions(paths, legs, heading_rad=heading_rad)
+    return Tour(tuple(results), tuple(itertools.chain(*legs)), instructions)

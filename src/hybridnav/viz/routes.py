@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.planner import Tour
     from hybridnav.planner.alternatives import Alternatives
-    from hybridnav.planner.itinerary import Leg
+    from hybridnav.planner.legs import Leg
     from hybridnav.topology import Door, Rooms, TopologicalMap
     from hybridnav.viz.layout import Entry
 
@@ -61,7 +61,7 @@ def plot_tour(
 ) -> Axes:
     """Draw a tour: the rooms as in `plot_rooms`, and the paths from waypoint to waypoint.
 
-    The doors on the path have their numbers, those of `Tour.in_words`.
+    The doors on the path have their numbers, those of `Tour.words`.
 
     Parameters
     ----------

@@ -1,0 +1,167 @@
+"""Doors and openings as a person meets them: how they lie to a path, and which are passed."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.grid import CellClass
+from hybridnav.sentences import Passed
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from hybridnav.planner.bends import Line
+    from hybridnav.sentences.instruction import Hand
+    from hybridnav.topology import Door, Rooms
+
+_LONG_M = 8.0
+"""Length above which a stretch needs landmarks."""
+_LATERAL_M = 3.5
+"""Distance from the path at which a door counts as passed, at most."""
+_NARROWEST_M = 0.5
+"""Width below which a person sees no door."""
+_MARGIN_M = 0.75
+"""Ends of a stretch at which no door counts: it lies at the corner, not on the way."""
+_ONE_DOOR_M = 1.0
+"""Distance of boundaries that belong to one door, as on both sides of a pillar."""
+_LOOK_M = 1.0
+_LEAST_SIDEWAYS = 0.5
+"""Sine of the least angle between a path and the way out by a door beside it."""
+
+
+class Landmarks:
+    """The doors of a map, as a person on a path sees them.
+
+    Parameters
+    ----------
+    rooms
+        The rooms.
+    """
+
+    def __init__(self, rooms: Rooms) -> None:
+        self._rooms = rooms
+        self._way_through_rad: dict[int, float] = {}
+
+    @cached_property
+    def _doors_of(self) -> dict[str | None, list[Door]]:
+        """The doors that a person notices, by the room on each side."""
+        found: dict[str | None, list[Door]] = {}
+        for door in self._rooms.doors:
+            if door.width_m >= _NARROWEST_M:
+                for room in set(door.rooms):
+                    found.setdefault(room, []).append(door)
+        return found
+
+    def way_out_rad(self, door: Door, *, is_forward: bool) -> float:
+        """Return the direction in which one passes a door at right angles.
+
+        Parameters
+        ----------
+        door
+            The door.
+        is_forward
+            Whether one comes from the first of its rooms.
+
+        Returns
+        -------
+        float
+            Radians, map frame: the mean of the steps across its boundary, which does not depend on
+            how the boundary winds between its ends; NaN for one that closes into a ring.
+        """
+        way = self._way_through_rad.get(door.number)
+        if way is None:
+            way = self._way_through_rad[door.number] = self._way_through(door)
+        return way if is_forward else way + math.pi
+
+    def _way_through(self, door: Door) -> float:
+        """Return the direction from the first room of a door to the other."""
+        labels, cols = self._rooms.labels, self._rooms.grid.shape[1]
+        first, other = (-1 if name is None else labels.index(name) for name in door.rooms)
+        flat = self._rooms.cells_beside(door.number)
+        label_of = labels.label_of.ravel()
+        across = []
+        for step in (1, cols):
+            pairs = flat[np.isin(flat + step, flat)]
+            if step == 1:
+                pairs = pairs[pairs % cols != cols - 1]
+            tail, head = label_of[pairs], label_of[pairs + step]
+            onward = np.count_nonzero((tail == first) & (head == other))
+            back = np.count_nonzero((tail == other) & (head == first))
+            across.append(int(onward) - int(back))
+        if across == [0, 0]:
+            return math.nan
+        return math.atan2(across[1], across[0]) + self._rooms.grid.frame.yaw_rad
+
+    def passed(
+        self, line: Line, between_m: tuple[float, float], room: str | None, but: Collection[int]
+    ) -> tuple[Passed, ...]:
+        """Return the doors and openings beside a long stretch of a path in one room.
+
+        Parameters
+        ----------
+        line
+            The path.
+        between_m
+            Begin and end of the stretch, by the length of the path; below 8 m nothing counts.
+        room
+            The room in which it lies, None outside rooms.
+        but
+            Numbers of doors that do not count: those at its ends.
+
+        Returns
+        -------
+        tuple of Passed
+            The counts at each hand, more first. A door counts if it lies within 3.5 m of the path,
+            beside it, and nothing occupied stands between.
+        """
+        begin_m, end_m = between_m
+        if end_m - begin_m <= _LONG_M:
+            return ()
+        points, along = line.between(begin_m, end_m)
+        counted: dict[Hand, list[Door]] = {"left": [], "right": []}
+        for door in self._doors_of.get(room, ()):
+            away = np.hypot(*(points - door.position).T)
+            nearest = int(np.argmin(away))
+            at_m = float(along[nearest])
+            is_beside = begin_m + _MARGIN_M < at_m < end_m - _MARGIN_M
+            if door.number in but or away[nearest] > _LATERAL_M or not is_beside:
+                continue
+            hand = self._hand_of(door, room, line.heading(at_m - _LOOK_M, at_m + _LOOK_M))
+            if (
+                hand is not None
+                and self._is_seen(points[nearest].tolist(), door)
+                and not _is_known(door, counted[hand])
+            ):
+                counted[hand].append(door)
+        found = [
+            Passed(hand, len(doors) - wide, wide)
+            for hand, doors in counted.items()
+            if doors
+            for wide in [sum(door.is_opening for door in doors)]
+        ]
+        return tuple(sorted(found, key=lambda one: (-one.n_doors, -one.n_openings)))
+
+    def _hand_of(self, door: Door, room: str | None, heading_rad: float) -> Hand | None:
+        """Return the hand to which a door leads out of a room; None if it lies across the path."""
+        way = self.way_out_rad(door, is_forward=door.rooms[0] == room)
+        sideways = math.sin(way - heading_rad)
+        if not abs(sideways) >= _LEAST_SIDEWAYS:
+            return None
+        return "left" if sideways > 0 else "right"
+
+    def _is_seen(self, point: list[float], door: Door) -> bool:
+        """Return whether no occupied cell lies between a point and the middle of a door."""
+        grid = self._rooms.grid
+        count = 2 + math.ceil(2 * math.dist(point, door.position) / grid.resolution_m)
+        points = np.linspace(point, door.position, count)[1:-1]
+        cells = grid.frame.cells_of(points)
+        return not (grid.measured[tuple(cells.T)] == CellClass.OCCUPIED).any()
+
+
+def _is_known(door: Door, others: list[Door]) -> bool:
+    """Return whether a door is part of one that was counted."""
+    return any(math.dist(door.position, other.position) < _ONE_DOOR_M for other in others)
