@@ -315,23 +315,8 @@ class PlanResult:
         return source if isinstance(source, tuple) else source.instructions()
 
     def words(self, language: str = "en") -> list[str]:
-        """Return a description of the path for a person, one sentence a line, as `Tour.words`.
-
-        Parameters
-        ----------
-        language
-            Code of a language, one of `hybridnav.sentences.languages`.
-
-        Returns
-        -------
-        list of str
-            No lines without a path, and on a map without rooms.
-
-        Raises
-        ------
-        InvalidValueError
-            When there are no sentences in this language.
-        """
+        """Return a description of the path for a person, as `Tour.words`; no lines without a path,
+        and on a map without rooms."""
         return sentences(self.instructions, language)
 
     def __getstate__(self) -> dict[str, Any]:

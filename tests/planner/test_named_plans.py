@@ -311,18 +311,6 @@ def test_plan_takes_names_from_the_file_beside_the_map(cli, map_file):
     assert done.err == ""
 
 
-def test_the_words_are_in_the_language_asked_for(cli, map_file):
-    query = ("plan", map_file, "--from", "kitchen", "--to", "lab", "--robot-radius", "0")
-    done = cli(*query, "--language", "de")
-    assert "words      Start in „kitchen“" in done.out
-    answer = cli(*query, "--language", "de", "--json").answer
-    assert [line.strip().removeprefix("words").strip() for line in done.out.splitlines()][
-        -1 - len(answer["words"]) : -1
-    ] == answer["words"]
-    assert answer["instructions"][0]["space"] == {"name": "kitchen", "shape": "room"}
-    assert cli(*query, "--language", "fr").refuses(2, "de (Deutsch), en (English)", "'fr'")
-
-
 def test_plan_with_stops_as_json_and_as_a_picture(cli, map_file, tmp_path):
     done = cli(
         *("plan", map_file, "--from", "sink", "--via", "lab", "--to", "1.25,1.25", "--json"),

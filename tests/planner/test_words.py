@@ -6,6 +6,7 @@ import itertools
 import math
 import re
 from functools import cache
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -114,6 +115,13 @@ def test_the_same_words_for_a_plan_a_tour_and_another_preset():
     by_cells = house("octile").plan(start, goal)
     assert by_cells.metric == "octile"
     assert hands_of(by_cells.words()) == hands_of(plan.words()) == ["L"]
+
+
+def test_a_turn_at_a_waypoint_comes_after_the_arrival():
+    """The nearest point of a room lies in its door, and the way on leads back by that door."""
+    words = hn.plan_tour(house(), [(1.25, 5.75), "archive", (1.75, 3.0)]).words()
+    assert words[2].endswith(" door 3 on the left into the archive, and you are there")
+    assert words[3].startswith("turn sharply right and leave the archive by door 3 ")
 
 
 def test_an_opening_is_no_door():
@@ -285,6 +293,16 @@ def test_words_replayed_on_the_graph_of_corridors_reach_the_goal(maze, preset):
             row, col = heading
             heading = np.array((col, -row) if hand == "left" else (-col, row))
     assert tuple(at) == goal, words
+
+
+def test_the_command_takes_a_language(cli):
+    map_file = FilePath(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
+    query = ("plan", map_file, "--from", "0.5,0.5", "--via", "1.5,0.5", "--to", "2.0,2.5")
+    german = cli(*query, "--language", "de", "--json").answer
+    assert german["words"][0].startswith("Start in „room-1“")
+    assert german["instructions"][0]["space"] == {"name": "room-1", "shape": "room"}
+    assert "words      start in room-1" in cli(*query).out
+    assert cli(*query, "--language", "fr").refuses(2, "de (Deutsch), en (English)", "'fr'")
 
 
 @pytest.fixture(scope="module")

@@ -70,5 +70,5 @@ def test_lists_and_pictures_tell_doors_from_openings():
     drawn = {line.get_gid(): line for line in plot_rooms(topology).lines}
     positions = {door.kind: door.position for door in topology.rooms.doors}
     for kind in ("door", "opening"):
-        assert tuple(drawn[f"{kind}s"].get_xydata()[0]) == pytest.approx(positions[kind])
+        assert np.asarray(drawn[f"{kind}s"].get_xydata())[0] == pytest.approx(positions[kind])
     assert drawn["doors"].get_marker() != drawn["openings"].get_marker()

@@ -221,21 +221,17 @@ def _events(line: Line, stretches: Sequence[_Stretch], landmarks: Landmarks) -> 
 
 
 def _crossing_near(events: Sequence[_Event], at_m: float) -> int | None:
-    """Return the index of the nearest crossing within reach of a bend; None if a waypoint lies
-    between."""
+    """Return the index of the nearest crossing within reach of a bend, without a waypoint between;
+    None if there is none."""
+    waypoints = [number for number, event in enumerate(events) if event.kind == "arrive"]
     near = [
         (abs(event.at_m - at_m), number)
         for number, event in enumerate(events)
-        if event.kind == "cross" and abs(event.at_m - at_m) <= _IN_DOORWAY_M
+        if event.kind == "cross"
+        and abs(event.at_m - at_m) <= _IN_DOORWAY_M
+        and not any((other > number) == (events[other].at_m <= at_m) for other in waypoints)
     ]
-    if not near:
-        return None
-    crossing = min(near)[1]
-    door_m = events[crossing].at_m
-    for event in events:
-        if event.kind == "arrive" and (door_m < event.at_m <= at_m or at_m < event.at_m < door_m):
-            return None
-    return crossing
+    return min(near)[1] if near else None
 
 
 def _with_bends(

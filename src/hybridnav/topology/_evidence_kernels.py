@@ -12,14 +12,16 @@ from hybridnav.topology._merging_kernels import union_hull
 
 @njit(cache=True, nogil=True)
 def is_wall(wall, row, col):
-    """Whether a point in cells lies in a wall."""
+    """Return whether a point in cells lies in a wall."""
     r, c = math.floor(row), math.floor(col)
     return 0 <= r < wall.shape[0] and 0 <= c < wall.shape[1] and wall[r, c]
 
 
 @njit(cache=True, nogil=True)
 def flush(wall, end, outward, across, reach):
-    """Share of an arm of 3/4 of the reach, square to an opening at its end, that runs on a wall."""
+    """Return the share of an arm, square to an opening at its end, that runs on a wall.
+
+    The arm has 3/4 of the reach."""
     arm, skip, deep = (3 * reach) // 4, max(1, reach // 7), max(2, reach // 7)
     met = 0
     for k in range(skip, arm + 1):
@@ -105,7 +107,7 @@ def opening_of(state, pair, reach, found):
 
 @njit(cache=True, nogil=True)
 def axes_of(moments):
-    """Elongation of cells, and the angle of their main axis from the direction of rows."""
+    """Return the elongation of cells, and the angle of their main axis from the rows."""
     n = moments[0]
     row, col = moments[1] / n, moments[2] / n
     rr, rc = moments[3] / n - row * row, moments[4] / n - row * col
@@ -164,7 +166,7 @@ def fill_evidence(state, pairs, resolution, reach, jamb, evidence):
 
 @njit(cache=True, nogil=True)
 def probabilities(evidence, features, thresholds, leaves, base):
-    """Probability of each row by a forest of complete trees, stored level by level."""
+    """Return the probability of each row by a forest of complete trees, stored level by level."""
     inner = features.shape[1]
     found = np.empty(len(evidence))
     for k in range(len(evidence)):

@@ -24,10 +24,15 @@ class SegmentState(NamedTuple):
     opened: np.ndarray
     """float64 (n,), sides that are open to other segments."""
     hull_areas: np.ndarray
+    """float64 (n,), area of the convex hull."""
     diameters: np.ndarray
+    """float64 (n,), greatest distance between two corners of the hull."""
     hull_begins: np.ndarray
+    """int64 (n,), where the corners of the hull begin in `hulls`."""
     hull_sizes: np.ndarray
+    """int64 (n,), number of these corners."""
     degrees: np.ndarray
+    """int64 (n,), number of segments that touch this one."""
     first_half: np.ndarray
     """int64 (n,), the first half pair of each segment, -1 for none."""
     versions: np.ndarray
@@ -35,24 +40,35 @@ class SegmentState(NamedTuple):
     endpoints: np.ndarray
     """int64 (m, 2), the two segments of each pair; the first is -1 once the pair is gone."""
     open_sides: np.ndarray
+    """float64 (m,), sides between free cells of both segments."""
     border_sides: np.ndarray
     """float64 (m,), sides with the reach into walls."""
     widest: np.ndarray
+    """float64 (m,), greatest clearance on the open sides."""
     clearances: np.ndarray
     """float64 (m,), sum of the clearance on the open sides."""
     head: np.ndarray
+    """int64 (m,), first run of open sides of each pair, -1 for none."""
     tail: np.ndarray
-    """int64 (m,), first and last run of open sides of each pair."""
+    """int64 (m,), last run of open sides of each pair, -1 for none."""
     next_half: np.ndarray
+    """int64 (2 m,), the half pair that follows at the same segment, -1 for none."""
     next_run: np.ndarray
+    """int64 (m,), the run that follows in the same pair, -1 for none."""
     run_begins: np.ndarray
+    """int64 (m,), first of the sides of each run."""
     run_ends: np.ndarray
+    """int64 (m,), where the sides of each run end."""
     sides: np.ndarray
     """float64 (k, 3), row, col, and 1 where the side lies along the columns."""
     wall: np.ndarray
+    """bool (rows, cols), walls and the cells beside them."""
     hulls: np.ndarray
+    """float64 (c, 2), corners of hulls, (row, col); those after `hulls_used` are free."""
     hulls_used: np.ndarray
+    """int64 (1,), number of corners in use."""
     mark: np.ndarray
+    """int64 (n,), scratch, -1."""
 
 
 @njit(cache=True, nogil=True)
@@ -83,7 +99,7 @@ def hull_of(points, count, corners):
 
 @njit(cache=True, nogil=True)
 def diameter_of(corners, size):
-    """Greatest distance between two corners."""
+    """Return the greatest distance between two corners."""
     most = 0.0
     for i in range(size):
         for j in range(i):
@@ -94,7 +110,7 @@ def diameter_of(corners, size):
 
 @njit(cache=True, nogil=True)
 def union_hull(state, u, v):
-    """Corners, size and area of the convex hull of two segments."""
+    """Return corners, size and area of the convex hull of two segments."""
     a, b = state.hull_sizes[u], state.hull_sizes[v]
     points = np.empty((a + b, 2))
     points[:a] = state.hulls[state.hull_begins[u] : state.hull_begins[u] + a]
@@ -106,7 +122,8 @@ def union_hull(state, u, v):
 
 @njit(cache=True, nogil=True)
 def measure_segments(label_of, reaching, clearance, n):
-    """Free cells, peaks, moments and rims of segments, and their hulls, one after the other."""
+    """Measure free cells, peaks, moments and rims of segments, and their hulls one after the
+    other."""
     rows, cols = label_of.shape
     free, peaks, rims = np.zeros(n), np.zeros(n), np.zeros(n)
     moments = np.zeros((n, 6))
@@ -170,7 +187,7 @@ def measure_segments(label_of, reaching, clearance, n):
 
 @njit(cache=True, nogil=True)
 def sides_between(label_of, clearance):
-    """Sides between cells of two segments: both segments, middle and direction, the clearance."""
+    """Find sides between cells of two segments: both segments, middle and direction, clearance."""
     rows, cols = label_of.shape
     n = 0
     for fill in range(2):
@@ -198,7 +215,7 @@ def sides_between(label_of, clearance):
 
 @njit(cache=True, nogil=True)
 def pairs_of(state, segment):
-    """The pairs of a segment."""
+    """Return the pairs of a segment."""
     found = np.empty(int(state.degrees[segment]), np.int64)
     n, half = 0, state.first_half[segment]
     while half >= 0:
@@ -257,7 +274,7 @@ def merge_pair(state, pair):
 
 @njit(cache=True, nogil=True)
 def pairs_of_both(state, segment):
-    """The pairs of a segment whose degree does not count yet; drops those that are gone."""
+    """Return the pairs of a segment whose degree does not count yet; drop those that are gone."""
     n, half, before = 0, state.first_half[segment], -1
     while half >= 0:
         following = state.next_half[half]

@@ -133,7 +133,7 @@ def grow_labels(label_of, region, most_steps):
 
 @njit(cache=True, nogil=True)
 def sharpness(rows, cols, angles):
-    """How sharp the projections of points on two square axes are at each angle, float64."""
+    """Measure how sharp the projections of points on two square axes are at each angle."""
     found = np.zeros(len(angles))
     side = int(math.hypot(np.abs(rows).max(), np.abs(cols).max())) + 2
     one, other = np.zeros(2 * side + 1, np.int64), np.zeros(2 * side + 1, np.int64)
@@ -153,9 +153,23 @@ def sharpness(rows, cols, angles):
 def cut_along(wall, free, slope, within, lengths, share, cut):
     """Set the cells of the gaps between walls that continue each other on a line.
 
-    Lines rise by `slope` rows a column, one through each cell. The lengths are those of
-    `gaps_in_rows` in cells: the longest gap, a door, the window, the least wall on either side and
-    on both. At least half of a gap lies `within`.
+    Lines rise by a slope, one through each cell.
+
+    Parameters
+    ----------
+    wall, free
+        bool (rows, cols).
+    slope
+        Rows a column.
+    within
+        bool (rows, cols), cells of which at least half of a gap consists.
+    lengths
+        As of `gaps_in_rows`, in cells: the longest gap, a door, the window, the least wall on
+        either side and on both.
+    share
+        Least share of free cells in the gap.
+    cut
+        bool (rows, cols), filled in.
     """
     longest, door, window, side, both = lengths
     rows, cols = wall.shape
