@@ -1,15 +1,22 @@
-"""The table of alternatives: seconds for three of them between random points, by doors and by
-homotopy.
+"""The table of alternatives: time for three of them between random points, by doors or homotopy.
 
     python -m benchmarks.alternatives [--data FOLDER] [--pairs 30] [--seed 0] [--homotopy]
 
 The office of `maps/office`, and from FOLDER the maps of Willow Garage and of GDC floors 2, 3 and
 3ne; robot radius 0.25 m, preset `shortest`, rooms found. Points are cells drawn from the largest
-connected part. `prepare` is the time of the first query, which measures the rooms; then for each
-pair the time of all alternatives, median and longest, over that of the plain plan alone in the
-median, the number of pairs with one, two and three alternatives, the greatest overlap and stretch,
-and the number of second alternatives that pass the same doors as the first. With `--homotopy` the
-same for homotopy classes.
+connected part, and times are those of one processor. The columns:
+
+    prepare     the first query, which measures the rooms
+    median      all alternatives of a pair
+    longest     the same
+    plain       the plain plan alone, in the median
+    1 / 2 / 3   pairs with as many alternatives
+    stopped     pairs for which the search stopped early
+    overlap     the greatest share of an alternative in common with a shorter one
+    stretch     the greatest length of one over that of the first
+    same doors  pairs whose second alternative passes the doors of the first
+
+With `--homotopy` there is a second row for homotopy classes.
 """
 
 from __future__ import annotations
@@ -61,18 +68,18 @@ def pairs_of(planner: hn.HybridPlanner, count: int, seed: int) -> list[np.ndarra
 
 def row_of(planner: hn.HybridPlanner, pairs: list[np.ndarray], by: By) -> list[str]:
     """The figures of one map."""
-    began = time.perf_counter()
+    began = time.process_time()
     hn.plan_alternatives(planner, pairs[0][0], pairs[0][1], WANTED, by=by)
-    prepare_s = time.perf_counter() - began
+    prepare_s = time.process_time() - began
     spent_s, plain_s, counts, overlaps, stretches, same = [], [], [0] * WANTED, [0.0], [1.0], 0
     stopped = 0
     for pair in pairs:
-        began = time.perf_counter()
+        began = time.process_time()
         planner.plan(*pair)
-        plain_s.append(time.perf_counter() - began)
-        began = time.perf_counter()
+        plain_s.append(time.process_time() - began)
+        began = time.process_time()
         found = hn.plan_alternatives(planner, pair[0], pair[1], WANTED, by=by)
-        spent_s.append(time.perf_counter() - began)
+        spent_s.append(time.process_time() - began)
         counts[len(found) - 1] += 1
         stopped += not found.complete
         overlaps += [other.overlap for other in found]

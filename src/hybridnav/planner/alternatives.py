@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, overload
 from hybridnav.errors import InvalidValueError
 from hybridnav.homotopy.search import MOST_STATES, TIME_LIMIT_S
 from hybridnav.planner.by_classes import ClassEffort, ClassTours
-from hybridnav.planner.by_doors import Chosen, DoorTours, Limits
+from hybridnav.planner.by_doors import Chosen, DoorTours, RouteLimits
 from hybridnav.planner.tour import Tour, plan_tour
 
 if TYPE_CHECKING:
@@ -36,14 +36,14 @@ class Alternative:
 
     Examples
     --------
-    >>> probability = np.zeros((3, 7))
-    >>> probability[1, 1:6] = 1.0
-    >>> rooms = hn.RoomLabels(("west", "east"), np.tile([0, 0, 0, 1, 1, 1, 1], (3, 1)))
+    >>> probability = np.zeros((5, 7))
+    >>> probability[1:4, 1:6] = 1.0
+    >>> rooms = hn.RoomLabels(("west", "east"), np.tile([0, 0, 0, 1, 1, 1, 1], (5, 1)))
     >>> grid = hn.OccupancyGrid(probability, robot_radius_m=0)
     >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
-    >>> found = hn.plan_alternatives(hn.HybridPlanner(topology), (0.5, 1.5), (6.5, 1.5), 3)
+    >>> found = hn.plan_alternatives(hn.HybridPlanner(topology), (0.5, 2.5), (6.5, 2.5), 3)
     >>> [(other.doors, round(other.path.length_m, 2)) for other in found]
-    [((1,), 6.83), ((2,), 6.83)]
+    [((1,), 8.16), ((2,), 8.16)]
     """
 
     tour: Tour
@@ -205,7 +205,7 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     >>> [other.path.length_m for other in found]
     [8.0, 8.0]
     """
-    limits = _checked(Limits(count, max_overlap, max_stretch))
+    limits = _checked(RouteLimits(count, max_overlap, max_stretch))
     if by not in get_args(By):
         raise InvalidValueError(f"by must be 'doors' or 'homotopy', got {by!r:.80}")
     if planner.costs is not None:
@@ -242,7 +242,7 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     return Alternatives(found, complete=not stopped, note=note)
 
 
-def _checked(limits: Limits) -> Limits:
+def _checked(limits: RouteLimits) -> RouteLimits:
     """Return the limits if they are in range."""
     try:
         count = operator.index(limits.count)
@@ -271,12 +271,12 @@ def _stopped(search: DoorTours | None, classes: ClassTours | None) -> str:
     return ""
 
 
-def _fewer(count: int, limits: Limits, reason: str) -> str:
+def _fewer(count: int, limits: RouteLimits, reason: str) -> str:
     """Return the reason why there are fewer alternatives than requested, empty if there are not."""
     return "" if count >= limits.count else f"{count} of {limits.count}: {reason}"
 
 
-def _reason(search: DoorTours | None, limits: Limits) -> str:
+def _reason(search: DoorTours | None, limits: RouteLimits) -> str:
     """Describe why there are no more alternatives by doors."""
     if search is None:
         return "the map has no rooms, so no doors; by homotopy, sides of obstacles count"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import LongArray
     from hybridnav.homotopy import AlternativeSearch, ClassPath, ClassPaths
     from hybridnav.homotopy.classes import Word
-    from hybridnav.planner.by_doors import DoorTours, Limits
+    from hybridnav.planner.by_doors import DoorTours, RouteLimits
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.planner.tour import Tour
@@ -122,7 +122,7 @@ class ClassTours:
             self.stopped = ""
         return [(self._tour(result), word) for word, result in results.items()]
 
-    def inside(self, search: DoorTours, chosen: list[Chosen], limits: Limits) -> list[Chosen]:
+    def inside(self, search: DoorTours, chosen: list[Chosen], limits: RouteLimits) -> list[Chosen]:
         """Return tours by doors with others by the same doors, on other sides of obstacles.
 
         Parameters
@@ -132,7 +132,7 @@ class ClassTours:
         chosen
             Tours by doors, the first one first.
         limits
-            Limits of all of them; here only what lies near a shorter path is in common.
+            RouteLimits of all of them; here only what lies near a shorter path is in common.
         """
         whole = chosen[0].tour
         planned = [(one, Track(one.tour, search.near_m, by_legs=False)) for one in chosen]

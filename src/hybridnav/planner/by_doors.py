@@ -28,7 +28,7 @@ _MOST_PLANNED = 4
 
 
 @dataclass(frozen=True)
-class Limits:
+class RouteLimits:
     """What alternatives must keep to."""
 
     count: int
@@ -96,7 +96,7 @@ class DoorTours:
         first, last = self._rooms.level.field_of.ravel()[self._endpoints].tolist()
         return bool(first == last)
 
-    def find(self, limits: Limits) -> list[Chosen]:
+    def find(self, limits: RouteLimits) -> list[Chosen]:
         """Find tours, the first one first, then by length."""
         planned = [(Chosen(self._first), Track(self._first, self.near_m))]
         chosen = planned
@@ -183,7 +183,7 @@ class DoorTours:
         result = replace(result, lower_bound=min(whole.lower_bound, result.cost))
         return tour_of(self._planner, [result], self._waypoints)
 
-    def _candidates(self, limits: Limits) -> Iterator[DoorRoute]:
+    def _candidates(self, limits: RouteLimits) -> Iterator[DoorRoute]:
         """Return routes by sequences of doors, gaps aside, each sequence once."""
         tried = {tuple(leg.door.number for leg in self._first.legs if _is_told(leg.door))}
         most_m = None
@@ -242,7 +242,9 @@ class DoorTours:
         return parts
 
 
-def admissible(planned: list[tuple[Chosen, Track]], limits: Limits) -> list[tuple[Chosen, Track]]:
+def admissible(
+    planned: list[tuple[Chosen, Track]], limits: RouteLimits
+) -> list[tuple[Chosen, Track]]:
     """Return the tours that do not share too much with a shorter one, by length after the first.
 
     Parameters

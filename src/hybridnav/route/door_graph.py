@@ -25,7 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DoorRoute:
-    """A route on the room level that passes no room twice."""
+    """A route on the room level that passes no room twice.
+
+    Examples
+    --------
+    >>> from hybridnav.route import DoorRoute
+    >>> DoorRoute(vertices=(0, 1), arcs=(0,), legs_m=(2.0, 1.0)).length_m
+    3.0
+    """
 
     vertices: tuple[int, ...]
     """Vertices of the room level, from that of the start to that of the goal."""
@@ -352,6 +359,15 @@ def door_graph(topology: TopologicalMap, *, allow_unexplored: bool = False) -> D
     -------
     DoorGraph
         The same object for the same arguments.
+
+    Examples
+    --------
+    >>> from hybridnav.route import door_graph
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+    >>> labels = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    >>> door_graph(topology) is door_graph(topology)
+    True
     """
     kept = _KEPT.setdefault(topology, {})
     found = kept.get(allow_unexplored)
