@@ -78,10 +78,25 @@ def test_names_hide_neither_each_other_nor_the_room_beside(side, width_in):
         endpoints[:, 1] = middle[0, 1]
         cells = grid.frame.cells_of(np.concatenate([middle, endpoints]))
         assert set(labels.label_of[tuple(cells.T)].tolist()) <= {-1, int(gid.split("-")[1])}
-    told = [re.fullmatch(r"rooms \((\d+) without their name\)", entry) for entry in legend(ax)]
-    left_out = sum(int(found[1]) for found in told if found)
-    assert left_out == 64 - len(names)
-    assert (left_out == 0) is (width_in == 15.0)
+    numbers = texts(ax, r"number-\d+")
+    assert len(names) + len(numbers) == 64  # every room has one or the other
+    assert (not numbers) is (width_in == 15.0)
+    for gid, text in numbers.items():
+        label = int(gid.split("-")[1])
+        assert text.get_text() == str(label + 1)
+        assert f"{label + 1}  laboratory {label}" in legend(ax)
+
+
+def test_a_room_too_small_for_its_number_is_pointed_out():
+    cells = np.zeros((40, 60), dtype=np.uint8)
+    label_of = np.zeros(cells.shape, dtype=np.int32)
+    label_of[20, 30] = 1
+    grid = hn.OccupancyGrid(cells.astype(np.float32), hn.Frame(0.5), robot_radius_m=0)
+    ax = plot_rooms(RoomLabels(("hall", "shaft"), label_of), grid, width_in=3.0)
+    assert texts(ax, r"number-1")["number-1"].get_text() == "2"
+    (line,) = (line for line in ax.lines if line.get_gid() == "lead-1")
+    assert line.get_xydata()[0].tolist() == pytest.approx([15.25, 10.25])
+    assert "2  shaft" in legend(ax)
 
 
 def test_a_tour_numbers_the_doors_that_its_words_tell_of(ring):

@@ -42,8 +42,9 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
 ) -> Axes:
     """Draw rooms in colours that differ between neighbours, with names, doors as dots, scale bar.
 
-    A name that does not fit its room, or would hide another, is written smaller or left out; the
-    legend counts those left out. Doors have their numbers if there is room for them.
+    Every room has its name or, where the name does not fit or would hide another, its number in the
+    list of rooms, beside the room if necessary; the legend then has the names of the numbers,
+    unless they end in them, as `room-7` does. Doors have their numbers if there is room for them.
 
     Openings are squares: they are wider than 2 m or not between jambs. Those of both kinds that are
     too narrow for the map's robot radius are hollow dots. Gaps, doors narrower than
@@ -87,7 +88,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     draw_room_cells(canvas, labels, grid)
     words = [grid.name, f"{len(labels.names)} rooms"]
-    writer, left_out, gaps = RoomWriter(canvas, grid, labels), 0, ""
+    writer, gaps = RoomWriter(canvas, grid, labels), ""
     doors: list[Door] = []
     if view is not None:
         *counted, gaps = view.counted()
@@ -95,12 +96,25 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         doors = [door for door in view.doors if not door.is_gap]
         writer.labels.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     if names:
-        left_out = writer.write_names()
-    entries: list[Entry] = [room_entry(left_out)]
+        writer.write_names()
+        writer.number_rooms()
+    entries: list[Entry] = [(swatch(style.PLACES), "rooms")]
+    key = _key(writer.unnamed, labels.names)
     if view is not None:
         entries += draw_doors(canvas, doors, f"{gaps} left out" if gaps else "")
         writer.number_doors(sorted(doors, key=lambda door: -door.width_m))
-    return finish(canvas, entries + ground_entries(grid), words if title is None else [title])
+    entries += [*ground_entries(grid), *key]
+    return finish(canvas, entries, words if title is None else [title])
+
+
+def _key(numbered: Sequence[int], names: Sequence[str]) -> list[Entry]:
+    """Return the legend's entries for numbers that stand for names."""
+    blank = Line2D([], [], linestyle="none")
+    pairs = [(str(label + 1), names[label]) for label in sorted(numbered)]
+    entries = [(blank, f"{n}  {name}") for n, name in pairs if name != f"room-{n}"]
+    if len(entries) < len(pairs):
+        entries.append((blank, "n  room-n"))
+    return entries
 
 
 def _view_of(

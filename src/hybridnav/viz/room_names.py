@@ -6,6 +6,7 @@ import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.lines import Line2D
 from scipy import ndimage
 
 from hybridnav.grid import NO_ROOM
@@ -26,6 +27,8 @@ _NAME_SIZES = (0.75, 0.65, 0.55)
 _LEAST_FONT = 4.0
 """Least legible font size, in points."""
 _NUMBER_SIZE = 0.7
+_LEADS = (4.0, 9.0, 16.0, 26.0)
+"""Lengths of the line to a number beside its room that are tried, in points."""
 _HALO = 1.5
 _PARTS = 4
 """Parts per side of a room's bounding box, each with a spot for the name."""
@@ -52,6 +55,8 @@ class RoomWriter:
         self._rooms = labels
         self.labels = LabelPlacer(canvas)
         """The names and numbers."""
+        self.unnamed: list[int] = []
+        """Rooms whose names did not fit, the largest first."""
 
     def number_doors(self, doors: Sequence[Door], *, always: bool = False) -> None:
         """Write the numbers of doors beside their dots.
@@ -97,15 +102,50 @@ class RoomWriter:
         order = sorted(range(len(names)), key=lambda n: (names[n] not in first, -areas[n], n))
         boxes = ndimage.find_objects(self._rooms.label_of + 1, len(names))
         along = _points_along(lines, self._grid.resolution_m)
-        left_out = 0
-        for label in order:
-            window = boxes[label]
-            if window is not None and not self._wrote_name(label, window, along):
-                left_out += 1
-        return left_out
+        self.unnamed = [
+            label
+            for label in order
+            if (window := boxes[label]) is not None
+            and not self._wrote(names[label], label, window, along)
+        ]
+        return len(self.unnamed)
 
-    def _wrote_name(self, label: int, window: tuple[slice, ...], along: FloatArray) -> bool:
-        name = self._rooms.names[label]
+    def number_rooms(self) -> None:
+        """Write the number of each room whose name did not fit: in the room, in small type if
+        necessary, or else beside it, with a line to the room."""
+        boxes = ndimage.find_objects(self._rooms.label_of + 1, len(self._rooms.names))
+        along = _points_along([], self._grid.resolution_m)
+        for label in self.unnamed:
+            number, window = str(label + 1), boxes[label]
+            assert window is not None  # noqa: S101 - it was looked at for its name
+            if not self._wrote(number, label, window, along, gid="number"):
+                self._point_out(number, label, window)
+
+    def _point_out(self, number: str, label: int, window: tuple[slice, ...]) -> None:
+        """Write a number where it hides least, with a line to its room."""
+        point = _depths(self._rooms.label_of[window] == label, window, self._grid)[0]
+        half = np.array([text_width(number, _LEAST_FONT) / 2, 0.55 * _LEAST_FONT])
+        spots = self.labels.boxes_beside(point, half, _LEADS)
+        hidden = [self.labels.n_hidden(at) + (not self.labels.is_in_view(at)) for at in spots]
+        box = spots[int(np.argmin(hidden))]
+        line = Line2D(
+            *np.stack([point, box.mean(axis=0)], axis=1), color=style.INK, linewidth=0.4, zorder=8
+        )
+        line.set_gid(f"lead-{label}")
+        self.labels.canvas.ax.add_line(line)
+        font = {"fontsize": _LEAST_FONT, "color": style.INK}
+        self.labels.write(number, box, f"number-{label}", halo=_HALO, **font)
+
+    def _wrote(
+        self,
+        name: str,
+        label: int,
+        window: tuple[slice, ...],
+        along: FloatArray,
+        *,
+        gid: str = "room",
+    ) -> bool:
+        """Write a name or a number in its room; return whether there is a spot for it."""
         points = _depths(self._rooms.label_of[window] == label, window, self._grid)
         spot: tuple[float, FloatArray] | None = None
         for size, point in itertools.product(_NAME_SIZES, points):
@@ -122,8 +162,8 @@ class RoomWriter:
         if spot is None:
             return False
         font, box = spot
-        gid = f"room-{label}"
-        self.labels.write(name, box, gid, halo=_HALO, fontsize=font, color=style.INK)
+        font_of = {"fontsize": font, "color": style.INK}
+        self.labels.write(name, box, f"{gid}-{label}", halo=_HALO, **font_of)
         return True
 
     def _is_in_room(self, box: FloatArray, label: int) -> bool:
