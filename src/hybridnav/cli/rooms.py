@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
@@ -22,7 +23,7 @@ from hybridnav.cli.common import (
     stage,
     timings,
 )
-from hybridnav.cli.errors import UsageError
+from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
 from hybridnav.cli.options import (
     FreeOption,
     JsonOption,
@@ -35,11 +36,13 @@ from hybridnav.cli.options import (
     RadiusOption,
     RoomsOption,
 )
-from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.grid.names import Segmentation
+from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
+from hybridnav.grid.names import Segmentation, read_point
+from hybridnav.io.room_measures import measures_of
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
+    from hybridnav.grid.room_labels import Point
     from hybridnav.topology import Door, Rooms
 
 OutOption = Annotated[
@@ -64,6 +67,10 @@ LeastAreaOption = Annotated[
         show_default="1.0",
     ),
 ]
+AtOption = Annotated[
+    str | None,
+    typer.Option("--at", metavar="X,Y", help="Print only the room that this point lies in."),
+]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 
 
@@ -79,12 +86,14 @@ def rooms(
     occupied_threshold: OccupiedOption = None,
     least_island_m2: LeastIslandOption = 0.0,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    at: AtOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
     """Find the rooms of MAP, or read them from a file, and list them with their doors."""
     check_picture(plot)
+    asked = _asked_point(at, out, plot)
     if out is not None and out.exists() and not force:
         raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
     if out is not None:
@@ -107,6 +116,10 @@ def rooms(
             labels = hn.load_rooms(rooms_file, grid)
         elif labels is None:
             labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
+    if asked is not None:
+        found = _found_at(asked, labels, grid)
+        answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _told_at(found))
+        raise typer.Exit(EXIT_SOLVED if found["room"] is not None else EXIT_NOT_SOLVED)
     # Loads numba, which help and wrong usage can do without.
     from hybridnav.topology.room_level import room_areas_m2  # noqa: PLC0415
 
@@ -139,14 +152,63 @@ def _checked_method(method: str) -> Segmentation:
     raise UsageError(f"--method must be one of {known}, got {method!r:.80}")
 
 
+def _asked_point(text: str | None, out: Path | None, plot: Path | None) -> Point | None:
+    """Return the point of `--at`, which stands alone."""
+    if text is None:
+        return None
+    if out is not None or plot is not None:
+        raise UsageError("--at prints one room: leave out --out and --plot")
+    point = read_point(text)
+    if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
+        raise UsageError(f"--at must be two finite numbers X,Y in metres, got {text!r:.90}")
+    return point[0], point[1]
+
+
+def _found_at(point: Point, labels: hn.RoomLabels, grid: hn.OccupancyGrid) -> dict[str, Any]:
+    """Return the room of a point, and what its cell is."""
+    row, col = grid.frame.cell_of(*point)
+    is_inside = 0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]
+    cell = CellClass(int(grid.measured[row, col])).name.lower() if is_inside else "outside"
+    return {"at_m": list(point), "room": labels.at(point, grid), "cell": cell}
+
+
+def _told_at(found: dict[str, Any]) -> str:
+    """Return the name alone, for scripts, or a line that there is none."""
+    if found["room"] is not None:
+        return f"{found['room']}\n"
+    x, y = found["at_m"]
+    where = "outside the map" if found["cell"] == "outside" else f"in {found['cell']} space"
+    return f"no room at ({x:.10g}, {y:.10g}), {where}\n"
+
+
 def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
     """Return rooms and doors as plain values; gaps are doors here."""
     return {
         "robot_radius_m": rooms.grid.robot_radius_m,
         "rooms": [
-            {"name": name, "area_m2": round(area_m2, 6), "point_m": _at(rooms, name), "fits": fits}
-            for name, area_m2, fits in zip(
-                rooms.names, areas_m2.tolist(), rooms.fits.tolist(), strict=True
+            {
+                "number": number,
+                "name": name,
+                "area_m2": round(area_m2, 6),
+                "point_m": _at(rooms, name),
+                "centre_m": _rounded(facts.centre_m),
+                "extent_m": [_rounded(facts.low_m), _rounded(facts.high_m)],
+                "fits": fits,
+                "neighbours": [
+                    {"room": other, "door": door.number, "width_m": round(door.width_m, 6)}
+                    for door, other in beside
+                ],
+            }
+            for number, (name, area_m2, fits, facts, beside) in enumerate(
+                zip(
+                    rooms.names,
+                    areas_m2.tolist(),
+                    rooms.fits.tolist(),
+                    measures_of(rooms.labels, rooms.grid),
+                    _neighbours(rooms),
+                    strict=True,
+                ),
+                start=1,
             )
         ],
         "doors": [
@@ -165,33 +227,51 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
 
 
 def _at(rooms: Rooms, name: str) -> list[float]:
-    return [round(number, 6) for number in rooms.point_of(name)]
+    return _rounded(rooms.point_of(name))
 
 
-def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
-    """Return one line a room: its free area, the point that stands for it, the doors to its
-    neighbours."""
-    doors: dict[str, list[str]] = {name: [] for name in rooms.names}
+def _rounded(point: tuple[float, float]) -> list[float]:
+    return [round(number, 6) for number in point]
+
+
+def _neighbours(rooms: Rooms) -> list[list[tuple[Door, str | None]]]:
+    """Return for each room its doors, gaps aside, and the room behind each."""
+    found: dict[str | None, list[tuple[Door, str | None]]] = {name: [] for name in rooms.names}
     for door in rooms.doors:
         for name, other in (door.rooms, door.rooms[::-1]):
             if name is not None and not door.is_gap:
-                doors[name].append(_door(door, other))
+                found[name].append((door, other))
+    return [found[name] for name in rooms.names]
+
+
+def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
+    """Return one line a room: its number, free area, size, the point that stands for it, the doors
+    to its neighbours."""
     width = max((len(name) for name in rooms.names), default=0)
+    digits = len(str(len(rooms.names)))
     of_rooms, of_doors, gaps = rooms.counted()
     left_out = f"; {gaps} not listed" if gaps else ""
     lines = [
         f"rooms      {of_rooms.replace(' rooms', '', 1)}; {of_doors}{left_out}",
-        "columns    room, area as measured, its point, doors to (number: width)",
+        "columns    room, number, area, extent in x and y, its point, doors to (number: width)",
     ]
-    for name, area_m2, fits in zip(
-        rooms.names, areas_m2.tolist(), rooms.fits.tolist(), strict=True
-    ):
+    measures = measures_of(rooms.labels, rooms.grid)
+    each = zip(
+        rooms.names,
+        areas_m2.tolist(),
+        rooms.fits.tolist(),
+        measures,
+        _neighbours(rooms),
+        strict=True,
+    )
+    for number, (name, area_m2, fits, facts, beside) in enumerate(each, start=1):
         point = "({:.2f}, {:.2f})".format(*_at(rooms, name))
-        stated = ([] if fits else [f"no robot of {rooms.grid.robot_radius_m:g} m fits"]) + doors[
-            name
-        ]
+        size = "{:.1f} x {:.1f} m".format(*facts.size_m)
+        stated = [] if fits else [f"no robot of {rooms.grid.robot_radius_m:g} m fits"]
+        stated += [_door(door, other) for door, other in beside]
         lines.append(
-            f"{name:<{width}} {area_m2:>9.2f} m²  {point:<16} {', '.join(stated)}".rstrip()
+            f"{name:<{width}} {number:>{digits}} {area_m2:>9.2f} m²  {size:<15} {point:<16} "
+            f"{', '.join(stated)}".rstrip()
         )
     return "\n".join(lines)
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from hybridnav._typing import IntArray
+    from hybridnav.grid.occupancy import OccupancyGrid
 
 MAX_ROOMS = 10_000
 """Most rooms of a map."""
@@ -101,6 +102,40 @@ class RoomLabels:
         if name in self.names:
             return self.names.index(name)
         raise InvalidValueError(f"no room is called {name!r:.90}{did_you_mean(name, self.names)}")
+
+    def at(self, point: Point, grid: OccupancyGrid) -> str | None:
+        """Return the name of the room that a point lies in.
+
+        Parameters
+        ----------
+        point
+            `(x, y)` in metres, map frame.
+        grid
+            The map of these rooms.
+
+        Returns
+        -------
+        str or None
+            The name; None for a point in no room or outside the map. Walls and furniture inside
+            an outline belong to its room.
+
+        Raises
+        ------
+        InvalidValueError
+            When the coordinates are not two finite numbers.
+
+        Examples
+        --------
+        >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+        >>> rooms = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, -1, 1]]))
+        >>> rooms.at((1.5, 0.5), grid), rooms.at((2.5, 0.5), grid)
+        ('kitchen', None)
+        """
+        row, col = grid.frame.cell_of(*_point("point", point))
+        rows, cols = self.label_of.shape
+        if not (0 <= row < rows and 0 <= col < cols) or self.label_of[row, col] == NO_ROOM:
+            return None
+        return self.names[int(self.label_of[row, col])]
 
 
 def _point(what: str, at: Point) -> Point:

@@ -135,6 +135,16 @@ class Rooms:
         """Return the name of a label, None for -1."""
         return None if label == NO_ROOM else self.names[label]
 
+    def at(self, point: tuple[float, float]) -> str | None:
+        """Return the name of the room that a point `(x, y)` in metres lies in, None for no room.
+
+        Raises
+        ------
+        InvalidValueError
+            When the coordinates are not two finite numbers.
+        """
+        return self.labels.at(point, self.grid)
+
     def vertices_of(self, name: str) -> LongArray:
         """Return the free parts of a room, as vertices of the room level, the largest first.
 
