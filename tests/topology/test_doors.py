@@ -283,9 +283,10 @@ def test_slivers_that_outlines_leave_over_go_to_the_room_beside_them():
     label_of[:, :14], label_of[:, 15:24] = 0, 1  # a strip of 5 cm, and a space of 0.3 m2
     label_of[8:12, 24:] = 1
     grid = occupancy_grid(np.ones((20, 30), dtype=np.uint8), resolution_m=0.05)
-    assert (without_slivers(label_of, grid) >= 0).all()
+    assert (without_slivers(label_of, grid, {1}) >= 0).all()
+    assert (without_slivers(label_of, grid, set()) == label_of).all()  # nobody has drawn them
     coarse = occupancy_grid(np.ones((20, 30), dtype=np.uint8), resolution_m=0.5)
-    assert (without_slivers(label_of, coarse) == label_of).all()
+    assert (without_slivers(label_of, coarse, {1}) == label_of).all()
 
 
 @pytest.fixture

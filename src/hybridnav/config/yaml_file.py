@@ -72,6 +72,58 @@ def read_yaml(
     HybridNavError
         Of the type `error` or `missing`; one line that names the file and, where known, the line.
     """
+    return read_marked(path, what=what, error=error, missing=missing, limits=limits).values
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A YAML mapping with its text, and where in it each value stands."""
+
+    values: dict[str, Any]
+    text: str
+    root: Node
+
+    def node(self, *keys: str | int) -> Node:
+        """Return the node of a value, by the keys and indices that lead to it."""
+        node: Any = self.root
+        for key in keys:
+            if isinstance(key, int):
+                node = node.value[key]
+            else:
+                node = next(value for name, value in node.value if name.value == key)
+        found: Node = node
+        return found
+
+    def line(self, *keys: str | int) -> int:
+        """Return the line of a value, from 1."""
+        return int(self.node(*keys).start_mark.line) + 1
+
+
+def read_marked(
+    path: PathLike,
+    *,
+    what: str,
+    error: type[HybridNavError],
+    missing: type[HybridNavError] | None = None,
+    limits: Limits = _SETTINGS,
+) -> Marked:
+    """Read a YAML mapping as `read_yaml` does, with the places of its values.
+
+    Parameters
+    ----------
+    path, what, error, missing, limits
+        As of `read_yaml`.
+
+    Returns
+    -------
+    Marked
+        The mapping.
+
+    Raises
+    ------
+    HybridNavError
+        Of the type `error` or `missing`, as by `read_yaml`.
+    """
     where = f"{what} {printable(path)}"
     with open_file(path, what=what, error=error, missing=missing or error) as stream:
         content = stream.read(limits.max_bytes + 1)
@@ -83,7 +135,7 @@ def read_yaml(
         line = content.count(b"\n", 0, failure.start) + 1
         raise error(f"{where}, line {line}: not UTF-8 text") from None
     try:
-        data = _construct(text, limits.max_values)
+        data, root = _construct(text, limits.max_values)
     except yaml.YAMLError as failure:
         raise error(f"{where}{_explain(failure, text)}") from None
     if not isinstance(data, dict):
@@ -92,7 +144,7 @@ def read_yaml(
     for key in data:
         if not isinstance(key, str):
             raise error(f"{where}: every key must be text, got {reprlib.repr(key)}")
-    return data
+    return Marked(data, text, root)
 
 
 def open_file(
@@ -224,11 +276,13 @@ class _LimitedLoader(_PlainLoader):
             raise ConstructorError(None, None, str(failure), node.start_mark) from None
 
 
-def _construct(text: str, max_values: int) -> Any:
-    loader = _LimitedLoader(text)
+def _construct(text: str, max_values: int) -> tuple[Any, Any]:
+    """Return the value of a document and its node; nothing and None for an empty one."""
+    loader: Any = _LimitedLoader(text)
     loader.max_values = max_values
     try:
-        return loader.get_single_data()
+        root = loader.get_single_node()
+        return None if root is None else loader.construct_document(root), root
     finally:
         loader.dispose()
 

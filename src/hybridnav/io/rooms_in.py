@@ -2,54 +2,37 @@
 
 from __future__ import annotations
 
-import math
 import reprlib
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._files import printable
-from hybridnav.config.yaml_file import Limits, read_yaml
+from hybridnav.config.yaml_file import read_marked, read_yaml
 from hybridnav.errors import InvalidValueError, MapNotFoundError, RoomsError, RoomsNotFoundError
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
-from hybridnav.grid.names import check_names, check_number
+from hybridnav.grid.names import check_names
 from hybridnav.grid.occupancy import extent
 from hybridnav.io.image import read_raster
-from hybridnav.io.rooms_paint import painted, without_slivers
+from hybridnav.io.rooms_cells import fingerprint, unpacked
+from hybridnav.io.rooms_entries import (
+    LIMITS,
+    Outline,
+    Read,
+    checked_rings,
+    list_of,
+    number_of,
+    read_entries,
+)
+from hybridnav.io.rooms_paint import cells_inside, painted, without_slivers
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
-    from hybridnav._typing import FloatArray, IntArray, PathLike
+    from hybridnav._typing import IntArray, PathLike
     from hybridnav.grid import OccupancyGrid
     from hybridnav.grid.room_labels import Point
-
-_ROOM_KEYS = ("name", "polygon", "polygons", "seed", "point")
-_OUTSIDE_CELLS = 1.0
-"""Greatest distance that an outline may reach over the rim of the map."""
-_FEWEST_CORNERS = 3
-_LEAST_AREA_CELLS = 1e-6
-
-LIMITS = Limits(max_bytes=2**22, max_values=100_000)
-"""Limits of a file of rooms; hostile files take three seconds."""
-
-
-@dataclass
-class _Read:
-    """Contents of a file: rings of outlines in cells, x along columns and y along rows."""
-
-    where: str
-    names: list[str] = field(default_factory=list)
-    outlines: dict[int, list[FloatArray]] = field(default_factory=dict)
-    seeds: dict[int, tuple[float, float]] = field(default_factory=dict)
-    points: dict[str, tuple[float, float]] = field(default_factory=dict)
-    doors: dict[int, tuple[float, float]] = field(default_factory=dict)
-    label_of: IntArray | None = None
-
-    def of(self, room: int) -> str:
-        return f"{self.where}: room {self.names[room]!r}"
 
 
 def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
@@ -62,11 +45,14 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         `polygon` (a ring of [x, y] in metres, map frame), `polygons` (rings: parts and holes) or a
         `seed` [x, y], which names the room that segmentation finds there; and optionally a `point`
         [x, y] that represents the room. Rings are filled by the even-odd rule, also where a ring
-        crosses itself. In addition, `points:` is a list of named points, and `doors:` a list of
-        numbers of doors, each with a `point` of its boundary: the door nearest to it, within a
-        metre, keeps the number. In the other form `locations:` is a list of names, with an image
-        `data:` of the size of the map's, whose pixel values index the list, or flat `polygons:` in
-        pixels of that image; polygons win if both are present.
+        crosses itself. Entries of one name are one room, if their outlines lie beside each other.
+        Where outlines overlap, one that a person has drawn or changed since the file was written
+        has the cells, and the later one of several. In addition, `points:` is a list of named
+        points, and `doors:` a list of numbers of doors, each with a `point` of its boundary: the
+        door nearest to it, within a metre, keeps the number. `cells:` holds cells that written
+        outlines miss. In the other form `locations:` is a list of names, with an image `data:` of
+        the size of the map's, whose pixel values index the list, or flat `polygons:` in pixels of
+        that image; polygons win if both are present, and the first of overlapping ones.
     grid
         The map.
 
@@ -80,8 +66,8 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
     RoomsNotFoundError
         When the file or the image does not exist.
     RoomsError
-        When one of them cannot be read; a room has no name or the name of another one, leaves the
-        map, overlaps another or has no free cell; a named point lies outside the map or in an
+        When one of them cannot be read; a room has no name or the name of one elsewhere, leaves
+        the map, or has no free cell of its own; a named point lies outside the map or in an
         obstacle; or the number of a door is invalid or occurs twice.
 
     Examples
@@ -94,30 +80,49 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
     array([[ 0,  0, -1, -1],
            [ 0,  0, -1, -1]], dtype=int32)
     """
-    values = read_yaml(
+    marked = read_marked(
         path, what="rooms", error=RoomsError, missing=RoomsNotFoundError, limits=LIMITS
     )
-    where = f"rooms {printable(path)}"
+    values, where = marked.values, f"rooms {printable(path)}"
     if "locations" in values:
         read = _locations(values, Path(path), where, grid)
     elif "rooms" in values:
-        read = _outlines(values, where, grid)
+        read = read_entries(marked, where, grid)
     else:
         raise RoomsError(f"{where}: lacks rooms, or locations")
+    return rooms_of(read, grid)
+
+
+def rooms_of(read: Read, grid: OccupancyGrid) -> RoomLabels:
+    """Return the rooms that a file describes.
+
+    Raises
+    ------
+    RoomsError
+        As by `load_rooms`.
+    """
     try:
         check_names(tuple(read.names))
         label_of = read.label_of
         if label_of is None:
-            label_of = painted(read.outlines, read.names, where, grid)
-        if read.seeds:
-            label_of = _seeded(read, label_of, grid)
-        if "rooms" in values:
-            label_of = without_slivers(label_of, grid)
-        check_rooms(read.names, label_of, where, grid)
-        check_points(read.points, where, grid)
+            label_of = labels_of(read, grid)
+        check_rooms(read, label_of, grid)
+        check_points(read.points, read.where, grid)
         return RoomLabels(tuple(read.names), label_of, read.points, read.doors)
     except InvalidValueError as error:
-        raise RoomsError(f"{where}: {error}") from None
+        raise RoomsError(f"{read.where}: {error}") from None
+
+
+def labels_of(read: Read, grid: OccupancyGrid) -> IntArray:
+    """Return the room of each cell by the outlines and seeds of a file, int32 (rows, cols)."""
+    runs_of = unpacked(read.cells, read.where, grid)
+    label_of = painted(read, runs_of, grid)
+    if read.seeds:
+        label_of = _seeded(read, label_of, grid)
+    if read.lines:
+        by_hand = {o.room for o in read.outlines if o.fingerprint not in runs_of}
+        label_of = without_slivers(label_of, grid, by_hand | set(read.seeds))
+    return label_of
 
 
 def files_of(path: Path) -> list[Path]:
@@ -135,82 +140,27 @@ def files_of(path: Path) -> list[Path]:
     return [path, path.parent / data] if isinstance(data, str) else [path]
 
 
-def _outlines(values: dict[str, Any], where: str, grid: OccupancyGrid) -> _Read:
-    """Read the form with rooms."""
-    read = _Read(where)
-    _check_keys(values, ("rooms", "points", "doors", "map"), where)
-    for number, entry in enumerate(_list_of(values["rooms"], f"{where}: rooms")):
-        at = f"{where}: room {number + 1}"
-        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
-            raise RoomsError(f"{at}: expected a mapping with a name, got {reprlib.repr(entry)}")
-        read.names.append(entry["name"])
-        at = read.of(number)
-        _check_keys(entry, _ROOM_KEYS, at)
-        shapes = [key for key in ("polygon", "polygons", "seed") if key in entry]
-        if len(shapes) != 1:
-            raise RoomsError(
-                f"{at}: expected one of polygon, polygons and seed, got {', '.join(shapes) or '-'}"
-            )
-        if "point" in entry:
-            read.points[entry["name"]] = _xy(entry["point"], f"{at}: point")
-        if "seed" in entry:
-            read.seeds[number] = _xy(entry["seed"], f"{at}: seed")
-            continue
-        rings = [entry["polygon"]] if "polygon" in entry else entry["polygons"]
-        outlines = [_ring(ring, f"{at}: polygon") for ring in _list_of(rings, f"{at}: polygons")]
-        read.outlines[number] = _checked([in_cells(ring, grid) for ring in outlines], at, grid)
-    taken = {*read.points, *read.names}
-    for entry in _list_of(values.get("points", []), f"{where}: points"):
-        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
-            raise RoomsError(f"{where}: points: expected a name and a point, got {entry!r:.80}")
-        if entry["name"] in taken:
-            raise RoomsError(f"{where}: point {entry['name']!r}: the name is given twice")
-        taken.add(entry["name"])
-        read.points[entry["name"]] = _xy(entry.get("point"), f"{where}: point {entry['name']!r}")
-    read.doors = _doors(values.get("doors", []), where)
-    return read
-
-
-def _doors(entries: Any, where: str) -> dict[int, tuple[float, float]]:
-    """Return the numbers of doors, each with a point of its boundary."""
-    doors: dict[int, tuple[float, float]] = {}
-    for entry in _list_of(entries, f"{where}: doors"):
-        if not isinstance(entry, dict) or "number" not in entry:
-            raise RoomsError(
-                f"{where}: doors: expected a number and a point, got {reprlib.repr(entry)}"
-            )
-        try:
-            number = check_number(entry["number"])
-        except InvalidValueError as error:
-            raise RoomsError(f"{where}: doors: {error}") from None
-        at = f"{where}: door {number}"
-        _check_keys(entry, ("number", "point"), at)
-        if number in doors:
-            raise RoomsError(f"{at}: the number is given twice, every door needs its own")
-        doors[number] = _xy(entry.get("point"), f"{at}: point")
-    return doors
-
-
-def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGrid) -> _Read:
+def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGrid) -> Read:
     """Read the form with a label image, whose polygons are flat lists of x, y in pixels, y down."""
-    read = _Read(where)
-    for name in _list_of(values["locations"], f"{where}: locations"):
+    read = Read(where)
+    for name in list_of(values["locations"], f"{where}: locations"):
         if not isinstance(name, str):
             raise RoomsError(f"{where}: locations: expected names, got {name!r:.80}")
         read.names.append(name)
     if "polygons" not in values:
         read.label_of = _label_image(values.get("data"), path, where, grid, len(read.names))
         return read
-    polygons = _list_of(values["polygons"], f"{where}: polygons")
+    polygons = list_of(values["polygons"], f"{where}: polygons")
     if len(polygons) != len(read.names):
         raise RoomsError(f"{where}: {len(read.names)} locations but {len(polygons)} polygons")
     for room, flat in enumerate(polygons):
-        numbers = [_number(value, read.of(room)) for value in _list_of(flat, read.of(room))]
+        numbers = [number_of(value, read.of(room)) for value in list_of(flat, read.of(room))]
         if len(numbers) % 2:
             raise RoomsError(f"{read.of(room)}: a polygon of {len(numbers)} numbers, expected x, y")
         pixels = np.array(numbers).reshape(-1, 2)
         corners = np.stack([pixels[:, 0], grid.shape[0] - pixels[:, 1]], axis=1)
-        read.outlines[room] = _checked([corners], read.of(room), grid)
+        rings = checked_rings([corners], read.of(room), grid)
+        read.outlines.append(Outline(room, rings, fingerprint(rings)))
     return read
 
 
@@ -232,28 +182,7 @@ def _label_image(data: Any, path: Path, where: str, grid: OccupancyGrid, n_rooms
     return np.where(level < n_rooms, level.astype(np.int32), np.int32(NO_ROOM))
 
 
-def _checked(rings: list[FloatArray], at: str, grid: OccupancyGrid) -> list[FloatArray]:
-    """Return the rings after a check that they have corners, an area, and a place on the map."""
-    for ring in rings:
-        if len(ring) < _FEWEST_CORNERS:
-            raise RoomsError(f"{at}: a polygon needs at least three corners, got {len(ring)}")
-    if all(_is_straight(ring) for ring in rings):
-        raise RoomsError(f"{at}: the polygon has no area")
-    corners, rim = np.concatenate(rings), np.array(grid.shape[::-1]) + _OUTSIDE_CELLS
-    if (corners < -_OUTSIDE_CELLS).any() or (corners > rim).any():
-        raise RoomsError(f"{at}: the polygon leaves the map, which spans {extent(grid)}")
-    return rings
-
-
-def _is_straight(ring: FloatArray) -> bool:
-    """Return whether all corners lie on one line."""
-    offset = ring - ring[0]
-    far = offset[np.argmax(np.abs(offset).sum(axis=1))]
-    cross = offset[:, 0] * far[1] - offset[:, 1] * far[0]
-    return bool((np.abs(cross) <= _LEAST_AREA_CELLS).all())
-
-
-def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
+def _seeded(read: Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     """Return the rooms that segmentation finds round the seeds.
 
     If several seeds lie in one room, each takes the cells nearest to it.
@@ -283,11 +212,22 @@ def _seeded(read: _Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     return np.where(label_of == NO_ROOM, divided, label_of)
 
 
-def check_rooms(names: Sequence[str], label_of: IntArray, where: str, grid: OccupancyGrid) -> None:
+def check_rooms(read: Read, label_of: IntArray, grid: OccupancyGrid) -> None:
     """Refuse rooms without a cell that was measured as free, whatever the robot's radius."""
-    free = label_of[(grid.measured == CellClass.FREE) & (label_of >= 0)]
-    for room in np.flatnonzero(np.bincount(free, minlength=len(names)) == 0).tolist():
-        raise RoomsError(f"{where}: room {names[room]!r}: holds no free cell of the map")
+    is_free = grid.measured == CellClass.FREE
+    free = label_of[is_free & (label_of >= 0)]
+    for room in np.flatnonzero(np.bincount(free, minlength=len(read.names)) == 0).tolist():
+        rings = [ring for each in read.outlines if each.room == room for ring in each.rings]
+        inside = cells_inside(rings, grid.shape) if rings else np.empty(0, dtype=np.int64)
+        over = label_of.ravel()[inside[is_free.ravel()[inside]]]
+        if len(over):
+            other = read.of(int(np.bincount(over[over >= 0]).argmax()))
+            drawn_over = other.removeprefix(f"{read.where}, ").removeprefix(f"{read.where}: ")
+            raise RoomsError(
+                f"{read.of(room)}: holds no free cell of its own, they overlap {drawn_over}: "
+                "give both rooms one name to make them one, or draw one smaller"
+            )
+        raise RoomsError(f"{read.of(room)}: holds no free cell of the map")
 
 
 def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -> None:
@@ -307,45 +247,3 @@ def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -
             raise RoomsError(
                 f"{where}: point {name!r}: ({point[0]:.10g}, {point[1]:.10g}) lies in an obstacle"
             )
-
-
-def in_cells(points: FloatArray, grid: OccupancyGrid) -> FloatArray:
-    """Convert points in metres to cells, x along columns and y along rows."""
-    return grid.frame.positions_of(points)[:, ::-1]
-
-
-def _check_keys(values: dict[Any, Any], known: tuple[str, ...], at: str) -> None:
-    for key in values:
-        if key not in known:
-            raise RoomsError(f"{at}: unknown key {key!r:.80}; known are {', '.join(known)}")
-
-
-def _list_of(value: Any, at: str) -> list[Any]:
-    if not isinstance(value, list):
-        raise RoomsError(f"{at}: expected a list, got {reprlib.repr(value)}")
-    return value
-
-
-def _ring(value: Any, at: str) -> FloatArray:
-    """Return the corners in metres, float64 (n, 2), without rows for an empty list."""
-    corners = [_xy(corner, at) for corner in _list_of(value, at)]
-    return np.array(corners, dtype=np.float64).reshape(-1, 2)
-
-
-_FARTHEST = 1e9
-"""Metres or pixels beyond which a coordinate counts as a mistake."""
-
-
-def _number(value: Any, at: str) -> float:
-    number = math.nan
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value) if abs(value) <= _FARTHEST else math.nan
-    if not math.isfinite(number):
-        raise RoomsError(f"{at}: expected a number, got {reprlib.repr(value)}")
-    return number
-
-
-def _xy(value: Any, at: str) -> tuple[float, float]:
-    if not isinstance(value, list) or len(value) != 2:  # noqa: PLR2004
-        raise RoomsError(f"{at}: expected [x, y] in metres, got {reprlib.repr(value)}")
-    return _number(value[0], at), _number(value[1], at)

@@ -2,41 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import shapely
 import yaml
-from scipy import ndimage
 
 from hybridnav._files import printable, replace_file
 from hybridnav.errors import RoomsError
-from hybridnav.io.rooms_in import LIMITS, check_points, check_rooms, in_cells
-from hybridnav.io.rooms_paint import painted, without_slivers
+from hybridnav.io.outlines import TOLERANCES_M, areas_of, kept_cells, outlines_of
+from hybridnav.io.rooms_cells import fingerprint, packed
+from hybridnav.io.rooms_entries import LIMITS, Outline, Read, in_cells
+from hybridnav.io.rooms_in import check_points, check_rooms, labels_of
+from hybridnav.io.rooms_paint import painted
+from hybridnav.io.rooms_text import HEADER, OldText
 
 if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
+    from collections.abc import Mapping
 
     from hybridnav._typing import FloatArray, IntArray, PathLike
     from hybridnav.grid import OccupancyGrid, RoomLabels
+    from hybridnav.grid.room_labels import Point
 
-_MOST_CORNERS = 20_000
-"""Most corners in a file, if outlines can be simplified."""
-_TOLERANCE_M = 0.15
-_KEPT = 0.7
-"""Least share of its cells that every room keeps with simplified outlines."""
+_MOST_BYTES = 20_000
+"""Size of a file above which coarser outlines are tried: more than a person edits."""
 _DECIMALS = 3
 
 
 def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     """Write rooms as a file that `load_rooms` reads and a person can edit.
 
-    Outlines are simplified together, so that neighbours keep their common border: by 15 cm, up to
-    60 cm if the file would otherwise have more than 20,000 corners, and not at all if a room would
-    lose too much. The doors of these outlines are written with their numbers in `rooms`, so that
-    lists, pictures and plans of the file use the same numbers.
+    Outlines have few corners, lie along walls, and neighbours share their common border. They are
+    coarser, by up to 60 cm, where outlines and cells would exceed 20 kB. The free cells that they
+    miss are kept in `cells`, so that every free cell is read with the room that it has; only
+    nameless ones below a square metre may get one. The doors are written with their numbers, so
+    that lists, pictures and plans of the file use the same.
+
+    Where the file exists, outlines that still hold, and all comments, are kept.
 
     Parameters
     ----------
@@ -62,15 +65,18 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     ('kitchen', 'hall')
     """
     where = f"rooms {printable(path)}"
-    check_rooms(rooms.names, rooms.label_of, where, grid)
+    check_rooms(Read(where, list(rooms.names)), rooms.label_of, grid)
     check_points(rooms.points, where, grid)
     # Loads scipy and numba.
     from hybridnav.topology.doors import renumbered  # noqa: PLC0415
 
-    rings_of, label_of = _rings_to_write(rooms, where, grid)
-    doors = renumbered(rooms, label_of, grid)
-    text, n_values = _written(replace(rooms, doors=doors), rings_of, grid)
+    old = OldText.of(path, rooms, grid)
+    draft = _fitting(rooms, grid, old, where)
+    doors = renumbered(rooms, draft.label_of, grid)
+    text = "\n".join([*draft.lines, *_door_lines(doors), *_cell_lines(draft.cells)]) + "\n"
     size = len(text.encode())
+    # A value has two bytes or more.
+    n_values = 0 if size < 2 * LIMITS.max_values else _n_values(text)
     if n_values > LIMITS.max_values or size > LIMITS.max_bytes:
         raise RoomsError(
             f"{where}: {len(rooms.names)} rooms take {n_values} values and {size} bytes, "
@@ -82,99 +88,126 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
         raise RoomsError(f"{where}: cannot write: {error.strerror}") from None
 
 
-def _rings_to_write(
-    rooms: RoomLabels, where: str, grid: OccupancyGrid
-) -> tuple[list[list[FloatArray]], IntArray]:
-    """Return the rings of each room in metres, float64 (n, 2), and the labels that they read back
-    as."""
-    boxes = ndimage.find_objects(rooms.label_of + 1, len(rooms.names))
-    shapes = [_outline(rooms.label_of, label, *box) for label, box in enumerate(boxes)]
-    simple = [_rings(s, grid) for s in _simplified(shapes, _TOLERANCE_M / grid.resolution_m)]
-    outlines = {n: [in_cells(ring, grid) for ring in rings] for n, rings in enumerate(simple)}
-    try:
-        again = painted(outlines, rooms.names, where, grid)
-        check_rooms(rooms.names, again, where, grid)
-    except RoomsError:
-        return [_rings(shape, grid) for shape in shapes], without_slivers(rooms.label_of, grid)
-    inside = rooms.label_of >= 0
-    is_kept = rooms.label_of[inside] == again[inside]
-    kept = np.bincount(rooms.label_of[inside], is_kept, len(rooms.names))
-    if (kept < _KEPT * np.bincount(rooms.label_of[inside])).any():
-        return [_rings(shape, grid) for shape in shapes], without_slivers(rooms.label_of, grid)
-    return simple, without_slivers(again, grid)
+@dataclass(frozen=True, eq=False)
+class _Draft:
+    """A file without its doors."""
+
+    lines: list[str]
+    cells: list[str]
+    label_of: IntArray
+    """int32 (rows, cols), the rooms as they are read."""
+
+    @property
+    def size(self) -> int:
+        """Number of bytes, about."""
+        return sum(len(line.encode()) + 1 for line in (*self.lines, *self.cells))
 
 
-def _written(
-    rooms: RoomLabels, rings_of: list[list[FloatArray]], grid: OccupancyGrid
-) -> tuple[str, int]:
-    """Return the text of a file, and the number of values that a reader counts."""
-    lines = [
-        f"# Rooms of {' '.join(grid.name.split())}: outlines in metres, map frame, [x, y].",
-        "# Rename rooms, move corners, or give a room `seed: [x, y]` in place of an outline.",
-        "rooms:" if rooms.names else "rooms: []",
-    ]
-    for name, rings in zip(rooms.names, rings_of, strict=True):
-        lines.append(f"- {_name(name)}")
-        if len(rings) == 1:
-            lines.append(f"  polygon: {_ring(rings[0])}")
-        else:
-            lines += ["  polygons:", *(f"  - {_ring(ring)}" for ring in rings)]
-        if name in rooms.points:
-            lines.append(f"  point: {_corner(*rooms.points[name])}")
+def _fitting(rooms: RoomLabels, grid: OccupancyGrid, old: OldText | None, where: str) -> _Draft:
+    """Return the finest draft of at most 20 kB that is read as these rooms, else the finest."""
+    areas = areas_of(rooms.label_of, len(rooms.names), grid)
+    for kept in [old, None] if old is not None and old.blocks else [None]:
+        best: _Draft | None = None
+        for tolerance_m in TOLERANCES_M:
+            rings_of = outlines_of(areas, grid, tolerance_m)
+            draft = _drafted(rooms, rings_of, grid, kept, where)
+            best = draft if best is None else best
+            if draft is None or draft.size <= _MOST_BYTES:
+                best = draft
+                break
+        if best is not None:
+            if kept is None and old is not None:
+                return replace(best, lines=[*old.comments, *best.lines])
+            return best
+    raise AssertionError  # a draft without an old file always holds
+
+
+def _drafted(
+    rooms: RoomLabels,
+    rings_of: list[list[FloatArray]],
+    grid: OccupancyGrid,
+    old: OldText | None,
+    where: str,
+) -> _Draft | None:
+    """Return a draft with these outlines for the rooms that the old file does not hold as they
+    are; None if it would be read otherwise."""
+    fresh = {
+        room: Outline(room, [in_cells(ring, grid) for ring in rings], fingerprint(rings))
+        for room, rings in enumerate(rings_of)
+    }
+    entries = {
+        room: _entry(name, rings, rooms)
+        for room, (name, rings) in enumerate(zip(rooms.names, rings_of, strict=True))
+    }
+    kept = [] if old is None else old.outlines
+    done = {outline.room for outline in kept}
+    outlines = sorted(
+        [*kept, *(fresh[room] for room in fresh if room not in done)], key=lambda each: each.room
+    )
+    written = [o for o in outlines if o.room not in done or o.fingerprint in _unchanged(old)]
+    read = Read(where, list(rooms.names), [1] * len(rooms.names), outlines)
+    none = np.empty(0, dtype=np.int64)
+    plain = painted(read, {outline.fingerprint: (none, none) for outline in written}, grid)
+    is_kept = kept_cells(rooms.label_of, grid)
+    missed = is_kept & (plain != rooms.label_of)
+    cells = packed(missed, rooms.label_of, [(o.room, o.fingerprint) for o in written], grid)
+    label_of = labels_of(replace(read, cells=cells), grid)
+    if (label_of != rooms.label_of)[is_kept].any():
+        return None
+    if old is None:
+        lines = [HEADER[0].format(" ".join(grid.name.split())), *HEADER[1:]]
+        lines.append("rooms:" if rooms.names else "rooms: []")
+        lines += [line for room in entries for line in entries[room]]
+        lines += _point_lines(rooms)
+    else:
+        lines = old.with_entries(entries, _point_lines(rooms))
+    return _Draft(lines, cells, label_of)
+
+
+def _n_values(text: str) -> int:
+    """Return the number of values that a reader counts."""
+    return sum(isinstance(each, yaml.NodeEvent) for each in yaml.parse(text))
+
+
+def _unchanged(old: OldText | None) -> set[int]:
+    """Return the fingerprints of the outlines that were written with their cells."""
+    return set() if old is None else old.written
+
+
+def _entry(name: str, rings: list[FloatArray], rooms: RoomLabels) -> list[str]:
+    lines = [f"- {_name(name)}"]
+    if len(rings) == 1:
+        lines.append(f"  polygon: {_ring(rings[0])}")
+    else:
+        lines += ["  polygons:", *(f"  - {_ring(ring)}" for ring in rings)]
+    if name in rooms.points:
+        lines.append(f"  point: {_corner(*rooms.points[name])}")
+    return lines
+
+
+def _point_lines(rooms: RoomLabels) -> list[str]:
     others = {name: at for name, at in rooms.points.items() if name not in rooms.names}
-    if others:
-        lines.append("points:")
-        for name, at in others.items():
-            lines += [f"- {_name(name)}", f"  point: {_corner(*at)}"]
-    if rooms.doors:
-        lines.append("doors:  # their numbers; a point of each")
-        for number, at in rooms.doors.items():
-            lines.append(f"- {{number: {number}, point: {_corner(*at)}}}")
-    # A list counts as one value in addition to its own values; a corner is a list of two.
-    n_corners = sum(len(ring) for rings in rings_of for ring in rings)
-    n_lists = sum(1 + len(rings) for rings in rings_of)
-    n_values = 7 + 4 * len(rooms.names) + n_lists + 3 * n_corners
-    n_values += 7 * len(rooms.points) + 7 * len(rooms.doors)
-    return "\n".join(lines) + "\n", n_values
+    lines = ["points:"] if others else []
+    for name, at in others.items():
+        lines += [f"- {_name(name)}", f"  point: {_corner(*at)}"]
+    return lines
+
+
+def _door_lines(doors: Mapping[int, Point]) -> list[str]:
+    lines = ["doors:  # their numbers; a point of each"] if doors else []
+    for number, at in doors.items():
+        x, y = (round(value, _DECIMALS) for value in at)
+        lines.append(f"- {{number: {number}, point: {_corner(x, y)}}}")
+    return lines
+
+
+def _cell_lines(cells: list[str]) -> list[str]:
+    """Return the lines of cells, none without rooms."""
+    return ["cells:  # which the outlines miss; hybridnav's own", *(f"- {line}" for line in cells)]
 
 
 def _name(name: str) -> str:
     return yaml.safe_dump({"name": name}, allow_unicode=True, width=999).strip()
-
-
-def _outline(label_of: IntArray, label: int, rows: slice, cols: slice) -> BaseGeometry:
-    """Return the area of the cells of a label, x along columns and y along rows, one unit a
-    cell."""
-    steps = np.diff(np.pad(label_of[rows, cols] == label, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    row, starts = np.nonzero(steps == 1)
-    _, ends = np.nonzero(steps == -1)
-    bottom, left = row + rows.start, cols.start
-    return shapely.union_all(shapely.box(starts + left, bottom, ends + left, bottom + 1))
-
-
-def _simplified(shapes: list[BaseGeometry], tolerance: float) -> list[BaseGeometry]:
-    """Return outlines with few corners and the same common borders; the tolerance is in cells."""
-    for factor in (1, 2, 4):
-        simple = list(shapely.coverage_simplify(shapes, factor * tolerance))
-        # A shape so small that it would vanish keeps its corners.
-        simple = [new if new.area > 0 else old for new, old in zip(simple, shapes, strict=True)]
-        if sum(shapely.get_num_coordinates(shape) for shape in simple) <= _MOST_CORNERS:
-            break
-    return simple
-
-
-def _polygons(shape: BaseGeometry) -> list[shapely.Polygon]:
-    return [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"]
-
-
-def _rings(shape: BaseGeometry, grid: OccupancyGrid) -> list[FloatArray]:
-    """Return the outer rings and holes in metres, rounded as in the file.
-
-    Filled by the even-odd rule they form the shape again.
-    """
-    rings = [ring for part in _polygons(shape) for ring in (part.exterior, *part.interiors)]
-    corners = [shapely.get_coordinates(ring)[:-1, ::-1] for ring in rings]
-    return [grid.frame.points_of_grid(ring).round(_DECIMALS) + 0.0 for ring in corners]
 
 
 def _ring(points: FloatArray) -> str:
@@ -182,4 +215,4 @@ def _ring(points: FloatArray) -> str:
 
 
 def _corner(x: float, y: float) -> str:
-    return f"[{round(float(x), _DECIMALS) + 0.0!r}, {round(float(y), _DECIMALS) + 0.0!r}]"
+    return f"[{float(x) + 0.0!r}, {float(y) + 0.0!r}]"

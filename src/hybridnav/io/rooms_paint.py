@@ -10,17 +10,18 @@ from scipy import ndimage
 from hybridnav.errors import RoomsError
 from hybridnav.grid import NO_ROOM, CellClass
 from hybridnav.grid.runs import in_runs
+from hybridnav.io.rooms_cells import NAMELESS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.io.rooms_cells import Runs
+    from hybridnav.io.rooms_entries import Outline, Read
 
-_LEAST_OVERLAP = 0.01
-"""Share of the smaller room that two outlines drawn by hand may have in common."""
-_MOST_COVERED = 0.5
-"""Share of a room that may lie in all others together, so that at most twice the map is painted."""
+_MOST_PAINTED = 4
+"""Most times that outlines may cover the map."""
 _LEAST_NAMELESS_M2 = 1.0
 """Least area of a space outside rooms; the default for rooms that are found."""
 _MOST_CROSSINGS = 5_000_000
@@ -28,25 +29,19 @@ _MOST_CROSSINGS = 5_000_000
 cross some ten thousand."""
 
 
-def painted(
-    outlines: Mapping[int, Sequence[FloatArray]],
-    names: Sequence[str],
-    where: str,
-    grid: OccupancyGrid,
-) -> IntArray:
+def painted(read: Read, runs_of: Mapping[int, Runs], grid: OccupancyGrid) -> IntArray:
     """Return for each cell the room whose outline contains its centre, by the even-odd rule.
 
-    Where outlines overlap a little, the first room has the cells.
+    Outlines that were written with their cells come first, then the cells that they miss, then the
+    outlines that a person has drawn or changed, in the order of the file: each takes the cells that
+    it contains from those before.
 
     Parameters
     ----------
-    outlines
-        Rings of each room, float64 (n, 2) in cells, x along columns and y along rows; any ring may
-        cross itself and others.
-    names
-        Names of all rooms, for messages.
-    where
-        The file, for messages.
+    read
+        The outlines, which may cross themselves and others.
+    runs_of
+        For each outline that was written, by its fingerprint, the cells that it misses.
     grid
         The map.
 
@@ -58,38 +53,46 @@ def painted(
     Raises
     ------
     RoomsError
-        When two rooms overlap, or outlines have too many sides for rooms.
+        When the outlines have too many sides, or cover too much, for rooms.
     """
-    n_crossings = sum(_n_crossings(ring) for rings in outlines.values() for ring in rings)
+    n_crossings = sum(_n_crossings(ring) for outline in read.outlines for ring in outline.rings)
     if n_crossings > _MOST_CROSSINGS:
         raise RoomsError(
-            f"{where}: the outlines cross {n_crossings:,} rows of the map in all, "
+            f"{read.where}: the outlines cross {n_crossings:,} rows of the map in all, "
             f"at most {_MOST_CROSSINGS:,} are read"
         )
     label_of = np.full(grid.shape, NO_ROOM, dtype=np.int32)
     flat = label_of.ravel()
-    n_cells = np.zeros(len(names), dtype=np.int64)
-    for room, rings in outlines.items():
-        cells = cells_inside(rings, grid.shape)
-        n_cells[room] = len(cells)
-        others = flat[cells]
-        is_taken = others != NO_ROOM
-        common = np.bincount(others[is_taken], minlength=len(names))
-        allowed = _LEAST_OVERLAP * np.minimum(n_cells, len(cells))
-        worst = int(np.argmax(common - allowed))
-        if common[worst] > allowed[worst]:
-            area_m2 = common[worst] * grid.resolution_m**2
+    n_painted = 0
+    by_hand = [outline for outline in read.outlines if outline.fingerprint not in runs_of]
+    if not read.lines:  # in the form with locations the first one keeps its cells
+        by_hand.reverse()
+    written = [outline for outline in read.outlines if outline.fingerprint in runs_of]
+    for number, outline in enumerate([*written, *by_hand]):
+        if number == len(written):
+            _paint_runs(flat, written, runs_of)
+        cells = cells_inside(outline.rings, grid.shape)
+        n_painted += len(cells)
+        if n_painted > _MOST_PAINTED * label_of.size:
             raise RoomsError(
-                f"{where}: room {names[worst]!r} and room {names[room]!r} overlap "
-                f"in {area_m2:.2f} square metres"
+                f"{read.of(outline.room, outline.line)}: the outlines up to here cover the map "
+                f"more than {_MOST_PAINTED} times: remove those that lie in others"
             )
-        if np.count_nonzero(is_taken) > _MOST_COVERED * len(cells):
-            raise RoomsError(f"{where}: room {names[room]!r}: most of it lies in other rooms")
-        flat[cells[~is_taken]] = room
+        flat[cells] = outline.room
+    if not by_hand:
+        _paint_runs(flat, written, runs_of)
     return label_of
 
 
-def without_slivers(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
+def _paint_runs(flat: IntArray, written: Sequence[Outline], runs_of: Mapping[int, Runs]) -> None:
+    """Give the cells that outlines miss to their rooms, and take away those of no room."""
+    if NAMELESS in runs_of:
+        flat[in_runs(*runs_of[NAMELESS])] = NO_ROOM
+    for outline in written:
+        flat[in_runs(*runs_of[outline.fingerprint])] = outline.room
+
+
+def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[int]) -> IntArray:
     """Assign the slivers between outlines to the rooms beside them.
 
     Outlines have few corners where the rim of the free cells has many, and people leave strips
@@ -101,6 +104,8 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
         int32 (rows, cols), -1 for no room.
     grid
         The map.
+    rooms
+        Rooms that a person has drawn: only slivers beside one of them are assigned.
 
     Returns
     -------
@@ -124,6 +129,8 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
         beside = small[part_of[one]] & (taken[other] != NO_ROOM)
         pairs.append(np.stack([part_of[one][beside], taken[other][beside]], axis=1))
     found, length = np.unique(np.concatenate(pairs), axis=0, return_counts=True)
+    is_beside = np.isin(found[:, 0], found[np.isin(found[:, 1], list(rooms)), 0])
+    found, length = found[is_beside], length[is_beside]
     room_of = np.full(n_parts + 1, NO_ROOM, dtype=np.int32)
     order = np.lexsort((-found[:, 1], length))  # the last one written counts
     room_of[found[order, 0]] = found[order, 1]

@@ -266,8 +266,9 @@ def renumbered(before: RoomLabels, label_of: IntArray, grid: OccupancyGrid) -> d
     Returns
     -------
     dict
-        Number and middle of each boundary. Numbers that are known and that no boundary has any
-        more stay in it, so that no other door takes one.
+        Number and middle of each door. Numbers that are known and that no boundary has any more
+        stay in it, so that no other door takes one. Gaps without a known number are left out: they
+        are many, and lists and pictures leave them out too.
     """
     clearance_m = measured_clearance_m(grid)
     old = RoomBoundaries.of(before, grid, clearance_m)
@@ -275,8 +276,10 @@ def renumbered(before: RoomLabels, label_of: IntArray, grid: OccupancyGrid) -> d
     known = dict(before.doors) | _by_number(numbers, old.middles)
     pairs = dict(zip(numbers, old.labels.tolist(), strict=True))
     new = RoomBoundaries.of(RoomLabels(before.names, label_of), grid, clearance_m)
-    kept = dict(before.doors) | _by_number(new.numbers(known, pairs).tolist(), new.middles)
-    return dict(sorted(kept.items()))
+    found = _by_number(new.numbers(known, pairs).tolist(), new.middles)
+    is_door = dict(zip(found, (new.widths_m >= LEAST_DOOR_M).tolist(), strict=True))
+    doors = {n: at for n, at in found.items() if is_door[n] or n in before.doors}
+    return dict(sorted((dict(before.doors) | doors).items()))
 
 
 def _by_number(numbers: list[int], middles: FloatArray) -> dict[int, Point]:

@@ -1,0 +1,151 @@
+"""The free cells that outlines of few corners miss, packed into a few lines of a file of rooms."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import zlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.errors import RoomsError
+from hybridnav.grid import NO_ROOM
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+
+Runs = tuple["LongArray", "LongArray"]
+"""First flat cell and length of each run of cells."""
+
+NAMELESS = 0
+"""Fingerprint that stands for no room."""
+_DECIMALS = 4
+_LINE = 120
+"""Characters in a line."""
+_MOST_BYTES = 2**20
+_BITS = 7
+
+
+def fingerprint(rings: Sequence[FloatArray]) -> int:
+    """Return a number of the coordinates of an outline, which another outline hardly has."""
+    text = ";".join(",".join(f"{n:.{_DECIMALS}f}" for n in ring.ravel().tolist()) for ring in rings)
+    return zlib.crc32(text.encode()) or 1
+
+
+def packed(
+    missed: BoolArray, label_of: IntArray, outlines: Sequence[tuple[int, int]], grid: OccupancyGrid
+) -> list[str]:
+    """Return lines that hold the rooms of the cells that outlines miss, and which outlines these
+    are.
+
+    Parameters
+    ----------
+    missed
+        bool (rows, cols), cells whose room is not the one whose outline holds them.
+    label_of
+        int32 (rows, cols), -1 for no room.
+    outlines
+        The room and the fingerprint of each outline that is written.
+    grid
+        The map.
+    """
+    cells = np.flatnonzero(missed)
+    labels = label_of.ravel()[cells]
+    numbers = [_signature(grid)]
+    packed_rooms: set[int] = set()
+    for label, number in [(NO_ROOM, NAMELESS), *outlines]:
+        mine = cells[(labels == label) & (label not in packed_rooms)]
+        packed_rooms.add(label)
+        begins = np.flatnonzero(np.diff(mine, prepend=-2) != 1)
+        lengths = np.diff(begins, append=len(mine))
+        starts = np.diff(mine[begins], prepend=0)
+        numbers += [number, len(begins), *starts.tolist(), *lengths.tolist()]
+    text = base64.b64encode(zlib.compress(b"".join(map(_varint, numbers)), 9)).decode()
+    return [text[at : at + _LINE] for at in range(0, len(text), _LINE)]
+
+
+def unpacked(lines: Sequence[Any], where: str, grid: OccupancyGrid) -> Mapping[int, Runs]:
+    """Return the cells that belong to each outline beyond those inside it.
+
+    Parameters
+    ----------
+    lines
+        As `packed` returned them.
+    where
+        The file, for messages.
+    grid
+        The map. If it is not the one that the lines were packed for, there are no cells.
+
+    Returns
+    -------
+    Mapping
+        By the fingerprint of each outline that was written with them.
+
+    Raises
+    ------
+    RoomsError
+        When the lines are damaged.
+    """
+    if not lines:
+        return {}
+    damaged = RoomsError(f"{where}: cells: damaged, delete the list: the outlines alone then count")
+    try:
+        text = "".join(lines)
+        inflate = zlib.decompressobj()
+        content = inflate.decompress(base64.b64decode(text, validate=True), _MOST_BYTES)
+        numbers = _varints(content)
+        if next(numbers) != _signature(grid):
+            return {}
+        return dict(_runs(numbers, label_cells=grid.shape[0] * grid.shape[1]))
+    except (TypeError, ValueError, binascii.Error, zlib.error, StopIteration, RuntimeError):
+        raise damaged from None
+
+
+def _runs(numbers: Iterator[int], label_cells: int) -> Iterator[tuple[int, Runs]]:
+    for number in numbers:
+        count = next(numbers)
+        if count > _MOST_BYTES:
+            raise ValueError
+        starts, lengths = (
+            np.array([next(numbers) for _ in range(count)], dtype=np.int64) for _ in range(2)
+        )
+        starts = np.cumsum(starts)
+        ends = starts + lengths
+        if count and (starts.min() < 0 or lengths.min() < 0 or ends.max() > label_cells):
+            raise ValueError
+        if (starts[1:] < ends[:-1]).any():
+            raise ValueError
+        yield number, (starts, lengths)
+
+
+def _signature(grid: OccupancyGrid) -> int:
+    """Return a number of the frame and the size of a map."""
+    frame = grid.frame
+    values = (*grid.shape, frame.resolution_m, *frame.origin_m, frame.yaw_rad)
+    return zlib.crc32(" ".join(f"{value:.9g}" for value in values).encode())
+
+
+def _varint(number: int) -> bytes:
+    """Return a whole number >= 0 in as few bytes as it needs, the low bits first."""
+    out = bytearray()
+    while number >= 1 << _BITS:
+        out.append(number % (1 << _BITS) + (1 << _BITS))
+        number >>= _BITS
+    out.append(number)
+    return bytes(out)
+
+
+def _varints(content: bytes) -> Iterator[int]:
+    number, shift = 0, 0
+    for byte in content:
+        number += (byte % (1 << _BITS)) << shift
+        shift += _BITS
+        if shift > 9 * _BITS:
+            raise ValueError
+        if byte < 1 << _BITS:
+            yield number
+            number, shift = 0, 0
