@@ -54,7 +54,9 @@ class Changing(RuleBasedStateMachine):
     @rule(box=boxes, by=st.floats(1.0, 9.0))
     def raise_costs(self, box, by):
         """Raise all costs in a box."""
-        self.change(box, self.in_box(box, lambda old: old * by, self.factor), self.closed)
+        self.change(
+            box, self.in_box(box, lambda old: np.minimum(old * by, 50), self.factor), self.closed
+        )
 
     @rule(box=boxes, share=st.floats(0.0, 1.0))
     def lower_costs(self, box, share):

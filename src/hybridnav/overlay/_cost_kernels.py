@@ -20,12 +20,11 @@ def move_cost(units, direction):
 
 
 @njit(cache=True, nogil=True)
-def least_cost(cell, goal, ground):
+def least_cost(cell, goal, cols, least_units):
     """Return a lower bound on the cost between two flat cells: no obstacles, least units.
 
     It is consistent: a move changes it by at most its own cost.
     """
-    cols, least_units = ground.cols, ground.least_units
     rows = abs(cell // cols - goal // cols)
     across = abs(cell % cols - goal % cols)
     diagonal = min(rows, across)

@@ -46,9 +46,9 @@ def spread(ground, start, goal, limit, distance, touched):
     tuple
         `touched`, their number, and the number of cells expanded.
     """
-    moves, field_of, units, cols, _ = ground
+    moves, field_of, units, cols, least_units = ground
     heap = np.empty((256, 2), np.int64)
-    key = np.int64(0) if goal < 0 else least_cost(start, goal, ground)
+    key = np.int64(0) if goal < 0 else least_cost(start, goal, cols, least_units)
     push(heap, 0, key, start)
     distance[start], touched[0] = 0, start
     size, n, expanded = 1, 1, 0
@@ -57,7 +57,7 @@ def spread(ground, start, goal, limit, distance, touched):
         cell = pop(heap, size)
         size -= 1
         so_far = np.int64(distance[cell])
-        ahead = np.int64(0) if goal < 0 else least_cost(cell, goal, ground)
+        ahead = np.int64(0) if goal < 0 else least_cost(cell, goal, cols, least_units)
         if key != so_far + ahead:
             continue
         expanded += 1
@@ -73,7 +73,7 @@ def spread(ground, start, goal, limit, distance, touched):
             cost = so_far + move_cost(units[cell] + units[other], k)
             if cost >= distance[other]:
                 continue
-            key = cost if goal < 0 else cost + least_cost(other, goal, ground)
+            key = cost if goal < 0 else cost + least_cost(other, goal, cols, least_units)
             if key > limit:
                 continue
             if distance[other] == FAR:

@@ -47,12 +47,13 @@ def aim(levels, ground, top, goal, field, reach):
     enters a field with lowered costs at one of its nodes p and leaves the last one at a node q:
     what lies between costs at least the distance without obstacles.
     """
+    cols, least_units = ground.cols, ground.least_units
     first, last = levels.node_at[field], levels.node_at[field + 1]
     tail = np.empty(last - first, np.int64)
     for node in range(first, last):
         tail[node - first] = reach[node - first]
         if levels.is_stale[field] and levels.is_lowered[field]:
-            tail[node - first] = least_cost(levels.cell_of[node], goal, ground)
+            tail[node - first] = least_cost(levels.cell_of[node], goal, cols, least_units)
     beyond = np.full(top.lowered.size, NO_PATH, np.int64)
     if top.distance.size == 0:
         return goal, field, tail, beyond
@@ -63,7 +64,7 @@ def aim(levels, ground, top, goal, field, reach):
     for i in range(top.lowered.size):
         for j in range(top.lowered.size):
             cells = levels.cell_of[top.lowered[i]], levels.cell_of[top.lowered[j]]
-            total = direct[j] + least_cost(cells[0], cells[1], ground)
+            total = direct[j] + least_cost(cells[0], cells[1], cols, least_units)
             beyond[i] = min(beyond[i], total)
     return goal, field, tail, beyond
 
@@ -89,7 +90,8 @@ def _from_last_level(levels, ground, top, target, node, work):
         stored = top.distance[node - origin, top.lowered[j] - origin]
         if stored < FAR:
             bound = min(bound, stored + beyond[j])
-    return _note(node, max(bound, least_cost(levels.cell_of[node], goal, ground)), work)
+    without = least_cost(levels.cell_of[node], goal, ground.cols, ground.least_units)
+    return _note(node, max(bound, without), work)
 
 
 @njit(cache=True, nogil=True)
@@ -125,7 +127,7 @@ def _inside_stale(levels, ground, top, target, around, work):
             least[i] = min(least[i], total)
             most[i] = max(most[i], apart)
     for i in range(width):
-        without = least_cost(levels.cell_of[begin + i], goal, ground)
+        without = least_cost(levels.cell_of[begin + i], goal, ground.cols, ground.least_units)
         inside = max(most[i], without) if around == field else np.int64(NO_PATH)
         _note(begin + i, max(min(least[i], inside), without), work)
 
@@ -156,4 +158,5 @@ def ahead_of(levels, ground, top, target, is_guided, node, work):
         if not levels.is_lowered[around] and levels.parent[around] < 0:
             _inside_stale(levels, ground, top, target, around, work)
             return work.ahead[node]
-    return _note(node, least_cost(levels.cell_of[node], target[0], ground), work)
+    cell = levels.cell_of[node]
+    return _note(node, least_cost(cell, target[0], ground.cols, ground.least_units), work)

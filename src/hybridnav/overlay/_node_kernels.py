@@ -179,7 +179,11 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
             offered = value + cost
             if cost >= FAR or offered >= distance[other]:
                 continue
-            key = offered + ahead_of(levels, ground, top, target, is_whole, other, work)
+            # A call that passes all these arrays costs as much as the rest of the turn.
+            ahead = work.ahead[other]
+            if ahead < 0:
+                ahead = ahead_of(levels, ground, top, target, is_whole, other, work)
+            key = offered + ahead
             if key >= best:
                 continue
             distance[other], before[other] = offered, mark
