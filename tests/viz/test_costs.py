@@ -37,7 +37,9 @@ def test_dearer_cells_are_darker_and_walls_stay_visible() -> None:
     assert colour_at(ax, 3, 5) == [255, 255, 255]
     assert wall < dear < mild < plain
     assert colour_at(ax, 10, 4) not in ([255, 255, 255], colour_at(ax, 8, 22))
-    labels = [text.get_text() for text in ax.get_legend().get_texts()]
+    legend = ax.get_legend()
+    assert legend is not None
+    labels = [text.get_text() for text in legend.get_texts()]
     assert labels == ["occupied", "within 0.1 m of occupied", "closed", "a path"]
     assert ax.get_title() == "room  ·  metres cost 1 to 3 times as much"
 

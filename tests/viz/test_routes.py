@@ -95,7 +95,7 @@ def test_a_room_too_small_for_its_number_is_pointed_out():
     ax = plot_rooms(RoomLabels(("hall", "shaft"), label_of), grid, width_in=3.0)
     assert texts(ax, r"number-1")["number-1"].get_text() == "2"
     (line,) = (line for line in ax.lines if line.get_gid() == "lead-1")
-    assert line.get_xydata()[0].tolist() == pytest.approx([15.25, 10.25])
+    assert np.asarray(line.get_xydata())[0].tolist() == pytest.approx([15.25, 10.25])
     assert "2  shaft" in legend(ax)
 
 

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.homotopy import _class_kernels
+from hybridnav.homotopy import _class_kernels, _tree_kernels
 from hybridnav.homotopy.classes import HomotopyClasses
 from hybridnav.homotopy.dead_ends import DeadEnds
 from hybridnav.search.fields import field_distances
@@ -157,7 +157,7 @@ class AlternativeSearch:
         gap_m = min(math.sqrt(least_hole_m2), _LARGEST_GAP_M)
         self._apart = max(1, round(gap_m / grid.resolution_m))
         words = self.classes.cell_words.words
-        self._letters = _class_kernels.Letters(
+        self._letters = _tree_kernels.Letters(
             np.cumsum([0, *map(len, words)], dtype=np.int64),
             np.array([letter for word in words for letter in word], dtype=np.int32),
         )
@@ -213,7 +213,7 @@ class AlternativeSearch:
         of_edge = self.classes.cell_words.of_edge
         plane = _class_kernels.Plane(moves, cols, left, of_edge, self._letters, last, apart)
         states = _class_kernels.States.of_room(most_states)
-        tree = _class_kernels.Tree.of_room(most_states)
+        tree = _tree_kernels.Tree.of_room(most_states)
         waiting = _class_kernels.Open.of_room(enterable.size, most_states, count)
         _class_kernels.begin(plane, states, waiting, first)
         reason, is_late = _class_kernels.PAUSED, False
@@ -223,7 +223,7 @@ class AlternativeSearch:
         found = []
         for state in waiting.goals[: waiting.used[_class_kernels.GOALS]].tolist():
             flat = _class_kernels.path_to(states, state)
-            word = tuple(_class_kernels.word_at(tree, states.word[state]).tolist())
+            word = tuple(_tree_kernels.word_at(tree, states.word[state]).tolist())
             length = float(length_in_cells(states.cost[[state]])[0])
             cells = np.stack(np.divmod(flat, cols), axis=1)
             found.append(ClassPath(cells, word, length))

@@ -185,6 +185,7 @@ class ClassTours:
             metric="octile",
             path=Path(cells, topology.grid.frame.points_of(cells), length_m),
             route_source=RouteOfCells(topology, RouteFinder(topology), cells),
+            instruction_source=(),
             lower_bound=bound_m,
         )
 

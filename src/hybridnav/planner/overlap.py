@@ -8,7 +8,7 @@ import shapely
 from shapely.ops import substring
 
 if TYPE_CHECKING:
-    from hybridnav.planner.itinerary import Leg
+    from hybridnav.planner.legs import Leg
     from hybridnav.planner.tour import Tour
 
 LegKey = tuple[int | None, str | None, int | None]

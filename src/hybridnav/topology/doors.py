@@ -277,7 +277,7 @@ def renumbered(before: RoomLabels, label_of: IntArray, grid: OccupancyGrid) -> d
     pairs = dict(zip(numbers, old.labels.tolist(), strict=True))
     new = RoomBoundaries.of(RoomLabels(before.names, label_of), grid, clearance_m)
     found = _by_number(new.numbers(known, pairs).tolist(), new.middles)
-    is_door = dict(zip(found, (new.widths_m >= LEAST_DOOR_M).tolist(), strict=True))
+    is_door = dict(zip(found, (new.passages_m >= LEAST_DOOR_M).tolist(), strict=True))
     doors = {n: at for n, at in found.items() if is_door[n] or n in before.doors}
     return dict(sorted((dict(before.doors) | doors).items()))
 
