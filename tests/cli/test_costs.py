@@ -38,7 +38,10 @@ def test_the_corridor_is_compared_with_the_cheapest_path(cli: Any) -> None:
     answer = json.loads(cli(*query, "--json").out)
     assert answer["metric"] == "weighted"
     assert answer["loss"] == answer["cost"] / answer["optimum_m"] - 1
-    assert answer["grid_length_m"] < answer["optimum_m"]
+    assert answer["grid_length_m"] < answer["optimum_m"] == answer["grid_cost"]
+    taut = cli(*query, "--smooth", "line-of-sight").out
+    length, cost = (f"{answer[key]:.2f} m" for key in ("grid_length_m", "grid_cost"))
+    assert f"grid       {length}, cost {cost} (weighted), " in taut
 
 
 def test_masks_are_read_and_joined(cli: Any, tmp_path: Path) -> None:

@@ -136,8 +136,10 @@ def _whole_grid_lines(figures: dict[str, Any]) -> list[str]:
     cells, seconds = figures["grid_expanded"], figures["grid_seconds"]
     took = f"{cells:,} cells expanded on the whole map, {seconds:.3f} s"
     if figures["optimum_m"] is None:
-        metric = "weighted" if figures["metric"] in _BY_COSTS else "octile"
-        return [f"grid       {figures['grid_length_m']:.2f} m ({metric}), {took}"]
+        length = f"{figures['grid_length_m']:.2f} m"
+        if figures["metric"] in _BY_COSTS:
+            return [f"grid       {length}, cost {figures['grid_cost']:.2f} m (weighted), {took}"]
+        return [f"grid       {length} (octile), {took}"]
     loss = f", loss {figures['loss'] * 100:.2f} %" if figures["loss"] is not None else ""
     return [f"optimum    {figures['optimum_m']:.2f} m{loss}", f"grid       {took}"]
 

@@ -233,6 +233,7 @@ def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[
         "optimum_m": cost if alike else None,
         "loss": loss,
         "grid_length_m": grid_result.path.length_m if grid_result.path is not None else None,
+        "grid_cost": cost,
         "grid_expanded": grid_result.stats.expanded,
         "grid_seconds": round(sum(grid_result.stats.seconds.values()), 6),
     }
