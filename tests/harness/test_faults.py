@@ -1,14 +1,18 @@
 """Methods with a planted fault are caught by a run of the harness; sound ones are not."""
 
 import csv
+import sys
 from collections import Counter
 
 import pytest
 
+import hybridnav as hn
 from hybridnav.harness.analysis import load_study
+from hybridnav.harness.frames import to_frame
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.tables import rows_of_study
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, ROOT, name_of, write_map
 
@@ -138,3 +142,24 @@ def test_counter_examples_are_in_all_that_is_written(folder, study):
     assert "is not free" in report
     assert f"{len(study.faults)} counter-examples" in (folder / "summary.md").read_text()
     assert load_study(folder).labels == study.labels
+
+
+def test_a_data_frame_holds_what_the_tables_say(study):
+    frame = to_frame(study)
+    rows = {str(row["method"]): row for row in rows_of_study(study)}
+    for label, part in frame.groupby("method"):
+        row = rows[str(label)]
+        assert (len(part), part["length_m"].count()) == (row["pairs"], row["solved"])
+        assert 100 * part["loss"].mean() == pytest.approx(row["loss mean %"], nan_ok=True)
+        assert 1e3 * part["seconds"].median() == pytest.approx(row["query ms, median"], nan_ok=True)
+    lengths = frame["octile_optimum_m"] * (1 + frame["octile_loss"])
+    known = frame["octile_loss"].notna()
+    assert lengths[known].to_numpy() == pytest.approx(frame["length_m"][known].to_numpy())
+    queries = frame.groupby(["start_row", "start_col", "goal_row", "goal_col"])
+    assert (queries["octile_optimum_m"].nunique() == 1).all()
+
+
+def test_a_data_frame_without_pandas_is_refused_in_one_line(study, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(hn.InvalidValueError, match=r"pip install 'hybridnav\[study\]'"):
+        to_frame(study)

@@ -5,6 +5,7 @@ S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, 1
 
 from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.compare import compare_runs
+from hybridnav.harness.frames import to_frame
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.yardstick import AnyAngleOptimum
@@ -16,5 +17,6 @@ __all__ = [
     "compare_runs",
     "evaluate",
     "load_study",
+    "to_frame",
     "write_outputs",
 ]
