@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
+import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.overlay import OverlaySearch, PathsTooLongError, build_overlay
+from hybridnav.overlay import OverlaySearch, PathsTooLongError, build_overlay, prepare_overlay
 from tests.overlay.judge import WeightedJudge
 from tests.strategies import examples
 
@@ -94,3 +95,22 @@ def test_long_paths_over_fields_that_fit_are_found():
     overlay = build_overlay(free, nested(free, [4, 12]), factor)
     found = OverlaySearch(overlay).path((0, 0), (0, 59))
     assert found.lower_bound_cells == found.cost_cells == 59 * 3000
+
+
+def test_endpoints_and_epsilon_out_of_range_are_refused():
+    free = np.ones((4, 8), dtype=bool)
+    search = OverlaySearch(build_overlay(free, nested(free, (4,)), np.ones((4, 8))))
+    for epsilon in (np.nan, np.inf, -0.1):
+        with pytest.raises(InvalidValueError, match="epsilon must be a finite number >= 0"):
+            search.path((0, 0), (0, 7), epsilon=epsilon)
+    for cell in ((-1, 0), (0, 8), (9, 9)):
+        for ends in ((cell, (0, 0)), ((0, 0), cell)):
+            with pytest.raises(InvalidValueError, match="is not on the map of"):
+                search.path(*ends)
+
+
+def test_grids_with_corner_cutting_are_refused():
+    grid = hn.OccupancyGrid(np.zeros((6, 6), np.float32), robot_radius_m=0, corner_cutting=True)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    with pytest.raises(InvalidValueError, match="without corner cutting"):
+        prepare_overlay(topology)

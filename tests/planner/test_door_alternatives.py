@@ -188,7 +188,7 @@ def test_both_sides_of_a_block_inside_a_room_count_only_when_asked_for(ring):
     found = hn.plan_alternatives(ring, ends[0], ends[1], 3)
     assert len(found) == 1
     assert found.complete
-    assert found.note.startswith("1 of 3: every other sequence of doors shares more than 80%")
+    assert found.note.startswith("1 of 3: no other candidate sequence of doors shares at most 80%")
     both = hn.plan_alternatives(ring, ends[0], ends[1], 3, inside_rooms=True)
     assert len(both) == 2
     assert both[0].doors == both[1].doors
@@ -202,11 +202,28 @@ def test_both_sides_of_a_block_inside_a_room_count_only_when_asked_for(ring):
     assert len(few) == 1
 
 
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
+def test_a_pillar_beside_the_straight_line_has_another_side(preset):
+    """Shortened by line of sight, the way round it would be the first path again."""
+    classes = np.ones((12, 12), dtype=np.uint8)
+    classes[3:5, 5:7] = 2
+    grid = occupancy_grid(classes)
+    rooms = hn.RoomLabels(("hall",), np.zeros(classes.shape, dtype=np.int32))
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    planner = hn.HybridPlanner(topology, preset=preset)
+    found = hn.plan_alternatives(
+        planner, (2.5, 2.5), (9.5, 2.5), 4, inside_rooms=True, max_overlap=1.0
+    )
+    assert len(found) == 2
+    assert found[0].tour.length_m == pytest.approx(7.0)
+    assert found[1].path.points[:, 1].max() > 5
+
+
 def test_start_and_goal_in_one_room_have_the_plain_plan_alone(ring):
     found = hn.plan_alternatives(ring, (4.5, 0.5), (16.5, 0.5), 3)
     assert len(found) == 1
     assert found.note == (
-        "1 of 3: start and goal are in one room; by homotopy, sides of obstacles count"
+        "1 of 3: no door lies between start and goal; by homotopy, sides of obstacles count"
     )
     assert hn.plan_alternatives(ring, (4.5, 0.5), (16.5, 0.5), 1).note == ""
 

@@ -399,7 +399,7 @@ def test_words_and_route_are_those_of_the_path_that_ompl_found() -> None:
     assert (np.abs(np.diff(path.cells, axis=0)).max(axis=1) == 1).all()
     (door,) = [leg.door for leg in tour.legs if leg.door is not None]
     narrow, wide = topology.rooms.doors
-    assert (narrow.width_m, wide.width_m) == pytest.approx((0.5, 2.1))
+    assert (narrow.width_m, wide.width_m) == pytest.approx((0.6, 2.4))
     assert 3.2 < at < 5.6
     assert door == wide
 

@@ -76,6 +76,8 @@ def parsed_costs(specs: list[str] | None) -> Costs:
         parts = rest.split(",") if rest else []
         if kind == "clearance":
             settings = _settings(kind, parts)
+            if overrides:
+                raise UsageError("--costs clearance is given twice, put its settings into one")
             overrides.append("planner.costs.clearance={}")
             overrides += [f"planner.costs.clearance.{key}={settings[key]!r}" for key in settings]
             continue

@@ -186,7 +186,7 @@ def plan(
     given = parsed_costs(costs)
     check_language(language)
     settings = read_settings(
-        preset or (PRESET if given else None),
+        PRESET if preset is None and given else preset,
         [*given.overrides, *(overrides or ())],
         robot_radius_m,
         seed,

@@ -192,7 +192,10 @@ class Request:
     def _beside_refusal(self, refused: hn.PlanResult) -> dict[str, Any]:
         """Return the figures of what was asked for beside a plan that was refused."""
         if self.wanted.count > 1:
-            return _alternatives_figures(hn.Alternatives((), complete=True))
+            # Loads numba, which help and wrong usage can do without.
+            from hybridnav.planner.alternatives import unplanned  # noqa: PLC0415
+
+            return _alternatives_figures(unplanned(refused.status))
         return _compared(refused, None) if self.compare else {}
 
     def _respond(
@@ -247,7 +250,8 @@ def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
             (leg.room or f"the {leg.shape}") + (f" (door {leg.door.number})" if leg.door else "")
             for leg in other.tour.legs
         ]
-        stretch = other.tour.length_m / found[0].tour.length_m if number else 1.0
+        first_m = found[0].tour.length_m
+        stretch = other.tour.length_m / first_m if number and first_m > 0 else 1.0
         routes.append(other.to_dict() | {"rooms": rooms, "stretch": stretch})
     return {
         "alternatives": routes,

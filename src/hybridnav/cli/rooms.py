@@ -38,11 +38,12 @@ from hybridnav.cli.options import (
 )
 from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
 from hybridnav.grid.names import Segmentation, read_point
-from hybridnav.io.room_measures import measures_of
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
+    from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.grid.room_labels import Point
+    from hybridnav.io.room_measures import RoomMeasures
     from hybridnav.topology import Door, Rooms
 
 OutOption = Annotated[
@@ -55,7 +56,7 @@ MethodOption = Annotated[
         "--method",
         metavar="NAME",
         help=f"How rooms are found: {', '.join(get_args(Segmentation))}.",
-        show_default="walls",
+        show_default="judged",
     ),
 ]
 LeastAreaOption = Annotated[
@@ -144,6 +145,12 @@ def rooms(
         save_figure(plot_rooms(topology), plot)
 
 
+def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
+    from hybridnav.io.room_measures import measures_of  # noqa: PLC0415 - loads numpy
+
+    return measures_of(labels, grid)
+
+
 def _checked_method(method: str) -> Segmentation:
     for known in get_args(Segmentation):
         if known == method:
@@ -204,7 +211,7 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                     rooms.names,
                     areas_m2.tolist(),
                     rooms.fits.tolist(),
-                    measures_of(rooms.labels, rooms.grid),
+                    _measures_of(rooms.labels, rooms.grid),
                     _neighbours(rooms),
                     strict=True,
                 ),
@@ -255,7 +262,7 @@ def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
         f"rooms      {of_rooms.replace(' rooms', '', 1)}; {of_doors}{left_out}",
         "columns    room, number, area, extent in x and y, its point, doors to (number: width)",
     ]
-    measures = measures_of(rooms.labels, rooms.grid)
+    measures = _measures_of(rooms.labels, rooms.grid)
     each = zip(
         rooms.names,
         areas_m2.tolist(),

@@ -179,8 +179,10 @@ class PlannerSettings(_Section):
         """Return why these settings cannot plan by costs, None if they can."""
         if self.refine == "grid-astar":
             return None
-        what = f"coarse: {self.coarse} knows lengths only" if self.refine == "none" else self.refine
-        return f"{what}; costs go with refine: grid-astar, as in preset grid-astar"
+        what = f"coarse: {self.coarse}" if self.refine == "none" else f"refine: {self.refine}"
+        return (
+            f"{what} knows lengths only; costs go with refine: grid-astar, as in preset grid-astar"
+        )
 
     @model_validator(mode="before")
     @classmethod

@@ -220,8 +220,9 @@ def check_rooms(read: Read, label_of: IntArray, grid: OccupancyGrid) -> None:
         rings = [ring for each in read.outlines if each.room == room for ring in each.rings]
         inside = cells_inside(rings, grid.shape) if rings else np.empty(0, dtype=np.int64)
         over = label_of.ravel()[inside[is_free.ravel()[inside]]]
+        over = over[over >= 0]
         if len(over):
-            other = read.of(int(np.bincount(over[over >= 0]).argmax()))
+            other = read.of(int(np.bincount(over).argmax()))
             drawn_over = other.removeprefix(f"{read.where}, ").removeprefix(f"{read.where}: ")
             raise RoomsError(
                 f"{read.of(room)}: holds no free cell of its own, they overlap {drawn_over}: "

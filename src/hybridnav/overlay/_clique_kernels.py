@@ -111,7 +111,7 @@ def fill_cliques(levels, ground, fields):
     levels
         See `Levels`; its cliques are changed.
     ground
-        See `Ground`.
+        See `CellCosts`.
     fields
         int32 (k,), the fields.
 

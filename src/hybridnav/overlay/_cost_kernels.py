@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.overlay._lane_kernels import FAR
 from hybridnav.search.moves import COL_STEP, ROW_STEP
 
@@ -55,7 +55,7 @@ def field_moves(ground, cells, place_of):
     Parameters
     ----------
     ground
-        See `Ground`.
+        See `CellCosts`.
     cells
         int64 (n,), the flat cells of the field, ascending.
     place_of
@@ -97,6 +97,7 @@ def crossing_cells(moves, label, cols):
     return is_crossing
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def crossing_moves(ground, label, cells, node_of):
     """Return the moves between fields of one level: start of each node's, nodes, costs.
@@ -104,7 +105,7 @@ def crossing_moves(ground, label, cells, node_of):
     Parameters
     ----------
     ground
-        See `Ground`.
+        See `CellCosts`.
     label
         int32 (rows * cols,), the field of this level of each cell.
     cells
@@ -161,7 +162,7 @@ def renew_moves(levels, ground, fields, box):
     levels
         See `Levels`; its costs of moves are changed.
     ground
-        See `Ground`.
+        See `CellCosts`.
     fields
         int32 (k,), fields of all levels that have cells in the box.
     box

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.overlay._cost_kernels import least_cost, move_cost
 from hybridnav.overlay._lane_kernels import FAR
 from hybridnav.search.arrays import grow, pop, push
@@ -24,6 +24,7 @@ def with_room(heap, size, more):
     return heap
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def spread(ground, start, goal, limit, distance, touched):
     """Find the distances from a cell inside its field, by A* to a goal, or without one by Dijkstra.
@@ -31,7 +32,7 @@ def spread(ground, start, goal, limit, distance, touched):
     Parameters
     ----------
     ground
-        See `Ground`.
+        See `CellCosts`.
     start, goal
         Flat cells of one field; -1 as the goal for all cells of the field.
     limit
@@ -101,7 +102,7 @@ def append_back(ground, distance, last, cells, n):
     Parameters
     ----------
     ground
-        See `Ground`.
+        See `CellCosts`.
     distance
         int32 (rows * cols,), as `spread` left it.
     last

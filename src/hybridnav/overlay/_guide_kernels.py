@@ -27,7 +27,7 @@ def aim(levels, ground, top, goal, field, reach):
     Parameters
     ----------
     levels, ground, top
-        See `Levels`, `Ground` and `Top`.
+        See `Levels`, `CellCosts` and `Top`.
     goal
         Flat cell.
     field
@@ -139,7 +139,7 @@ def ahead_of(levels, ground, top, target, is_guided, node, work):
     Parameters
     ----------
     levels, ground, top
-        See `Levels`, `Ground` and `Top`.
+        See `Levels`, `CellCosts` and `Top`.
     target
         What `aim` returned.
     is_guided

@@ -110,7 +110,7 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
     Parameters
     ----------
     levels, ground, top
-        See `Levels`, `Ground` and `Top`.
+        See `Levels`, `CellCosts` and `Top`.
     span
         The first node and the one after the last: those of one level inside one field of the level
         above. `(0, -1)` for the whole map: then each cell counts to the field of the highest level

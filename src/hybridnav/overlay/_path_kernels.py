@@ -187,7 +187,7 @@ def append_field_path(ground, endpoints, limit, distance, touched, cells, n):
     Parameters
     ----------
     ground
-        See `Ground`.
+        See `CellCosts`.
     endpoints
         Its two flat cells.
     limit
@@ -218,7 +218,7 @@ def append_cells(ground, levels, nodes, distance, touched, cells, n):
     Parameters
     ----------
     ground, levels
-        See `Ground` and `Levels`.
+        See `CellCosts` and `Levels`.
     nodes
         int64 (m,), m >= 1.
     distance, touched

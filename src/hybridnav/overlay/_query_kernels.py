@@ -44,7 +44,7 @@ def _across(levels, top, ground, around, reaches, goal, best, epsilon, work):
     Parameters
     ----------
     levels, top, ground
-        See `shortest`.
+        See `find_path`.
     around
         Two int64 (levels,), the fields of start and goal on each level.
     reaches
@@ -107,13 +107,13 @@ def _across(levels, top, ground, around, reaches, goal, best, epsilon, work):
 
 @guarded
 @njit(cache=True, nogil=True)
-def shortest(ground, levels, top, endpoints, epsilon, cell_work, node_work):
+def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
     """Find a path of least cost between two cells.
 
     Parameters
     ----------
     ground, levels, top
-        See `Ground`, `Levels` and `Top`.
+        See `CellCosts`, `Levels` and `Top`.
     endpoints
         Two flat cells of fields.
     epsilon

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hybridnav._progress import Progress
     from hybridnav._typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.overlay.changes import Change
-    from hybridnav.overlay.layout import Ground, Levels, Top
+    from hybridnav.overlay.layout import CellCosts, Levels, Top
 
 UNIT_BITS = 14
 """A factor of 1 is 2^14 units, a straight move over such cells costs 2^15."""
@@ -59,7 +59,7 @@ class Overlay:
     """
 
     def __init__(
-        self, ground: Ground, levels: Levels, factor: FloatArray, top_bytes: float
+        self, ground: CellCosts, levels: Levels, factor: FloatArray, top_bytes: float
     ) -> None:
         self.ground = ground
         self.levels = levels

@@ -11,7 +11,7 @@ from hybridnav.search.moves import legal_moves
 
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, IntArray
-    from hybridnav.overlay.layout import Ground, Levels
+    from hybridnav.overlay.layout import CellCosts, Levels
 
     Window = tuple[slice, slice]
 
@@ -36,13 +36,13 @@ class Change(NamedTuple):
     """int32 (k,), the fields with cells in the window."""
 
 
-def change_in(ground: Ground, shape: tuple[int, int], box: Window, units: IntArray) -> Change:
+def change_in(ground: CellCosts, shape: tuple[int, int], box: Window, units: IntArray) -> Change:
     """Return what changes when the cells in a box get other units.
 
     Parameters
     ----------
     ground
-        See `Ground`.
+        See `CellCosts`.
     shape
         Rows and columns of the map.
     box

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
 
 
-class Ground(NamedTuple):
+class CellCosts(NamedTuple):
     """The cells: what moves over them cost, and the fields of the finest level."""
 
     moves: ByteArray
@@ -106,7 +106,9 @@ class NodeWork(NamedTuple):
     """int64 (1,), their number."""
 
 
-def lay_out(moves: ByteArray, units: IntArray, labels: Sequence[IntArray]) -> tuple[Ground, Levels]:
+def lay_out(
+    moves: ByteArray, units: IntArray, labels: Sequence[IntArray]
+) -> tuple[CellCosts, Levels]:
     """Number fields and border cells; cliques and tables are left empty.
 
     Parameters
@@ -130,7 +132,7 @@ def lay_out(moves: ByteArray, units: IntArray, labels: Sequence[IntArray]) -> tu
     flat = np.full((len(labels), moves.size), -1, dtype=np.int32)
     flat[:, inside.ravel()] = fields
     least = int(units[inside].min(initial=1 << 30))
-    ground = Ground(
+    ground = CellCosts(
         moves.ravel(), flat[0], np.ascontiguousarray(units).ravel(), moves.shape[1], least
     )
     parent = np.concatenate(
@@ -168,7 +170,7 @@ def _numbered(labels: list[IntArray]) -> tuple[list[IntArray], list[IntArray]]:
 class _Nodes:
     """The nodes of one level, sorted by field."""
 
-    def __init__(self, ground: Ground, label: IntArray, first_field: int, level: int) -> None:
+    def __init__(self, ground: CellCosts, label: IntArray, first_field: int, level: int) -> None:
         crossing = np.flatnonzero(kernels.crossing_cells(ground.moves, label, ground.cols))
         order = np.argsort(label[crossing], kind="stable")
         self.cells = crossing[order].astype(np.int32)
@@ -177,7 +179,7 @@ class _Nodes:
 
 
 def _gathered(
-    ground: Ground, nodes: list[_Nodes], label: IntArray, level_at: LongArray, parent: IntArray
+    ground: CellCosts, nodes: list[_Nodes], label: IntArray, level_at: LongArray, parent: IntArray
 ) -> Levels:
     """Join the levels, and number what lies between and below their nodes."""
     field_of = np.concatenate([level.fields for level in nodes]).astype(np.int32)

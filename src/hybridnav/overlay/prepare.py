@@ -109,7 +109,7 @@ def prepare_overlay(
     Raises
     ------
     InvalidValueError
-        When factors have another shape or are out of range.
+        When factors have another shape or are out of range, or corners may be cut.
     PathsTooLongError
         When a path inside one of the finest fields costs more than 16,000 cells.
 
@@ -121,6 +121,8 @@ def prepare_overlay(
     >>> search.path((8, 3), (8, 20)).cost_cells
     17.0
     """
+    if topology.grid.corner_cutting:
+        raise InvalidValueError("an overlay needs a grid without corner cutting")
     enterable = topology.grid.enterable(allow_unexplored=allow_unexplored)
     return build_overlay(
         enterable,

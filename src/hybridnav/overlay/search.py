@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import _query_kernels as kernels
 from hybridnav.overlay._lane_kernels import FAR, NO_PATH
 from hybridnav.overlay.layout import NodeWork
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import LongArray
     from hybridnav.overlay.build import Overlay
 
-KERNEL = kernels.shortest
+KERNEL = kernels.find_path
 """The kernel whose compiled form shows that a search was run before."""
 
 Cell = tuple[int, int]
@@ -92,16 +93,28 @@ class OverlaySearch:
         start, goal
             (row, col); there is no path from or to a closed cell.
         epsilon
-            The search ends once no path can be cheaper by more than this part, >= 0.
+            The search ends once no path can be cheaper by more than this part, finite, >= 0.
+
+        Raises
+        ------
+        InvalidValueError
+            When a cell is not on the map, or epsilon is out of range.
         """
         overlay = self._overlay
+        if not 0 <= epsilon < math.inf:
+            raise InvalidValueError(f"epsilon must be a finite number >= 0, got {epsilon!r:.80}")
+        for cell in (start, goal):
+            if not all(0 <= at < size for at, size in zip(cell, overlay.shape, strict=True)):
+                raise InvalidValueError(
+                    f"cell {cell} is not on the map of {overlay.shape} rows and columns"
+                )
         with overlay.reading():
             if not (overlay.is_open(start) and overlay.is_open(goal)):
                 return OverlayPath(None, math.inf, math.inf, 0, 0)
             cols = overlay.shape[1]
             ends = (start[0] * cols + start[1], goal[0] * cols + goal[1])
             with self._works.lent() as work:
-                cost, bound, flat, expanded, expanded_nodes = kernels.shortest(
+                cost, bound, flat, expanded, expanded_nodes = kernels.find_path(
                     overlay.ground,
                     overlay.levels,
                     overlay.top,

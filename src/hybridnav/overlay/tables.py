@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from hybridnav._progress import Progress
     from hybridnav._typing import IntArray
-    from hybridnav.overlay.layout import Ground, Levels
+    from hybridnav.overlay.layout import CellCosts, Levels
 
 _LIMIT = int(FAR) // 2
 """Largest distance that is stored: sums of two must stay below FAR."""
@@ -31,7 +31,7 @@ class PathsTooLongError(InvalidValueError):
     """Costs inside a field that do not fit into 30 bits."""
 
 
-def fill_cliques(ground: Ground, levels: Levels, fields: IntArray) -> None:
+def fill_cliques(ground: CellCosts, levels: Levels, fields: IntArray) -> None:
     """Compute the distances between the border cells of some of the finest fields.
 
     Raises

@@ -96,8 +96,9 @@ class Alternatives(Sequence[Alternative]):
     found: tuple[Alternative, ...]
     """The alternatives; none if no path exists."""
     complete: bool
-    """Whether these are as many as requested, or all within the limits; False if the search
-    stopped before, so that there may be more."""
+    """Whether these are as many as requested, or all: by homotopy all classes, by doors all
+    candidates within the limits, which are not all sequences of doors. False if the search stopped
+    before."""
     note: str = ""
     """The reason why there are fewer than requested, one line; empty if there are not."""
 
@@ -114,6 +115,11 @@ class Alternatives(Sequence[Alternative]):
     def __len__(self) -> int:
         """Return the number of alternatives found."""
         return len(self.found)
+
+
+def unplanned(status: str) -> Alternatives:
+    """Return the alternatives of a query without a path."""
+    return Alternatives((), complete=True, note=f"no path was planned: {status}")
 
 
 def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
@@ -220,7 +226,7 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
         classes = ClassTours(planner, waypoints, closed, effort)
     first = plan_tour(planner, waypoints, at=at, blocked=closed)
     if not first.solved:
-        return Alternatives((), complete=True, note=f"no path was planned: {first.status}")
+        return unplanned(first.status)
     if by == "homotopy" and classes is not None:
         found = tuple(
             Alternative(tour, word=word) for tour, word in classes.find(first, limits.count)
@@ -281,8 +287,9 @@ def _reason(search: DoorTours | None, limits: RouteLimits) -> str:
     if search is None:
         return "the map has no rooms, so no doors; by homotopy, sides of obstacles count"
     if search.is_in_one_room:
-        return "start and goal are in one room; by homotopy, sides of obstacles count"
+        return "no door lies between start and goal; by homotopy, sides of obstacles count"
     return (
-        f"every other sequence of doors shares more than {limits.max_overlap:.0%} with a shorter "
-        f"one, or is longer than {limits.max_stretch:g} times the first"
+        "no other candidate sequence of doors shares at most "
+        f"{limits.max_overlap:.0%} with a shorter one and is at most {limits.max_stretch:g} times "
+        "as long as the first"
     )

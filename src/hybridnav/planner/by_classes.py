@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.lines import polyline_length
+from hybridnav.grid.lines import cells_of_line, polyline_length
 from hybridnav.homotopy import alternative_search
 from hybridnav.planner.by_doors import Chosen, admissible
 from hybridnav.planner.overlap import Track
@@ -141,7 +141,10 @@ class ClassTours:
             if closed is None:
                 continue
             result = one.tour.results[0]
+            own = None if result.path is None else self._word_of(result.path.cells)
             for other in self._paths(_endpoints(result), limits.count, closed).paths:
+                if other.word == own:
+                    continue
                 tour = self._tour(self._like(result, other, closed, whole.lower_bound))
                 if tour.length_m <= limits.max_stretch * whole.length_m:
                     track = Track(tour, search.near_m, by_legs=False)
@@ -202,6 +205,11 @@ class ClassTours:
         assert result.goal is not None  # noqa: S101
         sight = LineOfSight(grid, allow_unexplored=self._allowed, closed=closed)
         points = sight.shorten(other.cells, np.array(result.start), np.array(result.goal))
+        passed = cells_of_line(
+            self._search.classes.enterable_cells, grid.frame.positions_of(points)
+        )
+        if self._word_of(passed) != other.word:
+            return found  # shortened, it passes the obstacle on another side
         length_m = polyline_length(points)
         return replace(
             found,
@@ -209,6 +217,16 @@ class ClassTours:
             path=Path(other.cells, points, length_m),
             lower_bound=min(bound_m, length_m),
         )
+
+    def _word_of(self, cells: LongArray) -> Word:
+        """Return the class of the cells of a line, which may touch corners of what is closed."""
+        classes = self._search.classes
+        is_diagonal = (np.diff(cells, axis=0) != 0).all(axis=1)
+        side = np.stack([cells[:-1, 0], cells[1:, 1]], axis=1)
+        other = np.stack([cells[1:, 0], cells[:-1, 1]], axis=1)
+        side = np.where(classes.enterable_cells[tuple(side.T)][:, None], side, other)
+        at = np.flatnonzero(is_diagonal)
+        return classes.word_of_path(np.insert(cells, at + 1, side[at], axis=0))
 
     def _tour(self, result: PlanResult) -> Tour:
         return tour_of(self._planner, [result], self._waypoints)

@@ -166,6 +166,9 @@ class MaxDistance:
         seconds["coarse"] = time.perf_counter() - began
         cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
         seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
+        if cells is None and self._refiner.costs is not None:  # cells that the layer closes
+            whole = WholeMap(self._refiner).plan(query)
+            return replace(whole, stats=replace(whole.stats, seconds=seconds | whole.stats.seconds))
         places, arcs = topology.place_ids[route.places], topology.arc_ids[route.arcs]
         stats = PlanStats(
             expanded=expanded,

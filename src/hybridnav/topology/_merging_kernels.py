@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 
 
 class SegmentState(NamedTuple):
@@ -120,6 +120,7 @@ def union_hull(state, u, v):
     return corners, size, area
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def measure_segments(label_of, reaching, clearance, n):
     """Measure free cells, peaks, moments and rims of segments, and their hulls one after the
@@ -185,6 +186,7 @@ def measure_segments(label_of, reaching, clearance, n):
     return free, peaks, moments, rims, hull_begins, sizes, areas, diameters, hulls[:used]
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def sides_between(label_of, clearance):
     """Find sides between cells of two segments: both segments, middle and direction, clearance."""
@@ -226,6 +228,7 @@ def pairs_of(state, segment):
     return found
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def merge_pair(state, pair):
     """Let the larger segment of a pair take the other; return both."""

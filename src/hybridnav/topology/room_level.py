@@ -285,7 +285,7 @@ class Rooms:
         return (
             _counted("rooms", self.fits.tolist(), small),
             passages,
-            f"{n_gaps} gaps below {LEAST_DOOR_M:g} m" if n_gaps else "",
+            f"{n_gaps} gap{'s' if n_gaps != 1 else ''} below {LEAST_DOOR_M:g} m" if n_gaps else "",
         )
 
     def point_of(self, name: str) -> tuple[float, float]:
@@ -326,7 +326,8 @@ class Rooms:
 def _counted(things: str, usable: list[bool], why_not: str) -> str:
     """Return how many things there are, and how many are not usable, and why."""
     unusable = usable.count(False)
-    return f"{len(usable)} {things}" + (f", {unusable} of them {why_not}" if unusable else "")
+    named = things if len(usable) != 1 else things.removesuffix("s")
+    return f"{len(usable)} {named}" + (f", {unusable} of them {why_not}" if unusable else "")
 
 
 def room_areas_m2(labels: RoomLabels, grid: OccupancyGrid) -> FloatArray:

@@ -11,6 +11,7 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.metrics.judge import checked_points
 from hybridnav.viz import style
@@ -118,6 +119,10 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
 
 def _draw_paths(canvas: Canvas, paths: Mapping[str, ArrayLike]) -> list[Entry]:
     """Draw paths as lines with a pale rim; return their legend entries."""
+    if len(paths) > len(_PATHS):
+        raise InvalidValueError(
+            f"at most {len(_PATHS)} paths can be drawn, got {len(paths)}: draw fewer"
+        )
     entries: list[Entry] = []
     for (label, points), colour in zip(paths.items(), _PATHS, strict=False):
         line = checked_points(points)
