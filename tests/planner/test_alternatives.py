@@ -122,7 +122,7 @@ def test_a_search_stops_in_time_with_a_shortest_path(monkeypatch):
 @pytest.mark.parametrize("most_states", [0, -1, 1 << 27])
 def test_a_search_of_no_or_too_many_states_is_refused(most_states):
     with pytest.raises(
-        hn.InvalidValueError, match=r"expected a number from 1 to \d+: leave it out"
+        hn.InvalidValueError, match=r"expected a whole number from 1 to \d+: leave it out"
     ):
         by_homotopy(planner_of(TWO_DOORS), (1.5, 1.5), (12.5, 2.5), 2, most_states=most_states)
 

@@ -19,7 +19,7 @@ CostsOption = Annotated[
         "--costs",
         metavar="WHAT",
         help="Plan the cheapest path, by clearance[:KEY=VALUE,...], speed:FILE[,KEY=VALUE,...] or "
-        "keepout:FILE (masks of Nav2); may be repeated.",
+        "keepout:FILE[,multiplier=M] (masks of Nav2); may be repeated.",
     ),
 ]
 

@@ -92,7 +92,7 @@ ByOption = Annotated[
     typer.Option(
         "--by",
         metavar="WHAT",
-        help="What makes routes differ: doors, or homotopy (sides of obstacles, exact).",
+        help="What makes alternatives differ: doors, or homotopy (sides of obstacles, exact).",
     ),
 ]
 OverlapOption = Annotated[
@@ -102,7 +102,7 @@ OverlapOption = Annotated[
         metavar="SHARE",
         min=0,
         max=1,
-        help="Share that a route by doors may have in common with a shorter one.",
+        help="Share that an alternative by doors may have in common with a shorter one.",
     ),
 ]
 StretchOption = Annotated[
@@ -111,13 +111,13 @@ StretchOption = Annotated[
         "--max-stretch",
         metavar="FACTOR",
         min=1,
-        help="Length of a route by doors over that of the first, at most.",
+        help="Length of an alternative by doors over that of the first, at most.",
     ),
 ]
 InsideOption = Annotated[
     bool,
     typer.Option(
-        "--inside-rooms", help="Also routes by the same doors, on other sides of obstacles."
+        "--inside-rooms", help="Also alternatives by the same doors, on other sides of obstacles."
     ),
 ]
 LeastHoleOption = Annotated[

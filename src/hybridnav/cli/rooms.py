@@ -119,7 +119,7 @@ def rooms(
             labels = hn.find_rooms(grid, method=checked, least_area_m2=area_m2)
     if asked is not None:
         found = _found_at(asked, labels, grid)
-        answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _told_at(found))
+        answer(json.dumps(found, allow_nan=False) + "\n" if as_json else _room_line(found))
         raise typer.Exit(EXIT_SOLVED if found["room"] is not None else EXIT_NOT_SOLVED)
     # Loads numba, which help and wrong usage can do without.
     from hybridnav.topology.room_level import room_areas_m2  # noqa: PLC0415
@@ -179,7 +179,7 @@ def _found_at(point: Point, labels: hn.RoomLabels, grid: hn.OccupancyGrid) -> di
     return {"at_m": list(point), "room": labels.at(point, grid), "cell": cell}
 
 
-def _told_at(found: dict[str, Any]) -> str:
+def _room_line(found: dict[str, Any]) -> str:
     """Return the name alone, for scripts, or a line that there is none."""
     if found["room"] is not None:
         return f"{found['room']}\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
+from numbers import Integral, Real
 from time import perf_counter
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
@@ -243,9 +243,9 @@ class AlternativeSearch:
 
 def _check(most_states: int, time_limit_s: float) -> None:
     """Refuse limits that are out of range."""
-    if not 1 <= most_states <= _class_kernels.MOST_STATES:
+    if not (isinstance(most_states, Integral) and 1 <= most_states <= _class_kernels.MOST_STATES):
         raise InvalidValueError(
-            f"most_states is {most_states!r:.80}, expected a number from 1 to "
+            f"most_states is {most_states!r:.80}, expected a whole number from 1 to "
             f"{_class_kernels.MOST_STATES}: leave it out for {MOST_STATES}"
         )
     if not (isinstance(time_limit_s, Real) and time_limit_s > 0):

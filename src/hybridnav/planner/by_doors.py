@@ -185,14 +185,14 @@ class DoorTours:
 
     def _candidates(self, limits: RouteLimits) -> Iterator[DoorRoute]:
         """Return routes by sequences of doors, gaps aside, each sequence once."""
-        tried = {tuple(leg.door.number for leg in self._first.legs if _is_told(leg.door))}
+        tried = {tuple(leg.door.number for leg in self._first.legs if _is_counted(leg.door))}
         most_m = None
         for route in self._graph.routes(*self._endpoints):
             most_m = most_m or limits.max_stretch * route.length_m
             if route.length_m > most_m:
                 return
             doors = [self._rooms.door_of_arc.get(arc) for arc in route.arcs]
-            sequence = tuple(door.number for door in doors if _is_told(door))
+            sequence = tuple(door.number for door in doors if _is_counted(door))
             if sequence not in tried:
                 tried.add(sequence)
                 yield route
@@ -262,5 +262,5 @@ def admissible(
     return chosen
 
 
-def _is_told(door: Door | None) -> TypeGuard[Door]:
+def _is_counted(door: Door | None) -> TypeGuard[Door]:
     return door is not None and not door.is_gap

@@ -126,7 +126,8 @@ class GridSearch:
     def memory_bytes(self) -> int:
         """Bytes held between searches that do not overlap."""
         with self._works.lent() as work:
-            return int(self._moves.nbytes + work.records.nbytes + work.waiting.nbytes)
+            units = 0 if self._weights is None else self._weights.units.nbytes
+            return int(self._moves.nbytes + work.records.nbytes + work.waiting.nbytes + units)
 
     def search(  # noqa: PLR0913 - independent limits of one search
         self,

@@ -86,7 +86,7 @@ class Language:
     one_opening: str
     openings: str
     joint: str
-    """Between two items: ` and `."""
+    """What stands between two items, with its spaces."""
     turn: str
     """A turn; `{inside}`, `{lead}`, `{turn}`."""
     go: str

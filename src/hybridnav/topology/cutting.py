@@ -178,7 +178,7 @@ def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, B
 
 
 def _directions_of(wall: BoolArray, side: int, resolution_m: float) -> list[tuple[float, float]]:
-    """Up to two directions of one window, with how far their sharpness exceeds the median."""
+    """Find up to two directions of one window, with how far their sharpness exceeds the median."""
     cells = np.argwhere(wall) - side / 2
     if len(cells) * resolution_m < _LEAST_WALL_CELLS_M:
         return []
@@ -199,7 +199,7 @@ def _directions_of(wall: BoolArray, side: int, resolution_m: float) -> list[tupl
 
 
 def _wrapped(angle_rad: FloatArray) -> FloatArray:
-    """Angles of crosses: from -pi/4 to pi/4."""
+    """Return angles of crosses, from -pi/4 to pi/4."""
     wrapped: FloatArray = (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
     return wrapped
 
@@ -225,7 +225,7 @@ def _cut_in(ground: Ground, angle_rad: float, within: BoolArray, cut: BoolArray)
 
 
 def _basins(ground: Ground) -> IntArray:
-    """Basins of the clearance, parted at narrow passages."""
+    """Find the basins of the clearance, parted at narrow passages."""
     clearance = np.pad(ground.clearance, 1)
     inside = np.flatnonzero(np.pad(ground.free, 1))
     flat = clearance.ravel()
@@ -237,7 +237,7 @@ def _basins(ground: Ground) -> IntArray:
 
 
 def _closed(free: BoolArray, occupied: BoolArray, reach: float) -> BoolArray:
-    """Free cells, and those that a closing by a disc fills, but no obstacle."""
+    """Return free cells, and those that a closing by a disc fills, but no obstacle."""
     size = max(1, round(reach))
     row, col = np.ogrid[-size : size + 1, -size : size + 1]
     disc = row * row + col * col <= size * size + 1

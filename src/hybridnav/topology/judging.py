@@ -242,7 +242,7 @@ def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
 
 
 def _runs(pairs: LongArray, n: int) -> tuple[LongArray, LongArray, LongArray, LongArray]:
-    """Order of sides by pair, the key of each pair, and where its sides begin and end."""
+    """Return the order of sides by pair, each pair's key, and where its sides begin and end."""
     keys = pairs[:, 0] * n + pairs[:, 1]
     order = np.argsort(keys, kind="stable")
     found, begins, counts = np.unique(keys[order], return_index=True, return_counts=True)
@@ -250,7 +250,7 @@ def _runs(pairs: LongArray, n: int) -> tuple[LongArray, LongArray, LongArray, Lo
 
 
 def _halves(endpoints: LongArray, n: int) -> tuple[LongArray, LongArray]:
-    """Linked lists of the half pairs of each segment."""
+    """Return linked lists of the half pairs of each segment."""
     first, following = np.full(n, -1), np.full(2 * len(endpoints), -1)
     order = np.argsort(endpoints.ravel(), kind="stable")
     of = endpoints.ravel()[order]

@@ -168,7 +168,7 @@ def _judged(grid: OccupancyGrid, _method: Segmentation, least_area_m2: float) ->
 
 
 def _convex(grid: OccupancyGrid, method: Segmentation, least_area_m2: float) -> IntArray:
-    """Segments merged where their union is nearly convex."""
+    """Merge segments where their union is nearly convex."""
     outside = outside_of(grid)
     grid = _walled(grid)
     cut = np.where(outside, np.int32(NO_ROOM), _segments(grid, method, least_area_m2))
