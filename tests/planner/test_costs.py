@@ -79,7 +79,7 @@ def test_the_path_is_the_cheapest_with_gap_0(classes: Any, seed: int) -> None:
     closed = closed[~(closed == start).all(axis=1) & ~(closed == goal).all(axis=1)]
     is_open[tuple(closed.T)] = False
     least = optimum_m(grid, layer, is_open, start)[goal]
-    around = planner.plan(*ends, blocked={"cells": np.argwhere(closed)})
+    around = planner.plan(*ends, blocked={"cells": closed})
     assert around.solved == np.isfinite(least)
     if around.path is not None:
         assert_legal(around.path.cells, is_open)

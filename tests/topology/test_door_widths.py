@@ -66,7 +66,7 @@ def test_lists_and_pictures_tell_doors_from_openings():
     free[23:62, 10:50], label_of[23:62, 10:50] = True, 2
     grid = occupancy_grid(free.astype(np.uint8), resolution_m=RESOLUTION_M)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=named(label_of)))
-    assert topology.rooms.counted()[1] == "1 doors, 1 openings"
+    assert topology.rooms.counted()[1] == "1 door, 1 opening"
     drawn = {line.get_gid(): line for line in plot_rooms(topology).lines}
     positions = {door.kind: door.position for door in topology.rooms.doors}
     for kind in ("door", "opening"):
