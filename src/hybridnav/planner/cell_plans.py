@@ -157,8 +157,7 @@ class MaxDistance:
         route = search.search(*map(topology.place_at, query.cells))
         seconds = {"coarse": time.perf_counter() - began}
         if route is None and topology.grid.corner_cutting:
-            whole = WholeMap(self._refiner, self._own).plan(query)
-            return replace(whole, stats=replace(whole.stats, seconds=seconds | whole.stats.seconds))
+            return self._over_whole_map(query, seconds)
         if route is None:
             return CellPlan(None, stats=PlanStats(seconds=seconds))
         beside = search.enterable if self._settings.corridor == "neighbours" else None
@@ -167,8 +166,7 @@ class MaxDistance:
         cells, expanded = (self._own or self._refiner).refine(*query.cells, corridor)
         seconds["refine"] = time.perf_counter() - began - seconds["coarse"]
         if cells is None and self._refiner.costs is not None:  # cells that the layer closes
-            whole = WholeMap(self._refiner).plan(query)
-            return replace(whole, stats=replace(whole.stats, seconds=seconds | whole.stats.seconds))
+            return self._over_whole_map(query, seconds)
         places, arcs = topology.place_ids[route.places], topology.arc_ids[route.arcs]
         stats = PlanStats(
             expanded=expanded,
@@ -183,6 +181,11 @@ class MaxDistance:
             stats=stats,
         )
         return round_closed(plan, query, self._refiner)
+
+    def _over_whole_map(self, query: CellQuery, seconds: dict[str, float]) -> CellPlan:
+        """Return the plan on the whole map, with the seconds spent before."""
+        whole = WholeMap(self._refiner, self._own).plan(query)
+        return replace(whole, stats=replace(whole.stats, seconds=seconds | whole.stats.seconds))
 
     def plan_many(self, queries: CellQueries) -> None:
         """None, because each query has a search of its own; see `CellPlanner`."""

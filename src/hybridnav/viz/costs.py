@@ -16,7 +16,7 @@ from hybridnav.grid import CellClass
 from hybridnav.metrics.judge import checked_points
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.layout import add_legend, add_title, fit_height
+from hybridnav.viz.layout import LABELS, add_legend, add_title, fit_height, label_axes
 from hybridnav.viz.maps import ground_entries
 
 if TYPE_CHECKING:
@@ -36,9 +36,8 @@ _DECADE = 10.0
 _CLOSED = "#7b3294"
 _SHADES = (0.1, 0.33, 0.6, 0.85)
 """Parts of the colour map that follow white: its darkest end would look like a wall."""
-_LABELS, _BAR, _BAR_HEIGHT = 3.4, 3.0, 0.8
-"""Heights of the labels below the map, of the colour bar with its labels and of the bar itself, in
-font sizes."""
+_BAR, _BAR_HEIGHT = 3.0, 0.8
+"""Heights of the colour bar with its labels and of the bar itself, in font sizes."""
 _TICKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 _BAR_LEFT, _BAR_WIDTH = 0.3, 0.4
 """Place of the bar below the map, in widths of the map."""
@@ -136,17 +135,13 @@ def _draw_paths(canvas: Canvas, paths: Mapping[str, ArrayLike]) -> list[Entry]:
 def _finish(canvas: Canvas, entries: list[Entry], words: list[str], shown: ScalarMappable) -> None:
     """Add the title, axes in metres, legend and colour bar."""
     ax, font = canvas.ax, canvas.sizes.font
-    ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
-    ax.set_xlabel("x in metres", fontsize=font, labelpad=0.3 * font)
-    ax.set_ylabel("y in metres", fontsize=font, labelpad=0.3 * font)
-    for spine in ax.spines.values():
-        spine.set(linewidth=0.6, color=style.ARC)
+    label_axes(canvas)
     add_title(canvas, words)
-    fit_height(canvas, add_legend(canvas, entries, bar=0, below=(_LABELS + _BAR) * font))
+    fit_height(canvas, add_legend(canvas, entries, bar=0, below=(LABELS + _BAR) * font))
     points = float(ax.get_window_extent().height) * 72 / ax.figure.dpi
     place = (
         _BAR_LEFT,
-        -(_LABELS + _BAR_HEIGHT) * font / points,
+        -(LABELS + _BAR_HEIGHT) * font / points,
         _BAR_WIDTH,
         _BAR_HEIGHT * font / points,
     )

@@ -29,6 +29,8 @@ Entry = tuple[Any, str]
 
 BAR_SHARE = 0.2
 """Greatest length of the scale bar, as a share of the view's width."""
+LABELS = 3.4
+"""Height of the labels in metres below a map, in font sizes."""
 _HINTING = 1.06
 """Letters on whole pixels are so much wider than their outlines, at most."""
 _NARROWER = (0.9, 0.8, 0.7, 0.6, 0.5)
@@ -189,6 +191,16 @@ def _columns(widths: Sequence[float], font: float, room: float) -> int:
         if best == 0 or rows < -(-len(widths) // best):
             best = columns
     return best
+
+
+def label_axes(canvas: Canvas) -> None:
+    """Leave a thin frame round the map, with ticks and labels in metres."""
+    ax, font = canvas.ax, canvas.sizes.font
+    ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
+    ax.set_xlabel("x in metres", fontsize=font, labelpad=0.3 * font)
+    ax.set_ylabel("y in metres", fontsize=font, labelpad=0.3 * font)
+    for spine in ax.spines.values():
+        spine.set(linewidth=0.6, color=style.ARC)
 
 
 def frame_axes(canvas: Canvas) -> None:

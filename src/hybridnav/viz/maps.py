@@ -11,7 +11,7 @@ from hybridnav.grid import CellClass
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.layout import add_legend, add_title, fit_height
+from hybridnav.viz.layout import LABELS, add_legend, add_title, fit_height, label_axes
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 
 if TYPE_CHECKING:
@@ -207,11 +207,6 @@ def arc_handle(sizes: Sizes) -> Line2D:
 
 def _finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
     """Add the title, axes in metres and legend."""
-    ax, font = canvas.ax, canvas.sizes.font
-    ax.tick_params(labelsize=font, width=0.6, length=0.35 * font, color=style.ARC)
-    ax.set_xlabel("x in metres", fontsize=font, labelpad=0.3 * font)
-    ax.set_ylabel("y in metres", fontsize=font, labelpad=0.3 * font)
-    for spine in ax.spines.values():
-        spine.set(linewidth=0.6, color=style.ARC)
+    label_axes(canvas)
     add_title(canvas, words)
-    fit_height(canvas, add_legend(canvas, entries, bar=0, below=3.4 * font))
+    fit_height(canvas, add_legend(canvas, entries, bar=0, below=LABELS * canvas.sizes.font))
