@@ -5,23 +5,21 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, get_args
 
 from hybridnav._progress import no_progress
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
-from hybridnav.planner.costs import CostFinish, costs_of
+from hybridnav.planner.costs import costs_of
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point, read_points, read_pose
+from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.outcome import Outcomes
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
-from hybridnav.refine import LineOfSight
-from hybridnav.result import Path, PlanStatus
-from hybridnav.search.moves import path_length_in_cells
+from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -34,10 +32,8 @@ if TYPE_CHECKING:
     from hybridnav.planner.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
-    from hybridnav.result import Metric, PlanBatch, PlanResult
+    from hybridnav.result import PlanBatch, PlanResult
     from hybridnav.topology import TopologicalMap
-
-Smooth = Literal["none", "line-of-sight"]
 
 
 class HybridPlanner:
@@ -95,10 +91,9 @@ class HybridPlanner:
         self._cells = cell_planner(topology, settings, prepared, self.costs)
         self._closures = Closures(topology)
         self._outcomes = Outcomes(topology, self.preset, self.costs)
-        self._finish: CostFinish | None = None
-        if self.costs is not None:
-            allowed = settings.allow_unexplored
-            self._finish = CostFinish(topology.grid, self.costs, allow_unexplored=allowed)
+        self._finish = Finish(
+            topology.grid, self._cells, self._outcomes, settings, costs=self.costs
+        )
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
             # Loads modules for these presets only, or reports which one to install.
@@ -213,7 +208,7 @@ class HybridPlanner:
             return self._outcomes.no_path(plan, poses, self._cells.metric)
         if self._ompl is not None:
             return self._by_ompl(self._ompl, plan, poses, closed, began)
-        return self._along(plan, poses, finish, closed)
+        return self._finish.result(plan, poses, finish, closed)
 
     def plan_many(
         self,
@@ -272,61 +267,6 @@ class HybridPlanner:
         if self._ompl is not None:
             self._ompl.close()
 
-    def _along(
-        self,
-        plan: CellPlan,
-        poses: tuple[FloatArray, FloatArray],
-        finish: Smooth,
-        closed: ClosedCells | None,
-    ) -> PlanResult:
-        """Return the result of a path of the planner of cell paths."""
-        assert plan.cells is not None  # noqa: S101 - the caller has looked
-        if self._finish is not None:
-            return self._by_costs(self._finish, plan, poses, finish, closed)
-        grid = self.topology.grid
-        bound = plan.bound_cells * grid.resolution_m
-        points, metric = plan.points, self._cells.metric
-        if metric == "octile" and finish == "line-of-sight":
-            began = time.perf_counter()
-            points, metric = self._sight(closed).shorten(plan.cells, *poses), "any-angle"
-            plan.stats.seconds["smooth"] = time.perf_counter() - began
-            bound = self._cells.bound(plan, poses)
-        if points is None:
-            points = grid.frame.points_of(plan.cells)
-        if metric == "octile":
-            length_m = (plan.length_cells or path_length_in_cells(plan.cells)) * grid.resolution_m
-        else:
-            length_m = polyline_length(points)
-            points = points if length_m > 0 else points[:1]
-        if self._cells.metric == "any-angle" and plan.length_cells:
-            # A share of the length, so that a proved optimum has no gap by rounding.
-            bound = length_m * (plan.bound_cells / plan.length_cells)
-        path = Path(plan.cells, points, length_m)
-        return self._outcomes.solved(plan, poses, path, metric, min(bound, length_m))
-
-    def _by_costs(
-        self,
-        costs: CostFinish,
-        plan: CellPlan,
-        poses: tuple[FloatArray, FloatArray],
-        finish: Smooth,
-        closed: ClosedCells | None,
-    ) -> PlanResult:
-        """Return the result of a cheapest path of cells."""
-        assert plan.cells is not None  # noqa: S101 - the caller has looked
-        metric: Metric = "weighted"
-        if finish == "line-of-sight":
-            began = time.perf_counter()
-            metric = "any-angle-weighted"
-            path, cost_m = costs.line(plan.cells, poses, closed)
-            plan.stats.seconds["smooth"] = time.perf_counter() - began
-            bound = self._cells.bound(plan, (poses[0][:2], poses[1][:2]))
-        else:
-            path, cost_m = costs.cell_path(plan.cells)
-            bound = plan.bound_cells * self.topology.grid.resolution_m
-        bound = min(bound, cost_m)
-        return self._outcomes.solved(plan, poses, path, metric, bound, weighted_cost=cost_m)
-
     def _pose(self, name: str, given: ArrayLike) -> FloatArray:
         """Return a position and, with OMPL, heading; float64 (2,) or (3,)."""
         if self._ompl is None:
@@ -363,18 +303,6 @@ class HybridPlanner:
             stats=replace(plan.stats, seconds=seconds),
         )
 
-    def _sight(self, closed: ClosedCells | None) -> LineOfSight:
-        """Return the shortener of paths; with closed cells, one for this query."""
-        if closed is None:
-            return self._line_of_sight
-        allowed = self.preset.planner.allow_unexplored
-        return LineOfSight(self.topology.grid, allow_unexplored=allowed, closed=closed.flat)
-
-    @cached_property
-    def _line_of_sight(self) -> LineOfSight:
-        allowed = self.preset.planner.allow_unexplored
-        return LineOfSight(self.topology.grid, allow_unexplored=allowed)
-
     def _finish_asked_for(self, smooth: Smooth | None) -> Smooth:
         if smooth is None:
             return self.preset.planner.smooth
@@ -392,4 +320,4 @@ class HybridPlanner:
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
-        return closed if self._finish is None else self._finish.with_closed(closed)
+        return self._finish.with_closed(closed)

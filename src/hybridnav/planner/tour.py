@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.closed import ClosedCells
+    from hybridnav.planner.finish import Smooth
     from hybridnav.planner.legs import Leg
-    from hybridnav.planner.planner import HybridPlanner, Smooth
+    from hybridnav.planner.planner import HybridPlanner
     from hybridnav.result import Metric, PlanResult
     from hybridnav.sentences import Instruction
 

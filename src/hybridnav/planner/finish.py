@@ -1,0 +1,132 @@
+"""The finish of cell paths: from what a planner of cell paths has found to a result."""
+
+from __future__ import annotations
+
+import time
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+from hybridnav._copies import copies_alike
+from hybridnav.grid.lines import polyline_length
+from hybridnav.planner.costs import CostFinish
+from hybridnav.refine import LineOfSight
+from hybridnav.result import Path
+from hybridnav.search.moves import path_length_in_cells
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray
+    from hybridnav.config import PlannerSettings
+    from hybridnav.costs import CostLayer
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.cell_planner import CellPlan, CellPlanner
+    from hybridnav.planner.closed import ClosedCells
+    from hybridnav.planner.outcome import Outcomes
+    from hybridnav.result import Metric, PlanResult
+
+Smooth = Literal["none", "line-of-sight"]
+
+
+@copies_alike
+class Finish:
+    """The last step of plans: the path in the metric asked for, its length or cost, its bound.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    cells
+        The planner of cell paths.
+    outcomes
+        Makes the results.
+    settings
+        Section `planner` of the preset.
+    costs
+        Costs of the cells; None makes costs lengths.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        cells: CellPlanner,
+        outcomes: Outcomes,
+        settings: PlannerSettings,
+        *,
+        costs: CostLayer | None,
+    ) -> None:
+        self._grid = grid
+        self._cells = cells
+        self._outcomes = outcomes
+        self._allow_unexplored = settings.allow_unexplored
+        self._by_costs: CostFinish | None = None
+        if costs is not None:
+            self._by_costs = CostFinish(grid, costs, allow_unexplored=settings.allow_unexplored)
+
+    def with_closed(self, closed: ClosedCells | None) -> ClosedCells | None:
+        """Return the closed cells of a query with those that the costs close for all queries."""
+        return closed if self._by_costs is None else self._by_costs.with_closed(closed)
+
+    def result(
+        self,
+        plan: CellPlan,
+        poses: tuple[FloatArray, FloatArray],
+        smooth: Smooth,
+        closed: ClosedCells | None,
+    ) -> PlanResult:
+        """Return the result of a plan with a path."""
+        if self._by_costs is not None:
+            return self._cheapest(self._by_costs, plan, poses, smooth, closed)
+        assert plan.cells is not None  # noqa: S101 - the caller has looked
+        grid = self._grid
+        bound = plan.bound_cells * grid.resolution_m
+        points, metric = plan.points, self._cells.metric
+        if metric == "octile" and smooth == "line-of-sight":
+            began = time.perf_counter()
+            points, metric = self._sight(closed).shorten(plan.cells, *poses), "any-angle"
+            plan.stats.seconds["smooth"] = time.perf_counter() - began
+            bound = self._cells.bound(plan, poses)
+        if points is None:
+            points = grid.frame.points_of(plan.cells)
+        if metric == "octile":
+            length_m = (plan.length_cells or path_length_in_cells(plan.cells)) * grid.resolution_m
+        else:
+            length_m = polyline_length(points)
+            points = points if length_m > 0 else points[:1]
+        if self._cells.metric == "any-angle" and plan.length_cells:
+            # A share of the length, so that a proved optimum has no gap by rounding.
+            bound = length_m * (plan.bound_cells / plan.length_cells)
+        path = Path(plan.cells, points, length_m)
+        return self._outcomes.solved(plan, poses, path, metric, min(bound, length_m))
+
+    def _cheapest(
+        self,
+        costs: CostFinish,
+        plan: CellPlan,
+        poses: tuple[FloatArray, FloatArray],
+        smooth: Smooth,
+        closed: ClosedCells | None,
+    ) -> PlanResult:
+        """Return the result of a cheapest path of cells."""
+        assert plan.cells is not None  # noqa: S101 - the caller has looked
+        metric: Metric = "weighted"
+        if smooth == "line-of-sight":
+            began = time.perf_counter()
+            metric = "any-angle-weighted"
+            path, cost_m = costs.line(plan.cells, poses, closed)
+            plan.stats.seconds["smooth"] = time.perf_counter() - began
+            bound = self._cells.bound(plan, (poses[0][:2], poses[1][:2]))
+        else:
+            path, cost_m = costs.cell_path(plan.cells)
+            bound = plan.bound_cells * self._grid.resolution_m
+        bound = min(bound, cost_m)
+        return self._outcomes.solved(plan, poses, path, metric, bound, weighted_cost=cost_m)
+
+    def _sight(self, closed: ClosedCells | None) -> LineOfSight:
+        """Return the shortener of paths; with closed cells, one for this query."""
+        if closed is None:
+            return self._line_of_sight
+        allowed = self._allow_unexplored
+        return LineOfSight(self._grid, allow_unexplored=allowed, closed=closed.flat)
+
+    @cached_property
+    def _line_of_sight(self) -> LineOfSight:
+        return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored)
