@@ -166,7 +166,11 @@ def test_a_preset_is_a_frozen_value(write):
         ("pyramid: {linkage: average}\n", ["pyramid.linkage", "'radius'", "got 'average'"]),
         (
             "planner: {coarse: fast}\n",
-            ["planner.coarse", "'max-distance', 'portals', 'mesh', 'jumps' or 'none'", "'fast'"],
+            [
+                "planner.coarse",
+                "'max-distance', 'portals', 'mesh', 'jumps', 'overlay' or 'none'",
+                "'fast'",
+            ],
         ),
         ("planner: {refine: rrt}\n", ["planner.refine", "'grid-astar'", "got 'rrt'"]),
         ("planner: {allow_unexplored: maybe}\n", ["planner.allow_unexplored", "got 'maybe'"]),

@@ -256,7 +256,7 @@ def test_tours_choose_the_cells_of_rooms_by_costs_and_sum_them() -> None:
         hn.plan_alternatives(planner, "west", "east", 2)
 
 
-@pytest.mark.parametrize("preset", ["shortest", "octile", "portals"])
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
 def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) -> None:
     topology = topology_of(hn.example_map("figure1"))
     layer = layer_of(np.ones(topology.grid.shape))

@@ -555,12 +555,12 @@ def test_what_cannot_be_closed_is_refused_in_one_line(preset: str, blocked: Any)
 @pytest.mark.parametrize(
     ("preset", "override", "message"),
     [
-        ("paper", "planner.epsilon=0.1", "epsilon needs coarse: portals or mesh"),
-        ("grid-astar", "planner.epsilon=0", "epsilon needs coarse: portals or mesh"),
+        ("paper", "planner.epsilon=0.1", "epsilon needs coarse: portals, mesh or overlay"),
+        ("grid-astar", "planner.epsilon=0", "epsilon needs coarse: portals, mesh or overlay"),
         ("paper", "planner.refine=none", "coarse: max-distance goes with refine: grid-astar"),
         ("grid-astar", "planner.refine=none", "coarse: none goes with refine: grid-astar"),
         ("portals", "planner.refine=stored-paths", "planner.refine: should be 'grid-astar', "),
-        ("octile", "planner.epsilon=0.1", "epsilon needs coarse: portals or mesh"),
+        ("octile", "planner.epsilon=0.1", "epsilon needs coarse: portals, mesh or overlay"),
         ("octile", "planner.refine=grid-astar", "coarse: jumps goes with refine: none or ompl"),
         ("portals", "planner.coarse=none", "coarse: none goes with refine"),
         ("shortest", "planner.refine=grid-astar", "coarse: mesh goes with refine: none or ompl"),

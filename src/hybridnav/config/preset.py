@@ -43,6 +43,7 @@ _REFINED_BY = {
     "portals": "none",
     "mesh": "none",
     "jumps": "none",
+    "overlay": "none",
     "none": "grid-astar",
 }
 """What refines each coarse search; OMPL refines them all."""
@@ -145,24 +146,27 @@ class PlannerSettings(_Section):
     'jumps'
     """
 
-    coarse: Literal["max-distance", "portals", "mesh", "jumps", "none"] = "max-distance"
+    coarse: Literal["max-distance", "portals", "mesh", "jumps", "overlay", "none"] = "max-distance"
     """Structure to plan on. `max-distance`: the places, by that attribute of their arcs, which
     chooses the route. `portals`: portals between fields grown for planning alone. `mesh`: convex
-    polygons of free space. `jumps`: the corner cells at which shortest paths of cells turn. `none`:
-    the cells of the whole map. All but the first derive the route from the path."""
+    polygons of free space. `jumps`: the corner cells at which shortest paths of cells turn.
+    `overlay`: exact costs between the border cells of fields on several levels of the pyramid,
+    which `portals` takes too once there are costs. `none`: the cells of the whole map. All but the
+    first derive the route from the path."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields in which `grid-astar` and `ompl` begin: those of the coarse route, or also their
     neighbours. It has no effect with `coarse: portals` and `coarse: none`."""
     refine: Annotated[str, AfterValidator(_known_refiner)] = "grid-astar"
     """Search for the path. `grid-astar`: cell by cell in the corridor. `ompl`: by a sampling-based
-    planner. `none`: the coarse search has found it, over portals, on the mesh or the corner cells.
+    planner. `none`: the coarse search has found it, over portals, on the mesh, the corner cells or
+    the overlay.
     In place of `grid-astar`, `module:Class` names a refiner of your own, which is imported when a
     planner is made."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, a section of its own; otherwise null."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
-    """With `refine: none`, over portals and on the mesh: the search ends once no path can be
-    shorter by more than this part; null or 0 for the optimum."""
+    """With `refine: none`, over portals, on the mesh and the overlay: the search ends once no path
+    can be better by more than this part; null or 0 for the optimum."""
     budget_s: Annotated[_Float, Field(ge=0)] | None = None
     """On the mesh: seconds after which a query returns the best path so far, with its proved bound;
     null for no limit. Until the planner is prepared, such queries shorten a path of cells by line
@@ -172,16 +176,18 @@ class PlannerSettings(_Section):
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
     costs: CostSettings | None = None
-    """With `refine: grid-astar`, factors by which metres cost more; the path is the cheapest one.
-    null makes costs lengths."""
+    """With `refine: grid-astar`, and with `coarse: overlay` or `portals`, factors by which metres
+    cost more; the path is the cheapest one. null makes costs lengths."""
 
     def refusal_of_costs(self) -> str | None:
         """Return why these settings cannot plan by costs, None if they can."""
-        if self.refine == "grid-astar":
+        knows = self.refine == "none" and self.coarse in {"overlay", "portals"}
+        if knows or self.refine == "grid-astar":
             return None
         what = f"coarse: {self.coarse}" if self.refine == "none" else f"refine: {self.refine}"
         return (
-            f"{what} knows lengths only; costs go with refine: grid-astar, as in preset grid-astar"
+            f"{what} knows lengths only; costs go with coarse: overlay, as in preset robot, or "
+            "refine: grid-astar, as in preset grid-astar"
         )
 
     @model_validator(mode="before")
@@ -219,8 +225,10 @@ class PlannerSettings(_Section):
             )
         if self.budget_s is not None and (self.coarse, self.refine) != ("mesh", "none"):
             raise PydanticCustomError("mesh_needed", "budget_s needs coarse: mesh, refine: none")
-        if self.epsilon is not None and self.coarse not in {"portals", "mesh"}:
-            raise PydanticCustomError("bounds_needed", "epsilon needs coarse: portals or mesh")
+        if self.epsilon is not None and self.coarse not in {"portals", "mesh", "overlay"}:
+            raise PydanticCustomError(
+                "bounds_needed", "epsilon needs coarse: portals, mesh or overlay"
+            )
         return self
 
 

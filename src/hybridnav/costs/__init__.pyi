@@ -1,4 +1,5 @@
+from .checks import MOST_FACTOR as MOST_FACTOR, UNIT_BITS as UNIT_BITS
 from .integral import cost_along as cost_along
-from .layer import CostLayer as CostLayer, MOST_FACTOR as MOST_FACTOR, UNIT_BITS as UNIT_BITS
+from .layer import CostLayer as CostLayer
 
 __all__: list[str]

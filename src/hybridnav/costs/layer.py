@@ -11,6 +11,14 @@ import numpy as np
 
 from hybridnav._copies import copies_alike, frozen
 from hybridnav.costs import masks
+from hybridnav.costs.checks import (
+    MOST_FACTOR,
+    UNIT_BITS,
+    checked_factors,
+    checked_multiplier,
+    checked_setting,
+    rounded,
+)
 from hybridnav.costs.inflation import HIGHEST, inflated_costs
 from hybridnav.errors import InvalidValueError
 
@@ -20,10 +28,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, BoolArray, LongArray
     from hybridnav.grid import Frame, OccupancyGrid
 
-UNIT_BITS = 14
-"""Factors are whole multiples of 2^-14."""
-MOST_FACTOR = 1000.0
-"""Largest factor of a cell."""
+    Box = tuple[int, int, int, int]
 
 
 @copies_alike
@@ -68,7 +73,7 @@ class CostLayer:
     source: dict[str, Any] = field(default_factory=lambda: {"kind": "array"})
 
     def __post_init__(self) -> None:
-        factors = _checked_factors(self.factors)
+        factors = checked_factors(self.factors)
         object.__setattr__(self, "factors", frozen(factors))
         if self.closed is not None:
             closed = np.array(self.closed)
@@ -133,12 +138,12 @@ class CostLayer:
             "inscribed_radius_m": inscribed_m,
             "multiplier": multiplier,
         }
-        values = {name: _checked_setting(name, value) for name, value in settings.items()}
-        per_cost = _checked_multiplier(values["multiplier"]) / HIGHEST
+        values = {name: checked_setting(name, value) for name, value in settings.items()}
+        per_cost = checked_multiplier(values["multiplier"]) / HIGHEST
         costs = inflated_costs(
             grid, values["inflation_radius_m"], values["scaling"], values["inscribed_radius_m"]
         )
-        factor_of = _rounded(1 + per_cost * np.arange(256))
+        factor_of = rounded(1 + per_cost * np.arange(256))
         return cls(factor_of[costs], source={"kind": "clearance", **values})
 
     @classmethod
@@ -187,7 +192,7 @@ class CostLayer:
         array([[1., 2., 4.]], dtype=float32)
         """
         limits = masks.checked_speeds(base, multiplier, unit, full_speed_mps)
-        factor_of = _rounded(limits.factors(MOST_FACTOR))
+        factor_of = rounded(limits.factors(MOST_FACTOR))
         on_map = masks.on_map(grid, masks.checked_values(values), frame)
         return cls(factor_of[on_map], source={"kind": "speed mask", **limits.source})
 
@@ -228,9 +233,9 @@ class CostLayer:
         >>> layer.factors.round(2), layer.closed
         (array([[1.  , 2.01, 1.  ]], dtype=float32), array([[False, False,  True]]))
         """
-        value = _checked_multiplier(_checked_setting("multiplier", multiplier))
+        value = checked_multiplier(checked_setting("multiplier", multiplier))
         costs = masks.keepout_costs()
-        factor_of = _rounded(1 + np.where(costs > HIGHEST, 0, value / HIGHEST * costs))
+        factor_of = rounded(1 + np.where(costs > HIGHEST, 0, value / HIGHEST * costs))
         on_map = masks.on_map(grid, masks.checked_values(values), frame)
         source = {"kind": "keepout mask", "multiplier": value}
         return cls(factor_of[on_map], costs[on_map] > HIGHEST, source)
@@ -274,11 +279,69 @@ class CostLayer:
         >>> hn.CostLayer(np.array([[1.0, 2.0, 2.0]])).cost_of_cells(np.array([[0, 0], [0, 1]]))
         1.5
         """
-        units = self.units[cells[:, 0], cells[:, 1]].astype(np.int64)
+        # Without `units`, which a layer that has just been changed would compute for the whole map.
+        own = self.factors[cells[:, 0], cells[:, 1]]
+        units = (own * np.float32(1 << UNIT_BITS)).astype(np.int64)
         sums = units[:-1] + units[1:]
         diagonal = int(sums[(cells[1:] != cells[:-1]).all(axis=1)].sum())
         straight = int(sums.sum()) - diagonal
         return (straight + diagonal * math.sqrt(2.0)) / (2 << UNIT_BITS)
+
+    def part(self, box: Box) -> CostLayer:
+        """Return the layer of the cells in a box.
+
+        Parameters
+        ----------
+        box
+            First row, last row + 1, first column, last column + 1, inside the layer; not empty.
+        """
+        inside = slice(*box[:2]), slice(*box[2:])
+        closed = None if self.closed is None else self.closed[inside]
+        return CostLayer(self.factors[inside], closed, self.source)
+
+    def changed(self, part: CostLayer, row: int, col: int) -> CostLayer:
+        """Return the layer with some of its cells as in another one; the time is that of a copy.
+
+        Parameters
+        ----------
+        part
+            The new factors and closed cells of a box of cells.
+        row, col
+            The first row and column of the box.
+
+        Raises
+        ------
+        InvalidValueError
+            When the box is not inside the layer.
+
+        Examples
+        --------
+        >>> layer = hn.CostLayer(np.ones((1, 4)))
+        >>> layer.changed(hn.CostLayer(np.full((1, 2), 3.0)), 0, 1).factors
+        array([[1., 3., 3., 1.]], dtype=float32)
+        """
+        rows, cols = part.shape
+        if not (0 <= row <= self.shape[0] - rows and 0 <= col <= self.shape[1] - cols):
+            raise InvalidValueError(
+                f"{cols} x {rows} cells at row {row}, column {col} do not lie inside costs of "
+                f"{self.shape[1]} x {self.shape[0]} cells: give a box of this map"
+            )
+        inside = slice(row, row + rows), slice(col, col + cols)
+        factors, closed = self.factors.copy(), None
+        factors[inside] = part.factors
+        if self.closed is not None or part.closed is not None:
+            closed = np.zeros(self.shape, np.bool_) if self.closed is None else self.closed.copy()
+            closed[inside] = False if part.closed is None else part.closed
+        sources = self.source["of"] if self.source["kind"] == "changed" else [self.source]
+        if part.source not in sources:
+            sources = [*sources, part.source]
+        # Made without the checks of all cells: both layers have passed them.
+        layer = object.__new__(CostLayer)
+        object.__setattr__(layer, "factors", frozen(factors))
+        kept = None if closed is None or not closed.any() else frozen(closed)
+        object.__setattr__(layer, "closed", kept)
+        object.__setattr__(layer, "source", {"kind": "changed", "of": sources})
+        return layer
 
     def __or__(self, other: CostLayer) -> CostLayer:
         """Return the layer of the larger factors."""
@@ -305,61 +368,4 @@ class CostLayer:
             for part in (each.source["of"] if each.source["kind"] == how else [each.source])
         ]
         union = np.logical_or.reduce(closed) if closed else None
-        return CostLayer(_rounded(factors), union, {"kind": how, "of": parts})
-
-
-def _rounded(factors: AnyArray) -> NDArray[np.float32]:
-    """Return factors, rounded down to units; float32 holds these exactly."""
-    units = np.floor(np.asarray(factors, dtype=np.float64) * (1 << UNIT_BITS))
-    rounded: NDArray[np.float32] = (units / (1 << UNIT_BITS)).astype(np.float32)
-    return rounded
-
-
-def _checked_factors(given: ArrayLike) -> NDArray[np.float32]:
-    """Return the factors as a new float32 array in units.
-
-    Raises
-    ------
-    InvalidValueError
-        When they are no numbers from 1 to 1000 of two dimensions.
-    """
-    try:
-        array = np.asarray(given)
-        numbers = array.astype(np.float64) if array.dtype.kind in "iuf" else None
-    except (TypeError, ValueError, OverflowError):
-        numbers = None
-    if numbers is None or numbers.ndim != 2 or numbers.size == 0:  # noqa: PLR2004
-        shape = "no array of numbers" if numbers is None else f"shape {numbers.shape}"
-        raise InvalidValueError(
-            f"factors must be numbers of shape (rows, cols), one for each cell, got {shape}"
-        )
-    wrong = ~((numbers >= 1) & (numbers <= MOST_FACTOR))
-    if wrong.any():
-        row, col = np.unravel_index(int(wrong.argmax()), numbers.shape)
-        raise InvalidValueError(
-            f"factors must be numbers from 1 to {MOST_FACTOR:g}, got {numbers[row, col]:g} in cell "
-            f"({row}, {col}): close a cell with `closed`, or scale the factors"
-        )
-    return _rounded(numbers)
-
-
-def _checked_setting(name: str, value: Any) -> float:
-    """Return a finite number >= 0."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not (math.isfinite(number) and number >= 0) or isinstance(value, bool):
-        raise InvalidValueError(f"{name} must be a finite number >= 0, got {value!r:.80}")
-    return number
-
-
-def _checked_multiplier(multiplier: float) -> float:
-    """Return a multiplier with which no factor is too large."""
-    most = (MOST_FACTOR - 1) * HIGHEST / 254
-    if multiplier > most:
-        raise InvalidValueError(
-            f"multiplier must be at most {math.floor(most)}, so that no factor is above "
-            f"{MOST_FACTOR:g}, got {multiplier:g}"
-        )
-    return multiplier
+        return CostLayer(rounded(factors), union, {"kind": how, "of": parts})

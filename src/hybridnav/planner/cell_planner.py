@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
 from hybridnav._progress import no_progress
 from hybridnav.result import PlanStats
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.costs import CostLayer
     from hybridnav.grid import Frame
     from hybridnav.jumps import JumpSearch
     from hybridnav.mesh import MeshSearch
@@ -93,7 +94,7 @@ class CellPlanner(Protocol):
 
     @property
     def metric(self) -> Metric:
-        """The metric of all its paths, `octile` or `any-angle`."""
+        """The metric of all its paths, `octile`, `weighted` or `any-angle`."""
         ...
 
     @property
@@ -135,5 +136,22 @@ class CellPlanner(Protocol):
         NDArray | None
             int16 or int32 (rows, cols), -1 for cells without a field; None if the method plans
             without fields.
+        """
+        ...
+
+
+@runtime_checkable
+class Updatable(Protocol):
+    """A planner of cell paths whose structures follow when costs change."""
+
+    def update(self, costs: CostLayer, box: tuple[int, int, int, int]) -> None:
+        """Plan by other costs from now on; no query runs meanwhile.
+
+        Parameters
+        ----------
+        costs
+            The new costs of all cells.
+        box
+            First row, last row + 1, first column, last column + 1 of the cells that differ.
         """
         ...

@@ -17,13 +17,21 @@ from hybridnav.result import Path
 from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from shapely.geometry.base import BaseGeometry
+
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import Preset
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid import Frame, OccupancyGrid
+
+    Box = tuple[int, int, int, int]
+
+_ROUNDING_CELLS = 1e-6
 
 
-def costs_of(grid: OccupancyGrid, preset: Preset, given: CostLayer | None) -> CostLayer | None:
-    """Return the costs by which a planner plans: of its preset, joined with those given to it.
+@copies_alike
+class Costs:
+    """The costs by which a planner plans: of its preset, joined with those given to it.
 
     Parameters
     ----------
@@ -34,28 +42,101 @@ def costs_of(grid: OccupancyGrid, preset: Preset, given: CostLayer | None) -> Co
     given
         A layer for this planner; None for none.
 
-    Returns
-    -------
-    CostLayer | None
-        The layer of the larger factors; None where neither has costs.
-
     Raises
     ------
     InvalidValueError
         When the layer is one of another map, or the preset plans on a structure that knows no
         costs.
     """
-    if given is not None:
+
+    def __init__(self, grid: OccupancyGrid, preset: Preset, given: CostLayer | None) -> None:
+        self._grid, self._preset = grid, preset
+        named = preset.planner.costs
+        self._named: CostLayer | None = None
+        if named is not None and named.clearance is not None:
+            self._named = CostLayer.clearance(grid, **named.clearance.model_dump())
+        self.layer = self._named
+        """The layer of the larger factors; None where neither has costs."""
+        if given is not None:
+            self.check(given)
+            self.layer = given if self._named is None else self._named | given
+
+    def changed(self, given: CostLayer, box: Box) -> CostLayer:
+        """Return the layer with the cells in a box as another given layer has them.
+
+        Parameters
+        ----------
+        given
+            A layer of the map, of which nothing is read outside the box.
+        box
+            First row, last row + 1, first column, last column + 1 of its cells.
+
+        Raises
+        ------
+        InvalidValueError
+            As for the first one.
+        """
+        self.check(given)
+        layer = (
+            CostLayer(np.ones(self._grid.shape, np.float32)) if self.layer is None else self.layer
+        )
+        if box[0] >= box[1] or box[2] >= box[3]:
+            return layer
+        part = given.part(box)
+        if self._named is not None:
+            part = self._named.part(box) | part
+        return layer.changed(part, box[0], box[2])
+
+    def check(self, given: CostLayer) -> None:
+        """Raise `InvalidValueError` if a planner cannot plan by a layer."""
         if not isinstance(given, CostLayer):
             raise InvalidValueError(f"costs must be a CostLayer, got a {type(given).__name__}")
-        given.check_fits(grid)
-        if why := preset.planner.refusal_of_costs():
-            raise InvalidValueError(f"preset {preset.name} cannot plan by costs: {why}")
-    named = preset.planner.costs
-    if named is None or named.clearance is None:
-        return given
-    own = CostLayer.clearance(grid, **named.clearance.model_dump())
-    return own if given is None else own | given
+        given.check_fits(self._grid)
+        if why := self._preset.planner.refusal_of_costs():
+            raise InvalidValueError(f"preset {self._preset.name} cannot plan by costs: {why}")
+
+
+def box_of_cells(
+    changed: BaseGeometry | ArrayLike | None, frame: Frame, shape: tuple[int, int]
+) -> Box:
+    """Return the box of all cells that an area meets.
+
+    Parameters
+    ----------
+    changed
+        A shapely geometry in metres, whose bounds are taken, or `(x_min, y_min, x_max, y_max)` in
+        metres, map frame; None for the whole map.
+    frame
+        Place of the map.
+    shape
+        Its rows and columns.
+
+    Returns
+    -------
+    tuple
+        First row, last row + 1, first column, last column + 1.
+
+    Raises
+    ------
+    InvalidValueError
+        When the area is not described by four finite numbers, the least first.
+    """
+    if changed is None:
+        return 0, shape[0], 0, shape[1]
+    try:
+        x_min, y_min, x_max, y_max = np.asarray(getattr(changed, "bounds", changed), np.float64)
+    except (TypeError, ValueError, OverflowError):
+        x_min = y_min = x_max = y_max = np.float64(np.nan)
+    if not (x_min <= x_max < np.inf and y_min <= y_max < np.inf and min(x_min, y_min) > -np.inf):
+        raise InvalidValueError(
+            f"changed is {changed!r:.80}, expected an area in metres: give a shapely geometry, or "
+            "(x_min, y_min, x_max, y_max)"
+        )
+    corners = np.array([[x_min, y_min], [x_min, y_max], [x_max, y_min], [x_max, y_max]])
+    positions = frame.positions_of(corners)
+    low = np.clip(np.floor(positions.min(axis=0) - _ROUNDING_CELLS), 0, shape).astype(int)
+    high = np.clip(np.ceil(positions.max(axis=0) + _ROUNDING_CELLS), 0, shape).astype(int)
+    return int(low[0]), int(high[0]), int(low[1]), int(high[1])
 
 
 @copies_alike

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, get_args
 
+from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.batch import plan_many
-from hybridnav.planner.cell_planner import CellQuery
+from hybridnav.planner.cell_planner import CellQuery, Updatable
 from hybridnav.planner.closed import ClosedCells, Closures
-from hybridnav.planner.costs import costs_of
+from hybridnav.planner.costs import Costs, box_of_cells
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point, read_points, read_pose
 from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.outcome import Outcomes
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
+from hybridnav.planner.turns import Turns
 from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+    from shapely.geometry.base import BaseGeometry
 
     from hybridnav._progress import Progress
     from hybridnav._typing import FloatArray, PathLike
@@ -36,6 +40,7 @@ if TYPE_CHECKING:
     from hybridnav.topology import TopologicalMap
 
 
+@copies_alike
 class HybridPlanner:
     """Planner of paths between points of one map by a preset.
 
@@ -55,7 +60,7 @@ class HybridPlanner:
     costs
         A factor for each cell, by which a metre in it costs more, joined with the costs that the
         preset names. The path is the cheapest one, and its result has the metric `weighted`. Only
-        for presets with `refine: grid-astar`.
+        for presets with `refine: grid-astar`, or with `coarse: overlay` or `portals`.
 
     Raises
     ------
@@ -86,14 +91,12 @@ class HybridPlanner:
         self.preset = load_preset(preset)
         check_radius(topology.grid, self.preset)
         settings = self.preset.planner
-        self.costs = costs_of(topology.grid, self.preset, costs)
-        """The costs that it plans by, None for lengths."""
+        self._costs = Costs(topology.grid, self.preset, costs)
         self._cells = cell_planner(topology, settings, prepared, self.costs)
         self._closures = Closures(topology)
-        self._outcomes = Outcomes(topology, self.preset, self.costs)
-        self._finish = Finish(
-            topology.grid, self._cells, self._outcomes, settings, costs=self.costs
-        )
+        self._turns = Turns()
+        self._preparing = threading.Lock()
+        self._make_answers()
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
             # Loads modules for these presets only, or reports which one to install.
@@ -101,10 +104,24 @@ class HybridPlanner:
 
             self._ompl = ompl_planner(topology, self._cells, settings)
 
+    def _make_answers(self) -> None:
+        """Make what turns the paths of `_cells` into results, by the costs of now."""
+        grid = self.topology.grid
+        self._outcomes = Outcomes(self.topology, self.preset, self.costs)
+        self._finish = Finish(
+            grid, self._cells, self._outcomes, self.preset.planner, costs=self.costs
+        )
+
+    @property
+    def costs(self) -> CostLayer | None:
+        """The costs that it plans by, None for lengths."""
+        return self._costs.layer
+
     @property
     def prepared(self) -> Prepared | None:
         """The structure built for queries: a mesh, a jump-point graph or portals; None before that,
-        and with presets that build none."""
+        and with presets that build none or, as the overlay does, one that changes with the
+        costs."""
         return self._cells.prepared
 
     @cached_property
@@ -164,6 +181,18 @@ class HybridPlanner:
             When a point is not two finite numbers, a name is not known, or a closed item is not on
             the map.
         """
+        with self._turns.shared():
+            return self._plan(start, goal, smooth, blocked, at)
+
+    def _plan(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        smooth: Smooth | None,
+        blocked: Closable | ClosedCells | None,
+        at: At,
+    ) -> PlanResult:
+        """Plan a path while the costs stay as they are; see `plan`."""
         began = time.perf_counter()
         waypoint = goal
         if isinstance(start, str) or isinstance(goal, str):
@@ -248,11 +277,11 @@ class HybridPlanner:
         return plan_many(self.topology.grid, at_once, (first, last), closed, alone)
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
-        """Build the structures for queries now: mesh and graph of corners, jump-point graph, or
-        portals.
+        """Build the structures for queries now: mesh and graph of corners, jump-point graph,
+        portals, or overlay.
 
-        Structures that exist already are kept. Threads may call this, and plan meanwhile: each
-        structure is built once.
+        Structures that exist already are kept; what `update` has made stale is renewed. Threads may
+        call this, and plan meanwhile: each structure is built once.
 
         Parameters
         ----------
@@ -260,7 +289,55 @@ class HybridPlanner:
             Called after each step with the number of steps done and of all steps, as for a progress
             bar.
         """
-        self._cells.prepare(progress)
+        with self._preparing:
+            self._cells.prepare(progress)
+
+    def update(self, *, costs: CostLayer, changed: BaseGeometry | ArrayLike | None = None) -> None:
+        """Plan by other costs from now on; the next answer is exact for these, with its proof.
+
+        Queries of other threads that run already finish by the costs before; the update waits for
+        them, and for `prepare`. With an overlay (`coarse: overlay`, or `portals` with costs) the
+        costs between the border cells of the changed fields are computed at once; searches leave
+        stale tables above these out until `prepare` renews them. Other presets search the cells.
+
+        Parameters
+        ----------
+        costs
+            The new costs, in place of those given before; those of the preset stay joined with
+            them. Closed cells are closed from now on, and open again if they were closed before.
+        changed
+            The area outside of which nothing is read: a shapely geometry in metres, map frame,
+            whose bounds are taken, or `(x_min, y_min, x_max, y_max)`; None for the whole map.
+
+        Raises
+        ------
+        InvalidValueError
+            When the preset cannot plan by costs, the costs are those of another map, or the area is
+            not described like that; then nothing has changed.
+
+        Examples
+        --------
+        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+        >>> layer = hn.CostLayer(np.ones(topology.grid.shape))
+        >>> planner = hn.HybridPlanner(topology, preset="grid-astar", costs=layer)
+        >>> print(round(planner.plan((0.5, 0.5), (1.5, 0.5)).cost, 3))
+        1.0
+        >>> slow = hn.CostLayer(np.full(topology.grid.shape, 3.0))
+        >>> planner.update(costs=slow, changed=(0.8, 0.0, 1.2, 3.0))
+        >>> print(round(planner.plan((0.5, 0.5), (1.5, 0.5)).cost, 3))
+        1.8
+        """
+        grid = self.topology.grid
+        box = box_of_cells(changed, grid.frame, grid.shape)
+        with self._preparing:
+            layer = self._costs.changed(costs, box)
+            with self._turns.alone():
+                self._costs.layer = layer
+                if isinstance(self._cells, Updatable):
+                    self._cells.update(layer, box)
+                else:
+                    self._cells = cell_planner(self.topology, self.preset.planner, None, layer)
+                self._make_answers()
 
     def close(self) -> None:
         """End the OMPL process of a preset; the next query waits for another one."""

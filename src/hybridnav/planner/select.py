@@ -47,6 +47,12 @@ def cell_planner(
     """
     grid, coarse = topology.grid, settings.coarse
     refiner = GridRefiner(grid, allow_unexplored=settings.allow_unexplored, costs=costs)
+    if coarse == "overlay" or (coarse == "portals" and costs is not None):
+        from hybridnav.planner.overlay_plans import OverOverlay  # noqa: PLC0415
+
+        if coarse == "overlay":
+            _taken(type(None), prepared, coarse)
+        return OverOverlay(topology, refiner, settings)
     if coarse == "portals":
         from hybridnav.planner.cell_plans import OverPortals  # noqa: PLC0415
         from hybridnav.portals import BuiltPortals  # noqa: PLC0415

@@ -1,0 +1,78 @@
+"""Checks of factors and of the settings of costs, and the units that factors are rounded to."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.costs.inflation import HIGHEST
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from hybridnav._typing import AnyArray
+
+UNIT_BITS = 14
+"""Factors are whole multiples of 2^-14."""
+MOST_FACTOR = 1000.0
+"""Largest factor of a cell."""
+
+
+def rounded(factors: AnyArray) -> NDArray[np.float32]:
+    """Return factors, rounded down to units; float32 holds these exactly."""
+    units = np.floor(np.asarray(factors, dtype=np.float64) * (1 << UNIT_BITS))
+    rounded: NDArray[np.float32] = (units / (1 << UNIT_BITS)).astype(np.float32)
+    return rounded
+
+
+def checked_factors(given: ArrayLike) -> NDArray[np.float32]:
+    """Return the factors as a new float32 array in units.
+
+    Raises
+    ------
+    InvalidValueError
+        When they are no numbers from 1 to 1000 of two dimensions.
+    """
+    try:
+        array = np.asarray(given)
+        numbers = array.astype(np.float64) if array.dtype.kind in "iuf" else None
+    except (TypeError, ValueError, OverflowError):
+        numbers = None
+    if numbers is None or numbers.ndim != 2 or numbers.size == 0:  # noqa: PLR2004
+        shape = "no array of numbers" if numbers is None else f"shape {numbers.shape}"
+        raise InvalidValueError(
+            f"factors must be numbers of shape (rows, cols), one for each cell, got {shape}"
+        )
+    wrong = ~((numbers >= 1) & (numbers <= MOST_FACTOR))
+    if wrong.any():
+        row, col = np.unravel_index(int(wrong.argmax()), numbers.shape)
+        raise InvalidValueError(
+            f"factors must be numbers from 1 to {MOST_FACTOR:g}, got {numbers[row, col]:g} in cell "
+            f"({row}, {col}): close a cell with `closed`, or scale the factors"
+        )
+    return rounded(numbers)
+
+
+def checked_setting(name: str, value: Any) -> float:
+    """Return a finite number >= 0."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (math.isfinite(number) and number >= 0) or isinstance(value, bool):
+        raise InvalidValueError(f"{name} must be a finite number >= 0, got {value!r:.80}")
+    return number
+
+
+def checked_multiplier(multiplier: float) -> float:
+    """Return a multiplier with which no factor is too large."""
+    most = (MOST_FACTOR - 1) * HIGHEST / 254
+    if multiplier > most:
+        raise InvalidValueError(
+            f"multiplier must be at most {math.floor(most)}, so that no factor is above "
+            f"{MOST_FACTOR:g}, got {multiplier:g}"
+        )
+    return multiplier

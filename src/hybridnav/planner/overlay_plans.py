@@ -1,0 +1,166 @@
+"""Planner of presets with costs: cheapest cell paths on the multilevel overlay of the map."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._copies import copies_alike
+from hybridnav._progress import no_progress
+from hybridnav.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
+from hybridnav.planner.cell_planner import CellPlan
+from hybridnav.planner.cell_plans import WholeMap, round_closed
+from hybridnav.refine import GridRefiner
+from hybridnav.result import PlanStats
+
+if TYPE_CHECKING:
+    from hybridnav._progress import Progress
+    from hybridnav._typing import FloatArray
+    from hybridnav.config import PlannerSettings
+    from hybridnav.costs import CostLayer
+    from hybridnav.overlay import Overlay
+    from hybridnav.planner.cell_planner import CellQueries, CellQuery
+    from hybridnav.pyramid import Level
+    from hybridnav.result import Metric
+    from hybridnav.topology import TopologicalMap
+
+    Box = tuple[int, int, int, int]
+
+_WORTH = 20
+"""Times that queries expand all cells before the overlay is built: building it takes 3 to 7 us a
+cell, A* 0.2 us for each cell that it expands."""
+
+
+@copies_alike
+class OverOverlay:
+    """Cheapest paths of cells; the overlay is built once queries have spent as much time without.
+
+    Until then, and if corners may be cut, A* searches the whole map. Without costs the paths are
+    the shortest ones. It is not kept with a model: it belongs to costs, and these may change.
+
+    Parameters
+    ----------
+    topology
+        The map; its pyramid has the fields of the overlay.
+    refiner
+        Search of paths round closed cells, and before the overlay is built, with the costs.
+    settings
+        Whether unexplored cells may be entered, and the accepted distance from the optimum.
+    """
+
+    def __init__(
+        self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
+    ) -> None:
+        self._topology = topology
+        self._allow_unexplored = settings.allow_unexplored
+        self._epsilon = settings.epsilon or 0.0
+        self._take(refiner)
+        self._built: tuple[Overlay, OverlaySearch] | None = None
+        self._cannot_build = topology.grid.corner_cutting
+        self._expanded = 0
+        self._building = threading.Lock()
+
+    @cached_property
+    def _worth(self) -> int:
+        """Number of expanded cells after which the overlay is built."""
+        free = self._topology.grid.enterable(allow_unexplored=self._allow_unexplored)
+        return _WORTH * int(free.sum())
+
+    def _take(self, refiner: GridRefiner) -> None:
+        self._refiner = refiner
+        self._whole_map = WholeMap(refiner)
+
+    @property
+    def metric(self) -> Metric:
+        """`weighted`, or `octile` without costs; see `CellPlanner`."""
+        return self._whole_map.metric
+
+    @property
+    def prepared(self) -> None:
+        """None, because an overlay changes with the costs of its planner; see `CellPlanner`."""
+        return
+
+    def prepare(self, progress: Progress = no_progress) -> None:
+        """Build the overlay, or renew what updates have made stale; see `CellPlanner`."""
+        with self._building:
+            if self._built is not None:
+                self._built[0].renew(progress)
+            elif not self._cannot_build:
+                self._build(progress)
+        progress(1, 1)
+
+    def _build(self, progress: Progress) -> None:
+        costs, allowed = self._refiner.costs, self._allow_unexplored
+        factor: Any = None if costs is None else costs.factors
+        try:
+            overlay = prepare_overlay(
+                self._topology, factor, allow_unexplored=allowed, progress=progress
+            )
+        except PathsTooLongError:  # as with factors of hundreds in large fields
+            self._cannot_build = True
+            return
+        if costs is not None and len(costs.closed_flat):
+            overlay.update(factor, closed=costs.closed, changed=_box_of(costs))
+            overlay.renew()
+        self._built = overlay, OverlaySearch(overlay)
+
+    def update(self, costs: CostLayer, box: Box) -> None:
+        """Plan by other costs from now on; see `Updatable`."""
+        with self._building:
+            allowed = self._allow_unexplored
+            self._take(GridRefiner(self._topology.grid, allow_unexplored=allowed, costs=costs))
+            if self._built is None:
+                self._cannot_build = self._topology.grid.corner_cutting
+                return
+            factor: Any = costs.factors
+            try:
+                self._built[0].update(factor, closed=costs.closed, changed=box)
+            except PathsTooLongError:
+                self._built, self._cannot_build = None, True
+
+    def plan(self, query: CellQuery) -> CellPlan:
+        """Find a cheapest path, or one within epsilon of it; see `CellPlanner`."""
+        began = time.perf_counter()
+        seconds = {}
+        if self._built is None and self._expanded >= self._worth:
+            self.prepare()
+            seconds["overlay"] = time.perf_counter() - began
+        built = self._built
+        if built is None:
+            plan = self._whole_map.plan(query)
+            self._expanded += plan.stats.expanded
+            return plan
+        now = time.perf_counter()
+        found = built[1].path(*query.cells, epsilon=self._epsilon)
+        seconds["search"] = time.perf_counter() - now
+        plan = CellPlan(
+            found.cells,
+            bound_cells=found.lower_bound_cells,
+            stats=PlanStats(
+                expanded=found.expanded,
+                expanded_border_cells=found.expanded_border_cells,
+                seconds=seconds,
+            ),
+        )
+        return round_closed(plan, query, self._refiner)
+
+    def plan_many(self, queries: CellQueries) -> None:
+        """None, because each query has a search of its own; see `CellPlanner`."""
+
+    def bound(self, plan: CellPlan, points: tuple[FloatArray, FloatArray]) -> float:  # noqa: ARG002
+        """Return the straight distance; see `CellPlanner`."""
+        return math.dist(*points)
+
+    def fields(self, level: Level) -> None:
+        """None, because paths may use the whole map; see `CellPlanner`."""
+
+
+def _box_of(costs: CostLayer) -> Box:
+    """Return the box that holds all closed cells of a layer."""
+    rows, cols = np.divmod(costs.closed_flat, costs.shape[1])
+    return int(rows.min()), int(rows.max()) + 1, int(cols.min()), int(cols.max()) + 1

@@ -1,0 +1,251 @@
+"""Plans on the overlay: least costs as scipy finds them, before and after it is built, and changes
+of costs between and beside queries."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import box as area
+
+import hybridnav as hn
+from hybridnav.costs import cost_along
+from tests.layers import grid_of, layer_of
+from tests.oracle.grid import assert_legal, distances, move_graph
+from tests.planner.test_costs import optimum_m, random_layer, scene, seeds, topology_of
+from tests.search.test_weighted import weighted
+from tests.strategies import class_grids, examples, occupancy_grid
+
+ROUNDING = 1e-4
+"""Share of a cost by which the overlay's integers may miss the least one."""
+ON_OVERLAY = pytest.mark.parametrize("preset", ["portals", "overlay"])
+
+
+def preset_of(name: str, *, epsilon: float | None = None) -> hn.Preset:
+    """`coarse: overlay`, or `portals`, which is searched like it once there are costs."""
+    preset = hn.load_preset("portals")
+    changed = preset.planner.model_copy(
+        update={"coarse": "overlay" if name == "overlay" else "portals", "epsilon": epsilon}
+    )
+    return preset.model_copy(update={"planner": changed})
+
+
+def check(result: hn.PlanResult, least: float, is_open: Any, *, epsilon: float = 0.0) -> None:
+    """The path is legal, costs at most epsilon more than the least, and its bound holds."""
+    assert result.metric == "weighted"
+    assert result.solved == np.isfinite(least)
+    if result.path is None:
+        assert result.lower_bound == np.inf
+        return
+    assert_legal(result.path.cells, is_open)
+    assert result.lower_bound <= least * (1 + 1e-9)
+    assert least * (1 - 1e-9) <= result.cost <= least * (1 + epsilon) * (1 + ROUNDING)
+    assert result.gap <= epsilon + 2 * ROUNDING
+
+
+@given(
+    class_grids(max_side=20),
+    seeds,
+    st.sampled_from(["portals", "overlay"]),
+    st.sampled_from([0.0, 0.1]),
+)
+@settings(max_examples=examples(60), deadline=None)
+def test_paths_are_the_cheapest_with_proof_before_and_after_preparation(
+    classes: Any, seed: int, name: str, epsilon: float
+) -> None:
+    grid, layer, is_open, start, goal, rng = scene(classes, seed)
+    preset = preset_of(name, epsilon=epsilon)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset, costs=layer)
+    ends = grid.frame.points_of([start, goal])
+    least = optimum_m(grid, layer, is_open, start)[goal]
+    check(planner.plan(*ends), least, is_open, epsilon=epsilon)
+    planner.prepare()
+    result = planner.plan(*ends)
+    check(result, least, is_open, epsilon=epsilon)
+    if result.path is not None:
+        assert cost_along(grid, layer, result.path.points) == pytest.approx(result.cost)
+    closed = np.argwhere(rng.random(grid.shape) < 0.1)
+    closed = closed[~(closed == start).all(axis=1) & ~(closed == goal).all(axis=1)]
+    is_open[tuple(closed.T)] = False
+    least = optimum_m(grid, layer, is_open, start)[goal]
+    check(planner.plan(*ends, blocked={"cells": closed}), least, is_open, epsilon=epsilon)
+
+
+@given(class_grids(max_side=20), seeds, st.booleans(), st.booleans())
+@settings(max_examples=examples(60), deadline=None)
+def test_answers_follow_updates_exactly(
+    classes: Any,
+    seed: int,
+    prepared: bool,  # noqa: FBT001 - drawn
+    has_own: bool,  # noqa: FBT001 - drawn
+) -> None:
+    rng = np.random.default_rng(seed)
+    grid = occupancy_grid(classes, resolution_m=0.5)
+    name, overrides = ["portals", "grid-astar"][rng.integers(2)], []
+    if has_own:
+        overrides = ["planner.costs.clearance.multiplier=3"]
+    preset = hn.load_preset(name, overrides=overrides)
+    layer = random_layer(grid.shape, rng)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset, costs=layer)
+    own = hn.CostLayer.clearance(grid, multiplier=3.0).factors if has_own else np.ones(grid.shape)
+    factors = layer.factors.astype(float)
+    closed = np.zeros(grid.shape, np.bool_) if layer.closed is None else layer.closed.copy()
+    if prepared:
+        planner.prepare()
+    cells = np.argwhere(grid.enterable())
+    for _ in range(5):
+        new = random_layer(grid.shape, rng)
+        rows, cols = (np.sort(rng.integers(0, size + 1, 2)) for size in grid.shape)
+        inside = slice(*rows), slice(*cols)
+        if rows[0] < rows[1] and cols[0] < cols[1]:
+            factors[inside] = new.factors[inside]
+            closed[inside] = False if new.closed is None else new.closed[inside]
+            corners = grid.frame.points_of([(rows[0], cols[0]), (rows[1] - 1, cols[1] - 1)])
+            low, high = corners.min(axis=0) - 0.2, corners.max(axis=0) + 0.2
+            planner.update(costs=new, changed=area(*low, *high))
+        is_open = grid.enterable() & ~closed
+        graph = weighted(move_graph(is_open), np.maximum(own, factors))
+        for start, goal in (
+            cells[rng.integers(len(cells), size=(3, 2))].tolist() if len(cells) else []
+        ):
+            ends = grid.frame.points_of([start, goal])
+            result = planner.plan(*ends)
+            if closed[tuple(start)] or closed[tuple(goal)]:
+                assert result.status in {hn.PlanStatus.START_BLOCKED, hn.PlanStatus.GOAL_BLOCKED}
+                continue
+            least = distances(graph, grid.shape, tuple(start))[tuple(goal)] * grid.resolution_m
+            check(result, least, is_open)
+            near = planner.plan(*ends, smooth="line-of-sight")
+            assert near.solved == result.solved
+            assert near.cost <= result.cost * (1 + 1e-9) or not near.solved
+        if rng.random() < 0.3:
+            planner.prepare()
+
+
+def halls(n: int = 40) -> hn.OccupancyGrid:
+    """Two halls with two doors between them."""
+    probability = np.zeros((n, n))
+    probability[:, n // 2] = 1.0
+    probability[[4, 5, 34, 35], n // 2] = 0.0
+    return grid_of(probability, hn.Frame(0.5), robot_radius_m=0)
+
+
+@ON_OVERLAY
+def test_a_closed_door_opens_again_and_results_name_the_change(preset: str) -> None:
+    grid = halls()
+    planner = hn.HybridPlanner(
+        topology_of(grid), preset=preset_of(preset), costs=layer_of(np.ones(grid.shape))
+    )
+    planner.prepare()
+    before = planner.plan((5.0, 2.0), (15.0, 2.0))
+    closed = np.zeros(grid.shape, np.bool_)
+    closed[:10] = True
+    shut = hn.CostLayer(np.ones(grid.shape, np.float32), closed, {"kind": "door"})
+    planner.update(costs=shut, changed=(10.0, 0.0, 10.5, 5.0))
+    around = planner.plan((5.0, 2.0), (15.0, 2.0))
+    assert around.path is not None
+    assert around.path.points[:, 1].max() > 16
+    assert around.gap <= ROUNDING
+    assert around.settings["costs"] == {
+        "kind": "changed",
+        "of": [{"kind": "array"}, {"kind": "door"}],
+    }
+    planner.update(costs=layer_of(np.ones(grid.shape)), changed=(10.0, 0.0, 10.5, 5.0))
+    assert planner.plan((5.0, 2.0), (15.0, 2.0)).cost == before.cost
+
+
+def test_a_planner_of_lengths_takes_costs_later() -> None:
+    grid = halls()
+    for name in ("grid-astar", "paper", "portals"):
+        planner = hn.HybridPlanner(topology_of(grid), preset=name)
+        assert planner.plan((5.0, 2.0), (15.0, 2.0)).metric == "octile"
+        planner.update(costs=layer_of(np.full(grid.shape, 2.0)))
+        result = planner.plan((5.0, 2.0), (15.0, 2.0))
+        assert result.metric == "weighted"
+        assert result.cost == 20.0
+
+
+def test_the_overlay_is_built_once_queries_have_spent_as_much() -> None:
+    grid = halls(60)
+    layer = layer_of(np.random.default_rng(1).uniform(1, 4, grid.shape))
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset_of("overlay"), costs=layer)
+    free = np.argwhere(grid.enterable())
+    stages = []
+    for pair in free[np.random.default_rng(0).integers(len(free), size=(400, 2))]:
+        result = planner.plan(*grid.frame.points_of(pair))
+        assert result.gap <= 2 * ROUNDING
+        stages.append(set(result.stats.seconds))
+    assert "refine" in stages[0]
+    assert sum("overlay" in stage for stage in stages) == 1
+    assert "search" in stages[-1]
+
+
+def test_factors_too_large_for_the_overlay_are_planned_by_on_the_grid() -> None:
+    probability = np.zeros((60, 60))
+    probability[1::4, :-1] = probability[3::4, 1:] = 1.0  # one long winding corridor
+    grid = grid_of(probability, hn.Frame(0.5), robot_radius_m=0)
+    layer = layer_of(np.full(grid.shape, 1000.0))
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset_of("overlay"), costs=layer)
+    planner.prepare()
+    result = planner.plan((0.25, 0.25), (0.25, 29.25))
+    plain = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)
+    assert result.cost == plain.plan((0.25, 0.25), (0.25, 29.25)).cost
+
+
+def test_threads_finish_by_the_costs_before_or_after_an_update() -> None:
+    grid = halls(60)
+    topology = topology_of(grid)
+    layers = [layer_of(np.full(grid.shape, factor)) for factor in (1.0, 3.0)]
+    planner = hn.HybridPlanner(topology, preset=preset_of("overlay"), costs=layers[0])
+    planner.prepare()
+    ends = (2.0, 2.0), (28.0, 28.0)
+    allowed = set()
+    for layer in layers:
+        planner.update(costs=layer)
+        found = planner.plan(*ends)
+        allowed.add((found.cost, found.lower_bound))
+    wrong, done = [], threading.Event()
+
+    def ask() -> None:
+        while not done.is_set():
+            found = planner.plan(*ends)
+            if (found.cost, found.lower_bound) not in allowed:
+                wrong.append((found.cost, found.lower_bound))
+
+    threads = [threading.Thread(target=ask, daemon=True) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for turn in range(40):
+        planner.update(costs=layers[turn % 2])
+    done.set()
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads)
+    assert not wrong
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [(0, 0, 1), (0, 0, np.nan, 1), (2, 0, 1, 1), "here", (0, 0, np.inf, 1), {"cells": [[0, 0]]}],
+)
+def test_an_area_of_a_change_that_is_none_is_refused_in_one_line(changed: Any) -> None:
+    grid = halls()
+    planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar")
+    with pytest.raises(hn.InvalidValueError, match="changed is") as refused:
+        planner.update(costs=layer_of(np.ones(grid.shape)), changed=changed)
+    assert "\n" not in str(refused.value)
+    assert planner.costs is None
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
+def test_a_preset_that_knows_lengths_only_refuses_updates(preset: str) -> None:
+    grid = halls()
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    with pytest.raises(hn.InvalidValueError, match="cannot plan by costs"):
+        planner.update(costs=layer_of(np.ones(grid.shape)))
+    with pytest.raises(hn.InvalidValueError, match="are not those of a map of"):
+        planner.update(costs=layer_of(np.ones((2, 2))))
