@@ -6,6 +6,7 @@ exact comparison of two products, which tests hold against fractions.
 """
 
 from hybridnav.metrics.anyangle import MAX_CORNERS, AnyAnglePath, VisibilityGraph
+from hybridnav.metrics.cheapest import CheapestCost
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
 from hybridnav.metrics.judge_line import judge_line, line_cells
 from hybridnav.metrics.optimum import ScipyOptimum
@@ -24,6 +25,7 @@ __all__ = [
     "MAX_CORNERS",
     "AnyAnglePath",
     "Buckets",
+    "CheapestCost",
     "PairedDifference",
     "RoomAgreement",
     "ScipyOptimum",
