@@ -22,8 +22,8 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks._queries_measure import SLACK, YARDSTICK, read
-from hybridnav.harness.analysis import nanquantile
 from hybridnav.harness.methods import _nbytes
+from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.tables import to_markdown
 from hybridnav.mesh import MeshSearch, build_mesh
 from hybridnav.search.grid_search import GridSearch

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from benchmarks._queries_measure import YARDSTICK
-from hybridnav.harness.analysis import nanmean, nanquantile
+from hybridnav.harness.outcome import nanmean, nanquantile
 from hybridnav.harness.tables import text_of, to_markdown
 
 if TYPE_CHECKING:

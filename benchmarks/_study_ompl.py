@@ -10,8 +10,9 @@ import numpy as np
 
 import hybridnav as hn
 from hybridnav.config import load_preset
-from hybridnav.harness.analysis import nanmean, nanquantile, pairs_in_common
+from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import nanmean, nanquantile
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.tables import figures, to_markdown
 from hybridnav.viz import plot_losses
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from hybridnav.config import Preset
-    from hybridnav.harness.analysis import Outcome, Study
+    from hybridnav.harness.analysis import Study
+    from hybridnav.harness.outcome import Outcome
     from hybridnav.harness.tables import Row
 
 BESIDE = "portals"

@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING
 
 import hybridnav as hn
 from benchmarks import _study_ompl
-from hybridnav.harness.analysis import nanquantile
 from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.methods import BASELINES
+from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.tables import (

@@ -17,10 +17,11 @@ from benchmarks import _study_ompl
 from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
-from hybridnav.harness.analysis import pairs_in_common, query_key
+from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.contradictions import contradiction
 from hybridnav.harness.methods import preset_spec
+from hybridnav.harness.outcome import query_key
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of

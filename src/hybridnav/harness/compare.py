@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.analysis import load_study, loss_of, nanmean, query_key
+from hybridnav.harness.analysis import load_study
 from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import loss_of, nanmean, query_key
 from hybridnav.metrics import paired_difference
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from hybridnav._typing import FloatArray
-    from hybridnav.harness.analysis import Outcome, Study
+    from hybridnav.harness.analysis import Study
+    from hybridnav.harness.outcome import Outcome
     from hybridnav.harness.tables import Row
     from hybridnav.harness.yardstick import Yardstick
 

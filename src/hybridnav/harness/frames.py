@@ -9,7 +9,8 @@ from hybridnav.errors import InvalidValueError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from hybridnav.harness.analysis import Outcome, Study
+    from hybridnav.harness.analysis import Study
+    from hybridnav.harness.outcome import Outcome
 
 
 def to_frame(study: Study) -> pd.DataFrame:

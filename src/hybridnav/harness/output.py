@@ -9,8 +9,9 @@ import numpy as np
 from hybridnav._files import replace_file
 from hybridnav.errors import MapError
 from hybridnav.grid import MAX_CELLS
-from hybridnav.harness.analysis import Outcome, Study, load_study, nanquantile, query_key
+from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import Outcome, nanquantile, query_key
 from hybridnav.harness.paths import decode_path
 from hybridnav.harness.records import map_digest
 from hybridnav.harness.report import MapSection, ReportData, Table, WorstCase, render_report

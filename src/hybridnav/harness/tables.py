@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.analysis import nanmean, nanquantile, pairs_in_common
+from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import nanmean, nanquantile
 from hybridnav.metrics import distance_buckets, summarise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._typing import FloatArray
-    from hybridnav.harness.analysis import MapQuery, Outcome, Study
+    from hybridnav.harness.analysis import Study
+    from hybridnav.harness.outcome import MapQuery, Outcome
     from hybridnav.harness.yardstick import Yardstick
 
 Row = dict[str, str | float]
