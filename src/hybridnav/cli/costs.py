@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hybridnav.cli.errors import UsageError
+from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import hybridnav as hn
+    from hybridnav.io.cost_specs import CostSpec
 
 CostsOption = Annotated[
     list[str] | None,
@@ -26,13 +29,6 @@ CostsOption = Annotated[
 PRESET = "grid-astar"
 """The preset that plans by costs unless another is named."""
 
-_KEYS = {
-    "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),
-    "speed": ("base", "multiplier", "unit", "full_speed_mps"),
-    "keepout": ("multiplier",),
-}
-_TEXTS = frozenset({"unit"})
-
 
 @dataclass(frozen=True)
 class Costs:
@@ -40,8 +36,8 @@ class Costs:
 
     overrides: tuple[str, ...] = ()
     """Settings of the preset."""
-    masks: tuple[tuple[str, Path, dict[str, Any]], ...] = field(default=())
-    """Kind, file and settings of each mask."""
+    masks: tuple[CostSpec, ...] = ()
+    """Masks."""
 
     def __bool__(self) -> bool:
         """Return whether there are any."""
@@ -49,14 +45,8 @@ class Costs:
 
     def read(self, grid: hn.OccupancyGrid) -> hn.CostLayer | None:
         """Read the masks, on the cells of a map; None for no masks."""
-        import hybridnav as hn  # noqa: PLC0415 - loads numpy
-
-        loaders = {"speed": hn.load_speed_mask, "keepout": hn.load_keepout_mask}
-        layer: hn.CostLayer | None = None
-        for kind, path, settings in self.masks:
-            mask = loaders[kind](path, grid, **settings)
-            layer = mask if layer is None else layer | mask
-        return layer
+        layers = [mask.layer(grid) for mask in self.masks]
+        return reduce(or_, layers) if layers else None
 
 
 def parsed_costs(specs: list[str] | None) -> Costs:
@@ -67,41 +57,17 @@ def parsed_costs(specs: list[str] | None) -> Costs:
     UsageError
         When one of them has another form.
     """
+    from hybridnav.io.cost_specs import parse_costs  # noqa: PLC0415 - loads numpy
+
+    try:
+        found = parse_costs(specs or ())
+    except InvalidValueError as error:
+        raise UsageError(f"--{error}") from None
     overrides: list[str] = []
-    masks: list[tuple[str, Path, dict[str, Any]]] = []
-    for spec in specs or ():
-        kind, _, rest = spec.partition(":")
-        if kind not in _KEYS:
-            raise UsageError(f"--costs must begin with {', '.join(_KEYS)}, got {spec!r:.80}")
-        parts = rest.split(",") if rest else []
-        if kind == "clearance":
-            settings = _settings(kind, parts)
-            if overrides:
-                raise UsageError("--costs clearance is given twice, put its settings into one")
+    for spec in found:
+        if spec.kind == "clearance":
             overrides.append("planner.costs.clearance={}")
-            overrides += [f"planner.costs.clearance.{key}={settings[key]!r}" for key in settings]
-            continue
-        if not parts or not parts[0]:
-            raise UsageError(f"--costs {kind}: expected {kind}:FILE, got {spec!r:.80}")
-        masks.append((kind, Path(parts[0]), _settings(kind, parts[1:])))
-    return Costs(tuple(overrides), tuple(masks))
-
-
-def _settings(kind: str, parts: list[str]) -> dict[str, Any]:
-    """Return the settings of `KEY=VALUE` parts."""
-    settings: dict[str, Any] = {}
-    for part in parts:
-        key, equals, text = part.partition("=")
-        known = _KEYS[kind]
-        if not equals or key not in known:
-            raise UsageError(
-                f"--costs {kind} takes KEY=VALUE with {', '.join(known)}, got {part!r:.80}"
-            )
-        if key in _TEXTS:
-            settings[key] = text
-            continue
-        try:
-            settings[key] = float(text)
-        except ValueError:
-            raise UsageError(f"--costs {kind}: {key} must be a number, got {text!r:.80}") from None
-    return settings
+            overrides += [
+                f"planner.costs.clearance.{key}={spec.settings[key]!r}" for key in spec.settings
+            ]
+    return Costs(tuple(overrides), tuple(spec for spec in found if spec.kind != "clearance"))

@@ -1,0 +1,111 @@
+"""Costs as people write them: `clearance:multiplier=4`, `speed:FILE`, `keepout:FILE`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.costs import CostLayer
+from hybridnav.errors import InvalidValueError
+from hybridnav.io.masks import load_keepout_mask, load_speed_mask
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav.grid import OccupancyGrid
+
+_KEYS = {
+    "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),
+    "speed": ("base", "multiplier", "unit", "full_speed_mps"),
+    "keepout": ("multiplier",),
+}
+_TEXTS = frozenset({"unit"})
+
+
+@dataclass(frozen=True)
+class CostSpec:
+    """One source of costs."""
+
+    kind: str
+    """`clearance`, `speed` or `keepout`."""
+    file: str = ""
+    """File of a mask."""
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Settings by name."""
+
+    def layer(self, grid: OccupancyGrid) -> CostLayer:
+        """Return the costs of the cells of a map; see `CostLayer` and `load_speed_mask`."""
+        if self.kind == "clearance":
+            return CostLayer.clearance(grid, **self.settings)
+        if self.kind == "speed":
+            return load_speed_mask(self.file, grid, **self.settings)
+        return load_keepout_mask(self.file, grid, **self.settings)
+
+
+def parse_costs(texts: Sequence[str]) -> tuple[CostSpec, ...]:
+    """Return what some texts state.
+
+    Parameters
+    ----------
+    texts
+        `clearance[:KEY=VALUE,...]`, at most once, `speed:FILE[,KEY=VALUE,...]` or
+        `keepout:FILE[,multiplier=M]`.
+
+    Raises
+    ------
+    InvalidValueError
+        When one of them has another form.
+    """
+    specs: list[CostSpec] = []
+    for text in texts:
+        kind, _, rest = text.partition(":")
+        if kind not in _KEYS:
+            raise InvalidValueError(f"costs must begin with {', '.join(_KEYS)}, got {text!r:.80}")
+        parts = rest.split(",") if rest else []
+        if kind == "clearance":
+            if any(spec.kind == kind for spec in specs):
+                raise InvalidValueError("costs clearance is given twice, put its settings into one")
+            specs.append(CostSpec(kind, settings=_settings(kind, parts)))
+            continue
+        if not parts or not parts[0]:
+            raise InvalidValueError(f"costs {kind}: expected {kind}:FILE, got {text!r:.80}")
+        specs.append(CostSpec(kind, parts[0], _settings(kind, parts[1:])))
+    return tuple(specs)
+
+
+def read_costs(texts: Sequence[str], grid: OccupancyGrid) -> CostLayer | None:
+    """Return the layer of the larger factors that some texts state, None for no texts.
+
+    Raises
+    ------
+    InvalidValueError
+        When a text has another form, or a setting is out of range.
+    MapError
+        When a mask cannot be read.
+    """
+    layers = [spec.layer(grid) for spec in parse_costs(texts)]
+    return reduce(or_, layers) if layers else None
+
+
+def _settings(kind: str, parts: list[str]) -> dict[str, Any]:
+    """Return the settings of `KEY=VALUE` parts."""
+    settings: dict[str, Any] = {}
+    for part in parts:
+        key, equals, text = part.partition("=")
+        known = _KEYS[kind]
+        if not equals or key not in known:
+            raise InvalidValueError(
+                f"costs {kind} takes KEY=VALUE with {', '.join(known)}, got {part!r:.80}"
+            )
+        if key in _TEXTS:
+            settings[key] = text
+            continue
+        try:
+            settings[key] = float(text)
+        except ValueError:
+            raise InvalidValueError(
+                f"costs {kind}: {key} must be a number, got {text!r:.80}"
+            ) from None
+    return settings
