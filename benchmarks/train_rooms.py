@@ -26,7 +26,9 @@ from benchmarks._rooms_boost import Boosting, Examples, averaged, boost
 from benchmarks._rooms_buildings import SITES, Building
 from hybridnav.topology import judging
 from hybridnav.topology.cutting import Ground, fine_segments
+from hybridnav.topology.growing import Likely, Small, contract
 from hybridnav.topology.judging import EVIDENCE, Forest, JudgedSegments
+from hybridnav.topology.merging import least_cells
 from hybridnav.topology.segmentation import LEAST_LIKELY, SPECK_M2, outside_of
 
 if TYPE_CHECKING:
@@ -61,11 +63,11 @@ class View:
 
 @dataclass
 class Records:
-    """Pairs that were met while segments merged."""
+    """Pairs that were met while segments merged, an array for each time that some were judged."""
 
     evidence: list[FloatArray]
-    same: list[float]
-    weights: list[float]
+    same: list[FloatArray]
+    weights: list[FloatArray]
 
 
 def view_of(building: Building, degrees: float, scale: float) -> View:
@@ -91,68 +93,64 @@ def view_of(building: Building, degrees: float, scale: float) -> View:
         dense[known].astype(np.int64) * n_rooms + true[known],
         minlength=segments.n_segments * n_rooms,
     ).reshape(-1, n_rooms)
-    segments.merge_small(SPECK_M2)
     return View(segments, cells.astype(np.float64), ground.resolution_m)
 
 
 def met(view: View, forest: Forest | None) -> Records:
     """Record the pairs that a forest meets, or one who knows the rooms."""
     segments = copy.deepcopy(view.segments)
-    cells, records, done = view.cells.copy(), Records([], [], []), 0
+    records = Records([], [], [])
 
     def judge(pairs: LongArray, evidence: FloatArray) -> FloatArray:
-        nonlocal done
-        for kept, gone in segments.merges[done:]:
-            cells[kept] += cells[gone]
-        done = len(segments.merges)
-        likely = np.zeros(len(pairs)) if forest is None else forest.judge(pairs, evidence)
-        for at, pair in enumerate(pairs.tolist()):
-            known = _true_label(segments, cells, pair, view.resolution_m)
-            if known is None:
-                continue
-            records.evidence.append(evidence[at])
-            records.same.append(known[0])
-            records.weights.append(known[1])
-            if forest is None:
-                likely[at] = known[0] * (
-                    0.6 + 0.4 * min(1.0, segments.state.open_sides[pair] / 100)
-                )
-        return likely
+        same, weights = _true_labels(view, segments, pairs)
+        known = weights > 0
+        records.evidence.append(evidence[known])
+        records.same.append(same[known])
+        records.weights.append(weights[known])
+        if forest is not None:
+            return forest.judge(pairs, evidence)
+        opened = np.minimum(1.0, segments.state.open_sides[pairs] / 100)
+        return np.where(known, same * (0.6 + 0.4 * opened), 0.0)
 
-    segments.merge_likely(judge, LEAST_LIKELY)
+    specks = Small(least_cells(SPECK_M2, view.resolution_m**2))
+    contract(segments, [specks, Likely(judge, LEAST_LIKELY)])
     return records
 
 
-def _true_label(
-    segments: JudgedSegments, cells: FloatArray, pair: int, resolution_m: float
-) -> tuple[float, float] | None:
-    """Whether two segments lie in one room, and the weight; None where people drew none."""
-    u, v = segments.state.endpoints[pair]
-    sizes = segments.state.free[[u, v]]
-    in_room, known = cells[[u, v]], cells[[u, v]].sum(axis=1)
-    if (known < _LEAST_LABELLED * sizes).any():
-        return None
-    rooms, purest = in_room.argmax(axis=1), float((in_room.max(axis=1) / known).min())
-    weight = max(_LEAST_WEIGHT, 2 * purest - 1) * math.sqrt(sizes.min()) * resolution_m
-    return float(rooms[0] == rooms[1]), weight
+def _true_labels(
+    view: View, segments: JudgedSegments, pairs: LongArray
+) -> tuple[FloatArray, FloatArray]:
+    """Whether both segments of each pair lie in one room, and the weight, 0 where people drew
+    none."""
+    cells = np.zeros_like(view.cells)
+    np.add.at(cells, segments.owner_of, view.cells)
+    ends = segments.state.endpoints[pairs]
+    sizes, known = segments.state.free[ends], np.maximum(cells[ends].sum(axis=2), 1e-9)
+    rooms, purest = cells[ends].argmax(axis=2), (cells[ends].max(axis=2) / known).min(axis=1)
+    weights = np.maximum(_LEAST_WEIGHT, 2 * purest - 1) * np.sqrt(sizes.min(axis=1))
+    drawn = (known >= _LEAST_LABELLED * sizes).all(axis=1)
+    same = (rooms[:, 0] == rooms[:, 1]).astype(np.float64)
+    return same, np.where(drawn, weights * view.resolution_m, 0.0)
 
 
 def fitted(records: dict[str, list[Records]]) -> Forest:
     """Train on the records of some buildings; each site counts by the root of its weight."""
     totals: dict[str, float] = {}
     for name, found in records.items():
-        total = sum(sum(record.weights) for record in found)
+        total = sum(float(weights.sum()) for record in found for weights in record.weights)
         totals[SITES[name]] = totals.get(SITES[name], 0.0) + total
-    weights = [
-        np.array(record.weights) ** _BY_SIZE / math.sqrt(totals[SITES[name]])
-        for name, found in records.items()
-        for record in found
-    ]
     every = [record for found in records.values() for record in found]
-    weight = np.concatenate(weights)
+    weight = np.concatenate(
+        [
+            weights**_BY_SIZE / math.sqrt(totals[SITES[name]])
+            for name, found in records.items()
+            for record in found
+            for weights in record.weights
+        ]
+    )
     signs = np.array([(name in RISING) - (name in FALLING) for name in EVIDENCE])
-    evidence = np.array([row for record in every for row in record.evidence])
-    same = np.array([each for record in every for each in record.same])
+    evidence = np.concatenate([rows for record in every for rows in record.evidence])
+    same = np.concatenate([each for record in every for each in record.same])
     examples = Examples(evidence, same, weight / weight.mean())
     return averaged([boost(examples, signs, settings=Boosting(), seed=seed) for seed in SEEDS])
 

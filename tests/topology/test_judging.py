@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.topology.cutting import Ground, fine_segments, wall_directions
+from hybridnav.topology.growing import Likely, Small, contract
 from hybridnav.topology.judging import EVIDENCE, Forest, JudgedSegments
 from tests.strategies import class_grids, occupancy_grid
 from tests.topology.test_find_rooms import floor
@@ -60,7 +61,7 @@ def test_the_shipped_judge_keeps_a_door_and_joins_a_corridor():
     forest = Forest.shipped()
     for (free, label_of), n_rooms in ((two_rooms(), 2), (corridor(), 1)):
         segments = segments_of(free, label_of)
-        segments.merge_likely(forest.judge, 0.5)
+        contract(segments, [Likely(forest.judge, 0.5)])
         assert len(np.unique(segments.label_of[free])) == n_rooms
 
 
@@ -91,7 +92,7 @@ def test_merged_segments_have_the_evidence_of_segments_that_were_never_apart(cla
     if not free.any():
         return
     segments = segments_of(free, label_of)
-    segments.merge_likely(lambda pairs, _: rng.random(len(pairs)), 0.7)
+    contract(segments, [Likely(lambda pairs, _: rng.random(len(pairs)), 0.7)])
     again = segments_of(free, segments.label_of)
     state, fresh = segments.state, again.state
     kept = np.flatnonzero(state.versions >= 0)
@@ -113,7 +114,7 @@ def test_small_segments_go_to_the_neighbour_with_the_longest_open_border():
     label_of[2:22, 80:83] = 2
     label_of[2:8, 80] = 0  # a step makes its border there longer
     segments = segments_of(free, label_of)
-    segments.merge_small(1.0)
+    contract(segments, [Small(100)])
     merged = segments.label_of
     assert merged[12, 81] == merged[12, 40] != merged[12, 120]
 

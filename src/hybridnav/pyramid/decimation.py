@@ -20,16 +20,14 @@ from hybridnav.pyramid import _base_kernels, _field_kernels, _hull_kernels, _ker
 from hybridnav.pyramid.expansion import Expansion
 from hybridnav.pyramid.hulls import merge_hulls
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Linkage, Record
-from hybridnav.pyramid.resistance import Resisting
 from hybridnav.pyramid.scratch import Scratch
 from hybridnav.pyramid.start import N_CLASSES, kinds_of, start_at_base, start_at_level
 
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, IntArray
     from hybridnav.pyramid.level import Level
-    from hybridnav.pyramid.resistance import Resistance
     from hybridnav.pyramid.start import Start
-    from hybridnav.pyramid.steering import Steering
+    from hybridnav.pyramid.steering import Resists, Steering
 
 KERNEL = _kernels.select_stars
 """The kernel whose compiled form shows that a pyramid was built before."""
@@ -60,13 +58,13 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     limit: int,
     seed: int,
     rooms: IntArray | None = None,
-    resistance: Resistance | None = None,
+    resistance: Resists | None = None,
 ) -> tuple[Record, BuildStats, CombinatorialMap]:
     """Contract stars level by level until no edge may be contracted.
 
     With rooms there are three rounds: below the limit and inside rooms, which makes the places;
-    inside rooms without a limit, which makes the rooms; and without rooms. With a resistance there
-    are two: below the limit, and then without a limit until every arc resists.
+    inside rooms without a limit, which makes the rooms; and without rooms. With a resistance the
+    last round ends when every arc resists; the labels that it keeps apart, if any, stand for rooms.
 
     Parameters
     ----------
@@ -90,21 +88,22 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     CombinatorialMap
         The darts of the places: from the record they take longer than a build.
     """
-    kinds = classes if rooms is None else kinds_of(classes, rooms)
+    labels = rooms if resistance is None else resistance.kept_apart
+    kinds = classes if labels is None else kinds_of(classes, labels)
     began = time.perf_counter()
     start = start_at_base(kinds, limit)
     run = _Decimation(start, seed, _LINKAGES[linkage], limit)
     run.stats.seconds["base"] = time.perf_counter() - began
     run.exhaust()
     places = run.plane_map()
-    if rooms is not None:
+    if labels is not None:
         run.lift_limit()
         run.exhaust()
         run.forget_rooms()
-        run.exhaust()
     if resistance is not None:
         run.lift_limit()
-        run.steer(Resisting(resistance, run.field_of(), run.n_vertices))
+        run.steer(resistance.steering(run.field_of(), run.n_vertices))
+    if labels is not None or resistance is not None:
         run.exhaust()
     run.finish()
     return run.record, run.stats, places

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.pyramid.islands import Islands
     from hybridnav.pyramid.record import BuildStats, Record
-    from hybridnav.pyramid.resistance import Resistance
+    from hybridnav.pyramid.steering import Resists
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class DualGraphPyramid:
         linkage: Linkage = "radius",
         seed: int = 0,
         rooms: RoomLabels | None = None,
-        resistance: Resistance | None = None,
+        resistance: Resists | None = None,
     ) -> DualGraphPyramid:
         """Contract the cells of a grid to places and, with rooms, further to rooms and a building.
 
@@ -130,9 +130,7 @@ class DualGraphPyramid:
                 raise InvalidValueError(
                     f"rooms are labels of {labels.shape} cells, the grid has {grid.shape}"
                 )
-        if resistance is not None and (
-            rooms is not None or resistance.clearance.shape != grid.shape
-        ):
+        if resistance is not None and (rooms is not None or resistance.shape != grid.shape):
             raise InvalidValueError(
                 f"a resistance goes without rooms and with the clearance of {grid.shape} cells"
             )

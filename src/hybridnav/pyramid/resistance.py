@@ -70,6 +70,20 @@ class Resistance:
         clearance.flags.writeable = False
         object.__setattr__(self, "clearance", clearance)
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows and columns of the clearance."""
+        return self.clearance.shape
+
+    @property
+    def kept_apart(self) -> None:
+        """None: places are those of a pyramid without resistance."""
+        return
+
+    def steering(self, field_of: IntArray, n_vertices: int) -> Resisting:
+        """Return the steering from a level on; see `Resists`."""
+        return Resisting(self, field_of, n_vertices)
+
     def peaks(self, field_of: IntArray, n_vertices: int) -> FloatArray:
         """Return the greatest clearance in each field, float64 (n_vertices,).
 

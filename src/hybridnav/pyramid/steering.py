@@ -12,6 +12,29 @@ if TYPE_CHECKING:
     from hybridnav.pyramid._kernels import Vertices
 
 
+class Resists(Protocol):
+    """A rule by which arcs resist contraction above the places."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows and columns of the map that the rule is for."""
+
+    @property
+    def kept_apart(self) -> IntArray | None:
+        """int32 (rows, cols), labels that no place has two of, -1 for none; None for no labels."""
+
+    def steering(self, field_of: IntArray, n_vertices: int) -> Steering:
+        """Return the steering from a level on.
+
+        Parameters
+        ----------
+        field_of
+            int32 (n_cells,), the vertex of each cell at that level, -1 for none.
+        n_vertices
+            Vertices of that level.
+        """
+
+
 class Steering(Protocol):
     """A value of each arc of the level that is being contracted."""
 

@@ -1,8 +1,7 @@
-"""The judge of boundaries between segments: evidence, a small forest, merging by it."""
+"""The judge of boundaries between segments: the evidence on them, and a small forest."""
 
 from __future__ import annotations
 
-import heapq
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -13,11 +12,9 @@ from scipy import ndimage
 
 from hybridnav.topology import _evidence_kernels, _merging_kernels
 from hybridnav.topology._merging_kernels import SegmentState
-from hybridnav.topology.merging import grown, least_cells
+from hybridnav.topology.merging import grown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.topology.cutting import Ground
 
@@ -76,7 +73,7 @@ class Forest:
 
 
 class JudgedSegments:
-    """Segments of free space that merge by a judge's probabilities, the likeliest pair first.
+    """Segments of free space, with the evidence on their boundaries; merging keeps it up to date.
 
     Parameters
     ----------
@@ -93,74 +90,14 @@ class JudgedSegments:
         self.n_segments = len(found) - first
         self._resolution_m = ground.resolution_m
         self.state = _state(self._label_of, self.n_segments, ground)
-        self.merges: list[tuple[int, int]] = []
-        """Each merge so far: the segment that is left, and the one it took."""
+        self.owner_of = np.arange(self.n_segments)
+        """int64 (n_segments,), the segment that each one is part of by now."""
 
     @property
     def label_of(self) -> IntArray:
         """int32 (rows, cols), the segments as they are now; numbers have gaps."""
-        owner = np.arange(self.n_segments + 1)
-        owner[-1] = -1
-        for kept, gone in reversed(self.merges):
-            owner[gone] = owner[kept]
-        labels: IntArray = owner[self._label_of].astype(np.int32)
+        labels: IntArray = np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
         return labels
-
-    def merge_small(self, least_m2: float) -> None:
-        """Give segments of a smaller free area to the neighbour with the longest open border,
-        smallest first; those without a neighbour stay."""
-        least = least_cells(least_m2, self._resolution_m**2)
-        alive = np.flatnonzero(self.state.versions >= 0).tolist()
-        heap = [(float(self.state.free[segment]), segment) for segment in alive]
-        heapq.heapify(heap)
-        while heap:
-            cells, segment = heapq.heappop(heap)
-            if self.state.versions[segment] < 0 or cells != self.state.free[segment]:
-                continue
-            if cells >= least:
-                break
-            pairs = _merging_kernels.pairs_of(self.state, segment)
-            widest = int(pairs[np.argmax(self.state.open_sides[pairs])]) if len(pairs) else -1
-            if widest < 0 or self.state.open_sides[widest] == 0:
-                continue
-            kept = self._merge(widest)
-            heapq.heappush(heap, (float(self.state.free[kept]), kept))
-
-    def merge_likely(
-        self, judge: Callable[[LongArray, FloatArray], FloatArray], least: float
-    ) -> None:
-        """Merge pairs of at least a probability, the likeliest first; evidence is measured again
-        after each merge.
-
-        Parameters
-        ----------
-        judge
-            Returns probabilities, float64 (n,), for int64 (n,) pairs and their evidence, float64
-            (n, len(EVIDENCE)).
-        least
-            In [0, 1].
-        """
-        heap: list[tuple[float, int, int, int]] = []
-        state = self.state
-
-        def offer(pairs: LongArray) -> None:
-            pairs = pairs[state.open_sides[pairs] > 0]
-            evidence = self.evidence(pairs)
-            likely = judge(pairs, evidence)
-            for at in np.flatnonzero(likely >= least).tolist():
-                u, v = state.endpoints[pairs[at]]
-                versions = int(state.versions[u]), int(state.versions[v])
-                heapq.heappush(heap, (-float(likely[at]), int(pairs[at]), *versions))
-
-        offer(np.flatnonzero(state.endpoints[:, 0] >= 0))
-        while heap:
-            _, pair, *versions = heapq.heappop(heap)
-            u, v = state.endpoints[pair]
-            if u < 0 or versions != [state.versions[u], state.versions[v]]:
-                continue
-            kept = self._merge(pair)
-            state = self.state
-            offer(_merging_kernels.pairs_of(state, kept))
 
     def evidence(self, pairs: LongArray) -> FloatArray:
         """Return the evidence on pairs with an open border, float64 (n, len(EVIDENCE))."""
@@ -175,13 +112,20 @@ class JudgedSegments:
         )
         return found
 
-    def _merge(self, pair: int) -> int:
+    def pair_of(self, segment: int, other: int) -> int:
+        """Return the pair of two segments, -1 if they do not touch."""
+        pairs = _merging_kernels.pairs_of(self.state, segment)
+        found = pairs[(self.state.endpoints[pairs] == other).any(axis=1)]
+        return int(found[0]) if len(found) else -1
+
+    def merge(self, pair: int) -> int:
+        """Merge the two segments of a pair, and return the one that is left."""
         sizes = self.state.hull_sizes[self.state.endpoints[pair]].sum()
         if self.state.hulls_used[0] + sizes > len(self.state.hulls):
             hulls = np.concatenate([self.state.hulls, np.empty_like(self.state.hulls)])
             self.state = self.state._replace(hulls=hulls)
         kept, gone = _merging_kernels.merge_pair(self.state, pair)
-        self.merges.append((kept, gone))
+        self.owner_of[self.owner_of == gone] = kept
         return int(kept)
 
 

@@ -14,6 +14,7 @@ from hybridnav.grid.names import Segmentation
 from hybridnav.grid.room_labels import MAX_ROOMS
 from hybridnav.topology import _segmentation_kernels
 from hybridnav.topology.cutting import Ground, fine_segments
+from hybridnav.topology.growing import Likely, Small, contract
 from hybridnav.topology.judging import Forest, JudgedSegments
 from hybridnav.topology.merging import Segments, grown, least_cells
 from hybridnav.topology.segments import (
@@ -156,9 +157,9 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     outside = outside_of(grid)
     ground = Ground.of(grid, outside)
     segments = JudgedSegments(fine_segments(ground), ground)
-    segments.merge_small(min(SPECK_M2, least_area_m2))
-    segments.merge_likely(forest.judge, LEAST_LIKELY)
-    segments.merge_small(least_area_m2)
+    specks = least_cells(min(SPECK_M2, least_area_m2), grid.resolution_m**2)
+    least = least_cells(least_area_m2, grid.resolution_m**2)
+    contract(segments, [Small(specks), Likely(forest.judge, LEAST_LIKELY), Small(least)])
     free = (grid.measured == CellClass.FREE) & ~outside
     return np.where(free, segments.label_of, np.int32(NO_ROOM))
 
