@@ -72,3 +72,42 @@ def test_lists_and_pictures_tell_doors_from_openings():
     for kind in ("door", "opening"):
         assert np.asarray(drawn[f"{kind}s"].get_xydata())[0] == pytest.approx(positions[kind])
     assert drawn["doors"].get_marker() != drawn["openings"].get_marker()
+
+
+def hall_beside(posts):
+    """A hall of 8 m x 4 m beside a corridor; between both an opening with some posts in it."""
+    free = np.zeros((64, 104), dtype=bool)
+    free[2:22, 2:102] = True
+    free[22:62, 10:90] = True
+    free[22, 10:90] = ~np.isin(np.arange(80) // 2, list(posts))
+    label_of = np.where(free, 0, -1)
+    label_of[22:62][free[22:62]] = 1
+    return free, label_of
+
+
+def test_posts_in_a_wide_opening_make_no_doors_of_it():
+    found = doors_of(*hall_beside(range(0, 40, 5)))
+    assert len(found) == 8
+    assert all(door.width_m == pytest.approx(0.8) for door in found[:-1])
+    assert {door.kind for door in found} == {"opening"}
+
+
+def test_two_doors_beside_each_other_and_doors_along_a_wall_stay_doors():
+    wall = set(range(40))
+    near = doors_of(*hall_beside(wall - {10, 11, 12, 13, 17, 18, 19, 20}))
+    assert [door.kind for door in near] == ["door", "door"]
+    apart = doors_of(*hall_beside(wall - {1, 2, 3, 4, 13, 14, 15, 16, 25, 26, 27, 28, 35, 36, 37}))
+    assert [door.kind for door in apart] == ["door"] * 4
+
+
+@pytest.mark.parametrize("beside", [[(27, 30)], [(20, 24), (24, 41)]])
+def test_an_object_beside_a_border_in_the_open_makes_no_door_of_it(beside):
+    free = np.zeros((64, 64), dtype=bool)
+    free[2:62, 2:62] = True
+    for row, col in beside:
+        free[row, col] = False
+    label_of = np.where(free, 0, -1)
+    label_of[2:22, 25:40][free[2:22, 25:40]] = 1
+    label_of[22:40, 25:40][free[22:40, 25:40]] = 2
+    between = [d for d in doors_of(free, label_of) if set(d.rooms) == {"r1", "r2"}]
+    assert [door.kind for door in between] == ["opening"]

@@ -27,11 +27,14 @@ MOST_DOOR_M = 2.0
 """Width above which a boundary counts as an opening, in metres: double doors are narrower."""
 _DIRECTIONS = 36
 """Directions in which the extent of a boundary is measured: at most 0.1 % are lost between two."""
-_SAME_WIDTH = 1.3
-"""A disc of at most so many times the width of a boundary lies between its jambs."""
+_ROW_M, _MOST_ROW_M = 1.5, 3.0
+"""Boundaries between the same two rooms with less than the first between them make one row. In a
+row that is wider than the second, posts and furniture part an opening, and no jambs doors."""
+_THIN_M = 0.1
+"""Side of the squares of which one crack of a boundary each is looked at for rows."""
 _ASIDE_M = 0.2
 """Clearance below which the endpoints of a boundary may run along a wall: an outline that lies
-beside a door by less is no wider than the door."""
+beside a door by less is no wider than the door, and ends between its jambs."""
 _SAME_DOOR_M = 1.0
 """How far from a boundary a known point of it may lie, in metres: people move corners."""
 _NEAREST_CRACKS = 64
@@ -65,9 +68,9 @@ class RoomBoundaries:
     """float64 (n_boundaries,), diameter of the largest disc round a point of each that no occupied
     cell enters; its length where no cell is occupied."""
     between_jambs: BoolArray
-    """bool (n_boundaries,), boundaries that end beside cells that are not free, on both endpoints,
-    or whose disc is no wider than they are: the others close into a ring, or end in free space
-    where three rooms meet."""
+    """bool (n_boundaries,), boundaries whose two ends lie beside cells that are not free, or within
+    0.2 m of an occupied one, and that are in no wide row. The others close into a ring, end in free
+    space where three rooms meet, or are an opening that furniture divides."""
     resolution_m: float
     """Side of a cell in metres."""
 
@@ -114,8 +117,10 @@ class RoomBoundaries:
         length_m = np.bincount(boundary_of, minlength=count) * grid.resolution_m
         passages_m = np.where(np.isfinite(widest), 2 * widest, length_m)
         widths = _widths(edges, cols, boundary_of, clear / grid.resolution_m, aside)
-        jambs = np.bincount(boundary_of, _jambs(edges, free.reshape(rows, cols)), count)
-        filled = passages_m <= (_SAME_WIDTH * widths + 1) * grid.resolution_m
+        jambs = _jambs(edges, boundary_of, free.reshape(rows, cols), clear <= _ASIDE_M)
+        row_of = _rows_of(labels, boundary_of, sides)
+        in_row = row_of[boundary_of]
+        row_widths = _widths(edges, cols, in_row, clear / grid.resolution_m, aside)[row_of]
         return cls(
             edges,
             boundary_of,
@@ -124,7 +129,7 @@ class RoomBoundaries:
             middles_of(sides, boundary_of, count),
             widths * grid.resolution_m,
             passages_m,
-            (jambs >= 2) | filled,  # noqa: PLR2004 - one at either end
+            (jambs >= 2) & (row_widths * grid.resolution_m <= _MOST_ROW_M),  # noqa: PLR2004
             grid.resolution_m,
         )
 
@@ -223,14 +228,47 @@ def _extents(edges: LongArray, cols: int, boundary_of: LongArray) -> FloatArray:
     return extents
 
 
-def _jambs(edges: LongArray, free: BoolArray) -> LongArray:
-    """Return how many of the endpoints of each side touch a cell that is not free, or the rim."""
+def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> LongArray:
+    """Return the row that each boundary is part of, int64 (n_boundaries,), dense."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - most imports of the package need no rooms
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+    from scipy.spatial import KDTree  # noqa: PLC0415
+
+    count = len(labels)
+    squares = np.floor(sides / _THIN_M).astype(np.int64)
+    _, thin = np.unique(np.column_stack([boundary_of, squares]), axis=0, return_index=True)
+    _, pair_of = np.unique(np.sort(labels, axis=1), axis=0, return_inverse=True)
+    pair = pair_of.reshape(-1)[boundary_of[thin]]
+    # Boundaries of other rooms are far away in a third dimension.
+    near = KDTree(np.column_stack([sides[thin], 2 * _ROW_M * pair])).query_pairs(
+        _ROW_M, output_type="ndarray"
+    )
+    one, other = boundary_of[thin[near]].T
+    joined = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    row_of: LongArray = connected_components(joined, directed=False)[1].astype(np.int64)
+    return row_of
+
+
+def _jambs(
+    edges: LongArray, boundary_of: LongArray, free: BoolArray, is_near: BoolArray
+) -> LongArray:
+    """Return how many ends of each boundary have a jamb: a cell that is not free, or the rim, at
+    the end of the last crack, or an occupied cell near that crack."""
     around = np.pad(free, 1)
     blocks = around[:-1, :-1] & around[:-1, 1:] & around[1:, :-1] & around[1:, 1:]
     row, col = np.divmod(edges >> 1, free.shape[1])
     upward = (edges & 1).astype(np.int64)
-    low = blocks[row + upward, col + 1 - upward]
-    jambs: LongArray = 2 - low.astype(np.int64) - blocks[row + 1, col + 1]
+    corners = np.stack([row + upward, col + 1 - upward, row + 1, col + 1], axis=1).reshape(-1, 2)
+    of = boundary_of.repeat(2)
+    # Corners inside a boundary belong to two of its cracks.
+    _, first, count = np.unique(
+        np.column_stack([of, corners]), axis=0, return_index=True, return_counts=True
+    )
+    ends = first[count == 1]
+    has_jamb = ~blocks[tuple(corners[ends].T)] | is_near[ends // 2]
+    jambs: LongArray = np.bincount(
+        of[ends][has_jamb], minlength=int(boundary_of.max(initial=-1)) + 1
+    )
     return jambs
 
 
