@@ -12,6 +12,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.grid import RoomLabels
+from hybridnav.io.outlines import Outlines
 from tests.strategies import drawn, examples, occupancy_grid
 
 FLOOR = drawn(
@@ -96,15 +97,53 @@ def test_outlines_are_few_corners_on_walls_which_neighbours_share():
     label_of = np.full(classes.shape, 0, dtype=np.int32)
     label_of[:, 80:] = 1
     grid = occupancy_grid(classes, resolution_m=0.05)
-    from hybridnav.io.outlines import areas_of, outlines_of
-
-    rings = outlines_of(areas_of(label_of, 2, grid), grid, 0.2)
+    rings = Outlines(label_of, 2, grid).within(0.1)
     assert [len(room) for room in rings] == [1, 1]
     west, east = (shapely.Polygon(room[0]) for room in rings)
     assert shapely.coverage_is_valid([west, east])
     assert shapely.intersection(west, east).length == pytest.approx(4.0, abs=0.05)
     assert len(rings[0][0]) <= 5
     assert west.hausdorff_distance(shapely.box(0, 0, 4, 4)) <= 0.05 + 1e-9
+
+
+@pytest.mark.parametrize(("degrees", "tolerance_m"), [(0, 0.05), (7, 0.05), (30, 0.1)])
+def test_outlines_lie_within_their_tolerance_along_walls_of_any_direction(degrees, tolerance_m):
+    """Two wings, one turned: no step of a cell is left, and no corner lies far from the walls."""
+    side_m, wing = 0.05, shapely.box(2, 2, 12, 7)
+    other = shapely.affinity.rotate(shapely.box(16, 3, 26, 8), degrees)
+    rows, cols = 220, 560
+    x, y = np.meshgrid((np.arange(cols) + 0.5) * side_m, (np.arange(rows) + 0.5) * side_m)
+    label_of = np.full((rows, cols), -1, dtype=np.int32)
+    for room, shape in enumerate((wing, other)):
+        label_of[shapely.contains_xy(shape, x, y)] = room
+    grid = occupancy_grid((label_of >= 0).astype(np.uint8), resolution_m=side_m)
+    rings = Outlines(label_of, 2, grid).within(tolerance_m)
+    for (ring,), shape in zip(rings, (wing, other), strict=True):
+        assert len(ring) <= 5
+        assert shapely.Polygon(ring).hausdorff_distance(shape) < tolerance_m + 0.05 * 2**0.5
+        ((east, north),) = np.diff(ring[:2], axis=0)
+        turned = np.degrees(np.arctan2(north, east)) - (0 if shape is wing else degrees)
+        assert abs((turned + 45) % 90 - 45) < 0.6
+
+
+def test_the_tolerance_may_be_chosen(tmp_path):
+    rng = np.random.default_rng(5)
+    label_of = np.full((120, 160), -1, dtype=np.int32)
+    label_of[20:100, 20:140] = 0
+    for row in range(20, 100):
+        label_of[row, 80 + rng.integers(-4, 5) : 140] = 1
+    grid = occupancy_grid((label_of >= 0).astype(np.uint8), resolution_m=0.05)
+    rooms = RoomLabels(("west", "east"), label_of)
+    sizes = {}
+    for tolerance_m in (0.06, 0.2, 0.5, None):
+        path = tmp_path / f"{tolerance_m}.yaml"
+        hn.save_rooms(path, rooms, grid, tolerance_m=tolerance_m)
+        assert free_rooms(hn.load_rooms(path, grid), grid) == free_rooms(rooms, grid)
+        sizes[tolerance_m] = sum(line.count("[") for line in path.read_text().splitlines())
+    assert sizes[None] >= sizes[0.06] > sizes[0.2] > sizes[0.5]
+    for wrong in (0, -1, float("nan"), float("inf")):
+        with pytest.raises(hn.InvalidValueError, match="tolerance_m must be positive and finite"):
+            hn.save_rooms(tmp_path / "x.yaml", rooms, grid, tolerance_m=wrong)
 
 
 def test_names_may_be_changed(floor, path):
@@ -239,6 +278,7 @@ def test_a_real_floor_is_a_small_file_and_read_exactly(data, tmp_path, floor_nam
     path = tmp_path / "rooms.yaml"
     hn.save_rooms(path, rooms, grid)
     again = hn.load_rooms(path, grid)
+    assert path.stat().st_size <= 20_000
     named = (rooms.label_of >= 0) & (grid.measured == 1)
     assert (again.label_of == rooms.label_of)[named].all()
 

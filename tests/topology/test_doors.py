@@ -259,16 +259,18 @@ def test_numbers_that_are_known_survive_any_file(tmp_path_factory, scene, shift)
     assert [again.door(door.number).rooms for door in same] == [door.rooms for door in same]
 
 
-DOORS = "doors:\n- {number: 7, point: [1.95, 1.35]}\n- {number: 9, point: [0.5, 0.5]}\n"
+DOORS = "doors:\n  7: [1.95, 1.35]\n  9: [0.5, 0.5]\n"
+OLDER = "doors:\n- {number: 7, point: [1.95, 1.35]}\n- {number: 9, point: [0.5, 0.5]}\n"
 
 
-def test_a_file_edited_by_hand_keeps_the_doors_that_it_knows(tmp_path):
+@pytest.mark.parametrize("doors", [DOORS, OLDER])
+def test_a_file_edited_by_hand_keeps_the_doors_that_it_knows(tmp_path, doors):
     grid, labels = flat()
     path = tmp_path / "rooms.yaml"
     hn.save_rooms(path, labels, grid)
     text = path.read_text().replace("name: hall", "name: parlour")
     head, _ = text.split("doors:")
-    path.write_text(head + DOORS)
+    path.write_text(head + doors)
     rooms = rooms_of(grid, hn.load_rooms(path, grid))
     # 9 is no door any more, so that nothing else is called it.
     assert by_number(rooms) == {7: {"kitchen", "parlour"}, 10: {"parlour", "lab"}}

@@ -72,6 +72,15 @@ AtOption = Annotated[
     str | None,
     typer.Option("--at", metavar="X,Y", help="Print only the room that this point lies in."),
 ]
+ToleranceOption = Annotated[
+    float | None,
+    typer.Option(
+        "--tolerance",
+        metavar="D",
+        help="How far outlines may lie from the cells, in metres, before they are straightened.",
+        show_default="the least with which the file has 20 kB",
+    ),
+]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 
 
@@ -89,6 +98,7 @@ def rooms(
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     at: AtOption = None,
     force: ForceOption = False,
+    tolerance_m: ToleranceOption = None,
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
@@ -99,6 +109,9 @@ def rooms(
         raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
     if out is not None:
         check_writable(out, "--out")
+    if tolerance_m is not None and (out is None or not 0 < tolerance_m < math.inf):
+        needed = "needs --out" if out is None else "must be positive and finite"
+        raise UsageError(f"--tolerance {needed}, got --tolerance {tolerance_m:g}")
     finds = method is not None or least_area_m2 is not None
     if rooms_file is not None and finds:
         option = "--least-area" if method is None else "--method"
@@ -128,7 +141,7 @@ def rooms(
     if out is not None:
         # What is listed and drawn is what others read; areas stay those that were asked for.
         with stage("writing rooms", seconds, "write"):
-            hn.save_rooms(out, labels, grid)
+            hn.save_rooms(out, labels, grid, tolerance_m=tolerance_m)
             labels = hn.load_rooms(out, grid)
     with stage("building the pyramid", seconds, "pyramid"):
         topology = model.grown(settings.pyramid, labels)

@@ -166,23 +166,31 @@ def _closed(rings: list[FloatArray]) -> list[Any]:
 
 
 def _doors(marked: Marked, where: str) -> dict[int, tuple[float, float]]:
-    """Return the numbers of doors, each with a point of its boundary."""
+    """Return the numbers of doors, each with a point of its boundary.
+
+    Older files have a list of numbers and points.
+    """
+    value = marked.values.get("doors", {})
+    if isinstance(value, dict):
+        at = f"{where}, line {marked.line('doors')}: doors" if value else where
+        each = [(at, number, point) for number, point in value.items()]
+    else:
+        each = []
+        for index, entry in enumerate(list_of(value, f"{where}: doors")):
+            at = f"{where}, line {marked.line('doors', index)}: doors"
+            if not isinstance(entry, dict) or "number" not in entry:
+                raise RoomsError(f"{at}: expected a number and a point, got {reprlib.repr(entry)}")
+            check_keys(entry, ("number", "point"), f"{at}: door {entry['number']!r:.20}")
+            each.append((at, entry["number"], entry.get("point")))
     doors: dict[int, tuple[float, float]] = {}
-    for index, entry in enumerate(list_of(marked.values.get("doors", []), f"{where}: doors")):
-        here = f"{where}, line {marked.line('doors', index)}"
-        if not isinstance(entry, dict) or "number" not in entry:
-            raise RoomsError(
-                f"{here}: doors: expected a number and a point, got {reprlib.repr(entry)}"
-            )
+    for at, given, point in each:
         try:
-            number = check_number(entry["number"])
+            number = check_number(given)
         except InvalidValueError as error:
-            raise RoomsError(f"{here}: doors: {error}") from None
-        at = f"{here}: door {number}"
-        check_keys(entry, ("number", "point"), at)
+            raise RoomsError(f"{at}: {error}") from None
         if number in doors:
-            raise RoomsError(f"{at}: the number is given twice, every door needs its own")
-        doors[number] = xy_of(entry.get("point"), f"{at}: point")
+            raise RoomsError(f"{at}: door {number}: the number is given twice, keep one")
+        doors[number] = xy_of(point, f"{at}: door {number}: point")
     return doors
 
 

@@ -48,8 +48,9 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         crosses itself. Entries of one name are one room, if their outlines lie beside each other.
         Where outlines overlap, one that a person has drawn or changed since the file was written
         has the cells, and the later one of several. In addition, `points:` is a list of named
-        points, and `doors:` a list of numbers of doors, each with a `point` of its boundary: the
-        door nearest to it, within a metre, keeps the number. `cells:` holds cells that written
+        points, and `doors:` a mapping from numbers of doors to a point [x, y] of the boundary, or
+        a list with `number` and `point`: the door nearest to it, within a metre, keeps the number.
+        `cells:` holds cells that written
         outlines miss. In the other form `locations:` is a list of names, with an image `data:` of
         the size of the map's, whose pixel values index the list, or flat `polygons:` in pixels of
         that image; polygons win if both are present, and the first of overlapping ones.

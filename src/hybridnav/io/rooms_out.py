@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,8 +11,9 @@ import numpy as np
 import yaml
 
 from hybridnav._files import printable, replace_file
-from hybridnav.errors import RoomsError
-from hybridnav.io.outlines import TOLERANCES_M, areas_of, kept_cells, outlines_of
+from hybridnav.errors import InvalidValueError, RoomsError
+from hybridnav.io.outlines import Outlines, decimals_of
+from hybridnav.io.regions import kept_cells
 from hybridnav.io.rooms_cells import fingerprint, packed
 from hybridnav.io.rooms_entries import LIMITS, Outline, Read, in_cells
 from hybridnav.io.rooms_in import check_points, check_rooms, labels_of
@@ -19,7 +21,7 @@ from hybridnav.io.rooms_paint import painted
 from hybridnav.io.rooms_text import HEADER, OldText
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from hybridnav._typing import FloatArray, IntArray, PathLike
     from hybridnav.grid import OccupancyGrid, RoomLabels
@@ -27,17 +29,18 @@ if TYPE_CHECKING:
 
 _MOST_BYTES = 20_000
 """Size of a file above which coarser outlines are tried: more than a person edits."""
-_DECIMALS = 3
+_TOLERANCES_M = (0.05, 0.075, 0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
 
 
-def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
+def save_rooms(
+    path: PathLike, rooms: RoomLabels, grid: OccupancyGrid, *, tolerance_m: float | None = None
+) -> None:
     """Write rooms as a file that `load_rooms` reads and a person can edit.
 
-    Outlines have few corners, lie along walls, and neighbours share their common border. They are
-    coarser, by up to 60 cm, where outlines and cells would exceed 20 kB. The free cells that they
-    miss are kept in `cells`, so that every free cell is read with the room that it has; only
-    nameless ones below a square metre may get one. The doors are written with their numbers, so
-    that lists, pictures and plans of the file use the same.
+    Outlines have few corners, lie along walls, and neighbours share their common border. The free
+    cells that they miss are kept in `cells`, so that every free cell is read with the room that it
+    has; only nameless ones below a square metre may get one. The doors are written with their
+    numbers, so that lists, pictures and plans of the file use the same.
 
     Where the file exists, outlines that still hold, and all comments, are kept.
 
@@ -49,9 +52,15 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
         Labels of the cells of the map.
     grid
         The map.
+    tolerance_m
+        How far outlines may lie from the steps of the cells, in metres, before they are brought
+        into line with walls; None for the least of 0.05, 0.075, 0.1, 0.15, ... 0.6 m with which the
+        file has 20 kB.
 
     Raises
     ------
+    InvalidValueError
+        When the tolerance is not positive and finite.
     RoomsError
         When the file cannot be written, or could not be read again: a room has no free cell, a
         named point lies outside the map or in an obstacle, or there are too many rooms.
@@ -64,16 +73,14 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
     >>> hn.load_rooms("rooms.yaml", grid).names
     ('kitchen', 'hall')
     """
+    if tolerance_m is not None and not 0 < tolerance_m < math.inf:
+        raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
     where = f"rooms {printable(path)}"
     check_rooms(Read(where, list(rooms.names)), rooms.label_of, grid)
     check_points(rooms.points, where, grid)
-    # Loads scipy and numba.
-    from hybridnav.topology.doors import renumbered  # noqa: PLC0415
-
     old = OldText.of(path, rooms, grid)
-    draft = _fitting(rooms, grid, old, where)
-    doors = renumbered(rooms, draft.label_of, grid)
-    text = "\n".join([*draft.lines, *_door_lines(doors), *_cell_lines(draft.cells)]) + "\n"
+    tolerances_m = _TOLERANCES_M if tolerance_m is None else (tolerance_m,)
+    text = _Writer(rooms, grid, where).fitting(old, tolerances_m).text
     size = len(text.encode())
     # A value has two bytes or more.
     n_values = 0 if size < 2 * LIMITS.max_values else _n_values(text)
@@ -90,99 +97,110 @@ def save_rooms(path: PathLike, rooms: RoomLabels, grid: OccupancyGrid) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Draft:
-    """A file without its doors."""
+    """A file."""
 
     lines: list[str]
+    """Those up to the cells."""
     cells: list[str]
+    """Those of the cells."""
     label_of: IntArray
     """int32 (rows, cols), the rooms as they are read."""
 
     @property
-    def size(self) -> int:
-        """Number of bytes, about."""
-        return sum(len(line.encode()) + 1 for line in (*self.lines, *self.cells))
+    def text(self) -> str:
+        """The whole text."""
+        return "\n".join([*self.lines, *self.cells]) + "\n"
 
 
-def _fitting(rooms: RoomLabels, grid: OccupancyGrid, old: OldText | None, where: str) -> _Draft:
-    """Return the finest draft of at most 20 kB that is read as these rooms, else the finest."""
-    areas = areas_of(rooms.label_of, len(rooms.names), grid)
-    for kept in [old, None] if old is not None and old.blocks else [None]:
-        best: _Draft | None = None
-        for tolerance_m in TOLERANCES_M:
-            rings_of = outlines_of(areas, grid, tolerance_m)
-            draft = _drafted(rooms, rings_of, grid, kept, where)
-            best = draft if best is None else best
-            if draft is None or draft.size <= _MOST_BYTES:
-                best = draft
-                break
-        if best is not None:
-            if kept is None and old is not None:
-                return replace(best, lines=[*old.comments, *best.lines])
-            return best
-    raise AssertionError  # a draft without an old file always holds
+class _Writer:
+    """Drafts of a file with outlines of several tolerances."""
 
+    def __init__(self, rooms: RoomLabels, grid: OccupancyGrid, where: str) -> None:
+        self._rooms = rooms
+        self._grid = grid
+        self._where = where
+        self._outlines = Outlines(rooms.label_of, len(rooms.names), grid)
+        self._is_kept = kept_cells(rooms.label_of, grid)
+        self._names = [_name(name) for name in rooms.names]
 
-def _drafted(
-    rooms: RoomLabels,
-    rings_of: list[list[FloatArray]],
-    grid: OccupancyGrid,
-    old: OldText | None,
-    where: str,
-) -> _Draft | None:
-    """Return a draft with these outlines for the rooms that the old file does not hold as they
-    are; None if it would be read otherwise."""
-    fresh = {
-        room: Outline(room, [in_cells(ring, grid) for ring in rings], fingerprint(rings))
-        for room, rings in enumerate(rings_of)
-    }
-    entries = {
-        room: _entry(name, rings, rooms)
-        for room, (name, rings) in enumerate(zip(rooms.names, rings_of, strict=True))
-    }
-    kept = [] if old is None else old.outlines
-    done = {outline.room for outline in kept}
-    outlines = sorted(
-        [*kept, *(fresh[room] for room in fresh if room not in done)], key=lambda each: each.room
-    )
-    written = [o for o in outlines if o.room not in done or o.fingerprint in _unchanged(old)]
-    read = Read(where, list(rooms.names), [1] * len(rooms.names), outlines)
-    none = np.empty(0, dtype=np.int64)
-    plain = painted(read, {outline.fingerprint: (none, none) for outline in written}, grid)
-    is_kept = kept_cells(rooms.label_of, grid)
-    missed = is_kept & (plain != rooms.label_of)
-    cells = packed(missed, rooms.label_of, [(o.room, o.fingerprint) for o in written], grid)
-    label_of = labels_of(replace(read, cells=cells), grid)
-    if (label_of != rooms.label_of)[is_kept].any():
-        return None
-    if old is None:
-        lines = [HEADER[0].format(" ".join(grid.name.split())), *HEADER[1:]]
-        lines.append("rooms:" if rooms.names else "rooms: []")
-        lines += [line for room in entries for line in entries[room]]
-        lines += _point_lines(rooms)
-    else:
-        lines = old.with_entries(entries, _point_lines(rooms))
-    return _Draft(lines, cells, label_of)
+    def fitting(self, old: OldText | None, tolerances_m: Sequence[float]) -> _Draft:
+        """Return the finest draft of at most 20 kB that is read as these rooms, else the
+        coarsest; tolerances ascend."""
+        # Loads scipy and numba.
+        from hybridnav.topology.doors import renumbered  # noqa: PLC0415
+
+        for kept in [old, None] if old is not None and old.blocks else [None]:
+            best: _Draft | None = None
+            doors: list[str] = []
+            low, high, most = 0, len(tolerances_m), 0
+            while low < high:
+                # The coarsest first: it may be the only one.
+                middle = len(tolerances_m) - 1 if best is None else (low + high) // 2
+                draft = self._draft(self._outlines.within(tolerances_m[middle]), kept)
+                if draft is None:
+                    break
+                if best is None:
+                    # Cells are read as they are, so that the doors of all drafts are the same.
+                    found = renumbered(self._rooms, draft.label_of, self._grid)
+                    doors = _door_lines(found, self._grid)
+                    most = _MOST_BYTES - sum(len(line.encode()) + 1 for line in doors)
+                fits = len(draft.text.encode()) <= most
+                best = draft if fits or best is None else best
+                low, high = (low, middle) if fits else (middle + 1, high)
+            if best is not None:
+                comments = old.comments if kept is None and old is not None else []
+                return replace(best, lines=[*comments, *best.lines, *doors])
+        raise AssertionError  # a draft without an old file always holds
+
+    def _draft(self, rings_of: list[list[FloatArray]], old: OldText | None) -> _Draft | None:
+        """Return a draft without doors, with these outlines for the rooms that the old file does
+        not hold as they are; None if it would be read otherwise."""
+        rooms, grid = self._rooms, self._grid
+        fresh = {
+            room: Outline(room, [in_cells(ring, grid) for ring in rings], fingerprint(rings))
+            for room, rings in enumerate(rings_of)
+        }
+        kept = [] if old is None else old.outlines
+        done = {outline.room for outline in kept}
+        outlines = sorted(
+            [*kept, *(fresh[room] for room in fresh if room not in done)],
+            key=lambda each: each.room,
+        )
+        unchanged = set() if old is None else old.written
+        written = [o for o in outlines if o.room not in done or o.fingerprint in unchanged]
+        read = Read(self._where, list(rooms.names), [1] * len(rooms.names), outlines)
+        none = np.empty(0, dtype=np.int64)
+        plain = painted(read, {outline.fingerprint: (none, none) for outline in written}, grid)
+        missed = self._is_kept & (plain != rooms.label_of)
+        cells = packed(missed, rooms.label_of, [(o.room, o.fingerprint) for o in written], grid)
+        label_of = labels_of(replace(read, cells=cells), grid)
+        if (label_of != rooms.label_of)[self._is_kept].any():
+            return None
+        entries = {room: self._entry(room, rings) for room, rings in enumerate(rings_of)}
+        if old is None:
+            lines = [HEADER[0].format(" ".join(grid.name.split())), *HEADER[1:]]
+            lines.append("rooms:" if rooms.names else "rooms: []")
+            lines += [line for room in entries for line in entries[room]]
+            lines += _point_lines(rooms)
+        else:
+            lines = old.with_entries(entries, _point_lines(rooms))
+        return _Draft(lines, _cell_lines(cells), label_of)
+
+    def _entry(self, room: int, rings: list[FloatArray]) -> list[str]:
+        lines = [f"- {self._names[room]}"]
+        if len(rings) == 1:
+            lines.append(f"  polygon: {_ring(rings[0])}")
+        else:
+            lines += ["  polygons:", *(f"  - {_ring(ring)}" for ring in rings)]
+        points, name = self._rooms.points, self._rooms.names[room]
+        if name in points:
+            lines.append(f"  point: {_corner(*points[name])}")
+        return lines
 
 
 def _n_values(text: str) -> int:
     """Return the number of values that a reader counts."""
     return sum(isinstance(each, yaml.NodeEvent) for each in yaml.parse(text))
-
-
-def _unchanged(old: OldText | None) -> set[int]:
-    """Return the fingerprints of the outlines that were written with their cells."""
-    return set() if old is None else old.written
-
-
-def _entry(name: str, rings: list[FloatArray], rooms: RoomLabels) -> list[str]:
-    lines = [f"- {_name(name)}"]
-    if len(rings) == 1:
-        lines.append(f"  polygon: {_ring(rings[0])}")
-    else:
-        lines += ["  polygons:", *(f"  - {_ring(ring)}" for ring in rings)]
-    if name in rooms.points:
-        lines.append(f"  point: {_corner(*rooms.points[name])}")
-    return lines
 
 
 def _point_lines(rooms: RoomLabels) -> list[str]:
@@ -193,11 +211,11 @@ def _point_lines(rooms: RoomLabels) -> list[str]:
     return lines
 
 
-def _door_lines(doors: Mapping[int, Point]) -> list[str]:
+def _door_lines(doors: Mapping[int, Point], grid: OccupancyGrid) -> list[str]:
     lines = ["doors:  # their numbers; a point of each"] if doors else []
-    for number, at in doors.items():
-        x, y = (round(value, _DECIMALS) for value in at)
-        lines.append(f"- {{number: {number}, point: {_corner(x, y)}}}")
+    decimals = decimals_of(grid)
+    for number, (x, y) in doors.items():
+        lines.append(f"  {number}: {_corner(round(x, decimals), round(y, decimals))}")
     return lines
 
 
@@ -215,4 +233,9 @@ def _ring(points: FloatArray) -> str:
 
 
 def _corner(x: float, y: float) -> str:
-    return f"[{float(x) + 0.0!r}, {float(y) + 0.0!r}]"
+    return f"[{_number(x)},{_number(y)}]"
+
+
+def _number(value: float) -> str:
+    """Return a number in as few letters as it needs."""
+    return repr(float(value) + 0.0).removesuffix(".0")

@@ -113,6 +113,8 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[i
         Labels in which connected cells of no room, measured as free and together below one square
         metre, have the room with which they have the longest border.
     """
+    if not rooms:
+        return label_of
     nameless = (grid.measured == CellClass.FREE) & (label_of == NO_ROOM)
     part_of, n_parts = ndimage.label(nameless)
     cells = np.bincount(part_of.ravel(), minlength=n_parts + 1)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from hybridnav._files import printable
 from hybridnav.config.yaml_file import read_marked
 from hybridnav.errors import HybridNavError, RoomsError
-from hybridnav.io.outlines import kept_cells
+from hybridnav.io.regions import kept_cells
 from hybridnav.io.room_measures import measures_of
 from hybridnav.io.rooms_cells import unpacked
 from hybridnav.io.rooms_entries import LIMITS, Outline, Read, read_entries
