@@ -183,3 +183,13 @@ def test_a_damaged_record_is_named(cli, rooms, tmp_path):
 def test_runs_that_cannot_be_compared(cli, tmp_path):
     assert cli("compare", tmp_path, tmp_path / "none").refuses(2, "no records there")
     assert cli("compare", tmp_path, tmp_path, "--metric", "l2").refuses(2, "got metric 'l2'")
+
+
+def test_costs_are_judged_and_printed_beside_lengths(cli, tmp_path):
+    query = ("evaluate", FIGURE, "--robot-radius", "0", "--pairs", "5", "-o", tmp_path / "run")
+    done = cli(*query, "--preset", "shortest", "--costs", "clearance:multiplier=4")
+    assert done.code == 0
+    assert "| length mean m | cost mean m | weighted loss % |" in done.out
+    assert cli(*query, "--metric", "weighted").refuses(2, "--metric weighted goes with --costs")
+    assert cli(*query, "--costs", "walls").refuses(2, "--costs must begin with clearance")
+    assert cli(*query).refuses(2, "holds a run with costs clearance:multiplier=4")

@@ -8,7 +8,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.cli.app import run
-from hybridnav.harness.task import MapSpec, read_map
+from hybridnav.harness.scenes import MapSpec, read_map
 
 KEYS = "resolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 LIMIT = "more than the limit of 20,000,000; reading them takes about 1.2 GB of memory, planning "

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav.baselines import _weighted_kernels
-from hybridnav.baselines.protocol import Cell, MethodResult
+from hybridnav.baselines.protocol import Cell, CostClaim, MethodResult
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
 
 
@@ -35,22 +36,32 @@ class GridAstar:
     ----------
     grid
         The map; free cells are entered, all others not.
+    costs
+        Costs of its cells, by which paths are cheapest; None for lengths.
     """
 
-    def __init__(self, grid: OccupancyGrid) -> None:
+    def __init__(self, grid: OccupancyGrid, *, costs: CostLayer | None = None) -> None:
         self.name = "grid-astar"
         self.region_of: IntArray | None = None
+        self._costs, self._resolution_m = costs, grid.resolution_m
         enterable = grid.classes == CellClass.FREE
-        self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting)
+        units = None if costs is None else costs.units
+        self._search = GridSearch(enterable, corner_cutting=grid.corner_cutting, units=units)
         moves = legal_moves(enterable, grid.corner_cutting)
         self.n_nodes, self.n_edges = _graph_size(enterable, moves)
         self.memory_bytes = self._search.memory_bytes
 
     def solve(self, start: Cell, goal: Cell) -> MethodResult:
-        """Find a shortest path between two free cells; the bound is 1."""
+        """Find a shortest path between two free cells, or a cheapest one; the bound is its own."""
         began = time.perf_counter()
         found = self._search.search(start, goal)
         seconds = {"refine": time.perf_counter() - began}
+        if self._costs is not None and found.cells is not None:
+            cost_m = self._costs.cost_of_cells(found.cells) * self._resolution_m
+            claim = CostClaim(cost_m, cost_m)
+            return MethodResult(
+                found.cells, by_costs=claim, expanded=found.expanded, seconds=seconds
+            )
         bound = math.inf if found.cells is None else 1.0
         return MethodResult(found.cells, bound=bound, expanded=found.expanded, seconds=seconds)
 

@@ -39,6 +39,24 @@ class AnyAngleResult:
     method has no such fallback."""
 
 
+@dataclass(frozen=True)
+class CostClaim:
+    """What a method that plans by costs claims about the cost of its path.
+
+    Examples
+    --------
+    >>> from hybridnav.baselines import CostClaim, MethodResult
+    >>> MethodResult(np.array([[0, 0], [0, 1]]), by_costs=CostClaim(1.5, 1.5)).by_costs.cost_m
+    1.5
+    """
+
+    cost_m: float
+    """Cost of the path: the integral of the factors along it, in metres."""
+    lower_bound_m: float = 0.0
+    """Proved lower bound on the costs of all paths of cells, or, beside an `any_angle` path, of all
+    any-angle paths, in metres."""
+
+
 @dataclass(frozen=True, eq=False)
 class MethodResult:
     """A method's answer to one query.
@@ -64,7 +82,7 @@ class MethodResult:
     is the path from node to node of `nodes`."""
     bound: float = math.inf
     """Proved factor: the path of cells is at most `bound` times as long as the shortest; infinite
-    for no proof."""
+    for no proof. It is about lengths: claims about costs are in `by_costs`."""
     expanded: int = 0
     """Cells expanded by the metric layer."""
     expanded_nodes: int = 0
@@ -74,6 +92,8 @@ class MethodResult:
     one; `first path` until the first path of a planner that improves its path."""
     any_angle: AnyAngleResult | None = None
     """The path, if it is not one of cells."""
+    by_costs: CostClaim | None = None
+    """Claims about the cost of the path; None if the method planned by lengths."""
     gave_up: str = ""
     """Reason for no path and no claim that none exists, such as "timeout"."""
 
@@ -86,7 +106,10 @@ class MethodResult:
 class Method(Protocol):
     """One method prepared for one map.
 
-    Its construction prepares it; its `close`, if there is one, is called after the last query.
+    Its construction prepares it; its `close`, if there is one, is called after the last query. If
+    its constructor has a parameter `costs`, it is called with `costs=layer` in a run with costs,
+    where cells that the layer closes are occupied. Other methods are made as in any run, and what
+    they find is judged by the cost of their paths.
     """
 
     @property

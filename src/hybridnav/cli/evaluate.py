@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from hybridnav.cli.common import answer, complain, progress_bar, read_settings
+from hybridnav.cli.costs import parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import MaxCellsOption
 from hybridnav.grid import DEFAULT_MAX_CELLS
@@ -79,8 +80,17 @@ MetricOption = Annotated[
     typer.Option(
         "--metric",
         metavar="WHICH",
-        help="What losses refer to: the any-angle optimum for all paths, the octile optimum, or "
-        "both, each path's own (any-angle, octile, both).",
+        help="What losses refer to: the any-angle optimum for all paths, the octile optimum, the "
+        "least cost of paths of cells (with --costs), or both, each path's own (any-angle, octile, "
+        "weighted, both).",
+    ),
+]
+EvaluateCostsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--costs",
+        metavar="WHAT",
+        help="Plan and judge by costs, written as for `hybridnav plan`; may be repeated.",
     ),
 ]
 SetOption = Annotated[
@@ -104,6 +114,7 @@ def evaluate(
     robot_radius_m: RadiusOption = None,
     merge_distance_m: DistanceOption = None,
     corner_cutting: CornersOption = False,
+    costs: EvaluateCostsOption = None,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     timeout_s: TimeoutOption = 600.0,
     metric: MetricOption = "both",
@@ -121,6 +132,8 @@ def evaluate(
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
     yardstick = _yardstick(metric)
+    if not parsed_costs(costs) and yardstick == "weighted":
+        raise UsageError("--metric weighted goes with --costs: state them, or take another metric")
     if yardstick == "any-angle" and corner_cutting:
         raise UsageError(
             "--metric any-angle does not go with --corner-cutting: no any-angle path passes "
@@ -138,6 +151,7 @@ def evaluate(
         robot_radius_m=robot_radius_m,
         merge_distance_m=merge_distance_m,
         corner_cutting=corner_cutting,
+        costs=tuple(costs or ()),
         max_cells=max_cells,
         workers=workers,
         scheduler=scheduler,

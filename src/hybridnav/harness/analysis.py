@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
 from hybridnav.harness.records import read_records
@@ -38,6 +39,11 @@ class Study:
     outcomes: list[Outcome]
     metric: Yardstick = "both"
     """What losses refer to."""
+
+    @property
+    def costs(self) -> str:
+        """Costs of the run as a text, empty for lengths."""
+        return self.outcomes[0].costs if self.outcomes else ""
 
     @property
     def maps(self) -> list[str]:
@@ -89,7 +95,9 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
         Maps below this folder are named by their paths from it; None names them by their files.
     metric
         Reference of losses: "any-angle", for all paths the any-angle optimum; "octile", the octile
-        optimum, without losses for any-angle paths; "both", the optimum in each path's own metric.
+        optimum, without losses for any-angle paths; "weighted", in a run with costs, for the costs
+        of all paths the least cost of paths of cells; "both", in a run with costs "weighted", else
+        the optimum in each path's own metric.
 
     Returns
     -------
@@ -99,7 +107,7 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     Raises
     ------
     InvalidValueError
-        When a line is no record, or there is no such metric.
+        When a line is no record, runs differ in their costs, or there is no such metric.
 
     Examples
     --------
@@ -117,6 +125,7 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
             preparations[key] = record
         else:
             pairs.setdefault(key, []).append(record)
+    metric = _metric_of(preparations, metric, folder)
     names = _map_labels(preparations, root)
     digests: dict[str, set[tuple[str, str]]] = {}
     for record in preparations.values():
@@ -139,12 +148,35 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     outcomes.sort(
         key=lambda outcome: (
             order[outcome.map_name],
-            outcome.metric != "octile",
+            outcome.is_any_angle,
             place.get(outcome.preparation["method"], len(place)),
             outcome.label,
         )
     )
     return Study(outcomes, metric)
+
+
+def _metric_of(
+    preparations: dict[tuple[str, str], Record], metric: Yardstick, folder: Path
+) -> Yardstick:
+    """Return the yardstick for the runs in a folder, which all have the same costs.
+
+    Raises
+    ------
+    InvalidValueError
+        When they have not, or there are no costs to refer to.
+    """
+    costs = {str(record.get("costs", "")) for record in preparations.values()}
+    if len(costs) > 1:
+        known = ", ".join(repr(text) for text in sorted(costs))
+        raise InvalidValueError(
+            f"run {folder} has records with different costs, {known}: take a folder for each"
+        )
+    if metric == "weighted" and costs == {""}:
+        raise InvalidValueError(
+            f"run {folder} has no costs to refer to: run it with costs, or take another metric"
+        )
+    return "weighted" if metric == "both" and costs - {""} else metric
 
 
 def _map_labels(preparations: dict[tuple[str, str], Record], root: Path | None) -> dict[str, str]:

@@ -101,7 +101,7 @@ def _paired(first: Outcome, second: Outcome) -> _Sample:
     shared = [key for key in places[0] if key in places[1]]
     one, other = (np.array([place[key] for key in shared], dtype=np.int64) for place in places)
     best = np.minimum(first.best_m[one], second.best_m[other])
-    losses = loss_of(first.lengths_m[one], best), loss_of(second.lengths_m[other], best)
+    losses = loss_of(first.judged_m[one], best), loss_of(second.judged_m[other], best)
     return *losses, first.seconds[one], second.seconds[other]
 
 

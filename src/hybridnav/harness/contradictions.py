@@ -42,13 +42,39 @@ def contradiction(record: Record, reference: Record) -> str | None:
         return f"solvability: {record['status']}, but on the whole grid: {reference['status']}"
     if record.get("length_m") is None or reference.get("length_m") is None:
         return None
+    wrong = _cost_contradiction(record, reference.get("weighted_m"))
+    if wrong:
+        return wrong
     if is_any_angle(record):
         return _any_angle_contradiction(record, reference.get("any_angle_m"))
     return _cells_contradiction(record, reference)
 
 
+def octile_optimum_m(reference: Record) -> float:
+    """Return the length of the shortest path of cells that a record of the reference holds."""
+    return float(reference["octile_m"] if "octile_m" in reference else reference["length_m"])
+
+
+def _cost_contradiction(record: Record, optimum: float | None) -> str | None:
+    """Return the contradiction of costs by the least cost of paths of cells.
+
+    An any-angle path may cost less, and a bound on all any-angle paths holds for paths of cells.
+    """
+    cost, bound = record.get("cost_m"), record.get("cost_lower_bound_m")
+    if optimum is None or cost is None:
+        return None
+    if cost < optimum * (1 - SLACK) and not is_any_angle(record):
+        return f"cost {cost:.6f} m is below the weighted optimum {optimum:.6f} m"
+    slack = ANY_ANGLE_SLACK if is_any_angle(record) else SLACK
+    if bound is not None and bound > optimum * (1 + slack):
+        return (
+            f"the lower bound on costs {bound:.6f} m is above the weighted optimum {optimum:.6f} m"
+        )
+    return None
+
+
 def _cells_contradiction(record: Record, reference: Record) -> str | None:
-    length, optimum = record["length_m"], reference["length_m"]
+    length, optimum = record["length_m"], octile_optimum_m(reference)
     if length < optimum * (1 - SLACK):
         return f"length {length:.6f} m is below the optimum {optimum:.6f} m"
     bound = record.get("bound")

@@ -29,7 +29,9 @@ def to_frame(study: Study) -> pd.DataFrame:
         `goal_col`; `length_m`, NaN where the method found no path without a fault itself;
         `octile_optimum_m` and `any_angle_optimum_m`; `loss` over the reference that the study
         uses, `octile_loss` and `any_angle_loss`, as shares; `seconds` of the query and
-        `reference_seconds` of A* on the whole grid; `expanded` cells or nodes.
+        `reference_seconds` of A* on the whole grid; `expanded` cells or nodes. In a run with costs
+        also `costs`, their text; `cost_m`, `weighted_optimum_m` and `cost_lower_bound_m`;
+        `weighted_loss` and `gap`, as shares.
 
     Raises
     ------
@@ -74,4 +76,16 @@ def _columns(outcome: Outcome) -> dict[str, object]:
         "seconds": outcome.seconds,
         "reference_seconds": outcome.reference_seconds,
         "expanded": outcome.figure("expanded"),
+        **(_of_costs(outcome) if outcome.costs else {}),
+    }
+
+
+def _of_costs(outcome: Outcome) -> dict[str, object]:
+    return {
+        "costs": outcome.costs,
+        "cost_m": outcome.costs_m,
+        "weighted_optimum_m": outcome.weighted_optima_m,
+        "cost_lower_bound_m": outcome.figure("cost_lower_bound_m"),
+        "weighted_loss": outcome.weighted_losses,
+        "gap": outcome.gaps,
     }

@@ -12,6 +12,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
+from hybridnav.harness.cost_judge import CostJudge
 from hybridnav.harness.methods import HybridMethod, Prepared
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.metrics import ScipyOptimum, VisibilityGraph, judge_line, judge_path, line_cells
@@ -21,6 +22,7 @@ from hybridnav.search.moves import path_length_in_cells
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
     from hybridnav.baselines import AnyAngleResult, MethodResult
+    from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
@@ -53,11 +55,21 @@ class Judge:
         The method.
     reference
         Whether the lengths of this method are the optimum: then they are checked against other
-        optima too, and any-angle lengths are recorded.
+        optima too, and any-angle lengths are recorded. With costs its costs are the optimum.
+    costs
+        Costs of the cells, by which paths are judged too; None for lengths.
     """
 
-    def __init__(self, grid: OccupancyGrid, prepared: Prepared, *, reference: bool) -> None:
-        self._grid = grid
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        prepared: Prepared,
+        *,
+        reference: bool,
+        costs: CostLayer | None = None,
+    ) -> None:
+        self._grid, self._layer = grid, costs
+        self._costs = None if costs is None else CostJudge(grid, costs)
         self._oracles = Oracles(grid) if reference else None
         self._region_of = prepared.method.region_of
         self._consistency: Consistency | None = None
@@ -69,7 +81,8 @@ class Judge:
             self._has_arcs = own is not None
             self.region_faults = self._consistency.check_regions()
             free = grid.classes == CellClass.FREE
-            self._search = GridSearch(free, corner_cutting=grid.corner_cutting)
+            units = None if costs is None else costs.units
+            self._search = GridSearch(free, corner_cutting=grid.corner_cutting, units=units)
             self._regions = np.zeros(int(self._region_of.max(initial=-1)) + 1, dtype=np.bool_)
 
     def faults(self, pair: Pair, answer: MethodResult) -> tuple[float | None, list[str]]:
@@ -106,17 +119,31 @@ class Judge:
         assert answer.cells is not None  # noqa: S101 - the caller has looked
         return answer.cells
 
+    def cost(self, answer: MethodResult, length_m: float | None) -> tuple[Record, list[str]]:
+        """Return the cost of a legal path, counted anew, its bound, and faults of the claims about
+        them; nothing in a run without costs."""
+        if self._costs is None or length_m is None:
+            return {}, []
+        return self._costs.judged(answer, length_m)
+
     def oracles(
         self, answer: MethodResult, pair: Pair, length_m: float | None
     ) -> tuple[Record, list[str]]:
         """Return the other optima of a pair, and their contradictions by the reference's answer."""
         if self._oracles is None:
             return {}, []
-        return self._oracles.ask(answer, pair, length_m)
+        optima: Record = {}
+        if self._costs is not None:
+            optima, faults = self._costs.optima(pair, is_path=answer.is_path)
+            if faults:
+                return {}, faults
+            length_m = optima.get("octile_m")
+        known, faults = self._oracles.ask(answer, pair, length_m)
+        return optima | known, faults
 
     def plan_optimum_m(self, pair: Pair, answer: MethodResult) -> float | None:
-        """Return the length of the best path inside the regions of the plan; None without plan or
-        path."""
+        """Return the length, or the cost, of the best path inside the regions of the plan; None
+        without plan or path."""
         if answer.nodes is None or self._search is None:
             return None
         self._regions[list(answer.nodes)] = True
@@ -126,6 +153,8 @@ class Judge:
         self._regions[list(answer.nodes)] = False
         if found.cells is None:
             return None
+        if self._layer is not None:
+            return self._layer.cost_of_cells(found.cells) * self._grid.resolution_m
         return path_length_in_cells(found.cells) * self._grid.resolution_m
 
 
@@ -166,7 +195,8 @@ class Oracles:
     def ask(
         self, answer: MethodResult, pair: Pair, length_m: float | None
     ) -> tuple[Record, list[str]]:
-        """Return fields of the record, and faults."""
+        """Return fields of the record, and faults; `length_m` is the octile optimum as far as the
+        reference knows it."""
         known: Record = {}
         faults = []
         length = math.inf if length_m is None else length_m

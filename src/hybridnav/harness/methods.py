@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import inspect
 import json
 import time
 from dataclasses import dataclass, field
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav.baselines import AnyAngleResult, MethodResult
+from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
@@ -24,6 +25,7 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     from hybridnav._typing import IntArray
     from hybridnav.baselines import Method
+    from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
     from hybridnav.result import Metric, PlanResult
 
@@ -82,9 +84,15 @@ class MethodSpec:
 
 
 def preset_spec(
-    source: str | Preset, *, merge_distance_m: float | None = None, seed: int | None = None
+    source: str | Preset,
+    *,
+    merge_distance_m: float | None = None,
+    seed: int | None = None,
+    by_costs: bool = False,
 ) -> MethodSpec:
     """Return the method of a preset, with its merge distance and seed where they are given.
+
+    In a run with costs those take the place of the preset's own.
 
     Raises
     ------
@@ -94,7 +102,7 @@ def preset_spec(
         When it needs OMPL, which is not installed.
     """
     preset = load_preset(source)
-    _check_metric(preset)
+    _check_metric(preset, by_costs=by_costs)
     pyramid = preset.pyramid.model_dump(exclude={"robot_radius_m"})
     smoothed = preset.planner.smooth == LINE_OF_SIGHT
     return MethodSpec(
@@ -104,12 +112,12 @@ def preset_spec(
     )
 
 
-def _check_metric(preset: Preset) -> None:
+def _check_metric(preset: Preset, *, by_costs: bool) -> None:
     ompl, costs = preset.planner.ompl, preset.planner.costs
-    if costs is not None and costs.clearance is not None:
+    if costs is not None and costs.clearance is not None and not by_costs:
         raise InvalidValueError(
-            f"preset {preset.name}: the harness measures lengths, and planner.costs makes "
-            "something else small: it evaluates presets without costs"
+            f"preset {preset.name} plans by costs, and this run measures lengths: state costs for "
+            "all methods, as in --costs clearance"
         )
     if ompl is None:
         return
@@ -157,10 +165,12 @@ def _given(merge_distance_m: float | None, seed: int | None) -> dict[str, Any]:
 class HybridMethod:
     """A preset of `HybridPlanner` as a method; see `baselines.Method`."""
 
-    def __init__(self, topology: TopologicalMap, preset: Preset) -> None:
+    def __init__(
+        self, topology: TopologicalMap, preset: Preset, costs: CostLayer | None = None
+    ) -> None:
         self.topology = topology
         self.name = preset.name
-        self._planner = HybridPlanner(topology, preset=preset)
+        self._planner = HybridPlanner(topology, preset=preset, costs=costs)
         self._planner.prepare()
         self._frame = topology.grid.frame
         free = topology.classes == CellClass.FREE
@@ -182,13 +192,17 @@ class HybridMethod:
         path = result.path if result.solved else None
         line = _line(result)
         arc_ids = self.topology.arc_ids
+        by_costs = self._planner.costs is not None
+        claim = CostClaim(result.cost, result.lower_bound) if by_costs and result.solved else None
+        is_factor = result.solved and line is None and not by_costs
         return MethodResult(
             None if path is None or line is not None else path.cells,
             any_angle=line,
             gave_up=str(result.status) if result.status in _GAVE_UP else "",
             nodes=None if route is None else _dense(self.topology.place_ids, route.places),
             arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
-            bound=1 + result.gap if result.solved and line is None else np.inf,
+            bound=1 + result.gap if is_factor else np.inf,
+            by_costs=claim,
             expanded=stats.expanded + stats.expanded_intervals,
             expanded_nodes=stats.expanded_places,
             seconds=_stages(result),
@@ -204,13 +218,14 @@ _GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
 
 def _line(result: PlanResult) -> AnyAngleResult | None:
     """Return the path of a solved query if it is an any-angle path."""
-    if result.metric != "any-angle" or result.path is None or not result.solved:
+    is_line = result.metric in ("any-angle", "any-angle-weighted")
+    if not is_line or result.path is None or not result.solved:
         return None
     how = result.refinement
     return AnyAngleResult(
         result.path.points,
         result.path.length_m,
-        lower_bound_m=result.lower_bound,
+        lower_bound_m=result.lower_bound if result.metric == "any-angle" else 0.0,
         by_grid=None if how is None else how.by_grid,
     )
 
@@ -260,6 +275,8 @@ class Prepared:
     """The places that it plans on, None for methods that need none."""
     pyramid_seconds: float
     method_seconds: float
+    by_costs: bool = False
+    """Whether it plans by the costs of the run."""
 
     def close(self) -> None:
         """End the processes of the method, which answers no more."""
@@ -268,8 +285,8 @@ class Prepared:
             close()
 
 
-def prepare(spec: MethodSpec, grid: OccupancyGrid) -> Prepared:
-    """Build a method for a map."""
+def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = None) -> Prepared:
+    """Build a method for a map, with the costs of its cells if it can plan by them."""
     began = time.perf_counter()
     topology = None
     if spec.pyramid:
@@ -277,11 +294,27 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid) -> Prepared:
     built = time.perf_counter()
     method: Method
     if spec.preset is not None and topology is not None:
-        method = HybridMethod(topology, Preset.model_validate(spec.preset))
+        preset = Preset.model_validate(spec.preset)
+        if preset.planner.refusal_of_costs():
+            costs = None
+        method = HybridMethod(topology, preset, costs)
     else:
         made_of, options = _class_of(spec.name)
+        if not _takes_costs(made_of):
+            costs = None
+        if costs is not None:
+            options = options | {"costs": costs}
         method = made_of(grid if topology is None else topology, **options)
-    return Prepared(method, topology, built - began, time.perf_counter() - built)
+    by_costs = costs is not None
+    return Prepared(method, topology, built - began, time.perf_counter() - built, by_costs)
+
+
+def _takes_costs(made_of: Any) -> bool:
+    """Return whether a class is made with costs."""
+    try:
+        return "costs" in inspect.signature(made_of).parameters
+    except (TypeError, ValueError):  # a class without a signature
+        return False
 
 
 def _class_of(name: str) -> tuple[Any, dict[str, Any]]:

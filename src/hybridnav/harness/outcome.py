@@ -15,6 +15,7 @@ from hybridnav.harness.contradictions import (
     SLACK,
     contradiction,
     is_any_angle,
+    octile_optimum_m,
 )
 from hybridnav.harness.paths import path_steps
 from hybridnav.metrics import thrun_count
@@ -74,15 +75,32 @@ class Outcome:
 
     @cached_property
     def metric(self) -> str:
-        """Metric of the method's paths: "octile" or "any-angle"."""
-        return (
-            "any-angle" if any(map(is_any_angle, (self.preparation, *self.records))) else "octile"
-        )
+        """Metric of the method's paths: "octile" or "any-angle"; "weighted" or "any-angle-weighted"
+        if it planned by costs."""
+        if self.preparation.get("by_costs"):
+            return "any-angle-weighted" if self.is_any_angle else "weighted"
+        return "any-angle" if self.is_any_angle else "octile"
+
+    @cached_property
+    def is_any_angle(self) -> bool:
+        """Whether some of the method's paths are any-angle ones."""
+        return any(map(is_any_angle, (self.preparation, *self.records)))
+
+    @property
+    def costs(self) -> str:
+        """Costs of the run, as a text; empty for lengths."""
+        return str(self.preparation.get("costs", ""))
 
     @cached_property
     def optima_m(self) -> FloatArray:
-        """Lengths of the optimum on the grid."""
-        return np.array([record["length_m"] for record in self.references], dtype=float)
+        """Lengths of the shortest path of cells."""
+        return np.array([octile_optimum_m(record) for record in self.references], dtype=float)
+
+    @cached_property
+    def weighted_optima_m(self) -> FloatArray:
+        """Least costs of paths of cells; NaN in a run without costs."""
+        known = [record.get("weighted_m", math.nan) for record in self.references]
+        return np.array(known, dtype=float)
 
     @cached_property
     def any_angle_optima_m(self) -> FloatArray:
@@ -99,7 +117,9 @@ class Outcome:
 
     @cached_property
     def best_m(self) -> FloatArray:
-        """Reference lengths of the losses."""
+        """Reference lengths of the losses, or costs."""
+        if self.yardstick == "weighted":
+            return self.weighted_optima_m
         if self.yardstick == "octile":
             return self._octile_optima_m
         if self.yardstick == "any-angle":
@@ -109,8 +129,30 @@ class Outcome:
 
     @cached_property
     def losses(self) -> FloatArray:
-        """Lengths over their reference lengths, minus one."""
-        return loss_of(self.lengths_m, self.best_m)
+        """Lengths, or costs, over those of the reference, minus one. An any-angle path may cost
+        less than the cheapest path of cells: then its loss is negative."""
+        return loss_of(self.judged_m, self.best_m)
+
+    @property
+    def judged_m(self) -> FloatArray:
+        """What losses are computed from: the costs of the method's own paths, or their lengths."""
+        return self.costs_m if self.yardstick == "weighted" else self.lengths_m
+
+    @cached_property
+    def weighted_losses(self) -> FloatArray:
+        """Cost over the least cost of paths of cells, minus one, for paths in any metric."""
+        return loss_of(self.costs_m, self.weighted_optima_m)
+
+    @cached_property
+    def gaps(self) -> FloatArray:
+        """Proved distances from the optimum: cost over the proved lower bound on costs, minus one;
+        NaN without costs or bound."""
+        bounds = self.figure("cost_lower_bound_m")
+        gaps: FloatArray = np.divide(
+            self.costs_m, bounds, out=np.full(len(bounds), math.nan), where=bounds > 0
+        )
+        gaps -= 1
+        return np.where(gaps <= SLACK, 0.0, gaps)
 
     @cached_property
     def octile_losses(self) -> FloatArray:
@@ -136,12 +178,18 @@ class Outcome:
     @cached_property
     def lengths_m(self) -> FloatArray:
         """Lengths of the method's own paths without faults."""
-        return np.where(self._by_grid, math.nan, self._sound_m)
+        return np.where(self._by_grid, math.nan, self._sound("length_m"))
+
+    @cached_property
+    def costs_m(self) -> FloatArray:
+        """Costs of the same paths; NaN in a run without costs."""
+        return np.where(self._by_grid, math.nan, self._sound("cost_m"))
 
     @cached_property
     def fallback_losses(self) -> FloatArray:
         """Loss of the grid's paths that stand in for the method's own."""
-        return loss_of(np.where(self._by_grid, self._sound_m, math.nan), self.best_m)
+        key = "cost_m" if self.yardstick == "weighted" else "length_m"
+        return loss_of(np.where(self._by_grid, self._sound(key), math.nan), self.best_m)
 
     @cached_property
     def by_grid(self) -> float:
@@ -154,15 +202,17 @@ class Outcome:
     def _by_grid(self) -> BoolArray:
         return np.nan_to_num(self.figure("by_grid")) > 0
 
-    @cached_property
-    def _sound_m(self) -> FloatArray:
+    def _sound(self, key: str) -> FloatArray:
+        """Return one number of each path without a fault."""
         faulty = [bool(record and record.get("faults")) for record in self._matched]
-        return np.where(faulty, math.nan, self.figure("length_m"))
+        return np.where(faulty, math.nan, self.figure(key))
 
     @cached_property
     def plan_losses(self) -> FloatArray:
-        """Thrun's loss of the plan: the best grid path inside its regions, over the optimum."""
-        return loss_of(self.figure("plan_optimum_m"), self.optima_m)
+        """Thrun's loss of the plan: the best path of cells inside its regions, over the best of
+        all, by length or, in a run with costs, by cost."""
+        best = self.weighted_optima_m if self.costs else self.optima_m
+        return loss_of(self.figure("plan_optimum_m"), best)
 
     @cached_property
     def seconds(self) -> FloatArray:

@@ -15,6 +15,7 @@ from hybridnav.harness.outcome import Outcome, nanquantile, query_key
 from hybridnav.harness.paths import decode_path
 from hybridnav.harness.records import map_digest
 from hybridnav.harness.report import MapSection, ReportData, Table, WorstCase, render_report
+from hybridnav.harness.scenes import MapSpec, read_map
 from hybridnav.harness.tables import (
     EFFICIENCY_COLUMNS,
     Row,
@@ -26,7 +27,6 @@ from hybridnav.harness.tables import (
     to_csv,
     to_markdown,
 )
-from hybridnav.harness.task import MapSpec, read_map
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,6 +47,7 @@ REFERS_TO: dict[Yardstick, str] = {
     "both": "the optimum in the metric of each path",
     "any-angle": "the any-angle optimum, for all paths",
     "octile": "the octile optimum; any-angle paths have none",
+    "weighted": "the least cost of paths of cells, for the costs of all paths",
 }
 """What losses refer to, in words."""
 
@@ -121,6 +122,7 @@ def _report(
         *_machines(study).items(),
         ("maps", str(len(study.maps))),
         ("methods", ", ".join(study.labels)),
+        *([("costs", study.costs)] if study.costs else []),
         ("losses refer to", REFERS_TO[study.metric]),
         ("queries without an answer", f"{study.failures:,}"),
     ]
@@ -200,7 +202,7 @@ def _section(study: Study, name: str, rows: list[Row]) -> MapSection:
 def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
     """Return the methods for charts, each with those that its losses are compared with."""
     if study.metric == "octile":
-        return [outcome for outcome in outcomes if outcome.metric == "octile"]
+        return [outcome for outcome in outcomes if not outcome.is_any_angle]
     others = [outcome for outcome in outcomes if outcome.label != REFERENCE]
     if study.metric == "both" and all(outcome.metric == "any-angle" for outcome in others):
         return others or outcomes
@@ -214,11 +216,12 @@ def _worst(outcome: Outcome) -> list[WorstCase]:
     if outcome.label != REFERENCE:
         shown = WORST_CASES if outcome.preparation.get("preset") is not None else 1
         own = {query_key(record): record for record in outcome.records}
+        how = "dear" if outcome.yardstick == "weighted" else "long"
         order = np.argsort(-np.nan_to_num(outcome.losses, nan=0.0), kind="stable")[:shown]
         for at in order[outcome.losses[order] > 0]:
             reference = outcome.references[at]
             record = own[query_key(reference)]
-            cases.append(_case(outcome, record, f"{100 * outcome.losses[at]:.1f} % too long"))
+            cases.append(_case(outcome, record, f"{100 * outcome.losses[at]:.1f} % too {how}"))
     return [case for case in cases if case is not None]
 
 
@@ -234,7 +237,7 @@ def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
         grid = read_map(spec)
     except MapError:  # it is no longer there
         return None
-    if map_digest(grid) != about["map_sha"]:
+    if map_digest(grid) != about.get("grid_sha", about["map_sha"]):
         return None
     optimum = None
     if record["type"] == "pair":

@@ -84,7 +84,11 @@ class RecordFile:
         self.path = folder / RECORDS_FILE
         self.ids: set[str] = set()
         _drop_cut_line(self.path)
-        self.ids = {record["id"] for record in read_records(folder)}
+        there = read_records(folder)
+        self.ids = {record["id"] for record in there}
+        made = (record for record in there if record["type"] == "preparation")
+        self.costs = {str(record.get("costs", "")) for record in made}
+        """Costs of the runs in this folder, as texts; empty for lengths."""
         self._stream = self.path.open("ab")
         _lock(self._stream, folder)
 

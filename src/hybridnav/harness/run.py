@@ -22,8 +22,15 @@ from hybridnav.harness.pairs import (
     sample_pairs,
     scenario_pairs,
 )
-from hybridnav.harness.records import RECORDS_FILE, RecordFile, map_digest
-from hybridnav.harness.task import MapSpec, Task, read_map
+from hybridnav.harness.records import RECORDS_FILE, RecordFile
+from hybridnav.harness.scenes import (
+    GivenCosts,
+    MapSpec,
+    clear_scenes,
+    read_scene,
+    text_of_costs,
+)
+from hybridnav.harness.task import Task
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.io.movingai import read_scenarios
 
@@ -73,6 +80,10 @@ class RunSettings:
     merge_distance_m: float | None = None
     """None: the preset's for ROS maps (4 m for baselines), 40 m for MovingAI's."""
     corner_cutting: bool = False
+    costs: GivenCosts = ()
+    """Costs of cells, by which paths are judged: texts as in `hybridnav plan --costs`, such as
+    `("clearance:multiplier=4",)`, read for each map, or a `CostLayer` for one map. They take the
+    place of costs that a preset names; cells that they close are occupied for all methods."""
     max_cells: int = DEFAULT_MAX_CELLS
     """The most cells that a map may have; see `load_map`."""
     workers: int = 1
@@ -86,7 +97,9 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     r"""Answer all pairs on all maps by all methods, and append the records to a folder.
 
     Records that exist are kept, so a run that was killed resumes. The baseline "grid-astar" is
-    always among the methods: its lengths are the optimum.
+    always among the methods: its lengths are the optimum. With costs the optimum is that of
+    Dijkstra's algorithm by the judges, for each pair. Methods that can plan by costs do; the paths
+    of the others are judged by their cost too.
 
     Parameters
     ----------
@@ -105,7 +118,8 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     Raises
     ------
     InvalidValueError
-        When a setting is out of range, or the folder cannot be written.
+        When a setting is out of range, the folder cannot be written, or it holds a run with other
+        costs.
     MapError, PresetError
         When a map, a scenario file or a preset cannot be read.
 
@@ -119,14 +133,15 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     12
     """
     path = Path(folder)
-    read_map.cache_clear()  # a file may have changed since the last run of this process
+    clear_scenes()  # a file may have changed since the last run of this process
     tasks = [task for name in settings.maps for task in _tasks_of(settings, name)]
     try:
         path.mkdir(parents=True, exist_ok=True)
         if any(path.iterdir()) and not (path / RECORDS_FILE).exists():
             raise InvalidValueError(f"folder {folder} holds other files and no run: take a new one")
-        _write_settings(settings, path)
         with RecordFile(path) as records:
+            _check_costs(settings, records)
+            _write_settings(settings, path)
             total = len({name for task in tasks for name in task.ids})
             wanted = [rest for task in tasks if (rest := _missing(task, records.ids)) is not None]
             before = len(records.ids)
@@ -139,6 +154,20 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
             return len(records.ids) - before
     except OSError as error:
         raise InvalidValueError(f"folder {folder}: {error.strerror}") from None
+
+
+def _check_costs(settings: RunSettings, records: RecordFile) -> None:
+    """Raise `InvalidValueError` if the folder holds a run with other costs."""
+    own = text_of_costs(settings.costs)
+    for other in sorted(records.costs - {own}):
+        raise InvalidValueError(
+            f"folder {records.path.parent} holds a run {_with(other)}, and this one is "
+            f"{_with(own)}: take a new folder"
+        )
+
+
+def _with(costs: str) -> str:
+    return f"with costs {costs}" if costs else "without costs"
 
 
 def _run(settings: RunSettings, tasks: Sequence[Task]) -> Iterator[list[Record]]:
@@ -175,10 +204,11 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
         merge_distance_m = MOVINGAI_MERGE_DISTANCE_M
     if merge_distance_m is not None and not merge_distance_m > 0:
         raise InvalidValueError(f"the merge distance must be positive, got {merge_distance_m} m")
-    spec = MapSpec(str(Path(name).resolve()), radius_m, settings.corner_cutting, settings.max_cells)
-    grid = read_map(spec)
-    digest = map_digest(grid)
-    pairs = _pairs_of(settings, grid)
+    file = str(Path(name).resolve())
+    spec = MapSpec(file, radius_m, settings.corner_cutting, settings.max_cells, settings.costs)
+    scene = read_scene(spec)
+    digest = scene.digest
+    pairs = _pairs_of(settings, scene.grid)
     return [
         Task(spec, digest, method, tuple(pairs[at : at + _PAIRS_PER_TASK]))
         for method in methods_of(settings, merge_distance_m)
@@ -191,7 +221,9 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
     names = dict.fromkeys((REFERENCE, *settings.baselines))
     specs = [baseline_spec(name, merge_distance_m=merge_distance_m) for name in names]
     for preset in settings.presets:
-        spec = preset_spec(preset, merge_distance_m=merge_distance_m)
+        spec = preset_spec(
+            preset, merge_distance_m=merge_distance_m, by_costs=bool(text_of_costs(settings.costs))
+        )
         # The preset of the same name as the reference is that very search: measured once.
         if spec.name != REFERENCE:
             specs.append(spec)
@@ -227,6 +259,7 @@ def _write_settings(settings: RunSettings, folder: Path) -> None:
         preset if isinstance(preset, str) else preset.name for preset in settings.presets
     ]
     plain["sampler_version"] = SAMPLER_VERSION
+    plain["costs"] = text_of_costs(settings.costs)
     if settings.merge_distance_m == math.inf:  # JSON has no such number
         plain["merge_distance_m"] = "inf"
     with (folder / RUNS_FILE).open("a", encoding="utf-8") as stream:

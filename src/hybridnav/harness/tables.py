@@ -17,7 +17,7 @@ from hybridnav.metrics import distance_buckets, summarise
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import MapQuery, Outcome
     from hybridnav.harness.yardstick import Yardstick
@@ -46,6 +46,13 @@ _LOSS_COLUMNS = (
     "loss of the plan %",
     "loss mean m",
 )
+_COST_COLUMNS = (
+    "length mean m",
+    "cost mean m",
+    "weighted loss %",
+    "gap mean %",
+    "gap max %",
+)
 EFFICIENCY_COLUMNS = (
     "nodes",
     "backups",
@@ -65,6 +72,9 @@ EFFICIENCY_COLUMNS = (
 
 def loss_columns(metric: Yardstick) -> tuple[str, ...]:
     """Return the columns of a table of losses; the loss over the requested optimum comes first."""
+    if metric == "weighted":
+        at = _LOSS_COLUMNS.index("any-angle loss %")
+        return _LOSS_COLUMNS[:at] + _COST_COLUMNS + _LOSS_COLUMNS[at + 2 :]
     leading, other = "any-angle loss %", "octile loss %"
     if metric != "octile":
         return _LOSS_COLUMNS
@@ -90,12 +100,14 @@ def figures(
     -------
     dict
         By column. Losses are pooled over all pairs; nodes, memory and preparation are means over
-        the maps; counts and times are means or quantiles over all pairs.
+        the maps; counts and times are means or quantiles over all pairs. Columns about costs are
+        those of runs with costs alone.
     """
     losses = _pooled([outcome.losses for outcome in outcomes])
     finite = losses[np.isfinite(losses)]
     summary = summarise(finite)
     lengths = _pooled([outcome.lengths_m for outcome in outcomes])
+    judged = _pooled([outcome.judged_m for outcome in outcomes])
     shared = np.array([one for outcome in outcomes for one in outcome.among(common)], np.bool_)
     best = _pooled([outcome.best_m for outcome in outcomes])
     fallbacks = [outcome.by_grid for outcome in outcomes if not math.isnan(outcome.by_grid)]
@@ -109,6 +121,7 @@ def figures(
         "pairs in common": int(np.isfinite(lengths[shared]).sum()),
         "any-angle loss %": 100 * nanmean(_pooled([o.any_angle_losses for o in outcomes])[shared]),
         "octile loss %": 100 * nanmean(_pooled([o.octile_losses for o in outcomes])[shared]),
+        **(_of_costs(outcomes, shared) if any(outcome.costs for outcome in outcomes) else {}),
         "loss mean %": 100 * summary.mean,
         "loss 95 % interval": f"{text_of(low)} to {text_of(high)}" if len(finite) else "",
         "loss median %": 100 * summary.median,
@@ -117,8 +130,21 @@ def figures(
         "loss max %": 100 * summary.max,
         "without loss %": 100 * summary.share_without_loss,
         "loss of the plan %": 100 * nanmean(_pooled([o.plan_losses for o in outcomes])),
-        "loss mean m": nanmean(lengths - best),
+        "loss mean m": nanmean(judged - best),
         **_efficiency(outcomes, references),
+    }
+
+
+def _of_costs(outcomes: Sequence[Outcome], shared: BoolArray) -> Row:
+    """Return lengths and costs over the pairs in common, beside each other, and proved gaps."""
+    gaps = _pooled([outcome.gaps for outcome in outcomes])
+    return {
+        "length mean m": nanmean(_pooled([outcome.lengths_m for outcome in outcomes])[shared]),
+        "cost mean m": nanmean(_pooled([outcome.costs_m for outcome in outcomes])[shared]),
+        "weighted loss %": 100
+        * nanmean(_pooled([outcome.weighted_losses for outcome in outcomes])[shared]),
+        "gap mean %": 100 * nanmean(gaps),
+        "gap max %": 100 * nanquantile(gaps, 1.0),
     }
 
 
@@ -248,8 +274,8 @@ def text_of(value: str | float) -> str:
         return ""
     if math.isinf(value):
         return "never"
-    if 0 < value < _LEAST:
-        return f"< {_LEAST:.4f}"
+    if 0 < abs(value) < _LEAST:
+        return f"< {_LEAST:.4f}" if value > 0 else f"> -{_LEAST:.4f}"
     if value == 0 or abs(value) >= 10**_DIGITS / 10:
         return f"{value:,.0f}"
     digits = max(0, _DIGITS - 1 - math.floor(math.log10(abs(value))))

@@ -4,40 +4,29 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-from hybridnav.errors import HybridNavError, InvalidValueError, MapWarning
-from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
+from hybridnav.costs import CostLayer
+from hybridnav.errors import HybridNavError, InvalidValueError
+from hybridnav.grid import CellClass
 from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.pairs import SAMPLER_VERSION
 from hybridnav.harness.paths import encode_path
 from hybridnav.harness.records import environment, map_digest, pair_id, preparation_id
-from hybridnav.io import load_map
+from hybridnav.harness.scenes import read_map, read_scene, text_of_costs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from hybridnav.baselines import AnyAngleResult, MethodResult
-    from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
-
-
-@dataclass(frozen=True)
-class MapSpec:
-    """A map file and its reading."""
-
-    path: str
-    robot_radius_m: float | None
-    """None for that of a model."""
-    corner_cutting: bool = False
-    max_cells: int = DEFAULT_MAX_CELLS
+    from hybridnav.harness.scenes import MapSpec, Scene
 
 
 @dataclass(frozen=True)
@@ -59,15 +48,6 @@ class Task:
         return preparation_id(self.map_sha, self.method), *of_pairs
 
 
-@lru_cache(maxsize=2)
-def read_map(spec: MapSpec) -> OccupancyGrid:
-    """Return the grid of a map file; the last two are kept."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MapWarning)
-        grid = load_map(spec.path, robot_radius_m=spec.robot_radius_m, max_cells=spec.max_cells)
-    return replace(grid, corner_cutting=True) if spec.corner_cutting else grid
-
-
 def run_task(task: Task) -> Iterator[Record]:
     """Prepare the method, answer the pairs, judge the answers.
 
@@ -81,24 +61,24 @@ def run_task(task: Task) -> Iterator[Record]:
     Record
         The record of the preparation, then one for each pair; failures are records too.
     """
-    grid = read_map(task.map)
+    scene = read_scene(task.map)
     common = {
-        "map": grid.name,
+        "map": scene.grid.name,
         "map_sha": task.map_sha,
         "method": task.method.name,
         "method_sha": task.method.digest,
     }
     head = {"id": task.ids[0], "type": "preparation", **common}
     try:
-        prepared, judge = _ready(grid, task)
+        prepared, judge = _ready(scene, task)
     except Exception as error:  # noqa: BLE001 - a method that cannot be made is a result
         reason = _reason(error)
-        yield {**head, "status": "error", "error": reason, **_about(grid, task)}
+        yield {**head, "status": "error", "error": reason, **_about(scene, task)}
         for name, pair in zip(task.ids[1:], task.pairs, strict=True):
             yield {**_of_pair(name, pair, common), "status": "error", "error": reason, "faults": []}
         return
     with closing(prepared):
-        yield {**head, "status": "ready", **_about(grid, task), **_of_preparation(prepared, judge)}
+        yield {**head, "status": "ready", **_about(scene, task), **_of_preparation(prepared, judge)}
         for name, pair in zip(task.ids[1:], task.pairs, strict=True):
             yield {**_of_pair(name, pair, common), **_answer(prepared, judge, pair)}
 
@@ -106,6 +86,7 @@ def run_task(task: Task) -> Iterator[Record]:
 def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     method = prepared.method
     return {
+        **({"by_costs": True} if prepared.by_costs else {}),
         "pyramid_seconds": prepared.pyramid_seconds,
         "method_seconds": prepared.method_seconds,
         "n_nodes": int(method.n_nodes),
@@ -116,16 +97,19 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     }
 
 
-def _ready(grid: OccupancyGrid, task: Task) -> tuple[Prepared, Judge]:
-    if map_digest(grid) != task.map_sha:
+def _ready(scene: Scene, task: Task) -> tuple[Prepared, Judge]:
+    if scene.digest != task.map_sha:
         raise InvalidValueError(f"map {task.map.path} has changed since the run began")
-    _warm_up(task.method)
-    prepared = prepare(task.method, grid)
-    return prepared, Judge(grid, prepared, reference=task.method.name == REFERENCE)
+    _warm_up(task.method, by_costs=scene.costs is not None)
+    prepared = prepare(task.method, scene.grid, scene.costs)
+    is_reference = task.method.name == REFERENCE
+    return prepared, Judge(scene.grid, prepared, reference=is_reference, costs=scene.costs)
 
 
-def _about(grid: OccupancyGrid, task: Task) -> Record:
+def _about(scene: Scene, task: Task) -> Record:
+    grid = scene.grid
     return {
+        **_of_costs(scene, task.map),
         "file": task.map.path,
         "shape": list(grid.shape),
         "resolution_m": grid.resolution_m,
@@ -136,6 +120,17 @@ def _about(grid: OccupancyGrid, task: Task) -> Record:
         "preset": None if task.method.preset is None else _plain(task.method.preset),
         "pyramid": _plain(task.method.pyramid),
         "environment": environment(),
+    }
+
+
+def _of_costs(scene: Scene, spec: MapSpec) -> Record:
+    """Return the fields that the record of a preparation has in a run with costs."""
+    if scene.costs is None:
+        return {}
+    return {
+        "costs": text_of_costs(spec.costs),
+        "cost_source": scene.costs.source,
+        "grid_sha": map_digest(read_map(replace(spec, costs=()))),
     }
 
 
@@ -198,6 +193,9 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
 def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> Record:
     length_m, faults = judge.faults(pair, answer)
     known: Record = {}
+    costs: Record = {}
+    if not faults:
+        costs, faults = judge.cost(answer, length_m)
     if not faults:
         known, faults = judge.oracles(answer, pair, length_m)
     unsolved = answer.gave_up or "no path"
@@ -213,6 +211,7 @@ def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> R
         "expanded_nodes": int(answer.expanded_nodes),
         "seconds": seconds,
         "stages": {stage: float(value) for stage, value in answer.seconds.items()},
+        **costs,
         **known,
         "faults": faults,
     }
@@ -236,16 +235,17 @@ def _plan_steps(answer: MethodResult) -> int | None:
     return None if answer.nodes is None else len(answer.nodes) - 1
 
 
-def _warm_up(spec: MethodSpec) -> None:
+def _warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
     """Compile or load the kernels of a method on a small map, so that no time includes it."""
-    if spec.digest in _WARM:
+    if (spec.digest, by_costs) in _WARM:
         return
     grid = figure1_world().grid(robot_radius_m=0)
-    with closing(prepare(spec, grid)) as prepared:
-        Judge(grid, prepared, reference=False)
+    layer = CostLayer.clearance(grid) if by_costs else None
+    with closing(prepare(spec, grid, layer)) as prepared:
+        Judge(grid, prepared, reference=False, costs=layer)
         for goal in ((2, 2), (grid.shape[0] - 3, 12)):
             prepared.method.solve((2, 2), goal)
-    _WARM.add(spec.digest)
+    _WARM.add((spec.digest, by_costs))
 
 
-_WARM: set[str] = set()
+_WARM: set[tuple[str, bool]] = set()

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.scenes import text_of_costs
 from hybridnav.harness.task import Task, run_task
 
 if TYPE_CHECKING:
@@ -187,6 +188,8 @@ def failed_record(task: Task, index: int, status: str) -> Record:
         "status": status,
         "faults": [],
     }
+    if task.map.costs and not index:
+        common["costs"] = text_of_costs(task.map.costs)
     if index:
         pair = task.pairs[index - 1]
         common |= {"kind": pair.kind, "start": list(pair.start), "goal": list(pair.goal)}

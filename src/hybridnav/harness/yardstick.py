@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 
 Cell = tuple[int, int]
 
-Yardstick = Literal["both", "any-angle", "octile"]
-"""What losses refer to: each path's own metric; for all paths the any-angle optimum; the octile
-optimum, which any-angle paths have no loss over."""
+Yardstick = Literal["both", "any-angle", "octile", "weighted"]
+"""What losses refer to: each path's own metric, in a run with costs `weighted`; for all paths the
+any-angle optimum; the octile optimum, which any-angle paths have no loss over; the least cost of
+paths of cells, for the costs of all paths."""
 
 
 def check_yardstick(metric: str) -> None:

@@ -1,0 +1,114 @@
+# ruff: noqa: D102 - what `solve` does differently is what each class says
+"""Methods that plan by costs, each with one planted fault, for the harness to catch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
+from hybridnav.baselines.grid import GridAstar
+from hybridnav.costs import cost_along
+from tests.harness.faulty_methods import length_of
+
+if TYPE_CHECKING:
+    import hybridnav as hn
+
+    Cell = tuple[int, int]
+
+
+class Cheapest(GridAstar):
+    """A method without a fault, for the others to derive from: A* by costs, lengths without."""
+
+    def __init__(self, grid: hn.OccupancyGrid, *, costs: hn.CostLayer | None = None) -> None:
+        super().__init__(grid, costs=costs)
+        self.name = type(self).__name__
+        self.grid, self.layer = grid, costs
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        answer = super().solve(start, goal)
+        if answer.cells is None or answer.by_costs is None:
+            return answer
+        return self.changed(answer, answer.by_costs)
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:  # noqa: ARG002
+        """Return the answer with the planted fault."""
+        return answer
+
+    def cost_m(self, cells: Any) -> float:
+        """Cost of a path of cells."""
+        assert self.layer is not None
+        return self.layer.cost_of_cells(cells) * self.grid.resolution_m
+
+
+class DearSaidOptimal(Cheapest):
+    """A dearer path, to and fro at its start, with its true cost and gap 0."""
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:
+        assert answer.cells is not None
+        if len(answer.cells) < 2:
+            return answer
+        cells = np.concatenate([answer.cells[:2], answer.cells])
+        cost_m = self.cost_m(cells)
+        return replace(
+            answer, cells=cells, by_costs=replace(claim, cost_m=cost_m, lower_bound_m=cost_m)
+        )
+
+
+class DearSaidCheap(Cheapest):
+    """A dearer path that claims the cost of the cheapest."""
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:
+        assert answer.cells is not None
+        if len(answer.cells) < 2:
+            return answer
+        cells = np.concatenate([answer.cells[:2], answer.cells])
+        return replace(answer, cells=cells, by_costs=claim)
+
+
+class HonestlyDear(Cheapest):
+    """A dearer path with its true cost and the right bound: no fault."""
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:
+        assert answer.cells is not None
+        if len(answer.cells) < 2:
+            return answer
+        cells = np.concatenate([answer.cells[:2], answer.cells])
+        return replace(answer, cells=cells, by_costs=replace(claim, cost_m=self.cost_m(cells)))
+
+
+class BoundAboveItsCost(Cheapest):
+    """The cheapest path, and a bound above its cost."""
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:
+        return replace(answer, by_costs=replace(claim, lower_bound_m=1.01 * claim.cost_m + 0.01))
+
+
+class ClaimsNothing(Cheapest):
+    """The cheapest path, and claims that are no numbers."""
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:  # noqa: ARG002
+        return replace(answer, by_costs=CostClaim(math.nan, math.nan))
+
+
+class FalseBoundOfLine(Cheapest):
+    """An any-angle path, round about, whose cost it claims as the bound on all of them."""
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:  # noqa: ARG002
+        assert answer.cells is not None
+        assert self.layer is not None
+        cells = np.concatenate([answer.cells[:2], answer.cells])
+        points = self.grid.frame.points_of(cells)
+        cost_m = cost_along(self.grid, self.layer, points)
+        line = AnyAngleResult(points, length_of(points))
+        return MethodResult(None, any_angle=line, by_costs=CostClaim(cost_m, cost_m))
+
+
+class ByLength(GridAstar):
+    """A method that knows no costs: the shortest path, proved to be."""
+
+    def __init__(self, grid: hn.OccupancyGrid) -> None:
+        super().__init__(grid)
