@@ -122,12 +122,10 @@ def fine_segments(ground: Ground) -> IntArray:
     everywhere = np.where(free, np.int32(0), np.int32(-1))
     _segmentation_kernels.grow_labels(lines, everywhere, free.size)
     basins = _basins(ground)
-    both = np.where(
-        (lines >= 0) & (basins >= 0), lines * (basins.max(initial=0) + 1.0) + basins, -1
-    )
-    found, dense = np.unique(both, return_inverse=True)
-    first = int(np.searchsorted(found, 0))
-    segments: IntArray = np.maximum(dense.reshape(both.shape) - first, -1).astype(np.int32)
+    inside = (lines >= 0) & (basins >= 0)
+    both = lines[inside] * (np.int64(basins.max(initial=0)) + 1) + basins[inside]
+    segments = np.full(free.shape, -1, dtype=np.int32)
+    segments[inside] = np.unique(both, return_inverse=True)[1]
     return segments
 
 

@@ -249,10 +249,12 @@ def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
     """Return labels of at least some cells, renumbered by their first cells from the top row
     down."""
     areas = np.bincount(label_of[label_of >= 0])
-    found, first = np.unique(label_of[::-1], return_index=True)
-    kept = found >= 0
-    found, first = found[kept], first[kept]
-    large = areas[found] >= least
+    upside_down = label_of[::-1].ravel()
+    cells = np.flatnonzero(upside_down >= 0)[::-1]
+    firsts = np.empty(len(areas), dtype=np.int64)
+    firsts[upside_down[cells]] = cells  # the last one that is written stays: the first cell
+    found = np.flatnonzero(areas)
+    first, large = firsts[found], areas[found] >= least
     order = found[large][np.argsort(first[large], kind="stable")]
     new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
     new[order] = np.arange(len(order))
