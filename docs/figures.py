@@ -11,7 +11,15 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.mesh import build_mesh, trace_search
-from hybridnav.viz import plot_level, plot_levels, plot_mesh, plot_rooms, plot_search, save_figure
+from hybridnav.viz import (
+    plot_costs,
+    plot_level,
+    plot_levels,
+    plot_mesh,
+    plot_rooms,
+    plot_search,
+    save_figure,
+)
 
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
@@ -20,6 +28,9 @@ LEVELS = (6, 8, 10, -1)
 REGION_CELLS = 26_420
 """A tenth of the free cells, as portals have it."""
 START, GOAL = (1.0, 13.2), (40.6, 19.4)
+
+ROBOT = ("shortest", "robot")
+"""Presets whose paths are drawn over costs."""
 
 
 def draw_route(file: Path) -> None:
@@ -79,6 +90,18 @@ def draw_search(file: Path) -> None:
     save_figure(plot_search(grid, trace), file, dpi=150)
 
 
+def draw_robot(file: Path) -> None:
+    """Draw the paths of `robot` and `shortest` between the same points, over the costs."""
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    found = [hn.HybridPlanner(topology, preset=name).plan(START, GOAL).path for name in ROBOT]
+    paths = [path for path in found if path is not None]
+    lines = {name: path.poses()[:, :2] for name, path in zip(ROBOT, paths, strict=True)}
+    lengths = [f"{name} {path.length_m:.1f} m" for name, path in zip(ROBOT, paths, strict=True)]
+    layer = hn.CostLayer.clearance(grid)
+    save_figure(plot_costs(grid, layer, paths=lines, title=", ".join(lengths)), file, dpi=150)
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -93,6 +116,7 @@ if __name__ == "__main__":
         (draw_rooms, "office-rooms.png"),
         (draw_mesh, "mesh-office.png"),
         (draw_search, "mesh-search.png"),
+        (draw_robot, "office-robot.png"),
     ):
         draw(IMAGES / name)
         shrink(IMAGES / name)

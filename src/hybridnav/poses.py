@@ -76,6 +76,24 @@ class Motion:
         return ahead.astype(np.int8)
 
     @property
+    def spot_turns(self) -> LongArray:
+        """int64, indices of points at which the robot turns on the spot.
+
+        These are bends of straight lines without headings, and with headings the points that differ
+        from the next one in heading alone.
+        """
+        if self.headings_rad is None:
+            return np.flatnonzero(np.abs(wrapped(np.diff(self._travel))) > _BEND) + 1
+        return np.flatnonzero((self.lengths_m == 0) & (np.abs(self._turns) > _BEND))
+
+    @property
+    def max_curvature_per_m(self) -> float:
+        """Largest turn of a metre driven on arcs, in radians."""
+        lengths, turns = self.lengths_m, np.abs(self._turns)
+        bent = (lengths > 0) & (turns > _BEND)
+        return float((turns[bent] / lengths[bent]).max(initial=0.0)) if self.curved else 0.0
+
+    @property
     def headings_at_points(self) -> FloatArray:
         """float64 (n,), the headings, or the direction of travel after each point, before the last
         one; 0 without motion."""

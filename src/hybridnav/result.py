@@ -151,6 +151,17 @@ class Path:
         return self._motion.spread(spacing_m)[1]
 
     @property
+    def spot_turns(self) -> LongArray:
+        """int64, indices of points at which the robot turns on the spot: bends of straight lines,
+        and points that differ from the next one in heading alone."""
+        return self._motion.spot_turns
+
+    @property
+    def max_curvature_per_m(self) -> float:
+        """Largest curvature, 1 / the least radius of an arc, 1 / m; 0 for straight lines."""
+        return self._motion.max_curvature_per_m
+
+    @property
     def reversals(self) -> LongArray:
         """int64, indices of the points where the robot changes between ahead and backwards."""
         return np.flatnonzero(np.diff(self._motion.directions)) + 1
@@ -298,6 +309,8 @@ class PlanResult:
     chosen point."""
     goal: tuple[float, ...] | None = None
     """Goal of the plan, like `start`."""
+    grid_bound: float | None = None
+    """Proved bound on the cost of all paths of cells, metres, of an any-angle path by costs."""
     instruction_source: InstructionSource | tuple[Instruction, ...] = field(default=(), repr=False)
     """The instructions, or the data to find them from."""
 
@@ -344,6 +357,14 @@ class PlanResult:
             return math.nan
         return self.cost / self.lower_bound - 1 if self.lower_bound > 0 else 0.0
 
+    @property
+    def grid_gap(self) -> float:
+        """Proved distance from the cheapest path of cells, cost / `grid_bound` - 1, below 0 for a
+        cheaper path; NaN without that bound."""
+        if self.grid_bound is None or not self.solved:
+            return math.nan
+        return self.cost / self.grid_bound - 1 if self.grid_bound > 0 else 0.0
+
     def raise_for_status(self) -> Self:
         """Return the result itself if it is solved.
 
@@ -371,6 +392,8 @@ class PlanResult:
             "cost": self.cost if self.solved else None,
             "lower_bound": self.lower_bound if self.solved else None,
             "gap": self.gap if self.solved else None,
+            "grid_bound": self.grid_bound,
+            "grid_gap": self.grid_gap if self.grid_bound is not None else None,
             "places": list(self.route.places) if self.route else None,
             "arcs": list(self.route.arcs) if self.route else None,
             "points": np.round(self.path.points, 6).tolist() if self.path else None,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.cli.blocked import Closing
     from hybridnav.config import Preset
 
-_SMOOTH = ("none", "line-of-sight")
+_SMOOTH = ("none", "line-of-sight", "arcs")
 _PICTURES = (".pdf", ".png", ".svg")
 
 
@@ -156,19 +156,24 @@ def overridden(
 
 def check_picture(path: Path | None) -> None:
     """Refuse a picture that could not be saved, before anything is computed for it."""
+    check_output(path, "--plot", _PICTURES)
+
+
+def check_output(path: Path | None, option: str, endings: Sequence[str]) -> None:
+    """Refuse a file that could not be written, or ends in something else; None is no file."""
     if path is None:
         return
-    if path.suffix.lower() not in _PICTURES:
-        raise UsageError(f"--plot must end in {', '.join(_PICTURES)}, got {str(path)!r}")
+    if path.suffix.lower() not in endings:
+        raise UsageError(f"{option} must end in {', '.join(endings)}, got {str(path)!r}")
     try:
         in_folder, is_folder = path.parent.is_dir(), path.is_dir()
     except OSError as error:  # a name that is too long
-        raise UsageError(f"--plot {str(path)!r}: {error.strerror}") from None
+        raise UsageError(f"{option} {str(path)!r}: {error.strerror}") from None
     if not in_folder:
-        raise UsageError(f"--plot: there is no folder {str(path.parent)!r}")
+        raise UsageError(f"{option}: there is no folder {str(path.parent)!r}")
     if is_folder:
-        raise UsageError(f"--plot must name a file, {str(path)!r} is a folder")
-    check_writable(path, "--plot")
+        raise UsageError(f"{option} must name a file, {str(path)!r} is a folder")
+    check_writable(path, option)
 
 
 def check_writable(path: Path, option: str) -> None:

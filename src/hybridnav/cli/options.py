@@ -45,7 +45,7 @@ SmoothOption = Annotated[
     typer.Option(
         "--smooth",
         metavar="HOW",
-        help="Shorten the path: none or line-of-sight; else the preset's.",
+        help="Shorten the path: none, line-of-sight, or by costs arcs; else the preset's.",
     ),
 ]
 FreeOption = Annotated[

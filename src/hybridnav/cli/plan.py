@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from hybridnav.cli.blocked import BlockedOption, parsed_closing
-from hybridnav.cli.common import Reading, check_picture, read_settings
+from hybridnav.cli.common import Reading, check_output, check_picture, read_settings
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.keep import KeepInOption, KeepOption, Source
@@ -27,6 +28,7 @@ from hybridnav.cli.options import (
     SetOption,
     SmoothOption,
 )
+from hybridnav.cli.poses import ENDINGS
 from hybridnav.cli.request import Request, Wanted
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
@@ -137,6 +139,14 @@ LanguageOption = Annotated[
         help=f"Language of the words: {', '.join(languages())}.",
     ),
 ]
+PosesOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--poses",
+        metavar="FILE",
+        help="Write poses every 5 cm: x, y in metres, yaw in radians; .csv or .json.",
+    ),
+]
 CompareOption = Annotated[
     bool,
     typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
@@ -173,6 +183,7 @@ def plan(
     keep_in: KeepInOption = None,
     compare: CompareOption = False,
     plot: PlotOption = None,
+    poses: PosesOption = None,
     language: LanguageOption = "en",
     as_json: JsonOption = False,
 ) -> None:
@@ -181,6 +192,7 @@ def plan(
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     check_picture(plot)
+    check_output(poses, "--poses", ENDINGS)
     where = _checked_at(at)
     _check_least_hole(least_hole_m2)
     given = parsed_costs(costs)
@@ -214,9 +226,12 @@ def plan(
         wanted=wanted,
         compare=compare,
         plot=plot,
+        poses=poses,
         language=language,
         as_json=as_json,
     )
+    if poses is not None and alternatives > 1:
+        raise UsageError("--poses writes one path, and --alternatives asks for more: leave one out")
     if request.is_tour and compare:
         raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
     if not request.run():

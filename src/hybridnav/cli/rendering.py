@@ -103,6 +103,8 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
         bound, stated = _rounded_bound(figures["lower_bound"], figures["gap"])
         stated = stated.replace("long", "dear") if by_costs else stated
         lines.append(f"bound      {bound} m, the path is {stated}")
+        if figures["grid_bound"] is not None:
+            lines.append(_beside_cells(figures["grid_bound"], figures["grid_gap"]))
     if figures["steps"] is not None:
         lines.append(f"steps      {'; '.join(figures['steps'])}")
     if figures["places"] is not None:
@@ -117,6 +119,14 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
     if expanded:
         lines.append(f"expanded   {', '.join(expanded)}")
     return lines + _whole_grid_lines(figures)
+
+
+def _beside_cells(bound_m: float, gap: float) -> str:
+    """Describe how far an any-angle path is from all paths of cells, rounded to the safe side."""
+    share = abs(math.ceil(gap * 1000) / 10)
+    compared = f"at most {share:.1f} % dearer" if gap > 0 else f"at least {share:.1f} % cheaper"
+    low = math.floor(bound_m * 100) / 100
+    return f"cells      no path of cells costs less than {low:.2f} m, this one is {compared}"
 
 
 def _in_metric(figures: dict[str, Any]) -> str:

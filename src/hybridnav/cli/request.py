@@ -16,6 +16,7 @@ from hybridnav.cli.common import (
     stage,
 )
 from hybridnav.cli.compiling import compiling_beside
+from hybridnav.cli.poses import write_poses
 from hybridnav.cli.rendering import draw, query_of, respond
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ class Request:
     wanted: Wanted
     compare: bool
     plot: Path | None
+    poses: Path | None
     language: str
     as_json: bool
 
@@ -108,6 +110,8 @@ class Request:
         elif self.compare and isinstance(outcome, hn.PlanResult):
             beside = _compared(self._on_whole_grid(topology, closed, costs), outcome)
         self._respond(grid, outcome, beside, seconds)
+        if self.poses is not None:
+            write_poses(self.poses, outcome)
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
             draw(self.plot, topology, found or outcome, self.waypoints, optimum_m)

@@ -16,7 +16,7 @@ from hybridnav.cli.compiling import SEARCHES, processors, start
 if TYPE_CHECKING:
     import subprocess
 
-_PLANS = ("shortest", "grid-astar", "octile", "paper")
+_PLANS = ("shortest", "grid-astar", "octile", "paper", "robot")
 """Presets whose whole plans set-up compiles, what their searches have in common first."""
 _ENDPOINTS = ((2, 2), (60, 60))
 
@@ -60,7 +60,11 @@ def compile_plan(preset: str) -> None:
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
     if preset in _PLANS:
         endpoints = grid.frame.points_of(np.array(_ENDPOINTS))
-        hn.HybridPlanner(topology, preset=preset).plan(*endpoints).to_dict()
+        planner = hn.HybridPlanner(topology, preset=preset)
+        planner.plan(*endpoints).to_dict()
+        if preset == "robot":  # whose first plans need no overlay
+            planner.prepare()
+            planner.plan(*endpoints)
 
 
 def _end_with_parent() -> None:

@@ -171,8 +171,12 @@ class PlannerSettings(_Section):
     """On the mesh: seconds after which a query returns the best path so far, with its proved bound;
     null for no limit. Until the planner is prepared, such queries shorten a path of cells by line
     of sight."""
-    smooth: Literal["none", "line-of-sight"] = "none"
-    """Whether the path is shortened to an any-angle one."""
+    smooth: Literal["none", "line-of-sight", "arcs"] = "none"
+    """Whether the path is shortened to an any-angle one; `arcs`, which goes with costs, also rounds
+    its bends."""
+    turning_radius_m: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] = 0.3
+    """With `smooth: arcs`, the least radius of an arc in metres; where none fits, the robot turns
+    on the spot."""
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
     costs: CostSettings | None = None
@@ -200,7 +204,7 @@ class PlannerSettings(_Section):
     @model_validator(mode="after")
     def _go_together(self) -> Self:
         has_costs = self.costs is not None and self.costs.clearance is not None
-        if has_costs and (why := self.refusal_of_costs()):
+        if (has_costs or self.smooth == "arcs") and (why := self.refusal_of_costs()):
             raise PydanticCustomError("costs_refused", "{why}", {"why": why})
         if self.ompl is not None and self.refine != "ompl":
             raise PydanticCustomError("ompl_needed", "section ompl goes with refine: ompl")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridnav.costs.layer import CostLayer
     from hybridnav.grid import Frame, OccupancyGrid
 
-__all__ = ["cost_along", "positions_on", "segment_cost"]
+__all__ = ["cost_along", "line_cost", "positions_on", "segment_cost"]
 
 _QUANTUM = 2.0**-24
 _OFF = 1e-6

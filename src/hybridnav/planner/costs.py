@@ -12,6 +12,7 @@ from hybridnav.costs import CostLayer, cost_along
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.closed import ClosedCells
+from hybridnav.poses import Motion
 from hybridnav.refine import CostLine
 from hybridnav.result import Path
 from hybridnav.search.moves import path_length_in_cells
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from hybridnav._typing import FloatArray, LongArray
-    from hybridnav.config import Preset
+    from hybridnav.config import PlannerSettings, Preset
     from hybridnav.grid import Frame, OccupancyGrid
 
     Box = tuple[int, int, int, int]
@@ -149,14 +150,15 @@ class CostFinish:
         The map.
     layer
         Costs of its cells.
-    allow_unexplored
-        Whether unexplored cells may be entered.
+    settings
+        Whether unexplored cells may be entered, and the turning radius.
     """
 
-    def __init__(self, grid: OccupancyGrid, layer: CostLayer, *, allow_unexplored: bool) -> None:
+    def __init__(self, grid: OccupancyGrid, layer: CostLayer, settings: PlannerSettings) -> None:
         self.layer = layer
         self._grid = grid
-        self._allow_unexplored = allow_unexplored
+        self._allow_unexplored = settings.allow_unexplored
+        self._turning_radius_m = settings.turning_radius_m
 
     def with_closed(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the layer closes for all queries."""
@@ -177,14 +179,28 @@ class CostFinish:
     ) -> tuple[Path, float]:
         """Return the any-angle path that a path of cells is cut short to, and its cost in
         metres."""
-        line = self._line
-        if closed is not None:
-            allowed = self._allow_unexplored
-            line = CostLine(self._grid, self.layer, allow_unexplored=allowed, closed=closed.flat)
-        points = line.shorten(cells, poses[0][:2], poses[1][:2])
+        points = self._line_for(closed).shorten(cells, poses[0][:2], poses[1][:2])
         length_m = polyline_length(points)
         cost_m = max(cost_along(self._grid, self.layer, points), length_m)
         return Path(cells, points if length_m > 0 else points[:1], length_m), cost_m
+
+    def arcs(
+        self, cells: LongArray, poses: tuple[FloatArray, FloatArray], closed: ClosedCells | None
+    ) -> tuple[Path, float]:
+        """Return the same path with rounded bends, and its cost in metres."""
+        line, radius_m = self._line_for(closed), self._turning_radius_m
+        found = line.arcs(cells, poses[0][:2], poses[1][:2], radius_m=radius_m)
+        motion = Motion(found.points, found.headings_rad, curved=True)
+        length_m = float(motion.lengths_m.sum())
+        path = Path(cells, found.points, length_m, found.headings_rad, is_curved=True)
+        return path, max(found.cost_m, length_m)
+
+    def _line_for(self, closed: ClosedCells | None) -> CostLine:
+        """Return the shortener of paths; with closed cells, one for this query."""
+        if closed is None:
+            return self._line
+        allowed = self._allow_unexplored
+        return CostLine(self._grid, self.layer, allow_unexplored=allowed, closed=closed.flat)
 
     @cached_property
     def _line(self) -> CostLine:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from hybridnav._copies import copies_alike
+from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.costs import CostFinish
 from hybridnav.refine import LineOfSight
@@ -21,9 +23,9 @@ if TYPE_CHECKING:
     from hybridnav.planner.cell_planner import CellPlan, CellPlanner
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.outcome import Outcomes
-    from hybridnav.result import Metric, PlanResult
+    from hybridnav.result import PlanResult
 
-Smooth = Literal["none", "line-of-sight"]
+Smooth = Literal["none", "line-of-sight", "arcs"]
 
 
 @copies_alike
@@ -59,7 +61,26 @@ class Finish:
         self._allow_unexplored = settings.allow_unexplored
         self._by_costs: CostFinish | None = None
         if costs is not None:
-            self._by_costs = CostFinish(grid, costs, allow_unexplored=settings.allow_unexplored)
+            self._by_costs = CostFinish(grid, costs, settings)
+
+    def checked(self, smooth: Smooth | None, default: Smooth) -> Smooth:
+        """Return the finish asked for, or that of the preset for None.
+
+        Raises
+        ------
+        InvalidValueError
+            When it is another word, or needs costs and there are none.
+        """
+        chosen = default if smooth is None else smooth
+        if chosen not in get_args(Smooth):
+            known = ", ".join(map(repr, get_args(Smooth)))
+            raise InvalidValueError(f"smooth must be {known}, or None, got {smooth!r:.80}")
+        if chosen == "arcs" and self._by_costs is None:
+            raise InvalidValueError(
+                "smooth 'arcs' rounds bends of paths by costs, and this planner plans by lengths: "
+                "give it costs, or take 'line-of-sight'"
+            )
+        return chosen
 
     def with_closed(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
@@ -107,18 +128,20 @@ class Finish:
     ) -> PlanResult:
         """Return the result of a cheapest path of cells."""
         assert plan.cells is not None  # noqa: S101 - the caller has looked
-        metric: Metric = "weighted"
-        if smooth == "line-of-sight":
-            began = time.perf_counter()
-            metric = "any-angle-weighted"
-            path, cost_m = costs.line(plan.cells, poses, closed)
-            plan.stats.seconds["smooth"] = time.perf_counter() - began
-            bound = self._cells.bound(plan, (poses[0][:2], poses[1][:2]))
-        else:
+        grid_bound = plan.bound_cells * self._grid.resolution_m
+        if smooth == "none":
             path, cost_m = costs.cell_path(plan.cells)
-            bound = plan.bound_cells * self._grid.resolution_m
-        bound = min(bound, cost_m)
-        return self._outcomes.solved(plan, poses, path, metric, bound, weighted_cost=cost_m)
+            bound = min(grid_bound, cost_m)
+            return self._outcomes.solved(plan, poses, path, "weighted", bound, weighted_cost=cost_m)
+        began = time.perf_counter()
+        finish = costs.arcs if smooth == "arcs" else costs.line
+        path, cost_m = finish(plan.cells, poses, closed)
+        plan.stats.seconds["smooth"] = time.perf_counter() - began
+        bound = min(self._cells.bound(plan, (poses[0][:2], poses[1][:2])), cost_m)
+        found = self._outcomes.solved(
+            plan, poses, path, "any-angle-weighted", bound, weighted_cost=cost_m
+        )
+        return replace(found, grid_bound=grid_bound)
 
     def _sight(self, closed: ClosedCells | None) -> LineOfSight:
         """Return the shortener of paths; with closed cells, one for this query."""

@@ -6,7 +6,7 @@ import threading
 import time
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
@@ -160,8 +160,8 @@ class HybridPlanner:
             path; in other spaces the third number is ignored.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one, by costs without raising them;
-            None as in the preset. Without effect for `shortest` and OMPL, whose paths are any-angle
-            ones.
+            `"arcs"` rounds the bends of such a path by costs too; None as in the preset. Without
+            effect for `shortest` and OMPL, whose paths are any-angle ones.
         blocked
             Closures for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
             mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. If they
@@ -209,7 +209,7 @@ class HybridPlanner:
                 costs=self.costs,
             )
         poses = self._pose("start", start), self._pose("goal", goal)
-        finish = self._finish_asked_for(smooth)
+        finish = self._finish.checked(smooth, self.preset.planner.smooth)
         result = self._between(poses, finish, self.closed(blocked), began)
         if result.path is None or not result.solved or self.guide is None:
             return result
@@ -266,7 +266,7 @@ class HybridPlanner:
         last = read_points("goals", goals, needs_heading=self.needs_headings)
         if len(first) != len(last):
             raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
-        finish = self._finish_asked_for(smooth)
+        finish = self._finish.checked(smooth, self.preset.planner.smooth)
         closed = self.closed(blocked)
         is_kept = finish == "none" or self._cells.metric == "any-angle"
         at_once = self._cells if self._ompl is None and is_kept else None
@@ -379,15 +379,6 @@ class HybridPlanner:
             refinement=found.refinement,
             stats=replace(plan.stats, seconds=seconds),
         )
-
-    def _finish_asked_for(self, smooth: Smooth | None) -> Smooth:
-        if smooth is None:
-            return self.preset.planner.smooth
-        if smooth not in get_args(Smooth):
-            raise InvalidValueError(
-                f"smooth must be 'none' or 'line-of-sight', or None, got {smooth!r:.80}"
-            )
-        return smooth
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
         """Return the cells of a closure, None for no closure."""

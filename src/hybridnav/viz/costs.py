@@ -36,6 +36,8 @@ _DECADE = 10.0
 _CLOSED = "#7b3294"
 _SHADES = (0.1, 0.33, 0.6, 0.85)
 """Parts of the colour map that follow white: its darkest end would look like a wall."""
+_PALE = 0.55
+"""Part of white in these colours where paths are drawn over them."""
 _BAR, _BAR_HEIGHT = 3.0, 0.8
 """Heights of the colour bar with its labels and of the bar itself, in font sizes."""
 _TICKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
@@ -62,7 +64,7 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
         The map. The picture is cropped to its known part; its axes are metres of the map frame.
     layer
         Costs of its cells. White is the factor 1; closed cells have a colour of their own. If a
-        factor is above 10, colours follow the logarithm.
+        factor is above 10, colours follow the logarithm. They are paler below paths.
     paths
         Paths to draw by their labels, `(x, y)` in metres, shape (n, 2) each, at most 5; None for
         none.
@@ -96,7 +98,8 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
     is_free = grid.classes == CellClass.FREE
     most = max(float(layer.factors[is_free].max(initial=1.0)), 1.0 + 1e-3)
     scale: Normalize = LogNorm(1.0, most) if most > _DECADE else Normalize(1.0, most)
-    colours_of_costs = [style.FREE, *colormaps["YlOrRd"](_SHADES)]
+    strong = colormaps["YlOrRd"](_SHADES)[:, :3]
+    colours_of_costs = [style.FREE, *(_PALE + (1 - _PALE) * strong if paths else strong)]
     shades = LinearSegmentedColormap.from_list("factors", colours_of_costs)
     drawn = np.round(scale(layer.factors).clip(0, 1) * (_LEVELS - 1)).astype(np.uint8)
     drawn[grid.classes == CellClass.UNEXPLORED] = _LEVELS

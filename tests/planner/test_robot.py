@@ -1,0 +1,190 @@
+"""The preset `robot`: arcs that a differential robot can follow, inside free space, no dearer than
+the path of cells, with a bound on all paths of cells."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.costs import cost_along
+from hybridnav.metrics import segment_faults
+from tests.layers import grid_of
+from tests.planner.test_costs import optimum_m, scene, seeds, topology_of
+from tests.strategies import class_grids, examples, occupancy_grid
+
+OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
+
+
+def arc_steps(path: hn.Path) -> Any:
+    """Which steps of a path are arcs, and which turns on the spot."""
+    assert path.headings_rad is not None
+    turned = np.abs(np.angle(np.exp(1j * np.diff(path.headings_rad)))) > 1e-6
+    still = (np.diff(path.points, axis=0) == 0).all(axis=1)
+    return turned & ~still, turned & still
+
+
+def check(grid: hn.OccupancyGrid, is_open: Any, path: hn.Path, radius_m: float) -> None:
+    """The path stays in free space, its arcs are wide enough, its headings are those of travel."""
+    arcs, spots = arc_steps(path)
+    assert path.headings_rad is not None
+    assert path.max_curvature_per_m <= (1 + 1e-5) / radius_m
+    np.testing.assert_array_equal(path.spot_turns, np.flatnonzero(spots))
+    steps = np.diff(path.points, axis=0)
+    straight = ~arcs & (np.hypot(*steps.T) > 1e-3)
+    along = np.arctan2(steps[straight, 1], steps[straight, 0])
+    off = np.angle(np.exp(1j * (along - path.headings_rad[:-1][straight])))
+    assert np.abs(off).max(initial=0) < 1e-3
+    shut = occupancy_grid(
+        np.where(is_open, hn.CellClass.FREE, hn.CellClass.OCCUPIED).astype(np.uint8),
+        resolution_m=grid.resolution_m,
+    )
+    for i in np.flatnonzero(~arcs & ~spots):
+        assert segment_faults(shut, path.points[i : i + 2]) == ()
+    for i in np.flatnonzero(arcs):
+        piece = hn.Path(
+            path.cells,
+            path.points[i : i + 2].copy(),
+            1.0,
+            path.headings_rad[i : i + 2].copy(),
+            True,
+        )
+        cells = grid.frame.cells_of(piece.poses(grid.resolution_m / 100)[:, :2])
+        assert is_open[tuple(cells.T)].all()
+
+
+@given(class_grids(max_side=24), seeds, st.booleans(), st.sampled_from([0.1, 0.5, 2.0]))
+@settings(max_examples=examples(100), deadline=None)
+def test_arcs_stay_in_free_space_and_below_the_cost_of_the_cells(
+    classes: Any,
+    seed: int,
+    off_centre: bool,  # noqa: FBT001 - drawn
+    radius_m: float,
+) -> None:
+    grid, layer, is_open, start, goal, rng = scene(classes, seed)
+    preset = hn.load_preset("grid-astar", overrides=[f"planner.turning_radius_m={radius_m}"])
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset, costs=layer)
+    ends = grid.frame.points_of([start, goal])
+    if off_centre:
+        ends = ends + rng.uniform(-0.24, 0.24, (2, 2))
+    cells = planner.plan(*ends, smooth="none")
+    line = planner.plan(*ends, smooth="line-of-sight")
+    result = planner.plan(*ends, smooth="arcs")
+    assert result.status == cells.status
+    if result.path is None or cells.path is None:
+        return
+    assert result.metric == "any-angle-weighted"
+    assert (result.path.points[[0, -1]] == ends[[0, -1]]).all() or start == goal
+    over_cells = np.concatenate([ends[:1], cells.path.points[1:-1], ends[1:]])
+    assert result.cost <= cost_along(grid, layer, over_cells) + 1e-6
+    assert result.cost <= line.cost * 1.01 + 1e-6
+    assert result.cost >= result.path.length_m * (1 - 1e-9)
+    poses = result.path.poses(grid.resolution_m / 200)[:, :2]
+    assert result.cost == pytest.approx(cost_along(grid, layer, poses), rel=2e-3, abs=1e-6)
+    least = optimum_m(grid, layer, is_open, start)[goal]
+    assert result.grid_bound == line.grid_bound == pytest.approx(least, rel=1e-9, abs=1e-9)
+    if not off_centre:
+        assert result.grid_gap <= 1e-9
+    assert result.lower_bound <= line.cost * (1 + 1e-9)
+    if len(result.path.points) > 1:
+        check(grid, is_open, result.path, radius_m)
+
+
+def test_bends_in_the_open_are_arcs() -> None:
+    probability = np.zeros((100, 100))
+    probability[:60, 50] = 1.0  # a wall, round the end of which the path leads
+    grid = grid_of(probability, hn.Frame(0.05), robot_radius_m=0.25)
+    planner = hn.HybridPlanner(topology_of(grid), preset="robot")
+    result = planner.plan((1.0, 1.0), (4.0, 1.0))
+    assert result.path is not None
+    assert len(result.path.spot_turns) == 0
+    poses = result.path.poses()
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.05 + 1e-9
+    turns = np.abs(np.angle(np.exp(1j * np.diff(poses[:, 2]))))
+    assert turns.max() <= 0.05 / 0.3 + 1e-6
+    assert turns.sum() == pytest.approx(np.pi, abs=0.8)
+
+
+def test_where_no_arc_fits_the_robot_turns_on_the_spot() -> None:
+    probability = np.ones((12, 12))
+    probability[1, 1:11] = probability[1:11, 10] = 0.0  # a corridor one cell wide
+    grid = grid_of(probability, hn.Frame(1.0), robot_radius_m=0)
+    preset = hn.load_preset("robot", overrides=["planner.turning_radius_m=2"])
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    result = planner.plan((1.5, 1.5), (10.5, 10.5))
+    assert result.path is not None
+    spots = result.path.spot_turns
+    assert len(spots) == 1
+    assert result.path.max_curvature_per_m == 0
+    turn = result.path.points[spots[0] : spots[0] + 2]
+    assert turn[0].tolist() == turn[1].tolist()
+    assert grid.frame.cell_of(*turn[0].tolist()) in {(1, 10), (2, 10), (1, 9)}
+    poses = result.path.poses()
+    assert (np.diff(poses[:, :2], axis=0) == 0).all(axis=1).sum() == 1  # two headings at one point
+    assert len(np.unique(poses[:, 2].round(6))) == 2
+
+
+def test_robot_is_within_its_epsilon_of_the_cheapest_path_of_cells_on_the_office() -> None:
+    grid = hn.load_map(OFFICE, robot_radius_m=0.25)
+    topology = topology_of(grid)
+    robot = hn.HybridPlanner(topology, preset="robot")
+    robot.prepare()
+    exact = hn.HybridPlanner(topology, preset="grid-astar", costs=hn.CostLayer.clearance(grid))
+    rng = np.random.default_rng(3)
+    free = np.argwhere(grid.enterable())
+    spots = bends = 0
+    for pair in free[rng.integers(len(free), size=(40, 2))]:
+        ends = grid.frame.points_of(pair)
+        result, least = robot.plan(*ends), exact.plan(*ends)
+        assert result.solved == least.solved
+        if result.path is None:
+            continue
+        assert result.grid_bound is not None
+        assert result.grid_bound <= least.cost * (1 + 1e-9)
+        assert result.cost <= 1.01 * least.cost
+        assert result.grid_gap <= 0.0101
+        assert result.path.max_curvature_per_m <= 1 / 0.3 + 1e-4
+        spots += len(result.path.spot_turns)
+        bends += int(arc_steps(result.path)[0].sum())
+    assert spots < 0.02 * bends
+
+
+def test_lengths_know_no_arcs() -> None:
+    planner = hn.HybridPlanner(topology_of(hn.example_map("figure1")), preset="octile")
+    with pytest.raises(hn.InvalidValueError, match="rounds bends of paths by costs"):
+        planner.plan((0.5, 0.5), (2.0, 2.5), smooth="arcs")
+    with pytest.raises(hn.PresetError, match="knows lengths only"):
+        hn.load_preset("octile", overrides=["planner.smooth=arcs"])
+    with pytest.raises(hn.PresetError, match="turning_radius_m"):
+        hn.load_preset("robot", overrides=["planner.turning_radius_m=0"])
+
+
+@pytest.mark.parametrize("ending", ["csv", "json"])
+def test_the_command_line_writes_poses(cli: Any, tmp_path: Path, ending: str) -> None:
+    file = tmp_path / f"poses.{ending}"
+    query = ("plan", str(OFFICE), "--preset", "robot", "--start", "1.5,2.0", "--goal", "27.0,14.5")
+    done = cli(*query, "--poses", str(file), "--json")
+    assert done.code == 0
+    figures = json.loads(done.out)
+    assert figures["cost"] <= figures["grid_bound"] * 1.01
+    if ending == "csv":
+        with file.open(encoding="utf-8") as opened:
+            names, *rows = list(csv.reader(opened))
+    else:
+        answer = json.loads(file.read_text(encoding="utf-8"))
+        names, rows = answer["names"], answer["poses"]
+    assert names == ["x", "y", "yaw", "direction"]
+    poses = np.array(rows, dtype=float)
+    assert poses[0, :2].tolist() == [1.5, 2.0]
+    assert poses[-1, :2].tolist() == [27.0, 14.5]
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.05 + 1e-5
+    refused = cli(*query, "--poses", str(tmp_path / "poses.txt"))
+    assert refused.code == 2
+    assert "--poses must end in .csv, .json" in refused.err
