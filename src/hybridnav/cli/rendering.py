@@ -164,7 +164,8 @@ def _tour_lines(figures: dict[str, Any]) -> list[str]:
         shared = (
             f", {other['overlap']:.0%} in common" if number > 1 and other["word"] is None else ""
         )
-        length = f"{other['length_m']:.2f} m ({other['metric']})"
+        cost = f", cost {other['cost']:.2f} m" if other["metric"] in _BY_COSTS else ""
+        length = f"{other['length_m']:.2f} m{cost} ({other['metric']})"
         lines.append(f"route {number:<4} {length}{shared}{rooms}")
     if figures.get("alternatives_note"):
         lines.append(f"routes     {figures['alternatives_note']}")

@@ -50,7 +50,8 @@ class Alternative:
     """The plan. Its lower bound holds for every path between its endpoints, not only for those by
     the same doors: the gap states by how much the alternative can be longer than the optimum."""
     overlap: float = 0.0
-    """Share of its length in common with one before it, the greatest one; 0 for the first."""
+    """Share of its length, or of its cost with a planner by costs, in common with one before it,
+    the greatest one; 0 for the first."""
     word: Word | None = None
     """Reduced word of its homotopy class, by homotopy; None by doors."""
 
@@ -147,6 +148,9 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     the planner while the doors that lead off it are closed, and the path has to keep to the limits
     too. At most four sequences for each requested alternative are planned.
 
+    With a planner by costs the cheapest paths take the place of the shortest: sequences are tried
+    in the order of their cost, and overlap and stretch are measured in cost.
+
     By homotopy, two paths differ if they pass an obstacle on two sides. All are octile paths,
     whatever the preset: the first is a shortest one, the planner's own if that is octile and
     shortest, and each other is a shortest path of its class on the whole map. They have no limits.
@@ -166,11 +170,11 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     by
         `"doors"`, for people, on a map with rooms; or `"homotopy"`, exact.
     max_overlap
-        Greatest share of its length, from 0 to 1, that an alternative by doors has in common with a
-        shorter one: what lies within a robot's diameter (at least a cell) of the other path, and
-        all between the same two doors of one room.
+        Greatest share of its length, or of its cost, from 0 to 1, that an alternative by doors has
+        in common with a shorter one: what lies within a robot's diameter (at least a cell) of the
+        other path, and all between the same two doors of one room.
     max_stretch
-        Greatest length of an alternative by doors over that of the first, at least 1.
+        Greatest length, or cost, of an alternative by doors over that of the first, at least 1.
     inside_rooms
         Whether paths by the same doors count as alternatives too if they pass an obstacle inside a
         room on two sides. Then only what lies near the other path is in common. Not with OMPL.
@@ -191,15 +195,15 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     Returns
     -------
     Alternatives
-        The first, then the others by length; none if no path exists. If there are fewer than
-        requested, its `note` states the reason.
+        The first, then the others by length, or by cost; none if no path exists. If there are
+        fewer than requested, its `note` states the reason.
 
     Raises
     ------
     InvalidValueError
-        When an option is out of range, an end is not valid, a closed item is not on the map, the
-        planner plans by costs, or, by homotopy and inside rooms, the planner refines with OMPL or
-        its grid allows corner cutting.
+        When an option is out of range, an end is not valid, a closed item is not on the map,
+        or, by homotopy and inside rooms, the planner plans by costs, it refines with OMPL, or its
+        grid allows corner cutting.
 
     Examples
     --------
@@ -214,9 +218,10 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     limits = _checked(RouteLimits(count, max_overlap, max_stretch))
     if by not in get_args(By):
         raise InvalidValueError(f"by must be 'doors' or 'homotopy', got {by!r:.80}")
-    if planner.costs is not None:
+    if planner.costs is not None and (by == "homotopy" or inside_rooms):
         raise InvalidValueError(
-            "alternatives are shortest paths, and this planner plans by costs: ask one without"
+            "homotopy classes are searched for their shortest paths, and this planner plans by "
+            'costs: take by="doors" without inside_rooms, or a planner without costs'
         )
     closed = planner.closed(blocked)
     waypoints = [start, goal]
@@ -238,13 +243,15 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     search = None
     chosen = [Chosen(first)]
     if planner.topology.pyramid.rooms is not None:
-        search = DoorTours(planner, first, waypoints, closed)
+        search = DoorTours(planner, first, waypoints, planner.closed_for_all(closed))
         chosen = search.find(limits)
         if classes is not None and len(chosen) < limits.count:
             chosen = classes.inside(search, chosen, limits)
     stopped = _stopped(search, classes) if len(chosen) < limits.count else ""
     found = tuple(Alternative(one.tour, one.overlap) for one in chosen)
-    note = stopped or _fewer(len(found), limits, _reason(search, limits))
+    note = stopped or _fewer(
+        len(found), limits, _reason(search, limits, by_costs=planner.costs is not None)
+    )
     return Alternatives(found, complete=not stopped, note=note)
 
 
@@ -282,14 +289,15 @@ def _fewer(count: int, limits: RouteLimits, reason: str) -> str:
     return "" if count >= limits.count else f"{count} of {limits.count}: {reason}"
 
 
-def _reason(search: DoorTours | None, limits: RouteLimits) -> str:
+def _reason(search: DoorTours | None, limits: RouteLimits, *, by_costs: bool) -> str:
     """Describe why there are no more alternatives by doors."""
     if search is None:
         return "the map has no rooms, so no doors; by homotopy, sides of obstacles count"
     if search.is_in_one_room:
         return "no door lies between start and goal; by homotopy, sides of obstacles count"
+    better, worse = ("cheaper", "dear") if by_costs else ("shorter", "long")
     return (
         "no other candidate sequence of doors shares at most "
-        f"{limits.max_overlap:.0%} with a shorter one and is at most {limits.max_stretch:g} times "
-        "as long as the first"
+        f"{limits.max_overlap:.0%} with a {better} one and is at most {limits.max_stretch:g} times "
+        f"as {worse} as the first"
     )

@@ -36,7 +36,7 @@ class RouteLimits:
     max_overlap: float
     """Most that a path shares with a shorter one, from 0 to 1."""
     max_stretch: float
-    """Greatest length over that of the first."""
+    """Greatest length, or cost, over that of the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,9 @@ class DoorTours:
         self._rooms = planner.topology.rooms
         grid = planner.topology.grid
         graph = door_graph(
-            planner.topology, allow_unexplored=planner.preset.planner.allow_unexplored
+            planner.topology,
+            allow_unexplored=planner.preset.planner.allow_unexplored,
+            costs=planner.costs,
         )
         self._graph: DoorGraph = graph if closed is None else graph.closed(closed.flat)
         path = first.results[0].path
@@ -97,8 +99,9 @@ class DoorTours:
         return bool(first == last)
 
     def find(self, limits: RouteLimits) -> list[Chosen]:
-        """Find tours, the first one first, then by length."""
-        planned = [(Chosen(self._first), Track(self._first, self.near_m))]
+        """Find tours, the first one first, then by length, or by cost if the planner does."""
+        first = self._track(self._first)
+        planned = [(Chosen(self._first), first)]
         chosen = planned
         for route in self._candidates(limits):
             if len(chosen) == limits.count:
@@ -109,10 +112,18 @@ class DoorTours:
                 self.is_complete = False
                 break
             tour = self._planned(route)
-            if tour is not None and tour.length_m <= limits.max_stretch * self._first.length_m:
-                planned.append((Chosen(tour), Track(tour, self.near_m)))
-                chosen = admissible(planned, limits)
+            track = None if tour is None else self._track(tour)
+            if tour is None or track is None or track.cost_m > limits.max_stretch * first.cost_m:
+                continue
+            planned.append((Chosen(tour), track))
+            chosen = admissible(planned, limits)
         return [one for one, _ in chosen]
+
+    def _track(self, tour: Tour) -> Track:
+        """Return the line of a tour, measured as its planner plans."""
+        layer = self._planner.costs
+        costs = None if layer is None else (self._planner.topology.grid, layer)
+        return Track(tour, self.near_m, costs=costs)
 
     def closed_round(self, tour: Tour) -> LongArray | None:
         """Return the cells that are closed so that only the doors of a tour lead on.
@@ -245,7 +256,8 @@ class DoorTours:
 def admissible(
     planned: list[tuple[Chosen, Track]], limits: RouteLimits
 ) -> list[tuple[Chosen, Track]]:
-    """Return the tours that do not share too much with a shorter one, by length after the first.
+    """Return the tours that do not share too much with a shorter one, by length, or by cost, after
+    the first.
 
     Parameters
     ----------
@@ -255,7 +267,7 @@ def admissible(
         What they must keep to.
     """
     chosen = planned[:1]
-    for one, track in sorted(planned[1:], key=lambda pair: pair[1].length_m):
+    for one, track in sorted(planned[1:], key=lambda pair: pair[1].cost_m):
         overlap = max(track.share(other) for _, other in chosen)
         if overlap <= limits.max_overlap and len(chosen) < limits.count:
             chosen.append((replace(one, overlap=overlap), track))

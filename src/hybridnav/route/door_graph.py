@@ -13,13 +13,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from hybridnav.pyramid.cracks import endpoints_of, middle_sides, sides_of
-from hybridnav.search.fields import field_distances
+from hybridnav.route.room_fields import RoomFields
 from hybridnav.search.moves import STRAIGHT, length_in_cells
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.costs import CostLayer
     from hybridnav.topology import Rooms, TopologicalMap
 
 
@@ -39,11 +40,12 @@ class DoorRoute:
     arcs: tuple[int, ...]
     """Arcs of the room level between them, one fewer than vertices."""
     legs_m: tuple[float, ...]
-    """Length inside each room, from the middle of one boundary to that of the next, in metres."""
+    """Length inside each room, from the middle of one boundary to that of the next, in metres; on a
+    graph by costs what it costs."""
 
     @property
     def length_m(self) -> float:
-        """Length of the route in metres."""
+        """Length of the route in metres, or what it costs."""
         return sum(self.legs_m)
 
 
@@ -70,7 +72,8 @@ class DoorGraph:
     """The room level as a graph of darts, each an arc passed in one direction.
 
     A dart is linked to those that leave the room that it enters. The cost is that of the shortest
-    path of cells inside the room, between the cells in the middle of both boundaries.
+    path of cells inside the room, or of the cheapest one, between the cells in the middle of both
+    boundaries.
 
     Parameters
     ----------
@@ -83,6 +86,8 @@ class DoorGraph:
     opened
         The graph without closed cells, whose rooms are taken over where they meet none; None to
         measure all rooms.
+    factors
+        float64 (rows, cols), a factor of at least 1 for each cell; None for lengths.
 
     Examples
     --------
@@ -101,6 +106,7 @@ class DoorGraph:
         allow_unexplored: bool = False,
         closed: LongArray | None = None,
         opened: DoorGraph | None = None,
+        factors: FloatArray | None = None,
     ) -> None:
         level = rooms.level
         allowed = np.ones_like(rooms.is_free) if allow_unexplored else rooms.is_free
@@ -117,8 +123,10 @@ class DoorGraph:
         cells = np.stack(endpoints_of(edges, rooms.grid.shape[1]), axis=1)
         lies_first = level.field_of.ravel()[cells[:, 0]] == self.endpoints[self._arc_of, 0]
         self._cells: LongArray = np.where(lies_first[:, None], cells, cells[:, ::-1])
-        self._fields = _Fields(rooms, closed)
+        self._factors = factors
+        self._fields = RoomFields(rooms, closed, factors)
         self._middle = self._middles(sides_of(edges, rooms.grid.shape[1]), closed)
+        self._over = self._costs_over()
         self._tails = self.endpoints.ravel()  # of each dart
         self._by_tail = np.argsort(self._tails, kind="stable")
         self._legs: list[_Legs] = []
@@ -127,7 +135,7 @@ class DoorGraph:
             is_known = opened is not None and met is not None and vertex not in met
             legs = opened._legs[vertex] if is_known and opened else self._measured(vertex)  # noqa: SLF001
             self._legs.append(legs)
-        self._inner = _joined([_links_of(legs) for legs in self._legs])
+        self._inner = _joined([_links_of(legs, self._over) for legs in self._legs])
         self._closed: dict[bytes, DoorGraph] = {}
 
     def cells_beside(self, arc: int, half: int) -> LongArray:
@@ -163,7 +171,11 @@ class DoorGraph:
         found = self._closed.get(key)
         if found is None:
             found = self._closed[key] = DoorGraph(
-                self._rooms, allow_unexplored=self._allow_unexplored, closed=flat, opened=self
+                self._rooms,
+                allow_unexplored=self._allow_unexplored,
+                closed=flat,
+                opened=self,
+                factors=self._factors,
             )
             for oldest in list(self._closed)[:-_MOST_KEPT]:
                 self._closed.pop(oldest, None)  # another thread may have been here
@@ -207,7 +219,9 @@ class DoorGraph:
             seen.add(tuple(nodes))
             assert vertices[-1] == last  # noqa: S101 - links lead into the room of the goal
             along = np.append(from_start[coming], total[link] - to_goal[nodes[len(coming) :]])
-            legs_m = length_in_cells(np.diff(along)) * self._rooms.grid.resolution_m
+            legs = np.diff(along)
+            cells = length_in_cells(legs) if self._factors is None else legs / STRAIGHT
+            legs_m = cells * self._rooms.grid.resolution_m
             yield DoorRoute(vertices, tuple(self.arcs[arcs].tolist()), tuple(legs_m.tolist()))
 
     def _middles(self, sides: FloatArray, closed: LongArray | None) -> LongArray:
@@ -221,6 +235,14 @@ class DoorGraph:
             at = middle_sides(sides[is_open], dense.astype(np.int64), len(arcs))
             middle[arcs] = self._cells[is_open][at]
         return middle
+
+    def _costs_over(self) -> LongArray:
+        """Return the integer cost of the step over the boundary with each dart, int64 (2 n,)."""
+        costs = np.full(2 * len(self.arcs), STRAIGHT, dtype=np.int64)
+        if self._factors is not None:  # a boundary that is closed is no part of any link
+            factors = self._factors.ravel()[self._middle]
+            costs = np.repeat(np.rint(STRAIGHT * factors.mean(axis=1)), 2).astype(np.int64)
+        return costs
 
     def _measured(self, vertex: int) -> _Legs:
         low, high = np.searchsorted(self._tails, [vertex, vertex + 1], sorter=self._by_tail)
@@ -242,78 +264,26 @@ class DoorGraph:
         ones = np.ones(1, dtype=np.int64)
         costs = self._fields.window(first).costs(start, np.append(leaving.cells, goal))
         if first == last:
-            yield _links(origin * ones, (origin + 1) * ones, costs[-1:], 0)
+            yield _links(origin * ones, (origin + 1) * ones, costs[-1:], 0 * ones)
         tails = np.full_like(leaving.leaving, origin)
-        yield _links(tails, leaving.leaving, costs[:-1], STRAIGHT)
+        yield _links(tails, leaving.leaving, costs[:-1], self._over[leaving.leaving])
         costs = self._fields.window(last).costs(goal, entering.cells)
         heads = np.full_like(entering.leaving, origin + 1)
-        yield _links(entering.leaving ^ 1, heads, costs, 0)
+        yield _links(entering.leaving ^ 1, heads, costs, np.zeros_like(costs))
 
 
-class _Fields:
-    """The fields of the room level, with some cells closed."""
-
-    def __init__(self, rooms: Rooms, closed: LongArray | None) -> None:
-        from scipy import ndimage  # noqa: PLC0415 - most planners need no rooms
-
-        self._field_of = rooms.level.field_of
-        self._classes = rooms.grid.classes
-        self._closed = closed
-        self._windows = ndimage.find_objects(self._field_of + 1)
-
-    def vertices_of(self, cells: LongArray) -> LongArray:
-        """Return the vertex of each flat cell, -1 for none."""
-        found: LongArray = self._field_of.ravel()[cells].astype(np.int64)
-        return found
-
-    def window(self, vertex: int) -> _Window:
-        """Return the part of the map that a field spans."""
-        spans = self._windows[vertex]
-        corner = spans[0].start, spans[1].start
-        classes = np.array(self._classes[spans], dtype=np.uint8)
-        label = np.where(self._field_of[spans] == vertex, np.int32(0), np.int32(-1))
-        if self._closed is not None:
-            rows, cols = np.divmod(self._closed, self._field_of.shape[1])
-            rows, cols = rows - corner[0], cols - corner[1]
-            met = (rows >= 0) & (rows < label.shape[0]) & (cols >= 0) & (cols < label.shape[1])
-            classes[rows[met], cols[met]] = 0
-            label[rows[met], cols[met]] = -1
-        return _Window(corner, self._field_of.shape[1], classes, label)
-
-
-class _Window(NamedTuple):
-    """The part of the map that a field spans: its lowest cell, the columns of the map, and of each
-    cell its class, 0 if closed, and its label, 0 in the field and -1 elsewhere."""
-
-    corner: tuple[int, int]
-    cols: int
-    classes: ByteArray
-    label: IntArray
-
-    def costs(self, cell: int, others: LongArray) -> LongArray:
-        """Return the integer costs of the shortest paths inside the field from a flat cell of it to
-        others, -1 for no path."""
-        rows, cols = np.divmod(np.append(cell, others), self.cols)
-        rows, cols = rows - self.corner[0], cols - self.corner[1]
-        inside = (rows >= 0) & (rows < self.label.shape[0]) & (cols >= 0)
-        inside &= cols < self.label.shape[1]
-        at = np.where(inside, rows * self.label.shape[1] + cols, 0)
-        found = field_distances(self.classes, self.label.ravel(), at[:1])
-        costs: LongArray = np.where(inside, found[at], -1)[1:]
-        return costs
-
-
-def _links(tails: LongArray, heads: LongArray, costs: LongArray, over: int) -> _Links:
-    """Return the links that a path exists for; `over` is the cost over the boundary."""
+def _links(tails: LongArray, heads: LongArray, costs: LongArray, over: LongArray) -> _Links:
+    """Return the links that a path exists for; `over` are the costs over the boundaries."""
     there = costs >= 0
-    return _Links(tails[there], heads[there], costs[there] + over)
+    return _Links(tails[there], heads[there], costs[there] + over[there])
 
 
-def _links_of(legs: _Legs) -> _Links:
+def _links_of(legs: _Legs, over: LongArray) -> _Links:
     """Return the links of all pairs of darts of one room."""
     count = len(legs.leaving)
     tail, head = np.nonzero(~np.eye(count, dtype=np.bool_))
-    return _links(legs.leaving[tail] ^ 1, legs.leaving[head], legs.costs[tail, head], STRAIGHT)
+    heads = legs.leaving[head]
+    return _links(legs.leaving[tail] ^ 1, heads, legs.costs[tail, head], over[heads])
 
 
 def _joined(parts: list[_Links]) -> _Links:
@@ -340,13 +310,17 @@ def _chain(before: LongArray, node: int) -> list[int]:
 
 
 _MOST_KEPT = 4
-_KEPT: WeakKeyDictionary[TopologicalMap, dict[bool, DoorGraph]] = WeakKeyDictionary()
+_Kept = WeakKeyDictionary["TopologicalMap", dict[bool, DoorGraph]]
+_KEPT: _Kept = WeakKeyDictionary()
+_KEPT_BY_COSTS: WeakKeyDictionary[CostLayer, _Kept] = WeakKeyDictionary()
 
 
-def door_graph(topology: TopologicalMap, *, allow_unexplored: bool = False) -> DoorGraph:
+def door_graph(
+    topology: TopologicalMap, *, allow_unexplored: bool = False, costs: CostLayer | None = None
+) -> DoorGraph:
     """Return the graph of doors of a map with rooms, measured for the first query.
 
-    It is kept as long as the map.
+    It is kept as long as the map, and the costs.
 
     Parameters
     ----------
@@ -354,6 +328,8 @@ def door_graph(topology: TopologicalMap, *, allow_unexplored: bool = False) -> D
         A map with rooms.
     allow_unexplored
         As in `DoorGraph`.
+    costs
+        Factors of its cells, by which rooms are measured; None for lengths.
 
     Returns
     -------
@@ -369,10 +345,13 @@ def door_graph(topology: TopologicalMap, *, allow_unexplored: bool = False) -> D
     >>> door_graph(topology) is door_graph(topology)
     True
     """
-    kept = _KEPT.setdefault(topology, {})
+    by_map = _KEPT if costs is None else _KEPT_BY_COSTS.setdefault(costs, WeakKeyDictionary())
+    kept = by_map.setdefault(topology, {})
     found = kept.get(allow_unexplored)
     if found is None:
         found = kept[allow_unexplored] = DoorGraph(
-            topology.rooms, allow_unexplored=allow_unexplored
+            topology.rooms,
+            allow_unexplored=allow_unexplored,
+            factors=None if costs is None else costs.factors.astype(np.float64),
         )
     return found

@@ -1,0 +1,125 @@
+"""Distances inside the fields of the room level, by length or by costs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav.grid import CellClass
+from hybridnav.search.fields import field_distances
+from hybridnav.search.moves import STRAIGHT
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.topology import Rooms
+
+
+class RoomFields:
+    """The fields of the room level.
+
+    Parameters
+    ----------
+    rooms
+        The rooms.
+    closed
+        int64 (m,), flat cells that may not be entered; None for none.
+    factors
+        float64 (rows, cols), the factor of each cell; None for lengths.
+    """
+
+    def __init__(
+        self, rooms: Rooms, closed: LongArray | None, factors: FloatArray | None = None
+    ) -> None:
+        from scipy import ndimage  # noqa: PLC0415 - most planners need no rooms
+
+        self._field_of = rooms.level.field_of
+        self._classes = rooms.grid.classes
+        self._closed, self._factors = closed, factors
+        self._windows = ndimage.find_objects(self._field_of + 1)
+
+    def vertices_of(self, cells: LongArray) -> LongArray:
+        """Return the vertex of each flat cell, -1 for none."""
+        found: LongArray = self._field_of.ravel()[cells].astype(np.int64)
+        return found
+
+    def window(self, vertex: int) -> Window:
+        """Return the part of the map that a field spans."""
+        spans = self._windows[vertex]
+        corner = spans[0].start, spans[1].start
+        classes = np.array(self._classes[spans], dtype=np.uint8)
+        label = np.where(self._field_of[spans] == vertex, np.int32(0), np.int32(-1))
+        if self._closed is not None:
+            rows, cols = np.divmod(self._closed, self._field_of.shape[1])
+            rows, cols = rows - corner[0], cols - corner[1]
+            met = (rows >= 0) & (rows < label.shape[0]) & (cols >= 0) & (cols < label.shape[1])
+            classes[rows[met], cols[met]] = 0
+            label[rows[met], cols[met]] = -1
+        moves = None
+        if self._factors is not None:
+            moves = _weighted_moves(classes, np.asarray(label == 0), self._factors[spans])
+        return Window(corner, self._field_of.shape[1], classes, label, moves)
+
+
+class Window(NamedTuple):
+    """The part of the map that a field spans: its lowest cell, the columns of the map, and of each
+    cell its class, 0 if closed, and its label, 0 in the field and -1 elsewhere; by costs the moves
+    inside the field."""
+
+    corner: tuple[int, int]
+    cols: int
+    classes: ByteArray
+    label: IntArray
+    moves: csr_array[np.float64, tuple[int, int]] | None = None
+
+    def costs(self, cell: int, others: LongArray) -> LongArray:
+        """Return the integer costs of the shortest paths inside the field from a flat cell of it to
+        others, -1 for no path; those of the cheapest paths are rounded to the unit."""
+        rows, cols = np.divmod(np.append(cell, others), self.cols)
+        rows, cols = rows - self.corner[0], cols - self.corner[1]
+        inside = (rows >= 0) & (rows < self.label.shape[0]) & (cols >= 0)
+        inside &= cols < self.label.shape[1]
+        at = np.where(inside, rows * self.label.shape[1] + cols, 0)
+        if self.moves is None:
+            found = field_distances(self.classes, self.label.ravel(), at[:1])
+        else:
+            from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415 - most planners need no rooms
+
+            reached = dijkstra(self.moves, directed=False, indices=at[:1])[0]
+            found = np.where(np.isfinite(reached), np.rint(reached * STRAIGHT), -1.0)
+            found = found.astype(np.int64)
+        costs: LongArray = np.where(inside, found[at], -1)[1:]
+        return costs
+
+
+def _weighted_moves(
+    classes: ByteArray, inside: BoolArray, factors: FloatArray
+) -> csr_array[np.float64, tuple[int, int]]:
+    """Return the legal moves inside a field, each in one direction, with their costs.
+
+    Diagonals are judged as in `field_distances`.
+    """
+    from scipy.sparse import coo_array  # noqa: PLC0415 - most planners need no rooms
+
+    rows, cols = inside.shape
+    number = np.arange(rows * cols).reshape(rows, cols)
+    is_free_field = bool((classes[inside] == CellClass.FREE).all())
+    may_pass = classes == CellClass.FREE if is_free_field else classes != CellClass.OCCUPIED
+    every, low, high = slice(None), slice(None, -1), slice(1, None)
+    parts = []
+    for tail, head, sides, length in (
+        ((every, low), (every, high), (), 1.0),
+        ((low, every), (high, every), (), 1.0),
+        ((low, low), (high, high), ((low, high), (high, low)), math.sqrt(2.0)),
+        ((high, low), (low, high), ((high, high), (low, low)), math.sqrt(2.0)),
+    ):
+        legal = inside[tail] & inside[head]
+        for side in sides:
+            legal &= may_pass[side]
+        costs = length * (factors[tail] + factors[head]) / 2
+        parts.append((number[tail][legal], number[head][legal], costs[legal]))
+    tails, heads, costs = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return coo_array((costs, (tails, heads)), shape=(rows * cols, rows * cols)).tocsr()
