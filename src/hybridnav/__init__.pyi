@@ -34,6 +34,7 @@ from .io import (
     load_speed_mask as load_speed_mask,
     save as save,
     save_rooms as save_rooms,
+    write_ros_map as write_ros_map,
 )
 from .planner import (
     Alternative as Alternative,

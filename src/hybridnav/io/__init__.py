@@ -1,4 +1,4 @@
-"""Readers of ROS maps, MovingAI benchmarks, examples, rooms and closed areas; rooms out; models.
+"""Readers of maps, benchmarks, examples, rooms, closed areas; maps and rooms out; models.
 
 Names load on first use: rooms need scipy, models and closed areas numba, a map file neither.
 """

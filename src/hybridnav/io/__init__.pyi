@@ -11,5 +11,6 @@ from .movingai import (
 from .rooms_in import load_rooms as load_rooms
 from .rooms_out import save_rooms as save_rooms
 from .ros import load_ros_map as load_ros_map
+from .ros_out import write_ros_map as write_ros_map
 
 __all__: list[str]
