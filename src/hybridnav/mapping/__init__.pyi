@@ -1,0 +1,6 @@
+from .mapper import Mapper as Mapper
+from .models import LaserModel as LaserModel, SonarModel as SonarModel
+from .scans import LaserScan as LaserScan, SonarScan as SonarScan, sonar_ring as sonar_ring
+from .sequence import ScanSequence as ScanSequence
+
+__all__: list[str]

@@ -1,0 +1,148 @@
+"""Kernels of beams: the cells that they pass, by exact walks on integers.
+
+Positions are (row, col) counted in 2^-16 of a cell and always odd, so that no endpoint lies on a
+line of the lattice; beams of up to 2^14 cells are compared without rounding in int64.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybridnav._jit import guarded, njit
+
+_SHIFT = 16
+_NONE, _HIT, _CLEAR = 0, 1, 2
+
+
+@njit(cache=True, nogil=True)
+def _on_lattice(cells):
+    """Return a position, counted in cells, as an odd number of 2^-16 of a cell."""
+    return np.int64(math.floor(cells * (1 << _SHIFT))) | 1
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def beam_ends(ranges_m, pose, angles, limits, resolution_m):
+    """Return where the beams of a scan end.
+
+    Parameters
+    ----------
+    ranges_m
+        float64 (n,).
+    pose
+        `(x, y, heading)` of the laser, x and y relative to the corner of cell (0, 0).
+    angles
+        Direction of the first beam and the step to the next one, in radians.
+    limits
+        The least and the greatest range, how far a beam without a return clears, and how far before
+        its return a beam ceases to clear, in metres.
+    resolution_m
+        Side of a cell.
+
+    Returns
+    -------
+    tuple
+        int64 (n, 2), cells in which beams end. int64 (n + 1, 2), positions at which they cease to
+        clear, in the last row the laser. uint8 (n,): 0 for no reading, 1 for a hit, 2 for no
+        return. int64 (4,): first and last row, first and last column of the cells that they meet.
+    """
+    x, y, heading = pose
+    low, high, clear, blurred = limits
+    n = len(ranges_m)
+    hits, ends = np.empty((n, 2), np.int64), np.empty((n + 1, 2), np.int64)
+    kinds = np.zeros(n, np.uint8)
+    ends[:, 0], ends[:, 1] = _on_lattice(y / resolution_m), _on_lattice(x / resolution_m)
+    row, col = ends[n, 0] >> _SHIFT, ends[n, 1] >> _SHIFT
+    hits[:, 0], hits[:, 1] = row, col
+    box = np.array([row, row, col, col])
+    for k in range(n):
+        reach = ranges_m[k]
+        if not reach > low:  # NaN too
+            continue
+        kinds[k] = _HIT if reach < high else _CLEAR
+        until = reach - blurred if reach < high else clear
+        reach = reach if reach < high else clear
+        angle = heading + (angles[0] + k * angles[1])
+        cosine, sine = math.cos(angle), math.sin(angle)
+        if until > 0.0:
+            ends[k, 0] = _on_lattice((y + until * sine) / resolution_m)
+            ends[k, 1] = _on_lattice((x + until * cosine) / resolution_m)
+        hits[k, 0] = _on_lattice((y + reach * sine) / resolution_m) >> _SHIFT
+        hits[k, 1] = _on_lattice((x + reach * cosine) / resolution_m) >> _SHIFT
+        box[0], box[1] = min(box[0], hits[k, 0]), max(box[1], hits[k, 0])
+        box[2], box[3] = min(box[2], hits[k, 1]), max(box[3], hits[k, 1])
+    return hits, ends, kinds, box
+
+
+@njit(cache=True, nogil=True)
+def _start_of_walk(start_row, start_col, end_row, end_col):
+    """Return the first cell of a beam, the steps to its last one, and the state of the walk.
+
+    J. Amanatides, A. Woo: A fast voxel traversal algorithm for ray tracing, 1987, on integers. The
+    walk crosses next the line with the smaller state; on a tie it passes a corner.
+    """
+    row, col = start_row >> _SHIFT, start_col >> _SHIFT
+    rows, cols = abs(end_row - start_row), abs(end_col - start_col)
+    to_row = (
+        ((row + 1) << _SHIFT) - start_row if end_row > start_row else start_row - (row << _SHIFT)
+    )
+    to_col = (
+        ((col + 1) << _SHIFT) - start_col if end_col > start_col else start_col - (col << _SHIFT)
+    )
+    return row, col, to_row * cols, to_col * rows, cols << _SHIFT, rows << _SHIFT
+
+
+@njit(cache=True, nogil=True)
+def add_beams(evidence, seen_at, corner, beams, scan, changes):
+    """Add the beams of a scan to a grid: hits first, so that a cell that is hit is not freed.
+
+    Parameters
+    ----------
+    evidence
+        float32 (rows, cols), log odds; changed.
+    seen_at
+        int32 (rows, cols), the number of the last scan that met a cell; changed.
+    corner
+        Row and column of the first cell of these arrays.
+    beams
+        Cells of hits, ends and kinds, as from `beam_ends`.
+    scan
+        Number of the scan, at least 1 and never used before.
+    changes
+        Log odds of a hit and of a pass, and the limit of their sum, float32.
+    """
+    hit, passed, limit = changes
+    hits, ends, kinds = beams
+    first_row, first_col = corner
+    n = len(kinds)
+    for k in range(n):
+        if kinds[k] == _HIT:
+            row, col = hits[k, 0] - first_row, hits[k, 1] - first_col
+            if seen_at[row, col] != scan:
+                seen_at[row, col] = scan
+                evidence[row, col] = min(evidence[row, col] + hit, limit)
+    for k in range(n):
+        if kinds[k] == _NONE or (ends[k, 0] == ends[n, 0] and ends[k, 1] == ends[n, 1]):
+            continue
+        row, col, by_row, by_col, more_row, more_col = _start_of_walk(
+            ends[n, 0], ends[n, 1], ends[k, 0], ends[k, 1]
+        )
+        row_step = 1 if ends[k, 0] > ends[n, 0] else -1
+        col_step = 1 if ends[k, 1] > ends[n, 1] else -1
+        last_row, last_col = ends[k, 0] >> _SHIFT, ends[k, 1] >> _SHIFT
+        while True:
+            i, j = row - first_row, col - first_col
+            if seen_at[i, j] != scan:
+                seen_at[i, j] = scan
+                evidence[i, j] = max(evidence[i, j] + passed, -limit)
+            if row == last_row and col == last_col:
+                break
+            steps_row, steps_col = by_row <= by_col, by_col <= by_row
+            if steps_row:
+                row += row_step
+                by_row += more_row
+            if steps_col:
+                col += col_step
+                by_col += more_col

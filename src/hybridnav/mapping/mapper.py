@@ -1,0 +1,260 @@
+"""Occupancy grids that grow scan by scan."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
+from hybridnav.mapping._beam_kernels import add_beams, beam_ends
+from hybridnav.mapping._cone_kernels import add_cone
+from hybridnav.mapping.models import LaserModel, SonarModel, log_odds_of
+from hybridnav.mapping.scans import LaserScan, SonarScan
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from hybridnav._typing import IntArray
+
+_MOST_RANGE_CELLS = 2**14
+"""Cells of a beam that are walked exactly in int64."""
+_MARGIN_CELLS = 64
+"""Cells beyond a scan by which extents grow at least, so that not every scan makes them grow."""
+_LEAST_P = 0.02
+"""Probabilities stay within this and 1 - this, so that few scans can overrule many: doors open."""
+
+
+class Mapper:
+    """An occupancy grid in log odds that scans are added to (Moravec and Elfes).
+
+    Each cell starts at the odds of 0.5. A scan adds the log odds of its inverse model, which is
+    Bayes' rule for cells that are independent of each other (Elfes 1989); sums stay within the odds
+    of 0.02 and 0.98. The extents grow with the scans: cells lie on a lattice that never moves, so a
+    grid that grew is bit for bit one that was large from the start.
+
+    Parameters
+    ----------
+    resolution_m
+        Side of a cell in metres.
+    laser, sonar
+        Inverse models of the sensors; their defaults if None.
+    corner_m
+        A corner of the lattice of cells, `(x, y)` in metres, map frame.
+    max_cells
+        The most cells that the grid may have. A scan that needs more is refused: its pose is a
+        mistake, or the resolution too fine.
+
+    Raises
+    ------
+    InvalidValueError
+        When a value is out of range, or a sensor reaches farther than 2^14 cells.
+
+    Examples
+    --------
+    >>> from hybridnav.mapping import LaserScan, Mapper
+    >>> mapper = Mapper(resolution_m=1.0)
+    >>> pose = (0.5, 0.5, 0.0)
+    >>> mapper.add(LaserScan(np.array([3.0]), pose=pose, start_rad=0.0, step_rad=0.0))
+    True
+    >>> mapper.to_grid(robot_radius_m=0).classes
+    array([[1, 1, 1, 0]], dtype=uint8)
+    """
+
+    def __init__(
+        self,
+        *,
+        resolution_m: float = 0.05,
+        laser: LaserModel | None = None,
+        sonar: SonarModel | None = None,
+        corner_m: tuple[float, float] = (0.0, 0.0),
+        max_cells: int = DEFAULT_MAX_CELLS,
+    ) -> None:
+        self._frame = Frame(resolution_m, corner_m)
+        self._laser = LaserModel() if laser is None else laser
+        self._sonar = SonarModel() if sonar is None else sonar
+        if not 1 <= max_cells <= MAX_CELLS:
+            raise InvalidValueError(f"max_cells must be 1 to {MAX_CELLS}, got {max_cells}")
+        self._max_cells = max_cells
+        far_m = max(self._laser.max_range_m, self._sonar.max_range_m + self._sonar.tolerance_m)
+        if far_m / self.resolution_m > _MOST_RANGE_CELLS:
+            raise InvalidValueError(
+                f"a range of {far_m:g} m is {far_m / self.resolution_m:.0f} cells of "
+                f"{self.resolution_m:g} m, more than {_MOST_RANGE_CELLS}: take larger cells or a "
+                "shorter range"
+            )
+        self._corner = (0, 0)
+        """Row and column, on the lattice, of the first cell of the arrays."""
+        self._evidence: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+        self._seen_at: IntArray = np.zeros((0, 0), np.int32)
+        self._n_scans = 0
+
+    @property
+    def resolution_m(self) -> float:
+        """Side of a cell in metres."""
+        return self._frame.resolution_m
+
+    @property
+    def n_scans(self) -> int:
+        """Number of scans that were added."""
+        return self._n_scans
+
+    @property
+    def has_cells(self) -> bool:
+        """Whether any scan has met a cell, so that there is a grid."""
+        return bool((self._seen_at > 0).any())
+
+    def add(self, scan: LaserScan | SonarScan) -> bool:
+        """Add a scan.
+
+        Parameters
+        ----------
+        scan
+            Readings of a laser or of sonars, with their pose. Readings that are none are left out.
+
+        Returns
+        -------
+        bool
+            Whether the scan was added; False if the grid would exceed its greatest size with it,
+            and has not changed.
+        """
+        added = self._add_laser(scan) if isinstance(scan, LaserScan) else self._add_sonars(scan)
+        self._n_scans += added
+        return added
+
+    def _add_laser(self, scan: LaserScan) -> bool:
+        model, (x, y, heading_rad) = self._laser, scan.pose
+        x0, y0 = self._frame.origin_m
+        high_m = min(model.max_range_m, scan.max_range_m)
+        hits, ends, kinds, box = beam_ends(
+            scan.ranges_m,
+            (x - x0, y - y0, heading_rad),
+            (scan.start_rad, scan.step_rad),
+            (model.min_range_m, high_m, min(model.clear_range_m, high_m), model.tolerance_m),
+            self.resolution_m,
+        )
+        if not self._grow(*box.tolist()):
+            return False
+        changes = log_odds_of(model.when_hit), log_odds_of(model.when_passed)
+        limit = -log_odds_of(_LEAST_P)
+        add_beams(
+            self._evidence,
+            self._seen_at,
+            self._corner,
+            (hits, ends, kinds),
+            self._n_scans + 1,
+            (np.float32(changes[0]), np.float32(changes[1]), np.float32(limit)),
+        )
+        return True
+
+    def _add_sonars(self, scan: SonarScan) -> bool:
+        model, (x, y, heading_rad) = self._sonar, scan.pose
+        (x0, y0), side_m = self._frame.origin_m, self.resolution_m
+        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+        apexes = [
+            (
+                (y - y0 + sine * ahead + cosine * aside) / side_m,
+                (x - x0 + cosine * ahead - sine * aside) / side_m,
+                heading_rad + turn,
+            )
+            for ahead, aside, turn in scan.mounts.tolist()
+        ]
+        reach = (model.max_range_m + model.tolerance_m) / side_m
+        rows, cols = ([apex[axis] for apex in apexes] for axis in range(2))
+        box = min(rows) - reach, max(rows) + reach, min(cols) - reach, max(cols) + reach
+        if not self._grow(*(math.floor(value) for value in box)):
+            return False
+        changes = model.when_hit, model.when_passed, -log_odds_of(_LEAST_P)
+        lengths = model.tolerance_m / side_m, model.min_range_m / side_m
+        for apex, range_m in zip(apexes, scan.ranges_m.tolist(), strict=True):
+            if range_m > model.min_range_m:
+                add_cone(
+                    self._evidence,
+                    self._seen_at,
+                    self._corner,
+                    apex,
+                    (min(range_m, model.max_range_m) / side_m, range_m < model.max_range_m),
+                    (model.half_angle_rad, *lengths),
+                    changes,
+                    self._n_scans + 1,
+                )
+        return True
+
+    def _grow(self, first_row: int, last_row: int, first_col: int, last_col: int) -> bool:
+        """Make the arrays hold a box of cells; return whether it is within the greatest size."""
+        rows, cols = self._evidence.shape
+        row, col = self._corner if rows else (first_row, first_col)
+        need = (
+            (min(first_row, row), max(last_row + 1, row + rows)),
+            (min(first_col, col), max(last_col + 1, col + cols)),
+        )
+        if need == ((row, row + rows), (col, col + cols)):
+            return True
+        if math.prod(end - begin for begin, end in need) > self._max_cells:
+            return False
+        # A margin in proportion to the extents, so that copying costs little in total.
+        margins = [max(_MARGIN_CELLS, (end - begin) // 4) for begin, end in need]
+        (top, bottom), (left, right) = (
+            (begin - margin * (begin < old), end + margin * (end > old + size))
+            for (begin, end), margin, old, size in zip(
+                need, margins, (row, col), (rows, cols), strict=True
+            )
+        )
+        if (bottom - top) * (right - left) > self._max_cells:
+            (top, bottom), (left, right) = need
+        for name in ("_evidence", "_seen_at"):
+            old_array = getattr(self, name)
+            new = np.zeros((bottom - top, right - left), old_array.dtype)
+            new[row - top : row - top + rows, col - left : col - left + cols] = old_array
+            setattr(self, name, new)
+        self._corner = (top, left)
+        return True
+
+    def to_grid(
+        self,
+        *,
+        robot_radius_m: float | None = None,
+        free_threshold: float = 0.196,
+        occupied_threshold: float = 0.65,
+        name: str = "map",
+    ) -> OccupancyGrid:
+        """Return the occupancy grid of all scans so far, cut to the cells that they have met.
+
+        Parameters
+        ----------
+        robot_radius_m
+            Radius in metres by which occupied cells are inflated; None is the default, 0.25 m.
+        free_threshold, occupied_threshold
+            U1 and U2 of the grid.
+        name
+            Name of the map.
+
+        Returns
+        -------
+        OccupancyGrid
+            Probabilities, NaN where no scan has been; the frame lies on the lattice of cells.
+
+        Raises
+        ------
+        InvalidValueError
+            When no scan has met a cell, or a threshold or the radius is out of range.
+        """
+        met = self._seen_at > 0
+        rows, cols = (np.flatnonzero(met.any(axis=axis)) for axis in (1, 0))
+        if not rows.size:
+            raise InvalidValueError("a map needs at least one scan with a reading, add one first")
+        window = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+        probability = 1.0 / (1.0 + np.exp(-self._evidence[window].astype(np.float64)))
+        probability[~met[window]] = math.nan
+        first = [int(rows[0]) + self._corner[0], int(cols[0]) + self._corner[1]]
+        x, y = self._frame.points_of_grid(first).tolist()
+        return OccupancyGrid(
+            probability.astype(np.float32),
+            Frame(self.resolution_m, (x, y)),
+            free_threshold=free_threshold,
+            occupied_threshold=occupied_threshold,
+            robot_radius_m=robot_radius_m,
+            name=name,
+        )

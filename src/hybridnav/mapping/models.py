@@ -1,0 +1,167 @@
+"""Inverse sensor models: how probable a reading makes it that a cell is occupied.
+
+References
+----------
+H. Moravec, A. Elfes: High resolution maps from wide angle sonar, 1985: profiles of a sonar's cone.
+A. Elfes: Using occupancy grids for mobile robot perception and navigation, 1989: Bayes' rule for
+cells. K. Konolige: Improved occupancy grids for map building, 1997: log odds, and readings that
+must not count many times. S. Thrun, W. Burgard, D. Fox: Probabilistic Robotics, 2005, chapter 9:
+the inverse model of a beam.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hybridnav.errors import InvalidValueError
+
+
+def log_odds_of(probability: float) -> float:
+    """Return the log odds of a probability within (0, 1)."""
+    return math.log(probability / (1.0 - probability))
+
+
+def _check_probabilities(when_hit: float, when_passed: float) -> None:
+    if not 0 < when_passed < 0.5 < when_hit < 1:  # noqa: PLR2004 - the prior
+        raise InvalidValueError(
+            "a model needs 0 < when_passed < 0.5 < when_hit < 1, the prior of a cell being 0.5, "
+            f"got when_passed {when_passed} and when_hit {when_hit}"
+        )
+
+
+def _check_lengths(**lengths_m: float) -> None:
+    for name, length_m in lengths_m.items():
+        if not (math.isfinite(length_m) and length_m >= 0):
+            raise InvalidValueError(
+                f"{name} must be a finite length in metres >= 0, got {length_m}"
+            )
+
+
+@dataclass(frozen=True)
+class LaserModel:
+    """Inverse model of laser beams without width (Thrun, Burgard, Fox 2005, section 9.2).
+
+    A beam occupies the cell in which it ends, and frees the cells whose inside it passes before it
+    comes within a tolerance of that point. One scan counts once for each cell, however many beams
+    meet it, and a cell in which any beam of the scan ends is occupied, not free: readings are far
+    from independent where beams are dense, near the laser and along walls that they graze (Konolige
+    1997).
+
+    Parameters
+    ----------
+    when_hit, when_passed
+        Probability that a cell is occupied after one scan in which a beam ended in it, and after
+        one that passed it. A hit counts twice as much as a pass by default, and one pass makes a
+        cell free at the default thresholds of maps.
+    max_range_m
+        Readings of that length or more have no return: they are no obstacles. The default is the
+        range at which a SICK LMS 200 sees a surface of 10 % reflectivity.
+    min_range_m
+        Readings of that length or less are none: errors, dust, or parts of the robot.
+    clear_range_m
+        Length to which a beam without a return frees cells. 0, the default, leaves them: on real
+        robots such beams have also met black, mirroring or transparent surfaces.
+    tolerance_m
+        Distance before the end of a beam that it leaves as it was: half the thickness of obstacles
+        in the model of Thrun, Burgard and Fox. It keeps walls that beams graze.
+
+    Raises
+    ------
+    InvalidValueError
+        When a probability or a length is out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.mapping import LaserModel
+    >>> LaserModel(max_range_m=8.0).max_range_m
+    8.0
+    """
+
+    when_hit: float = 0.95
+    when_passed: float = 0.19
+    max_range_m: float = 30.0
+    min_range_m: float = 0.0
+    clear_range_m: float = 0.0
+    tolerance_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        _check_probabilities(self.when_hit, self.when_passed)
+        _check_lengths(
+            max_range_m=self.max_range_m,
+            min_range_m=self.min_range_m,
+            clear_range_m=self.clear_range_m,
+            tolerance_m=self.tolerance_m,
+        )
+        if not self.min_range_m < self.max_range_m or self.clear_range_m > self.max_range_m:
+            raise InvalidValueError(
+                "a laser needs min_range_m < max_range_m and clear_range_m <= max_range_m, got "
+                f"{self.min_range_m}, {self.max_range_m} and {self.clear_range_m}"
+            )
+
+
+@dataclass(frozen=True)
+class SonarModel:
+    """Inverse model of a sonar's cone, with the profiles of Moravec and Elfes (1985).
+
+    For a reading R, a cell whose centre lies at distance r and at the angle a off the axis has
+
+    * `r < R - e`: the probability 0.5 - (0.5 - when_passed) E, with
+      E = (1 - ((r - min_range) / (R - e - min_range))^2) (1 - (a / half_angle)^2);
+    * `R - e <= r <= R + e`: 0.5 + (when_hit - 0.5) O, with
+      O = (1 - ((r - R) / e)^2) (1 - (a / half_angle)^2);
+
+    and other cells stay as they are. Each sonar's reading counts by itself, by Bayes' rule (Elfes
+    1989): so the free cone of a neighbour clears a part of the arc on which an echo may lie.
+
+    Parameters
+    ----------
+    when_hit, when_passed
+        The greatest and the least probability that one reading yields, on the axis.
+    half_angle_rad
+        Half of the cone's opening; the default is that of Polaroid's sonars, 12.5 degrees.
+    tolerance_m
+        e, by which echoes are uncertain.
+    max_range_m
+        Readings of that length or more have no echo: the cone up to that length is free. The
+        default is that of the Nomad 200, 255 inches.
+    min_range_m
+        What the sonar cannot measure: cells nearer than that stay, and readings of that length or
+        less are none.
+
+    Raises
+    ------
+    InvalidValueError
+        When a probability, a length or the angle is out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.mapping import SonarModel
+    >>> SonarModel(max_range_m=3.0).max_range_m
+    3.0
+    """
+
+    when_hit: float = 0.7
+    when_passed: float = 0.3
+    half_angle_rad: float = math.radians(12.5)
+    tolerance_m: float = 0.1
+    max_range_m: float = 6.477
+    min_range_m: float = 0.15
+
+    def __post_init__(self) -> None:
+        _check_probabilities(self.when_hit, self.when_passed)
+        _check_lengths(
+            tolerance_m=self.tolerance_m,
+            max_range_m=self.max_range_m,
+            min_range_m=self.min_range_m,
+        )
+        if not 0 < self.half_angle_rad < math.pi / 2:
+            raise InvalidValueError(
+                "half of a cone's opening must lie within 0 and pi / 2 radians, "
+                f"got {self.half_angle_rad}"
+            )
+        if not (self.tolerance_m > 0 and self.min_range_m < self.max_range_m):
+            raise InvalidValueError(
+                "a sonar needs tolerance_m > 0 and min_range_m < max_range_m, got "
+                f"{self.tolerance_m}, {self.min_range_m} and {self.max_range_m}"
+            )

@@ -1,0 +1,293 @@
+"""Grids from scans: every cell against the definition, growth, hostile values."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.mapping import LaserModel, LaserScan, Mapper, SonarModel, SonarScan, sonar_ring
+from tests.oracle.beams import kinds_of_cells
+from tests.strategies import examples
+
+HIT, PASSED = math.log(0.95 / 0.05), math.log(0.19 / 0.81)
+LIMIT = math.log(0.98 / 0.02)
+
+_READINGS = st.one_of(
+    st.floats(0.0, 6.0),
+    st.sampled_from([0.0, 0.05, 1.0, 2.5, 4.0, math.inf, math.nan, -math.inf, -1.0, 1e300, 5e-324]),
+)
+
+
+@st.composite
+def scans(draw: Any, reach: float = 3.0) -> LaserScan:
+    """A scan with any readings, at a pose near the origin, often on lines of the lattice."""
+    place = st.one_of(st.floats(-reach, reach), st.sampled_from([0.0, 0.5, 1.0, -0.25, 0.3]))
+    turn = st.one_of(st.floats(-4, 4), st.sampled_from([0.0, math.pi / 2, math.pi / 4, 1e9]))
+    return LaserScan(
+        np.array(draw(st.lists(_READINGS, min_size=1, max_size=12))),
+        pose=(draw(place), draw(place), draw(turn)),
+        start_rad=draw(st.sampled_from([0.0, -math.pi / 2, 0.1])),
+        step_rad=draw(st.sampled_from([0.0, math.pi / 4, 0.01, 0.5])),
+        max_range_m=draw(st.sampled_from([math.inf, 4.0])),
+    )
+
+
+MODELS = st.builds(
+    LaserModel,
+    max_range_m=st.just(5.0),
+    min_range_m=st.sampled_from([0.0, 0.5]),
+    clear_range_m=st.sampled_from([0.0, 2.0, 5.0]),
+    tolerance_m=st.sampled_from([0.0, 0.1, 1.0]),
+)
+
+
+def expected_evidence(given_scans: list[LaserScan], model: LaserModel, side_m: float) -> Any:
+    evidence: dict[tuple[int, int], np.float32] = {}
+    for scan in given_scans:
+        hits, passed = kinds_of_cells(scan, model, side_m)
+        for cells, change in ((hits, HIT), (passed, PASSED)):
+            for cell in cells:
+                total = evidence.get(cell, np.float32(0)) + np.float32(change)
+                evidence[cell] = np.clip(total, np.float32(-LIMIT), np.float32(LIMIT))
+    return evidence
+
+
+@given(
+    st.lists(scans(), min_size=1, max_size=4),
+    MODELS,
+    st.sampled_from([0.25, 0.3, 1.0]),
+)
+@settings(max_examples=examples(120))
+def test_every_cell_has_the_evidence_of_the_definition(
+    given_scans: list[LaserScan], model: LaserModel, side_m: float
+) -> None:
+    mapper = Mapper(resolution_m=side_m, laser=model)
+    for scan in given_scans:
+        assert mapper.add(scan)
+    expected = expected_evidence(given_scans, model, side_m)
+    assert mapper.has_cells == bool(expected)
+    if not expected:
+        with pytest.raises(hn.InvalidValueError, match="at least one scan"):
+            mapper.to_grid()
+        return
+    grid = mapper.to_grid(robot_radius_m=0)
+    first_row = round(grid.frame.origin_m[1] / side_m)
+    first_col = round(grid.frame.origin_m[0] / side_m)
+    found = {
+        (first_row + row, first_col + col): grid.probability[row, col]
+        for row, col in np.argwhere(~np.isnan(grid.probability)).tolist()
+    }
+    assert found.keys() == expected.keys()
+    for cell, evidence in expected.items():
+        assert found[cell] == pytest.approx(1 / (1 + math.exp(-evidence)), abs=1e-6)
+
+
+@given(st.lists(scans(reach=60.0), min_size=1, max_size=5))
+@settings(max_examples=examples(60))
+def test_a_grid_that_grew_is_one_that_was_large_from_the_start(
+    given_scans: list[LaserScan],
+) -> None:
+    grown = Mapper(resolution_m=0.25)
+    large = Mapper(resolution_m=0.25)
+    no_return = np.array([math.inf])
+    for x, y in ((-99.0, -99.0), (99.0, 99.0)):
+        assert large.add(LaserScan(no_return, (x, y, 0.0), start_rad=0.0, step_rad=0.0))
+    for scan in given_scans:
+        assert grown.add(scan)
+        assert large.add(scan)
+    assert grown.has_cells == large.has_cells
+    if grown.has_cells:
+        first, second = grown.to_grid(), large.to_grid()
+        assert first.frame == second.frame
+        assert np.array_equal(first.probability, second.probability, equal_nan=True)
+
+
+def test_a_scan_counts_once_for_a_cell_and_a_hit_before_a_pass() -> None:
+    """Three beams along a row: two pass the cell in which the third one ends."""
+    scan = LaserScan(np.array([5.0, 3.0, 5.0]), (0.5, 0.5, 0.0), start_rad=0, step_rad=0)
+    mapper = Mapper(resolution_m=1.0, laser=LaserModel(tolerance_m=0.0))
+    mapper.add(scan)
+    row = mapper.to_grid().probability[0]
+    assert row == pytest.approx([0.19, 0.19, 0.19, 0.95, 0.19, 0.95])
+
+
+def test_a_door_that_opens_becomes_free_after_some_scans() -> None:
+    def beam(reach: float) -> LaserScan:
+        return LaserScan(np.array([reach]), (0.5, 0.5, 0.0), start_rad=0, step_rad=0)
+
+    mapper = Mapper(resolution_m=1.0)
+    for _ in range(1000):
+        mapper.add(beam(3.0))
+    assert mapper.to_grid().measured[0, 3] == hn.CellClass.OCCUPIED
+    for _ in range(4):
+        mapper.add(beam(8.0))
+    assert mapper.to_grid().measured[0, 3] == hn.CellClass.FREE
+
+
+def test_beams_without_a_return_are_no_obstacles() -> None:
+    beams = LaserScan(np.array([30.0, np.inf, 81.9]), (0, 0, 0), start_rad=0, step_rad=1)
+    mapper = Mapper()
+    assert mapper.add(beams)
+    assert not mapper.has_cells
+    clearing = Mapper(laser=LaserModel(clear_range_m=2.0))
+    assert clearing.add(beams)
+    counts = clearing.to_grid(robot_radius_m=0).class_counts()
+    assert counts["occupied"] == 0
+    assert counts["free"] > 100
+
+
+def test_a_scan_that_needs_too_many_cells_changes_nothing() -> None:
+    mapper = Mapper(resolution_m=0.1, max_cells=10_000)
+    near = LaserScan(np.full(4, 2.0), (0, 0, 0), start_rad=0, step_rad=1)
+    far = LaserScan(np.full(4, 2.0), (1e8, -1e8, 0), start_rad=0, step_rad=1)
+    assert mapper.add(near)
+    before = mapper.to_grid()
+    assert not mapper.add(far)
+    assert mapper.n_scans == 1
+    assert np.array_equal(mapper.to_grid().probability, before.probability, equal_nan=True)
+    assert mapper.add(near)
+
+
+@pytest.mark.parametrize("far_m", [1e6, 1e9])
+def test_cells_far_from_the_origin_stay_on_the_lattice(far_m: float) -> None:
+    mapper = Mapper(resolution_m=0.5, corner_m=(far_m, -far_m))
+    mapper.add(LaserScan(np.array([3.0]), (far_m - 0.75, -far_m + 0.25, 0), 0.0, 0.0))
+    grid = mapper.to_grid(robot_radius_m=0)
+    assert grid.frame.origin_m == pytest.approx((far_m - 1.0, -far_m))
+    assert grid.measured[0, -1] == hn.CellClass.OCCUPIED
+
+
+def cone_probability(model: SonarModel, reading: float, distance: float, off: float) -> float:
+    """The probability of the class's description."""
+    across = 1 - (off / model.half_angle_rad) ** 2
+    echo = reading < model.max_range_m
+    reading = min(reading, model.max_range_m)
+    far, near = reading + model.tolerance_m * echo, reading - model.tolerance_m * echo
+    if across < 0 or not model.min_range_m <= distance <= far:
+        return 0.5
+    if distance < near:
+        along = 1 - ((distance - model.min_range_m) / (near - model.min_range_m)) ** 2
+        return 0.5 - (0.5 - model.when_passed) * along * across
+    if not echo:
+        return 0.5
+    along = 1 - ((distance - reading) / model.tolerance_m) ** 2
+    return 0.5 + (model.when_hit - 0.5) * along * across
+
+
+@given(
+    st.floats(-1.5, 1.5),
+    st.floats(-1.5, 1.5),
+    st.floats(-4, 4),
+    st.lists(st.one_of(st.floats(1.0, 4.0), st.just(math.inf)), min_size=4, max_size=4),
+)
+@settings(max_examples=examples(40))
+def test_cones_add_the_log_odds_of_their_description(
+    x: float, y: float, heading: float, readings: list[float]
+) -> None:
+    model, mounts = SonarModel(max_range_m=3.0, tolerance_m=0.3), sonar_ring(4, radius_m=0.2)
+    mapper = Mapper(resolution_m=0.25, sonar=model)
+    mapper.add(SonarScan(np.array(readings), (x, y, heading), mounts))
+    grid = mapper.to_grid(robot_radius_m=0)
+    for row in range(grid.shape[0]):
+        for col in range(grid.shape[1]):
+            centre = grid.frame.points_of([row, col])
+            odds = 0.0
+            for (ahead, aside, turn), reading in zip(mounts, readings, strict=True):
+                cosine, sine = math.cos(heading), math.sin(heading)
+                apex = np.array(
+                    [x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside]
+                )
+                bearing = math.atan2(*(centre - apex)[::-1]) - heading - turn
+                off = (bearing + math.pi) % math.tau - math.pi
+                p = cone_probability(model, reading, math.dist(centre, apex), off)
+                odds += math.log(p / (1 - p))
+            found = grid.probability[row, col]
+            expected = 1 / (1 + math.exp(-odds))
+            assert (0.5 if math.isnan(found) else found) == pytest.approx(expected, abs=1e-4)
+
+
+def test_a_ring_of_sonars_sees_the_walls_of_a_corridor() -> None:
+    """Driving along it, with the readings that walls at 1 m to both hands return."""
+    mapper, mounts = Mapper(resolution_m=0.1), sonar_ring()
+    for x in np.arange(0.0, 4.0, 0.1):
+        aside = np.abs(np.sin(mounts[:, 2]))
+        readings = np.where(aside > 0.9, (1.0 - 0.23 * aside) / np.maximum(aside, 0.1), np.nan)
+        assert mapper.add(SonarScan(readings, (float(x), 0.0, 0.0), mounts))
+    grid = mapper.to_grid(robot_radius_m=0)
+
+    def kind(x: float, y: float) -> int:
+        return int(grid.measured[tuple(grid.frame.cells_of([x, y]))])
+
+    assert {kind(x, 1.0) for x in (1.0, 2.0, 3.0)} == {int(hn.CellClass.OCCUPIED)}
+    assert {kind(x, -1.0) for x in (1.0, 2.0, 3.0)} == {int(hn.CellClass.OCCUPIED)}
+    assert {kind(x, 0.6) for x in (1.0, 2.0, 3.0)} == {int(hn.CellClass.FREE)}
+
+
+BAD_SCANS: dict[str, Any] = {
+    "no ranges": {"ranges_m": np.array([])},
+    "a table": {"ranges_m": np.ones((2, 2))},
+    "no place": {"pose": (math.nan, 0.0, 0.0)},
+    "endless turn": {"pose": (0.0, 0.0, math.inf)},
+    "too far": {"pose": (1e10, 0.0, 0.0)},
+    "step": {"step_rad": 1e308},
+    "range": {"max_range_m": math.nan},
+}
+
+
+@pytest.mark.parametrize("change", BAD_SCANS.values(), ids=BAD_SCANS)
+def test_a_scan_refuses_values_that_are_none(change: dict[str, Any]) -> None:
+    fine = {"ranges_m": np.ones(3), "pose": (0.0, 0.0, 0.0), "start_rad": 0.0, "step_rad": 0.1}
+    with pytest.raises(hn.InvalidValueError) as refused:
+        LaserScan(**{**fine, **change})
+    assert "\n" not in str(refused.value)
+
+
+def test_sonars_need_one_finite_mount_each() -> None:
+    for mounts in (np.zeros((2, 3)), np.full((3, 3), np.nan), np.full((3, 3), 1e300)):
+        with pytest.raises(hn.InvalidValueError, match="mounts"):
+            SonarScan(np.ones(3), (0.0, 0.0, 0.0), mounts)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"when_hit": 0.5},
+        {"when_passed": 0.0},
+        {"max_range_m": math.inf},
+        {"min_range_m": 40.0},
+        {"clear_range_m": 31.0},
+        {"tolerance_m": -1.0},
+    ],
+)
+def test_a_laser_refuses_settings_out_of_range(values: dict[str, float]) -> None:
+    with pytest.raises(hn.InvalidValueError):
+        LaserModel(**values)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"when_hit": 1.0}, {"half_angle_rad": 2.0}, {"tolerance_m": 0.0}, {"max_range_m": 0.1}],
+)
+def test_a_sonar_refuses_settings_out_of_range(values: dict[str, float]) -> None:
+    with pytest.raises(hn.InvalidValueError):
+        SonarModel(**values)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"resolution_m": 0.0},
+        {"resolution_m": 1e-4},
+        {"corner_m": (math.nan, 0.0)},
+        {"max_cells": 0},
+    ],
+)
+def test_a_mapper_refuses_settings_out_of_range(values: dict[str, Any]) -> None:
+    with pytest.raises(hn.InvalidValueError):
+        Mapper(**values)

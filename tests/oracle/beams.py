@@ -1,0 +1,62 @@
+"""What a laser scan does to each cell, by the definition: exact tests of every cell in a box."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+_PARTS = 2**16
+"""Positions are counted in parts of a cell, and are odd."""
+
+
+def position(cells: float) -> int:
+    """Return a position in parts of a cell."""
+    return math.floor(cells * _PARTS) | 1
+
+
+def passes(start: tuple[int, int], end: tuple[int, int], cell: tuple[int, int]) -> bool:
+    """Return whether a segment passes the inside of a cell: clipped to it, some length is left."""
+    low, high = Fraction(0), Fraction(1)
+    for axis in range(2):
+        begin, reach = start[axis], end[axis] - start[axis]
+        near, far = cell[axis] * _PARTS, (cell[axis] + 1) * _PARTS
+        if reach == 0:
+            if not near < begin < far:
+                return False
+            continue
+        first, second = sorted((Fraction(near - begin, reach), Fraction(far - begin, reach)))
+        low, high = max(low, first), min(high, second)
+    return low < high
+
+
+def kinds_of_cells(scan, model, resolution_m, corner_m=(0.0, 0.0)):
+    """Return the cells that a scan hits, and those that it passes and does not hit."""
+    x, y = scan.pose[0] - corner_m[0], scan.pose[1] - corner_m[1]
+    start = (position(y / resolution_m), position(x / resolution_m))
+    far = min(model.max_range_m, scan.max_range_m)
+    hits, passed = set(), set()
+    for k, reading in enumerate(scan.ranges_m.tolist()):
+        if not reading > model.min_range_m:
+            continue
+        angle = scan.pose[2] + (scan.start_rad + k * scan.step_rad)
+
+        def at(reach, angle=angle):
+            return (
+                position((y + reach * math.sin(angle)) / resolution_m),
+                position((x + reach * math.cos(angle)) / resolution_m),
+            )
+
+        if reading < far:
+            hits.add(tuple(part // _PARTS for part in at(reading)))
+            until = reading - model.tolerance_m
+        else:
+            until = min(model.clear_range_m, far)
+        if until <= 0 or at(until) == start:
+            continue
+        end = at(until)
+        rows, cols = (
+            range(min(start[axis], end[axis]) // _PARTS, max(start[axis], end[axis]) // _PARTS + 1)
+            for axis in range(2)
+        )
+        passed |= {(row, col) for row in rows for col in cols if passes(start, end, (row, col))}
+    return hits, passed - hits
