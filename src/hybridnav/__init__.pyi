@@ -24,6 +24,7 @@ from .grid import (
     drop_islands as drop_islands,
 )
 from .io import (
+    CarmenLog as CarmenLog,
     Model as Model,
     example_map as example_map,
     load as load,

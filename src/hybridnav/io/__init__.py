@@ -1,4 +1,4 @@
-"""Readers of maps, benchmarks, examples, rooms, closed areas; maps and rooms out; models.
+"""Readers of maps, benchmarks, examples, logs, rooms, closed areas; maps and rooms out; models.
 
 Names load on first use: rooms need scipy, models and closed areas numba, a map file neither.
 """

@@ -1,4 +1,5 @@
 from .blocked import load_blocked as load_blocked
+from .carmen import CarmenLog as CarmenLog
 from .examples import example_map as example_map
 from .maps import load as load, load_map as load_map
 from .models import Model as Model, save as save
