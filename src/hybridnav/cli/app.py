@@ -19,6 +19,7 @@ from hybridnav.errors import HybridNavError
 _HOME_OF = {
     "plan": "plan",
     "build": "build",
+    "map": "map",
     "show": "show",
     "rooms": "rooms",
     "evaluate": "evaluate",
