@@ -16,7 +16,7 @@ from hybridnav.topology.segmentation import divide_rooms
 from hybridnav.topology.segments import main_direction
 from tests.strategies import class_grids, occupancy_grid
 
-METHODS = ["judged", "walls", "watershed", "contraction"]
+METHODS = ["judged", "walls", "watershed"]
 RESOLUTION_M = 0.1
 
 
@@ -74,8 +74,7 @@ def beside_a_closet(side_cells):
     return free
 
 
-# Contraction parts rooms beside a door, so wide that a closet merges with the room before it.
-@pytest.mark.parametrize("method", ["walls", "watershed"])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_closet_with_a_door_is_a_room_by_its_free_area(method):
     free = beside_a_closet(12)
     free[12:20, 42] = 1
@@ -149,7 +148,7 @@ def test_a_map_without_free_cells_has_no_rooms(method):
 
 def test_unknown_methods_and_areas_are_refused():
     grid = hn.OccupancyGrid(np.zeros((5, 5), np.float32))
-    with pytest.raises(hn.InvalidValueError, match="judged, walls, watershed, contraction"):
+    with pytest.raises(hn.InvalidValueError, match="judged, walls, watershed"):
         hn.find_rooms(grid, method="magic")  # type: ignore[arg-type]
     for area_m2 in (0.0, -1.0, math.nan, math.inf, 1e308):
         with pytest.raises(hn.InvalidValueError, match="positive"):

@@ -12,7 +12,7 @@ MAX_NAME = 80
 MAX_NUMBER = 1_000_000_000
 """Number of a door at most."""
 
-Segmentation = Literal["judged", "walls", "watershed", "contraction"]
+Segmentation = Literal["judged", "walls", "watershed"]
 """How rooms may be found; see `hybridnav.topology.find_rooms`."""
 
 

@@ -19,7 +19,6 @@ from hybridnav.topology.judging import Forest, JudgedSegments
 from hybridnav.topology.merging import Segments, grown, least_cells
 from hybridnav.topology.segments import (
     LEAST_SEGMENT_M2,
-    contracted_segments,
     walled_segments,
     watershed_segments,
 )
@@ -47,9 +46,8 @@ LEAST_LIKELY = 0.5
 """Segments of one room: the least probability at which they merge."""
 _SOLIDITY = 0.8
 _OPEN = 0.65
-_STRAIGHT: dict[Segmentation, float] = {"walls": 0.35, "watershed": 0.35, "contraction": _SOLIDITY}
-"""Solidity of two parts of one corridor. Boundaries of places lie beside doors, not in them, and
-look like a corridor's: contraction has no rule of its own for it."""
+_STRAIGHT = 0.35
+"""Solidity of two parts of one corridor."""
 _WALL_REACH_M = 0.25
 """How far rooms reach into walls, and into the unexplored cells of their own side: outlines that
 people edit then run inside walls, not along the free cells' steps."""
@@ -70,8 +68,7 @@ def find_rooms(
         learnt from people's rooms, judges by the evidence on a boundary that both lie in one room.
         The other methods merge segments where their union is nearly convex and hardly walled; they
         cut `"walls"` along the lines of walls that continue behind an opening, and at pinched
-        passages; `"watershed"` along the watersheds of the distance transform; `"contraction"`
-        where boundaries resist the contraction of a pyramid.
+        passages; `"watershed"` along the watersheds of the distance transform.
     least_area_m2
         In square metres of free cells, positive, at most 1e9. Smaller segments go to the neighbour
         with the longest open border; without one they are no room. Free space outside the building
@@ -175,9 +172,7 @@ def _convex(grid: OccupancyGrid, method: Segmentation, least_area_m2: float) -> 
     cut = np.where(outside, np.int32(NO_ROOM), _segments(grid, method, least_area_m2))
     segments = Segments(cut, grid.resolution_m)
     segments.merge_small(min(least_area_m2, _SPLINTER_M2))
-    segments.merge_convex(
-        least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT[method]
-    )
+    segments.merge_convex(least_solidity=_SOLIDITY, least_open=_OPEN, least_straight=_STRAIGHT)
     segments.merge_small(least_area_m2)
     return segments.label_of
 
@@ -186,7 +181,7 @@ def _segments(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> Int
     """Return the segments into which free space is cut."""
     if method == "walls":
         return walled_segments(grid, least_m2=min(least_m2, LEAST_SEGMENT_M2))
-    return watershed_segments(grid) if method == "watershed" else contracted_segments(grid)
+    return watershed_segments(grid)
 
 
 def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:

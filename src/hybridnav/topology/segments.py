@@ -4,7 +4,6 @@ rooms."""
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,6 @@ from scipy import ndimage
 
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
-from hybridnav.pyramid import DualGraphPyramid, Resistance
 from hybridnav.topology import _segmentation_kernels
 
 if TYPE_CHECKING:
@@ -21,9 +19,6 @@ if TYPE_CHECKING:
 
 _PERSISTENCE = 0.8
 """A passage parts two segments when its clearance is below this share of that of either segment."""
-_FINE_M = 1.0
-"""U_d of the places that the steered contraction begins with."""
-
 _PINCH = 0.4
 _PINCH_M = 0.65
 """Besides wall lines only a passage with less clearance than this, and than this share of that on
@@ -85,33 +80,6 @@ def _clearance(grid: OccupancyGrid) -> FloatArray:
     clearance = clearance_cells(grid.measured == CellClass.OCCUPIED)
     clearance[~np.isfinite(clearance)] = 1.0
     return clearance
-
-
-def contracted_segments(grid: OccupancyGrid) -> IntArray:
-    """Return the fields of the apex of a pyramid in which narrow boundaries resist.
-
-    The pyramid grows on above fine places of the map as it was measured. Each level contracts the
-    stars of a maximal independent edge set, widest arcs first, but no arc whose boundary has less
-    clearance than a share of the greatest in either field. So doors resist, two doors between the
-    same rooms one by one, and separate the vertices of the apex.
-
-    Parameters
-    ----------
-    grid
-        The map; cells count as they were measured, whatever the robot's radius.
-
-    Returns
-    -------
-    IntArray
-        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
-    """
-    apex = DualGraphPyramid.build(
-        replace(grid, robot_radius_m=0.0, least_island_m2=0.0),
-        merge_distance_m=max(_FINE_M, 2 * grid.resolution_m),
-        resistance=Resistance(_clearance(grid), _PERSISTENCE),
-    )[-1]
-    segments: IntArray = np.where(grid.measured == CellClass.FREE, apex.field_of, -1)
-    return segments.astype(np.int32)
 
 
 def walled_segments(grid: OccupancyGrid, *, least_m2: float = LEAST_SEGMENT_M2) -> IntArray:
