@@ -14,6 +14,7 @@ import hybridnav as hn
 from hybridnav.sentences import (
     Doorway,
     Instruction,
+    Landmark,
     Passed,
     Space,
     Turn,
@@ -23,7 +24,7 @@ from hybridnav.sentences import (
 )
 
 if TYPE_CHECKING:
-    from hybridnav.sentences.instruction import Hand
+    from hybridnav.sentences.instruction import Hand, Side
 
 KITCHEN, CORRIDOR, LAB = Space("kitchen"), Space(None, "corridor"), Space("l3_404")
 AT = (1.0, 2.0)
@@ -144,7 +145,7 @@ def test_an_unknown_language_is_refused_in_one_line(given):
 @pytest.mark.parametrize("code", languages())
 def test_every_template_is_used_and_filled(code):
     """Whatever occurs: no brace is left, no blank is doubled, and no template is idle."""
-    turns = [None, Turn(1.5), TURN, SHARP, Turn(-2.5), BACK]
+    turns = [None, Turn(1.5), Turn(0.8), Turn(-0.8), TURN, SHARP, Turn(-2.5), BACK]
     spaces = [
         KITCHEN,
         LAB,
@@ -179,6 +180,10 @@ def test_every_template_is_used_and_filled(code):
                 ],
                 code,
             )
+            sides: tuple[Side, ...] = ("left", "right", "ahead", "behind")
+            for side in sides:
+                seen = Landmark(4, space, side, is_opening=is_opening)
+                written += sentences([instruction("start", 0.0, space, landmark=seen)], code)
             if turn is not None:
                 written += sentences([instruction(turn=turn, space=space, passed=passed)], code)
     text = "\n".join(written)
@@ -191,3 +196,31 @@ def test_every_template_is_used_and_filled(code):
         if isinstance(value, str) and field.name not in {"name", "decimal"}:
             fixed = [part for part in re.split(r"\{\w+\}", value) if part.strip()]
             assert all(part.strip() in text for part in fixed), field.name
+
+
+def test_a_narrow_opening_has_no_width_to_recognise_it_by():
+    for width_m, text in ((1.2, "opening 9"), (2.4, "opening 9 (2.4 m wide)")):
+        doorway = Doorway(LAB, 9, width_m, is_opening=True)
+        assert (
+            f"go through {text} into l3_404"
+            in sentences([instruction("cross", doorway=doorway)])[0]
+        )
+
+
+def test_a_landmark_shows_the_direction_at_the_start():
+    cases: tuple[tuple[str, Space, Side], ...] = (
+        ("en", KITCHEN, "left"),
+        ("en", LAB, "ahead"),
+        ("en", Space(None), "behind"),
+        ("de", LAB, "right"),
+    )
+    told = [
+        sentences([instruction("start", 0.0, landmark=Landmark(4, space, side))], code)[0]
+        for code, space, side in cases
+    ]
+    assert told == [
+        "start in the corridor with door 4 to the kitchen on the left",
+        "start in the corridor towards door 4 to l3_404",
+        "start in the corridor with door 4 behind you",
+        "Start im Flur, Tür 4 in „l3_404“ rechts",
+    ]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.poses import wrapped
+from hybridnav.sentences.instruction import LEAST_BEND_RAD
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.result import Path
 
-LEAST_BEND_RAD = math.radians(55.0)
-"""Turn from which a bend counts."""
+_LEAST_SLIGHT_RAD = math.radians(40.0)
+"""Turn from which a slight bend counts: several that nobody tells lead elsewhere."""
 _TOLERANCE_M = 0.75
 """Deviation below which a path counts as straight: a step round a chair is no bend."""
 _ONE_BEND_M = 1.5
@@ -29,7 +30,7 @@ _ROUNDING_M = 1e-9
 
 @dataclass(frozen=True)
 class Bend:
-    """A turn of a line by 55 degrees or more."""
+    """A turn of a line: by 55 degrees or more, or a slight one from 40 degrees on."""
 
     at_m: float
     """Metres from the begin of the line."""
@@ -95,7 +96,7 @@ class Line:
         return float(along[int(np.argmin(away))])
 
     def bends(self) -> list[Bend]:
-        """Return its bends of 55 degrees or more, in order.
+        """Return its bends of 40 degrees or more, in order.
 
         They are turns of the line simplified by 0.75 m (Douglas and Peucker 1973), path by path.
         Slighter turns to one hand, each within 1.5 m of the one before, make one bend.
@@ -112,7 +113,7 @@ class Line:
                 float(headings[run[-1] + 1]),
             )
             for run in _runs(turns, along[1:-1])
-            if abs(turns[run].sum()) >= LEAST_BEND_RAD
+            if abs(turns[run].sum()) >= _LEAST_SLIGHT_RAD
         ]
 
     def _snapped(self, along_m: float) -> float:

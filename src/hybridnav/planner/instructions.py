@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.planner.bends import LEAST_BEND_RAD, Line
+from hybridnav.planner.bends import Line
 from hybridnav.sentences import Doorway, Instruction, Turn
+from hybridnav.sentences.instruction import LEAST_BEND_RAD
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -29,6 +30,10 @@ _GRAZE_M = 3.0
 """Length of a visit in a room, in and out by one door, that is not mentioned."""
 _IN_DOORWAY_M = 1.5
 """Distance from a door within which a bend is described with it."""
+_AT_WAYPOINT_M = 0.5
+"""Distance from a waypoint at which a bend lies at it, and not at a door farther on."""
+_NEAR_EXIT_M = 4.0
+"""Distance of the first door up to which a start needs no landmark."""
 _BEYOND_M = 0.75
 """Distance from a door from which a bend lies clearly before or behind it."""
 _NEARER_RAD = math.radians(10.0)
@@ -107,9 +112,14 @@ def instructions_of(
     """
     line = Line(paths)
     stretches = _without_slivers(list(_stretches(line, legs)))
-    yield _start(line, stretches[0].space, heading_rad)
     before_m, is_first, entered = 0.0, True, set[int]()
     events = _events(line, stretches, landmarks)
+    start = _start(line, stretches[0].space, heading_rad)
+    first = events[0]
+    if heading_rad is None and not (first.kind == "cross" and first.at_m <= _NEAR_EXIT_M):
+        left = {door.number for door in stretches[0].doors}
+        start = replace(start, landmark=landmarks.at_start(line, start.space.name, left))
+    yield start
     for event, following in zip(events, [*events[1:], None], strict=True):
         stretch = event.stretch
         left = {door.number for door in stretch.doors}
@@ -209,6 +219,8 @@ def _events(line: Line, stretches: Sequence[_Stretch], landmarks: Landmarks) -> 
     turns: list[_Event] = []
     for bend in line.bends():
         crossing = _crossing_near(events, bend.at_m)
+        if crossing is not None and Turn(bend.angle_rad).is_slight:
+            continue  # where a door lies and leads is described with it
         if crossing is None:
             stretch = stretches[min(bisect.bisect_right(ends_m, bend.at_m), len(stretches) - 1)]
             turns.append(_Event("turn", bend.at_m, stretch, turn=bend))
@@ -224,12 +236,14 @@ def _crossing_near(events: Sequence[_Event], at_m: float) -> int | None:
     """Return the index of the nearest crossing within reach of a bend, without a waypoint between;
     None if there is none."""
     waypoints = [number for number, event in enumerate(events) if event.kind == "arrive"]
+    beside = [other for other in waypoints if abs(events[other].at_m - at_m) <= _AT_WAYPOINT_M]
     near = [
         (abs(event.at_m - at_m), number)
         for number, event in enumerate(events)
         if event.kind == "cross"
         and abs(event.at_m - at_m) <= _IN_DOORWAY_M
         and not any((other > number) == (events[other].at_m <= at_m) for other in waypoints)
+        and all(abs(event.at_m - events[other].at_m) <= _AT_WAYPOINT_M for other in beside)
     ]
     return min(near)[1] if near else None
 

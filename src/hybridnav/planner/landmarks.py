@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.grid import CellClass
-from hybridnav.sentences import Passed
+from hybridnav.sentences import Landmark, Passed, Space
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from hybridnav.planner.bends import Line
-    from hybridnav.sentences.instruction import Hand
+    from hybridnav.sentences.instruction import Hand, Side
     from hybridnav.topology import Door, Rooms
 
 _LONG_M = 8.0
@@ -29,6 +29,12 @@ _MARGIN_M = 0.75
 _ONE_DOOR_M = 1.0
 """Distance of boundaries that belong to one door, as on both sides of a pillar."""
 _LOOK_M = 1.0
+_FARTHEST_M = 20.0
+"""Distance at which a person recognises a door from the start, at most."""
+_NEAREST_M = 0.7
+"""Distance from a door below which nobody can tell where it lies."""
+_AHEAD_RAD = math.radians(35.0)
+"""Angle to the path up to which a landmark lies ahead, or behind."""
 _LEAST_SIDEWAYS = 0.5
 """Sine of the least angle between a path and the way out by a door beside it."""
 
@@ -51,7 +57,7 @@ class Landmarks:
         """The doors that a person notices, by the room on each side."""
         found: dict[str | None, list[Door]] = {}
         for door in self._rooms.doors:
-            if door.width_m >= _NARROWEST_M:
+            if door.width_m >= _NARROWEST_M and not door.is_gap:
                 for room in set(door.rooms):
                     found.setdefault(room, []).append(door)
         return found
@@ -145,6 +151,43 @@ class Landmarks:
         ]
         return tuple(sorted(found, key=lambda one: (-one.n_doors, -one.n_openings)))
 
+    def at_start(self, line: Line, room: str | None, exits: Collection[int]) -> Landmark | None:
+        """Return the door that shows a person at the begin of a path in which direction to go.
+
+        Parameters
+        ----------
+        line
+            The path.
+        room
+            The room of its begin, None outside rooms.
+        exits
+            Numbers of the doors by which the path leaves the room.
+
+        Returns
+        -------
+        Landmark or None
+            The exit if it lies ahead, over furniture too; else the nearest other door in sight,
+            within 20 m; else the exit in sight.
+        """
+        (x, y), heading_rad = line.at(0.0), line.first_heading()
+        found: list[tuple[bool, float, int, Landmark]] = []
+        for door in () if math.isnan(heading_rad) else self._doors_of.get(room, ()):
+            away_m, is_exit = math.dist((x, y), door.position), door.number in exits
+            if away_m < _NEAREST_M or (away_m > _FARTHEST_M and not is_exit):
+                continue
+            way = math.atan2(door.position[1] - y, door.position[0] - x)
+            side = _side(math.remainder(way - heading_rad, math.tau))
+            beyond = door.rooms[1] if door.rooms[0] == room else door.rooms[0]
+            if door.is_opening and beyond is None:
+                continue
+            seen = Landmark(door.number, Space(beyond), side, is_opening=door.is_opening)
+            if is_exit and side == "ahead":
+                return seen
+            if not self._is_seen([x, y], door):
+                continue
+            found.append((is_exit, away_m, door.number, seen))
+        return min(found, key=lambda one: one[:3])[3] if found else None
+
     def _hand_of(self, door: Door, room: str | None, heading_rad: float) -> Hand | None:
         """Return the hand to which a door leads out of a room; None if it lies across the path."""
         way = self.way_out_rad(door, is_forward=door.rooms[0] == room)
@@ -160,6 +203,15 @@ class Landmarks:
         points = np.linspace(point, door.position, count)[1:-1]
         cells = grid.frame.cells_of(points)
         return not (grid.measured[tuple(cells.T)] == CellClass.OCCUPIED).any()
+
+
+def _side(angle_rad: float) -> Side:
+    """Return where something lies, by its angle to the direction of the path."""
+    if abs(angle_rad) <= _AHEAD_RAD:
+        return "ahead"
+    if abs(angle_rad) >= math.pi - _AHEAD_RAD:
+        return "behind"
+    return "left" if angle_rad > 0 else "right"
 
 
 def _is_known(door: Door, others: list[Door]) -> bool:

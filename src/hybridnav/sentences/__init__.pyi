@@ -1,5 +1,6 @@
 from .instruction import (
     Instruction as Instruction,
+    Landmark as Landmark,
     Passed as Passed,
     Space as Space,
     Doorway as Doorway,

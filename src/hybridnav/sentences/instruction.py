@@ -9,6 +9,9 @@ from typing import Any, Literal
 Kind = Literal["start", "turn", "cross", "arrive"]
 Shape = Literal["corridor", "hall", "room", "passage"]
 Hand = Literal["left", "right"]
+Side = Literal["left", "right", "ahead", "behind"]
+LEAST_BEND_RAD = math.radians(55.0)
+"""Turn from which a bend counts."""
 _SHARP_RAD = math.radians(135.0)
 _ROUND_RAD = math.radians(175.0)
 
@@ -54,6 +57,11 @@ class Turn:
         return "left" if self.angle_rad > 0 else "right"
 
     @property
+    def is_slight(self) -> bool:
+        """Whether it is below 55 degrees."""
+        return abs(self.angle_rad) < LEAST_BEND_RAD
+
+    @property
     def is_sharp(self) -> bool:
         """Whether it exceeds 135 degrees."""
         return abs(self.angle_rad) > _SHARP_RAD
@@ -80,6 +88,36 @@ class Passed:
     """Number of doors."""
     n_openings: int = 0
     """Number of openings."""
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """A door or an opening by which a person at the start finds the direction to go.
+
+    Examples
+    --------
+    >>> from hybridnav.sentences import Landmark, Space
+    >>> Landmark(7, Space("kitchen"), "left").is_opening
+    False
+    """
+
+    door: int
+    """Its number."""
+    beyond: Space
+    """The space behind it."""
+    side: Side
+    """Where it lies for a person who faces along the path."""
+    is_opening: bool = False
+    """Whether it is too wide to be a door."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plain values for JSON."""
+        return {
+            "door": self.door,
+            "beyond": self.beyond.to_dict(),
+            "side": self.side,
+            "is_opening": self.is_opening,
+        }
 
 
 @dataclass(frozen=True)
@@ -140,6 +178,8 @@ class Instruction:
     """What a path crosses; None but for the kind `cross`."""
     waypoint: str | None = None
     """Name or coordinates of the waypoint at which one arrives."""
+    landmark: Landmark | None = None
+    """What shows the direction at a start without a heading."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the plain values for JSON."""
@@ -156,6 +196,7 @@ class Instruction:
             "turn_rad": _angle(self.turn),
             "doorway": None if self.doorway is None else _doorway(self.doorway),
             "waypoint": self.waypoint,
+            "landmark": None if self.landmark is None else self.landmark.to_dict(),
         }
 
 

@@ -25,6 +25,8 @@ class HandWords:
     """A turn of a path: `turn left`."""
     sharp: str
     """A turn by more than 135 degrees."""
+    slight: str
+    """A turn by less than 55 degrees: `bear left`."""
     face: str
     """A turn on the spot before the first step."""
     beside: str
@@ -71,6 +73,16 @@ class Language:
     """First sentence; `{inside}`."""
     start_facing: str
     """First sentence of a robot with a heading; `{inside}`, `{turn}`."""
+    start_beside: str
+    """First sentence with a landmark at one hand; `{inside}`, `{landmark}`, `{beside}`."""
+    start_towards: str
+    """First sentence with a landmark ahead; `{inside}`, `{landmark}`."""
+    start_away: str
+    """First sentence with a landmark behind; `{inside}`, `{landmark}`."""
+    door_to: str
+    """A door as a landmark; `{number}`, `{itself}`, `{into}`."""
+    opening_to: str
+    """An opening as a landmark; `{number}`, `{itself}`, `{into}`."""
     after: str
     """A distance without landmarks; `{metres}`."""
     after_passing: str
@@ -106,7 +118,9 @@ class Language:
     door_beside: str
     """A door at one hand; `{number}`, `{beside}`."""
     opening: str
-    """An opening; `{number}`, `{width}`."""
+    """A wide opening; `{number}`, `{width}`."""
+    narrow_opening: str
+    """An opening as wide as a door, but without jambs; `{number}`."""
     out_turning: str
     """End of a sentence with a turn behind a door; `{turn}`."""
     arrive: str

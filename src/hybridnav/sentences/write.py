@@ -11,10 +11,20 @@ from hybridnav.sentences.german import GERMAN
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav.sentences.instruction import Doorway, Hand, Instruction, Passed, Space, Turn
+    from hybridnav.sentences.instruction import (
+        Doorway,
+        Hand,
+        Instruction,
+        Landmark,
+        Passed,
+        Space,
+        Turn,
+    )
     from hybridnav.sentences.language import HandWords, Language, SpaceWords
 
 _LANGUAGES = {"de": GERMAN, "en": ENGLISH}
+_WIDE_M = 2.0
+"""Width from which an opening is recognised by it, in metres."""
 _AT_ONCE_M = 0.5
 """Length below which a distance is not written, in metres."""
 
@@ -132,9 +142,25 @@ class _Writer:
         if instruction.kind == "turn":
             assert turn is not None  # noqa: S101 - a turn has one
             return words.turn.format(inside=inside, lead=lead, turn=self._turn(turn))
+        if instruction.landmark is not None:
+            return self._start(instruction.landmark, inside)
         if turn is None:
             return words.start.format(inside=inside)
         return words.start_facing.format(inside=inside, turn=self._face(turn))
+
+    def _start(self, landmark: Landmark, inside: str) -> str:
+        """Return the first sentence with a landmark that shows the direction."""
+        words, beyond = self.words, self._space(landmark.beyond)
+        template = words.opening_to if landmark.is_opening else words.door_to
+        if landmark.beyond.name is None and not landmark.is_opening:
+            template = words.door
+        named = template.format(number=landmark.door, itself=beyond.itself, into=beyond.into)
+        if landmark.side == "ahead":
+            return words.start_towards.format(inside=inside, landmark=named)
+        if landmark.side == "behind":
+            return words.start_away.format(inside=inside, landmark=named)
+        beside = self._hand(landmark.side).beside
+        return words.start_beside.format(inside=inside, landmark=named, beside=beside)
 
     def _arrival(self, instruction: Instruction) -> str:
         """Return the template of an arrival."""
@@ -163,6 +189,8 @@ class _Writer:
     def _door(self, doorway: Doorway) -> str:
         words, number = self.words, doorway.door
         if doorway.is_opening:
+            if doorway.width_m < _WIDE_M:
+                return words.narrow_opening.format(number=number)
             width = f"{doorway.width_m:.1f}".replace(".", words.decimal)
             return words.opening.format(number=number, width=width)
         if doorway.beside is None:
@@ -213,6 +241,8 @@ class _Writer:
         if turn.is_round:
             return self.words.turn_round
         hand = self._hand(turn.hand)
+        if turn.is_slight:
+            return hand.slight
         return hand.sharp if turn.is_sharp else hand.turn
 
     def _face(self, turn: Turn) -> str:
