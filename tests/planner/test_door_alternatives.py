@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.homotopy.search import AlternativeSearch
 from hybridnav.metrics import judge_path
 from tests.floors import random_floor
 from tests.strategies import examples, occupancy_grid
@@ -200,6 +201,42 @@ def test_both_sides_of_a_block_inside_a_room_count_only_when_asked_for(ring):
     assert both[1].path.length_m == pytest.approx(both[0].path.length_m)
     few = hn.plan_alternatives(ring, ends[0], ends[1], 3, inside_rooms=True, max_overlap=0.1)
     assert len(few) == 1
+
+
+def test_all_searches_inside_rooms_share_one_time_limit(monkeypatch):
+    """Two sequences of doors, and a clock that moves 4 s with each look."""
+    classes = np.ones((9, 21), dtype=np.uint8)
+    classes[:, 10] = 2
+    classes[[1, 7], 10] = 1
+    classes[3:6, 4:6] = 2
+    labels = np.zeros(classes.shape, dtype=np.int32)
+    labels[:, 10:] = 1
+    rooms = hn.RoomLabels(("west", "east"), labels)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes), rooms=rooms))
+    left_s = []
+    paths = AlternativeSearch.paths
+
+    def noted(self, *ends, time_limit_s, **limits):
+        left_s.append(time_limit_s)
+        return paths(self, *ends, time_limit_s=time_limit_s, **limits)
+
+    looks = itertools.count(0.0, 4.0)
+    monkeypatch.setattr("hybridnav.planner.by_classes.perf_counter", lambda: next(looks))
+    monkeypatch.setattr(AlternativeSearch, "paths", noted)
+    planner = hn.HybridPlanner(topology)
+    found = hn.plan_alternatives(
+        planner, (0.5, 4.5), (20.5, 4.5), 9, inside_rooms=True, max_overlap=1.0, time_limit_s=10.0
+    )
+    assert len({other.doors for other in found}) == 2
+    assert left_s == [6.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    "limits", [{"most_states": 0}, {"time_limit_s": math.nan}, {"least_hole_m2": -1.0}]
+)
+def test_options_are_checked_where_they_change_nothing(ring, limits):
+    with pytest.raises(hn.InvalidValueError):
+        hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **limits)
 
 
 @pytest.mark.parametrize("preset", ["shortest", "octile"])

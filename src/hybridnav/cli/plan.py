@@ -90,30 +90,33 @@ AlternativesOption = Annotated[
     ),
 ]
 ByOption = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--by",
         metavar="WHAT",
         help="What makes alternatives differ: doors, or homotopy (sides of obstacles, exact).",
+        show_default="doors",
     ),
 ]
 OverlapOption = Annotated[
-    float,
+    float | None,
     typer.Option(
         "--max-overlap",
         metavar="SHARE",
         min=0,
         max=1,
         help="Share that an alternative by doors may have in common with a shorter one.",
+        show_default="0.8",
     ),
 ]
 StretchOption = Annotated[
-    float,
+    float | None,
     typer.Option(
         "--max-stretch",
         metavar="FACTOR",
         min=1,
         help="Length of an alternative by doors over that of the first, at most.",
+        show_default="2.0",
     ),
 ]
 InsideOption = Annotated[
@@ -123,14 +126,17 @@ InsideOption = Annotated[
     ),
 ]
 LeastHoleOption = Annotated[
-    float,
+    float | None,
     typer.Option(
         "--least-hole",
         metavar="A",
         min=0,
         help="Square metres of an obstacle whose two sides make two routes, by homotopy.",
+        show_default="1.0",
     ),
 ]
+_BY_DOORS = {"--max-overlap", "--max-stretch", "--inside-rooms"}
+"""Options that change nothing by homotopy."""
 LanguageOption = Annotated[
     str,
     typer.Option(
@@ -163,11 +169,11 @@ def plan(
     at: AtOption = "anywhere",
     rooms_file: RoomsOption = None,
     alternatives: AlternativesOption = 1,
-    by: ByOption = "doors",
-    max_overlap: OverlapOption = 0.8,
-    max_stretch: StretchOption = 2.0,
+    by: ByOption = None,
+    max_overlap: OverlapOption = None,
+    max_stretch: StretchOption = None,
     inside_rooms: InsideOption = False,
-    least_hole_m2: LeastHoleOption = 1.0,
+    least_hole_m2: LeastHoleOption = None,
     blocked: BlockedOption = None,
     costs: CostsOption = None,
     preset: PresetOption = None,
@@ -194,7 +200,6 @@ def plan(
     check_picture(plot)
     check_output(poses, "--poses", ENDINGS)
     where = _checked_at(at)
-    _check_least_hole(least_hole_m2)
     given = parsed_costs(costs)
     check_language(language)
     settings = read_settings(
@@ -210,8 +215,25 @@ def plan(
     first, last = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
+    hole_m2 = _checked_least_hole(1.0 if least_hole_m2 is None else least_hole_m2)
+    given_by = "doors" if by is None else _checked_by(by)
+    options = {
+        "--by": by,
+        "--max-overlap": max_overlap,
+        "--max-stretch": max_stretch,
+        "--inside-rooms": inside_rooms or None,
+        "--least-hole": least_hole_m2,
+    }
+    _check_used(
+        {name for name, value in options.items() if value is not None}, given_by, alternatives
+    )
     wanted = Wanted(
-        alternatives, _checked_by(by), max_overlap, max_stretch, inside_rooms, least_hole_m2
+        alternatives,
+        given_by,
+        0.8 if max_overlap is None else max_overlap,
+        2.0 if max_stretch is None else max_stretch,
+        inside_rooms,
+        hole_m2,
     )
     if settings.planner.refine == "ompl" and wanted.needs_grid:
         option = "--by homotopy" if by == "homotopy" else "--inside-rooms"
@@ -272,6 +294,19 @@ def _checked_by(by: str) -> By:
     raise UsageError(f"--by must be doors or homotopy, got {by!r:.80}")
 
 
-def _check_least_hole(area_m2: float) -> None:
+def _check_used(used: set[str], by: By, alternatives: int) -> None:
+    """Refuse options of alternatives that change nothing."""
+    if used and alternatives == 1:
+        raise UsageError(f"{min(used)} is for alternatives: add --alternatives N, or leave it out")
+    idle = used & _BY_DOORS if by == "homotopy" else set[str]()
+    if by == "doors" and "--inside-rooms" not in used:
+        idle = used & {"--least-hole"}
+    if idle:
+        where = "doors" if by == "homotopy" else "homotopy, or with --inside-rooms"
+        raise UsageError(f"{min(idle)} is for alternatives by {where}: leave it out")
+
+
+def _checked_least_hole(area_m2: float) -> float:
     if not math.isfinite(area_m2):
         raise UsageError(f"--least-hole must be a finite number of m² >= 0, got {area_m2}")
+    return area_m2

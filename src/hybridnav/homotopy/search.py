@@ -196,7 +196,7 @@ class AlternativeSearch:
         InvalidValueError
             When `most_states` is out of range, or the time limit is not a number above 0.
         """
-        _check(most_states, time_limit_s)
+        check_limits(most_states, time_limit_s)
         until = perf_counter() + time_limit_s
         cols = self._enterable.shape[1]
         enterable = self._enterable
@@ -241,8 +241,14 @@ class AlternativeSearch:
         return dead_ends
 
 
-def _check(most_states: int, time_limit_s: float) -> None:
-    """Refuse limits that are out of range."""
+def check_limits(most_states: int, time_limit_s: float) -> None:
+    """Refuse limits of a search that are out of range.
+
+    Raises
+    ------
+    InvalidValueError
+        When one is.
+    """
     if not (isinstance(most_states, Integral) and 1 <= most_states <= _class_kernels.MOST_STATES):
         raise InvalidValueError(
             f"most_states is {most_states!r:.80}, expected a whole number from 1 to "

@@ -10,7 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal, get_args, overload
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.homotopy.search import MOST_STATES, TIME_LIMIT_S
+from hybridnav.homotopy.search import MOST_STATES, TIME_LIMIT_S, check_limits
 from hybridnav.planner.by_classes import ClassEffort, ClassTours
 from hybridnav.planner.by_doors import Chosen, DoorTours, RouteLimits
 from hybridnav.planner.tour import Tour, plan_tour
@@ -190,7 +190,8 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
         By homotopy and inside rooms, pairs of a cell and a class that are looked at before the
         search stops, from 1 to 2^26; more take more time and memory.
     time_limit_s
-        By homotopy and inside rooms, seconds before the search stops.
+        By homotopy and inside rooms, seconds before the search stops; inside rooms, for all
+        sequences of doors together.
 
     Returns
     -------
@@ -223,11 +224,11 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
             "homotopy classes are searched for their shortest paths, and this planner plans by "
             'costs: take by="doors" without inside_rooms, or a planner without costs'
         )
+    effort = _checked_effort(ClassEffort(least_hole_m2, most_states, time_limit_s))
     closed = planner.closed(blocked)
     waypoints = [start, goal]
     classes = None
     if by == "homotopy" or inside_rooms:
-        effort = ClassEffort(least_hole_m2, most_states, time_limit_s)
         classes = ClassTours(planner, waypoints, closed, effort)
     first = plan_tour(planner, waypoints, at=at, blocked=closed)
     if not first.solved:
@@ -273,6 +274,17 @@ def _checked(limits: RouteLimits) -> RouteLimits:
                 f"{name} must be a number from {low:g} {most}, got {value!r:.80}"
             )
     return replace(limits, count=count)
+
+
+def _checked_effort(effort: ClassEffort) -> ClassEffort:
+    """Return what a search for classes takes if it is in range, also where none is needed."""
+    check_limits(effort.most_states, effort.time_limit_s)
+    if not (isinstance(effort.least_hole_m2, Real) and 0 <= effort.least_hole_m2 < math.inf):
+        raise InvalidValueError(
+            "least hole must be a finite number of square metres >= 0, "
+            f"got {effort.least_hole_m2!r:.80}"
+        )
+    return effort
 
 
 def _stopped(search: DoorTours | None, classes: ClassTours | None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from hybridnav.result import PlanResult
 
 Cell = tuple[int, int]
+_LEAST_S = 1e-3
+"""Seconds of a search whose call is late already: it looks at the clock and stops."""
 
 
 class ClassEffort(NamedTuple):
@@ -77,6 +80,7 @@ class ClassTours:
         self._planner, self._waypoints = planner, waypoints
         self._closed, self._effort = closed, effort
         self._allowed = planner.preset.planner.allow_unexplored
+        self._until: float | None = None
         self._search: AlternativeSearch = alternative_search(
             planner.topology,
             allow_unexplored=self._allowed,
@@ -155,12 +159,15 @@ class ClassTours:
         self, endpoints: tuple[Cell, Cell], count: int, closed: LongArray | None
     ) -> ClassPaths:
         effort = self._effort
+        if self._until is None:  # all searches of a call share its time
+            self._until = perf_counter() + effort.time_limit_s
+        left_s = max(self._until - perf_counter(), _LEAST_S)
         found = self._search.paths(
             *endpoints,
             count,
             closed=closed,
             most_states=effort.most_states,
-            time_limit_s=effort.time_limit_s,
+            time_limit_s=min(left_s, effort.time_limit_s),
         )
         if not found.complete:
             limit = f"{effort.most_states:,} states (most_states)"
