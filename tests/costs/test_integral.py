@@ -106,6 +106,8 @@ def test_a_point_costs_nothing_and_a_diagonal_passes_no_side_cell() -> None:
             "points must be finite numbers (x, y) of shape (n, 2), n >= 1, got shape (2,)",
         ),
         (np.empty((0, 2)), "points must be finite numbers"),
+        ([(0.5, 0.5), (0.5,)], "give each point two"),
+        ("home", "give each point two"),
     ],
 )
 def test_unusable_points_are_refused(points: Any, message: str) -> None:

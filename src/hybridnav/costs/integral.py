@@ -58,7 +58,13 @@ def cost_along(grid: OccupancyGrid, layer: CostLayer, points: ArrayLike) -> floa
     4.5
     """
     layer.check_fits(grid)
-    xy = np.asarray(points, dtype=np.float64)
+    try:
+        xy = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidValueError(
+            f"points are {points!r:.60}, expected finite numbers (x, y) of shape (n, 2): give each "
+            "point two"
+        ) from None
     if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy) or not np.isfinite(xy).all():  # noqa: PLR2004
         raise InvalidValueError(
             f"points must be finite numbers (x, y) of shape (n, 2), n >= 1, got shape {xy.shape}"
