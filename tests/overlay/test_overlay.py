@@ -1,5 +1,7 @@
 """Costs on a multilevel overlay against Dijkstra's algorithm of scipy."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,7 +10,13 @@ from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
-from hybridnav.overlay import OverlaySearch, PathsTooLongError, build_overlay, prepare_overlay
+from hybridnav.overlay import (
+    OverlayOptions,
+    OverlaySearch,
+    PathsTooLongError,
+    build_overlay,
+    prepare_overlay,
+)
 from tests.overlay.judge import WeightedJudge
 from tests.strategies import examples
 
@@ -48,6 +56,16 @@ def test_paths_cost_what_dijkstra_finds(seed, sizes, share, has_top, epsilon):
         judge.check(search.path(start, goal, epsilon=epsilon), start, goal, epsilon=epsilon)
 
 
+def test_fields_without_moves_are_passed_by():
+    """The first field holds a single cell without a neighbour."""
+    free = np.ones((8, 8), dtype=np.bool_)
+    free[:2, :2] = [[True, False], [False, False]]
+    search = OverlaySearch(build_overlay(free, nested(free, (2, 4, 8))))
+    judge = WeightedJudge(free, np.ones((8, 8)))
+    for start, goal in [((2, 0), (0, 3)), ((7, 7), (0, 2)), ((0, 0), (7, 7))]:
+        judge.check(search.path(start, goal), start, goal)
+
+
 def test_costs_of_one_need_no_array():
     free = np.ones((9, 9), dtype=np.bool_)
     search = OverlaySearch(build_overlay(free, nested(free, [3])))
@@ -65,10 +83,10 @@ def test_factors_out_of_range_are_refused(bad):
     free = np.ones((6, 6), dtype=np.bool_)
     factor = np.ones((6, 6))
     factor[2, 2] = bad
-    with pytest.raises(InvalidValueError, match="expected a number from 1 to 4096"):
+    with pytest.raises(InvalidValueError, match="expected a number from 1 to 1000"):
         build_overlay(free, nested(free, [3]), factor)
     overlay = build_overlay(free, nested(free, [3]))
-    with pytest.raises(InvalidValueError, match="expected a number from 1 to 4096"):
+    with pytest.raises(InvalidValueError, match="expected a number from 1 to 1000"):
         overlay.update(factor)
 
 
@@ -78,23 +96,63 @@ def test_factors_of_another_shape_are_refused():
         build_overlay(free, nested(free, [3]), np.ones((6, 5)))
 
 
+@pytest.mark.parametrize("bad", [[[1.0, 2.0], [1.0]], "high", None, [["a"]]])
+def test_factors_that_are_no_numbers_are_refused(bad):
+    free = np.ones((2, 2), dtype=np.bool_)
+    overlay = build_overlay(free, nested(free, [2]))
+    with pytest.raises(InvalidValueError, match="give an array of rows and columns"):
+        overlay.update(bad)
+
+
+def test_lists_of_factors_are_taken():
+    factor: Any = [[1.0, 3.0, 3.0, 1.0]]
+    free = np.ones((1, 4), dtype=np.bool_)
+    overlay = build_overlay(free, nested(free, [2]))
+    overlay.update(factor)
+    assert OverlaySearch(overlay).path((0, 0), (0, 3)).cost_cells == 7.0
+
+
+def test_an_overlay_without_levels_is_refused():
+    with pytest.raises(InvalidValueError, match="was given no level"):
+        build_overlay(np.ones((2, 2), dtype=np.bool_), [])
+
+
+@pytest.mark.parametrize("sizes", [("a",), (), (9, 3), (np.nan,)])
+def test_sizes_that_do_not_rise_are_refused(sizes):
+    with pytest.raises(InvalidValueError, match="expected rising numbers"):
+        OverlayOptions(field_cells=sizes)
+
+
+@pytest.mark.parametrize("places", [17, 2])
+def test_costs_are_those_of_the_factors_as_given(places):
+    """Factors that are no whole units cost what they are, whole ones too."""
+    free = np.ones((5, 9), dtype=np.bool_)
+    factor = 1 + np.round(np.random.default_rng(places).random((5, 9)) * 2**places) / 2**places
+    overlay = build_overlay(free, nested(free, [3]), factor)
+    search = OverlaySearch(overlay)
+    WeightedJudge(free, factor).check(search.path((0, 0), (4, 8)), (0, 0), (4, 8))
+    factor[1:3, 2:5] = 1 / 3 + 1
+    overlay.update(factor, changed=(1, 3, 2, 5))
+    WeightedJudge(free, factor).check(search.path((0, 0), (4, 8)), (0, 0), (4, 8))
+
+
 def test_paths_that_do_not_fit_are_refused_and_change_nothing():
     """A corridor of 24 cells whose factors add up to more than 16,000 cells."""
     free = np.ones((1, 24), dtype=np.bool_)
-    overlay = build_overlay(free, nested(free, [12, 24]))
+    overlay = build_overlay(free, nested(free, [24]))
     search = OverlaySearch(overlay)
     with pytest.raises(PathsTooLongError, match="use smaller fields"):
-        overlay.update(np.full((1, 24), 4000.0))
+        overlay.update(np.full((1, 24), 1000.0))
     assert search.path((0, 0), (0, 23)).lower_bound_cells == 23
 
 
 def test_long_paths_over_fields_that_fit_are_found():
     """Each field is crossed at less than 16,000 cells, all at more than 32 bits hold."""
-    free = np.ones((1, 60), dtype=np.bool_)
-    factor = np.full((1, 60), 3000.0)
+    free = np.ones((1, 80), dtype=np.bool_)
+    factor = np.full((1, 80), 1000.0)
     overlay = build_overlay(free, nested(free, [4, 12]), factor)
-    found = OverlaySearch(overlay).path((0, 0), (0, 59))
-    assert found.lower_bound_cells == found.cost_cells == 59 * 3000
+    found = OverlaySearch(overlay).path((0, 0), (0, 79))
+    assert found.lower_bound_cells == found.cost_cells == 79 * 1000
 
 
 def test_endpoints_and_epsilon_out_of_range_are_refused():

@@ -160,8 +160,27 @@ def test_threads_ask_while_another_one_changes_costs():
     assert len(costs) == 2
 
 
+@pytest.mark.parametrize(("before", "after"), [(9.0, 1.0), (1.0, 9.0)])
+def test_tables_guide_searches_only_while_they_are_lower_bounds(before, after):
+    """A wall of high costs falls, or rises, inside a field that has a table."""
+    free = np.ones((18, 36), dtype=np.bool_)
+    factor = np.full((18, 36), 2.0)
+    factor[:, 12:15] = before
+    overlay = build_overlay(free, nested(free, [3, 9, 18]), factor, top_bytes=1e9)
+    search = OverlaySearch(overlay)
+    factor[4:8, 12:15] = after
+    overlay.update(factor, changed=(4, 8, 12, 15))
+    levels = overlay.levels
+    assert levels.is_stale[levels.level_at[2] :].any()
+    assert levels.is_lowered[levels.is_stale].all() == (after < before)
+    judge = WeightedJudge(free, factor)
+    for start, goal in [((6, 0), (6, 35)), ((17, 3), (0, 20)), ((5, 10), (6, 16))]:
+        judge.check(search.path(start, goal), start, goal)
+        judge.check(search.path(goal, start), goal, start)
+
+
 @pytest.mark.parametrize(
-    "box", [(0, 7, 0, 3), (2, 1, 0, 3), (0, 1, 2), (0.0, 1, 0, 1), (-1, 1, 0, 1)]
+    "box", [(0, 7, 0, 3), (2, 1, 0, 3), (0, 1, 2), (0.0, 1, 0, 1), (-1, 1, 0, 1), 3, "all"]
 )
 def test_boxes_outside_the_map_are_refused(box):
     free = np.ones((6, 6), dtype=np.bool_)

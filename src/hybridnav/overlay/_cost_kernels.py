@@ -8,7 +8,7 @@ from hybridnav._jit import guarded, njit
 from hybridnav.overlay._lane_kernels import FAR
 from hybridnav.search.moves import COL_STEP, ROW_STEP
 
-_ROOT = 1482910
+ROOT = 1482910
 """sqrt 2 in units of 1 / 2^20, rounded down."""
 
 
@@ -16,7 +16,35 @@ _ROOT = 1482910
 def move_cost(units, direction):
     """Return the cost of a move from the sum of the units of its two cells, rounded down."""
     units = np.int64(units)
-    return units * _ROOT >> 20 if direction & 1 else units
+    return units * ROOT >> 20 if direction & 1 else units
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def sums_along(units, cells):
+    """Return the sums of the units of two cells over the straight moves of a path, and the others.
+
+    Parameters
+    ----------
+    units
+        int32 (rows, cols).
+    cells
+        int64 (n, 2), (row, col).
+    """
+    straight, diagonal = np.int64(0), np.int64(0)
+    for i in range(1, len(cells)):
+        row, col, row_before, col_before = (
+            cells[i, 0],
+            cells[i, 1],
+            cells[i - 1, 0],
+            cells[i - 1, 1],
+        )
+        both = np.int64(units[row, col]) + np.int64(units[row_before, col_before])
+        if row != row_before and col != col_before:
+            diagonal += both
+        else:
+            straight += both
+    return straight, diagonal
 
 
 @njit(cache=True, nogil=True)
@@ -29,7 +57,7 @@ def least_cost(cell, goal, cols, least_units):
     across = abs(cell % cols - goal % cols)
     diagonal = min(rows, across)
     straight = max(rows, across) - diagonal
-    return straight * 2 * least_units + diagonal * (2 * least_units * _ROOT >> 20)
+    return straight * 2 * least_units + diagonal * (2 * least_units * ROOT >> 20)
 
 
 @njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.overlay._cost_kernels import least_cost, move_cost
+from hybridnav.overlay._cost_kernels import ROOT, move_cost
 from hybridnav.overlay._lane_kernels import FAR
 from hybridnav.search.arrays import grow, pop, push
 from hybridnav.search.moves import COL_STEP, ROW_STEP
@@ -26,17 +26,21 @@ def with_room(heap, size, more):
 
 @guarded
 @njit(cache=True, nogil=True)
-def spread(ground, start, goal, limit, distance, touched):
+def spread(ground, span, start, goal, limit, distance, touched):
     """Find the distances from a cell inside its field, by A* to a goal, or without one by Dijkstra.
+
+    Moves that turn by 135 degrees or more are not tried: the cell before has a cheaper one.
 
     Parameters
     ----------
     ground
         See `CellCosts`.
+    span
+        The fields of the finest level that paths pass: the first, and the one after the last.
     start, goal
-        Flat cells of one field; -1 as the goal for all cells of the field.
+        Flat cells of these fields; -1 as the goal for all cells.
     limit
-        Paths that cost more are not followed.
+        Paths that cost more are not followed; with a goal its distance.
     distance
         int32 (rows * cols,), changed: the costs; those not on the way to the goal may be too large.
     touched
@@ -48,33 +52,37 @@ def spread(ground, start, goal, limit, distance, touched):
         `touched`, their number, and the number of cells expanded.
     """
     moves, field_of, units, cols, least_units = ground
+    straight = np.int64(2 * least_units) if goal >= 0 else np.int64(0)
+    bend = (straight * ROOT >> 20) - straight
+    goal_row, goal_col = goal // cols, goal % cols
     heap = np.empty((256, 2), np.int64)
-    key = np.int64(0) if goal < 0 else least_cost(start, goal, cols, least_units)
-    push(heap, 0, key, start)
+    key = _octile(start // cols - goal_row, start % cols - goal_col, straight, bend)
+    push(heap, 0, key, start << 4 | 8)
     distance[start], touched[0] = 0, start
     size, n, expanded = 1, 1, 0
-    while size > 0:
+    is_found = start == goal
+    while size > 0 and not is_found:
         key = heap[0, 0]
-        cell = pop(heap, size)
+        entry = pop(heap, size)
+        cell, towards = np.uint64(entry >> 4), entry & 15
         size -= 1
         so_far = np.int64(distance[cell])
-        ahead = np.int64(0) if goal < 0 else least_cost(cell, goal, cols, least_units)
-        if key != so_far + ahead:
+        row = np.int64(cell) // cols - goal_row
+        col = np.int64(cell) % cols - goal_col
+        if key != so_far + _octile(row, col, straight, bend):
             continue
         expanded += 1
-        if cell == goal:
-            break
         heap = with_room(heap, size, 8)
-        for k in range(8):
-            if not moves[cell] >> k & 1:
+        own, mask = units[cell], moves[cell]
+        for turn in range(-2, 3 if towards < 8 else 6):
+            k = towards + turn & 7
+            if not mask >> k & 1:
                 continue
-            other = cell + ROW_STEP[k] * cols + COL_STEP[k]
-            if field_of[other] != field_of[start]:
+            other = np.uint64(np.int64(cell) + ROW_STEP[k] * cols + COL_STEP[k])
+            cost = so_far + move_cost(own + units[other], k)
+            if cost >= distance[other] or not span[0] <= field_of[other] < span[1]:
                 continue
-            cost = so_far + move_cost(units[cell] + units[other], k)
-            if cost >= distance[other]:
-                continue
-            key = cost if goal < 0 else cost + least_cost(other, goal, cols, least_units)
+            key = cost + _octile(row + ROW_STEP[k], col + COL_STEP[k], straight, bend)
             if key > limit:
                 continue
             if distance[other] == FAR:
@@ -83,9 +91,19 @@ def spread(ground, start, goal, limit, distance, touched):
                 touched[n] = other
                 n += 1
             distance[other] = cost
-            push(heap, size, key, other)
+            if np.int64(other) == goal and cost == limit:
+                is_found = True
+                break
+            push(heap, size, key, np.int64(other) << 4 | k)
             size += 1
     return touched, n, expanded
+
+
+@njit(cache=True, nogil=True)
+def _octile(rows, cols, straight, bend):
+    """Return the cost of a straight path, by that of a straight move and what a diagonal adds."""
+    rows, cols = abs(rows), abs(cols)
+    return straight * max(rows, cols) + bend * min(rows, cols)
 
 
 @njit(cache=True, nogil=True)
@@ -96,14 +114,14 @@ def forget(distance, touched, n):
 
 
 @njit(cache=True, nogil=True)
-def append_back(ground, distance, last, cells, n):
+def append_back(ground, span, distance, last, cells, n):
     """Append the path from a cell back to the start of a `spread`, without the start.
 
     Parameters
     ----------
     ground
         See `CellCosts`.
-    distance
+    span, distance
         int32 (rows * cols,), as `spread` left it.
     last
         Flat cell that was reached.
@@ -127,7 +145,7 @@ def append_back(ground, distance, last, cells, n):
         for k in range(8):
             if moves[cell] >> k & 1:
                 other = cell + ROW_STEP[k] * cols + COL_STEP[k]
-                if field_of[other] == field_of[last] and distance[other] < FAR:
+                if span[0] <= field_of[other] < span[1] and distance[other] < FAR:
                     cost = move_cost(units[cell] + units[other], k)
                     if distance[other] + cost == distance[cell]:
                         before = other

@@ -16,6 +16,96 @@ START = -(1 << 30)
 
 
 @njit(cache=True, nogil=True)
+def _flood(levels, field, child, below):
+    """Compute the distances from a cell to all nodes of the finest level inside a field.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    field
+        A field of the level above the finest.
+    child
+        The field of the finest level around the cell, inside it.
+    below
+        int64 (n,), the distances to the nodes of `child`, inside that.
+    """
+    fields = levels.inner_at[field], levels.inner_at[field + 1]
+    begin = levels.node_at[fields[0]]
+    span = begin, levels.node_at[fields[1]]
+    distance = np.full(span[1] - begin, NO_PATH, np.int64)
+    is_new, is_old = np.zeros(distance.size, np.bool_), np.zeros(distance.size, np.bool_)
+    nearest = np.full(fields[1] - fields[0], NO_PATH, np.int64)
+    first = levels.node_at[child] - begin
+    for i in range(below.size):
+        distance[first + i] = below[i]
+        is_old[first + i] = below[i] < NO_PATH
+    current = np.int64(child)
+    while current >= 0:
+        _leave(levels, current, (fields[0], span[1]), distance, is_new, is_old, nearest)
+        at = np.argmin(nearest)
+        current = np.int64(-1) if nearest[at] == NO_PATH else fields[0] + at
+        nearest[at] = NO_PATH
+        if current >= 0:
+            _cross(levels, current, begin, distance, is_new, is_old)
+    return distance
+
+
+@njit(cache=True, nogil=True)
+def _leave(levels, field, span, distance, is_new, is_old, nearest):
+    """Lower the distances at the far ends of moves from a field, of nodes that were improved.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    field
+        A field of the finest level.
+    span
+        The first field, whose first node has place 0, and the node after the last.
+    distance
+        int64 (n,), changed.
+    is_new, is_old
+        bool (n,), changed: nodes that a move improved, and nodes whose moves are to be looked at.
+    nearest
+        int64 (fields,), changed: the least distance of a new node in each field inside.
+    """
+    first, end = span
+    begin = levels.node_at[first]
+    for node in range(levels.node_at[field], levels.node_at[field + 1]):
+        if not is_old[node - begin]:
+            continue
+        is_old[node - begin] = False
+        for at in range(levels.move_at[node], levels.move_at[node + 1]):
+            other = levels.move_to[at]
+            offered = distance[node - begin] + levels.move_cost[at]
+            if begin <= other < end and levels.move_cost[at] < FAR:
+                if offered < distance[other - begin]:
+                    distance[other - begin] = offered
+                    is_new[other - begin] = True
+                    inside = levels.field_of[other] - first
+                    nearest[inside] = min(nearest[inside], offered)
+
+
+@njit(cache=True, nogil=True)
+def _cross(levels, field, begin, distance, is_new, is_old):
+    """Lower the distances of the nodes of a field to those of its new ones plus the clique's."""
+    first, n = levels.node_at[field] - begin, levels.node_at[field + 1] - levels.node_at[field]
+    at = levels.clique_at[field]
+    own = distance[first : first + n]
+    for i in range(n):
+        if not is_new[first + i]:
+            continue
+        is_new[first + i], is_old[first + i] = False, True
+        value = own[i]
+        for j in range(n):
+            cost = levels.clique[at + clique_place(i, j)]
+            if cost < FAR and value + cost < own[j]:
+                own[j] = value + cost
+                is_old[first + j] = True
+
+
+@njit(cache=True, nogil=True)
 def climb(levels, field, distance, reach):
     """Compute the distances from a cell to the nodes of its field on each level, inside it.
 
@@ -30,12 +120,26 @@ def climb(levels, field, distance, reach):
     reach
         int64 (levels, most nodes of a field), changed; where tables are stale, these are the
         distances before the changes.
+
+    Returns
+    -------
+    ndarray
+        int64 (n,), the distances to the nodes of the finest level, inside its field of the next
+        one; those of its own field with one level.
     """
     first, last = levels.node_at[field], levels.node_at[field + 1]
     for node in range(first, last):
         value = np.int64(distance[levels.cell_of[node]])
         reach[0, node - first] = value if value < FAR else NO_PATH
-    for level in range(1, len(reach)):
+    row = reach[0, : last - first]
+    if len(reach) > 1:
+        child, field = field, levels.parent[field]
+        row = _flood(levels, field, child, row)
+        first, last = levels.node_at[field], levels.node_at[field + 1]
+        begin = levels.node_at[levels.inner_at[field]]
+        for i in range(last - first):
+            reach[1, i] = row[levels.below[first + i] - begin]
+    for level in range(2, len(reach)):
         inner, count = first, last - first
         field = levels.parent[field]
         first, last = levels.node_at[field], levels.node_at[field + 1]
@@ -44,12 +148,13 @@ def climb(levels, field, distance, reach):
         below = reach[level - 1, :count]
         for i in range(last - first):
             at = levels.table_at[field] + i * width + inner - begin
-            row = levels.table[at : at + count]
+            stored = levels.table[at : at + count]
             least = np.int64(NO_PATH)
             for j in range(count):
-                total = below[j] + row[j] if row[j] < FAR else np.int64(NO_PATH)
+                total = below[j] + stored[j] if stored[j] < FAR else np.int64(NO_PATH)
                 least = min(least, total)
             reach[level, i] = least
+    return row
 
 
 @njit(cache=True, nogil=True)
@@ -143,6 +248,8 @@ def over_cliques(levels, ground, top, span, fields, reaches, target, limit, epsi
     first, goals = levels.node_at[fields[0]], levels.node_at[fields[1]]
     for node in range(first, levels.node_at[fields[0] + 1]):
         value = reaches[0][node - first]
+        if value >= best:
+            continue
         key = value + ahead_of(levels, ground, top, target, is_whole, node, work)
         if key < best:
             heap = with_room(heap, size, 1)

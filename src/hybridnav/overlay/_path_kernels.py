@@ -22,6 +22,25 @@ def append(nodes, n, node):
 
 
 @njit(cache=True, nogil=True)
+def _next(levels, span, row, node):
+    """Return the node after one on a shortest path; see `_walk`."""
+    first, rest = span[0], row[node - span[0]]
+    for at in range(levels.move_at[node], levels.move_at[node + 1]):
+        other = levels.move_to[at]
+        if span[0] <= other < span[1]:
+            if levels.move_cost[at] + row[other - first] == rest:
+                return np.int64(other)
+    field = levels.field_of[node]
+    begin, end = levels.node_at[field], levels.node_at[field + 1]
+    at = levels.clique_at[field]
+    for other in range(begin, end):
+        cost = levels.clique[at + clique_place(node - begin, other - begin)]
+        if other != node and cost + row[other - first] == rest:
+            return np.int64(other)
+    return np.int64(-1)
+
+
+@njit(cache=True, nogil=True)
 def _walk(levels, span, row, node, last, nodes, n):
     """Append the nodes of a shortest path to a node, from their distances to it.
 
@@ -43,25 +62,8 @@ def _walk(levels, span, row, node, last, nodes, n):
     tuple
         `nodes`, in a new array if there was no room, and their number, without the first node.
     """
-    first = span[0]
     while node != last:
-        rest, following = row[node - first], np.int64(-1)
-        for at in range(levels.move_at[node], levels.move_at[node + 1]):
-            other = levels.move_to[at]
-            if span[0] <= other < span[1]:
-                if levels.move_cost[at] + row[other - first] == rest:
-                    following = np.int64(other)
-                    break
-        if following < 0:
-            field = levels.field_of[node]
-            begin, end = levels.node_at[field], levels.node_at[field + 1]
-            at = levels.clique_at[field]
-            for other in range(begin, end):
-                cost = levels.clique[at + clique_place(node - begin, other - begin)]
-                if other != node and cost + row[other - first] == rest:
-                    following = np.int64(other)
-                    break
-        node = following
+        node = _next(levels, span, row, node)
         nodes = append(nodes, n, node)
         n += 1
     return nodes, n
@@ -143,7 +145,7 @@ def descend(levels, level, upper, children, reaches):
     levels
         See `Levels`.
     level
-        The level, > 0.
+        The level, > 1.
     upper
         int64 (n,), n >= 1, nodes of this level and of levels below.
     children
@@ -181,17 +183,81 @@ def descend(levels, level, upper, children, reaches):
 
 
 @njit(cache=True, nogil=True)
-def append_field_path(ground, endpoints, limit, distance, touched, cells, n):
+def join_ends(levels, upper, children, reaches, rows):
+    """Return the nodes of a path, joined with those of the finest level that lead to its ends.
+
+    Some follow each other on the same cell.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    upper
+        int64 (n,), n >= 1, nodes of the two finest levels.
+    children
+        The fields of start and goal on the finest level.
+    reaches
+        Two int64 (n,), the distances inside them, from the start and to the goal.
+    rows
+        What `climb` returned for start and goal.
+    """
+    nodes = np.empty(2 * upper.size + 64, np.int64)
+    nodes, n = _walk_out(levels, upper[0], children[0], reaches[0], rows[0], nodes, 0)
+    nodes[:n] = nodes[:n][::-1].copy()
+    for node in upper:
+        nodes = append(nodes, n, node)
+        n += 1
+    nodes, n = _walk_out(levels, upper[-1], children[1], reaches[1], rows[1], nodes, n)
+    return nodes[:n]
+
+
+@njit(cache=True, nogil=True)
+def _walk_out(levels, node, child, below, row, nodes, n):
+    """Append the nodes of the finest level from a node back to one that a cell reaches directly.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    node
+        Node of the finest level, which is appended alone, or of the next one.
+    child
+        The field of the finest level around the cell.
+    below
+        int64 (n,), the distances from the cell to the nodes of `child`.
+    row
+        int64 (n,), those to all nodes of the finest level inside the node's field.
+    nodes, n
+        int64 (room,) and how many of them are filled.
+    """
+    if node < levels.node_at[levels.level_at[1]]:
+        return append(nodes, n, node), n + 1
+    span = _inside(levels, levels.field_of[node])
+    first = levels.node_at[child]
+    node = np.int64(levels.below[node])
+    nodes = append(nodes, n, node)
+    n += 1
+    while levels.field_of[node] != child or row[node - span[0]] != below[node - first]:
+        node = _next(levels, span, row, node)
+        nodes = append(nodes, n, node)
+        n += 1
+    return nodes, n
+
+
+@njit(cache=True, nogil=True)
+def append_field_path(ground, span, endpoints, limit, distance, touched, cells, n):
     """Append the cells of a shortest path inside a field, without its first one.
 
     Parameters
     ----------
     ground
         See `CellCosts`.
+    span
+        See `spread`.
     endpoints
         Its two flat cells.
     limit
-        A cost that it does not exceed.
+        Its cost.
     distance, touched
         Work arrays, see `spread`.
     cells, n
@@ -203,9 +269,11 @@ def append_field_path(ground, endpoints, limit, distance, touched, cells, n):
         `cells` and `touched`, in new arrays if there was no room; the number of cells filled and of
         cells expanded.
     """
-    touched, count, expanded = spread(ground, endpoints[0], endpoints[1], limit, distance, touched)
+    touched, count, expanded = spread(
+        ground, span, endpoints[0], endpoints[1], limit, distance, touched
+    )
     begin = n
-    cells, n = append_back(ground, distance, endpoints[1], cells, n)
+    cells, n = append_back(ground, span, distance, endpoints[1], cells, n)
     cells[begin:n] = cells[begin:n][::-1].copy()
     forget(distance, touched, count)
     return cells, touched, n, expanded
@@ -213,7 +281,7 @@ def append_field_path(ground, endpoints, limit, distance, touched, cells, n):
 
 @njit(cache=True, nogil=True)
 def append_cells(ground, levels, nodes, distance, touched, cells, n):
-    """Append the cells of a path over nodes of the finest level, without that of the first one.
+    """Append the cells of a path over nodes of the two finest levels, without the first one's.
 
     Parameters
     ----------
@@ -235,6 +303,8 @@ def append_cells(ground, levels, nodes, distance, touched, cells, n):
     for i in range(1, nodes.size):
         before, node = nodes[i - 1], nodes[i]
         field = levels.field_of[node]
+        if levels.cell_of[before] == levels.cell_of[node]:
+            continue
         if levels.field_of[before] != field:
             cells = append(cells, n, levels.cell_of[node])
             n += 1
@@ -242,9 +312,12 @@ def append_cells(ground, levels, nodes, distance, touched, cells, n):
         first = levels.node_at[field]
         place = levels.clique_at[field] + clique_place(before - first, node - first)
         limit = levels.clique[place]
+        span = (np.int64(field), np.int64(field) + 1)
+        if field >= levels.level_at[1]:
+            span = (np.int64(levels.inner_at[field]), np.int64(levels.inner_at[field + 1]))
         endpoints = (np.int64(levels.cell_of[before]), np.int64(levels.cell_of[node]))
         cells, touched, n, more = append_field_path(
-            ground, endpoints, limit, distance, touched, cells, n
+            ground, span, endpoints, limit, distance, touched, cells, n
         )
         expanded += more
     return cells, touched, n, expanded

@@ -14,6 +14,7 @@ from hybridnav.overlay._path_kernels import (
     append_cells,
     back_over_cliques,
     descend,
+    join_ends,
     over_top,
 )
 
@@ -132,24 +133,28 @@ def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
     start, goal = endpoints
     n_levels = len(levels.level_at) - 1
     from_start, to_goal = cell_work[0], cell_work[1]
+    fields = np.int64(ground.field_of[start]), np.int64(ground.field_of[goal])
+    spans = (fields[0], fields[0] + 1), (fields[1], fields[1] + 1)
     touched, n_touched, expanded = spread(
-        ground, start, np.int64(-1), np.int64(FAR), from_start, np.empty(256, np.int64)
+        ground, spans[0], start, np.int64(-1), np.int64(FAR), from_start, np.empty(256, np.int64)
     )
     others, n_others, more = spread(
-        ground, goal, np.int64(-1), np.int64(FAR), to_goal, np.empty(256, np.int64)
+        ground, spans[1], goal, np.int64(-1), np.int64(FAR), to_goal, np.empty(256, np.int64)
     )
     expanded += more
     around = (
-        _fields(levels, np.int64(ground.field_of[start]), n_levels),
-        _fields(levels, np.int64(ground.field_of[goal]), n_levels),
+        _fields(levels, fields[0], n_levels),
+        _fields(levels, fields[1], n_levels),
     )
     most = 1
     for level in range(n_levels):
-        for fields in around:
-            most = max(most, levels.node_at[fields[level] + 1] - levels.node_at[fields[level]])
+        for every in around:
+            most = max(most, levels.node_at[every[level] + 1] - levels.node_at[every[level]])
     reaches = (np.empty((n_levels, most), np.int64), np.empty((n_levels, most), np.int64))
-    climb(levels, around[0][0], from_start, reaches[0])
-    climb(levels, around[1][0], to_goal, reaches[1])
+    rows = (
+        climb(levels, around[0][0], from_start, reaches[0]),
+        climb(levels, around[1][0], to_goal, reaches[1]),
+    )
     inside = np.int64(NO_PATH)
     if around[0][0] == around[1][0] and from_start[goal] < FAR:
         inside = np.int64(from_start[goal])
@@ -160,24 +165,27 @@ def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
     if level < 0:
         forget(to_goal, others, n_others)
         if inside < NO_PATH:
-            cells, n = append_back(ground, from_start, goal, cells, n)
+            cells, n = append_back(ground, spans[0], from_start, goal, cells, n)
         cells = append(cells, n, start)
         cells[: n + 1] = cells[: n + 1][::-1].copy()
         forget(from_start, touched, n_touched)
         return cost, bound, cells[: n + 1], expanded, n_expanded
-    while level > 0:
+    while level > 1:
         children = (around[0][level - 1], around[1][level - 1])
         both = (reaches[0][level - 1], reaches[1][level - 1])
         nodes = descend(levels, level, nodes, children, both)
         level -= 1
+    nodes = join_ends(
+        levels, nodes, (around[0][0], around[1][0]), (reaches[0][0], reaches[1][0]), rows
+    )
     first, last = levels.cell_of[nodes[0]], levels.cell_of[nodes[-1]]
-    cells, n = append_back(ground, from_start, first, cells, n)
+    cells, n = append_back(ground, spans[0], from_start, first, cells, n)
     cells = append(cells, n, start)
     n += 1
     cells[:n] = cells[:n][::-1].copy()
     forget(from_start, touched, n_touched)
     cells, touched, n, more = append_cells(ground, levels, nodes, from_start, touched, cells, n)
-    tail, m = append_back(ground, to_goal, last, np.empty(64, np.int64), 0)
+    tail, m = append_back(ground, spans[1], to_goal, last, np.empty(64, np.int64), 0)
     forget(to_goal, others, n_others)
     if m > 0:
         for i in range(1, m):

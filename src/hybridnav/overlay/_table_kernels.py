@@ -135,7 +135,7 @@ def distances_among(levels, fields, sources, table):
 
 @njit(cache=True, nogil=True)
 def fill_tables(levels, fields):
-    """Compute tables and cliques of some fields of an upper level; see `Levels`.
+    """Compute tables, where they are kept, and cliques of some fields of an upper level.
 
     Parameters
     ----------
@@ -156,7 +156,10 @@ def fill_tables(levels, fields):
         begin, end = levels.node_at[inside[0]], levels.node_at[inside[1]]
         at = levels.table_at[field]
         n, width = last - first, end - begin
-        table = levels.table[at : at + n * width].reshape(n, width)
+        if levels.table_at[field + 1] > at:
+            table = levels.table[at : at + n * width].reshape(n, width)
+        else:
+            table = np.empty((n, width), np.int32)
         most = max(most, distances_among(levels, inside, levels.below[first:last], table))
         at = levels.clique_at[field]
         for i in range(n):

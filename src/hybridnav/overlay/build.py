@@ -6,6 +6,7 @@ not depend on costs; what depends on them is computed again when they change.
 
 from __future__ import annotations
 
+import math
 import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -14,11 +15,18 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
+from hybridnav.costs.layer import MOST_FACTOR, UNIT_BITS
 from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import _cost_kernels as kernels
 from hybridnav.overlay.changes import change_in, fields_around
 from hybridnav.overlay.layout import lay_out
-from hybridnav.overlay.tables import PathsTooLongError, compute_top, fill_cliques, fill_tables
+from hybridnav.overlay.tables import (
+    PathsTooLongError,
+    compute_top,
+    fill_cliques,
+    fill_some,
+    fill_tables,
+)
 from hybridnav.search.moves import legal_moves
 
 if TYPE_CHECKING:
@@ -29,10 +37,8 @@ if TYPE_CHECKING:
     from hybridnav.overlay.changes import Change
     from hybridnav.overlay.layout import CellCosts, Levels, Top
 
-UNIT_BITS = 14
-"""A factor of 1 is 2^14 units, a straight move over such cells costs 2^15."""
-MOST_FACTOR = 4096.0
-"""Largest factor: the costs of moves must be small beside those of paths."""
+_ONE = 1 << UNIT_BITS
+"""Units of a factor of 1; a straight move over such cells costs twice as many."""
 TOP_BYTES_PER_CELL = 50.0
 """Most bytes for each cell of the distances between the nodes of the last level, unless asked
 otherwise."""
@@ -43,8 +49,8 @@ _SIDES = 4
 class Overlay:
     """Costs between the border cells of fields on several levels, exact at any time.
 
-    `update` changes costs in a box of cells: the fields that it touches get their new costs at
-    once. The tables of the fields around them become stale: until `renew`, searches go through the
+    `update` changes costs in a box of cells: the fields of the two finest levels that it touches
+    get their new costs at once. The tables of the fields around them become stale: until `renew`, searches go through the
     levels below there, guided by the former tables as long as these are lower bounds. Updates wait
     until the searches of other threads have ended.
 
@@ -53,20 +59,20 @@ class Overlay:
     ground, levels
         Cells, and levels with the cliques of the finest fields.
     factor
-        float32 or float64 (rows, cols), the factors as given.
+        Float (rows, cols), the factors as given, None where `ground` has them exactly.
     top_bytes
         Most bytes of the distances between the nodes of the last level.
     """
 
     def __init__(
-        self, ground: CellCosts, levels: Levels, factor: FloatArray, top_bytes: float
+        self, ground: CellCosts, levels: Levels, factor: FloatArray | None, top_bytes: float
     ) -> None:
         self.ground = ground
         self.levels = levels
-        self.factor = factor
+        self._factor = factor
         self.version = 0
         """How often costs have changed."""
-        self.shape = (factor.shape[0], factor.shape[1])
+        self.shape = (ground.moves.size // ground.cols, ground.cols)
         self._top_bytes = top_bytes
         self.top: Top = compute_top(levels, -1.0)
         self._readers = 0
@@ -81,8 +87,9 @@ class Overlay:
     @property
     def memory_bytes(self) -> int:
         """Bytes of all arrays."""
-        arrays: list[AnyArray] = [*self.ground[:3], *self.levels, self.factor, self.top.distance]
-        return sum(array.nbytes for array in arrays)
+        arrays: list[AnyArray] = [*self.ground[:3], *self.levels, self.top.distance]
+        given = 0 if self._factor is None else self._factor.nbytes
+        return sum(array.nbytes for array in arrays) + given
 
     @property
     def is_current(self) -> bool:
@@ -119,9 +126,13 @@ class Overlay:
         cells
             int64 (n, 2), (row, col) of the cells passed.
         """
-        straight = (np.diff(cells, axis=0) == 0).any(axis=1)
-        length = np.where(straight, 1.0, np.sqrt(2.0))
-        factor = self.factor[cells[:, 0], cells[:, 1]].astype(np.float64)
+        if self._factor is None:
+            units = self.ground.units.reshape(self.shape)
+            straight, diagonal = kernels.sums_along(units, cells)
+            return float(straight + diagonal * math.sqrt(2.0)) * self.cost_unit
+        is_straight = (np.diff(cells, axis=0) == 0).any(axis=1)
+        length = np.where(is_straight, 1.0, math.sqrt(2.0))
+        factor = self._factor[cells[:, 0], cells[:, 1]]
         return float((length * (factor[1:] + factor[:-1])).sum() / 2)
 
     def update(
@@ -136,7 +147,7 @@ class Overlay:
         Parameters
         ----------
         factor
-            Any float (rows, cols), the factor of each cell, from 1 to 4096 where it may be entered.
+            Any float (rows, cols), the factor of each cell, from 1 to 1000 where it may be entered.
         closed
             bool (rows, cols), cells that may not be entered for now, of those for which the overlay
             was built; None for none.
@@ -152,10 +163,12 @@ class Overlay:
             When a path inside one of the finest fields costs more than 16,000 cells; nothing has
             changed then.
         """
+        factor = _numbers(factor)
         rows, cols = self._box(changed)
         field_of = self.ground.field_of.reshape(self.shape)[rows, cols]
         shut = field_of < 0
         if closed is not None:
+            closed = np.asarray(closed)
             if closed.shape != self.shape or closed.dtype != np.bool_:
                 raise InvalidValueError(
                     f"closed has shape {closed.shape} and type {closed.dtype}: give one bool for "
@@ -168,9 +181,11 @@ class Overlay:
             if len(change.touched):
                 self._apply(change)
                 self.version += 1
-            if factor.dtype != np.float32 and self.factor.dtype == np.float32:
-                self.factor = self.factor.astype(np.float64)
-            self.factor[rows, cols] = np.where(shut, 1.0, factor[rows, cols])
+            given = np.where(shut, 1.0, factor[rows, cols]).astype(np.float64)
+            if self._factor is None and not _are_whole(given):
+                self._factor = np.maximum(self.ground.units.reshape(self.shape), 1) / _ONE
+            if self._factor is not None:
+                self._factor[rows, cols] = given
 
     def renew(self, progress: Progress = no_progress) -> None:
         """Compute all stale tables again, so that queries are as fast as before any update."""
@@ -184,7 +199,7 @@ class Overlay:
     def _box(self, changed: tuple[int, int, int, int] | None) -> tuple[slice, slice]:
         if changed is None:
             return slice(0, self.shape[0]), slice(0, self.shape[1])
-        sides = tuple(changed)
+        sides = tuple(changed) if isinstance(changed, tuple | list) else ()
         fits = len(sides) == _SIDES and all(isinstance(side, int | np.integer) for side in sides)
         if not fits or not (
             0 <= sides[0] <= sides[1] <= self.shape[0]
@@ -215,11 +230,14 @@ class Overlay:
         beside = np.concatenate(fields_around(levels, change.beside))
         window = (rows.start, rows.stop, cols.start, cols.stop)
         kernels.renew_moves(levels, self.ground, beside, window)
-        for fields in fields_around(levels, change.touched)[1:]:
+        touched = fields_around(levels, change.touched)
+        for fields in touched[1:]:
             levels.is_stale[fields] = True
         lowered = fields_around(levels, change.lowered)
         for fields in lowered[1:]:
             levels.is_lowered[fields] = levels.is_stale[fields] | levels.is_lowered[fields]
+        for fields in touched[1:2]:
+            fill_some(levels, fields)
         nodes = [
             np.arange(levels.node_at[field], levels.node_at[field + 1], dtype=np.int32)
             for field in lowered[-1]
@@ -246,7 +264,7 @@ def build_overlay(
         int32 (rows, cols) for each level, the finest first: the field of each of these cells, -1
         elsewhere; each field lies in one field of the next level.
     factor
-        Any float (rows, cols), from 1 to 4096: a move costs its length times the mean of its two
+        Any float (rows, cols), from 1 to 1000: a move costs its length times the mean of its two
         cells; None for 1 everywhere. Rounded down to 1 / 2^14.
     top_bytes
         Most bytes of the distances between the border cells of the last level: with more, queries
@@ -275,10 +293,14 @@ def build_overlay(
     >>> OverlaySearch(overlay).path((0, 0), (0, 7)).cost_cells
     7.0
     """
+    if not labels:
+        raise InvalidValueError(
+            "an overlay was given no level: give the field of each cell on at least one"
+        )
     for label in labels:
         if label.shape != enterable.shape or (label[enterable] < 0).any():
             raise InvalidValueError("every cell that may be entered must be in a field")
-    given: FloatArray = np.ones(enterable.shape) if factor is None else factor
+    given = np.ones(enterable.shape) if factor is None else _numbers(factor)
     whole = slice(0, enterable.shape[0]), slice(0, enterable.shape[1])
     units = units_of(given, (enterable.shape[0], enterable.shape[1]), enterable, whole)
     moves = legal_moves(np.ascontiguousarray(enterable), False)
@@ -288,9 +310,8 @@ def build_overlay(
     progress(1, len(labels) + 1)
     if top_bytes is None:
         top_bytes = TOP_BYTES_PER_CELL * max(int(enterable.sum()), 1)
-    kept = np.where(enterable, given, np.ones(1, dtype=given.dtype))
-    kept = kept.astype(np.float32 if given.dtype == np.float32 else np.float64, copy=False)
-    overlay = Overlay(ground, levels, kept, top_bytes)
+    kept = np.where(enterable, given, 1.0).astype(np.float64)
+    overlay = Overlay(ground, levels, None if _are_whole(kept) else kept, top_bytes)
     overlay.renew(progress)
     return overlay
 
@@ -327,5 +348,30 @@ def units_of(
             f"a factor of a free cell is {bad}, expected a number from 1 to {MOST_FACTOR:.0f}: "
             "close cells that must not be entered"
         )
-    units: IntArray = np.where(enterable, np.floor(own * (1 << UNIT_BITS)), 0).astype(np.int32)
+    units: IntArray = np.where(enterable, np.floor(own * _ONE), 0).astype(np.int32)
     return units
+
+
+def _numbers(factor: FloatArray) -> FloatArray:
+    """Return factors as an array of floats.
+
+    Raises
+    ------
+    InvalidValueError
+        When they are no numbers, or rows differ in length.
+    """
+    try:
+        array = np.asarray(factor)
+    except ValueError:
+        array = np.empty(0, dtype=np.bool_)
+    if array.dtype.kind not in "iuf":
+        raise InvalidValueError(
+            f"factors are {factor!r:.60}, expected one number per cell: give an array of rows and "
+            "columns"
+        )
+    return array
+
+
+def _are_whole(factor: FloatArray) -> bool:
+    """Return whether factors are whole units."""
+    return bool((np.floor(factor * _ONE) == factor * _ONE).all())

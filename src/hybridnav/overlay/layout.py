@@ -69,13 +69,15 @@ class Levels(NamedTuple):
     clique: IntArray
     """int32, for each field the distances inside it between its n nodes, n * (n + 1) / 2."""
     table_at: LongArray
-    """int64 (fields + 1,), where the table of each field begins; empty on the finest level."""
+    """int64 (fields + 1,), where the table of each field begins; empty on the two finest
+    levels."""
     table: IntArray
     """int32, for each field the distances inside it from its n nodes to the m nodes of the level
     below that lie in it, n * m, row by row."""
     is_stale: BoolArray
     """bool (fields,), whether a table is that of former costs, or was never computed. Then those of
-    the fields around it are, too. Never on the finest level."""
+    the fields around it are, too. Never on the finest level; on the next one only where distances
+    do not fit."""
     is_lowered: BoolArray
     """bool (fields,), of a stale one: whether distances can be less than its table has."""
 
@@ -202,7 +204,7 @@ def _gathered(
     n_nodes = np.diff(node_at)
     clique_at = np.concatenate([[0], np.cumsum(n_nodes * (n_nodes + 1) // 2)])
     n_inner = node_at[inner_at[1:]] - node_at[inner_at[:-1]]
-    n_inner[: level_at[1]] = 0
+    n_inner[: level_at[min(2, len(nodes))]] = 0
     table_at = np.concatenate([[0], np.cumsum(n_nodes * n_inner)])
     below_of = np.concatenate(below)
     has_below = below_of >= 0

@@ -35,7 +35,9 @@ class OverlayOptions:
     ----------
     field_cells
         Cells of the fields of each level of the overlay, the finest first, rising: the highest
-        level of the pyramid on which a cell lies, on average, in a field of at most so many.
+        level of the pyramid on which a cell lies, on average, in a field of at most so many. The
+        first speeds up preparation, changes, and the way from the ends of a path to the border of
+        a field of the second.
     region_cells
         Most cells of the regions of the pyramid; see `DualGraphPyramid.with_regions`.
     top_bytes_per_cell
@@ -54,13 +56,19 @@ class OverlayOptions:
     80000
     """
 
-    field_cells: tuple[int, ...] = (2_000, 80_000, 1_000_000)
+    field_cells: tuple[int, ...] = (300, 2_000, 80_000, 1_000_000)
     region_cells: int = 80_000
     top_bytes_per_cell: float = 50.0
 
     def __post_init__(self) -> None:
-        rising = self.field_cells[:1] and all(
-            low < high for low, high in zip((0, *self.field_cells), self.field_cells, strict=False)
+        are_numbers = all(isinstance(cells, int | float) for cells in self.field_cells)
+        rising = (
+            are_numbers
+            and self.field_cells[:1]
+            and all(
+                low < high
+                for low, high in zip((0, *self.field_cells), self.field_cells, strict=False)
+            )
         )
         if not rising:
             raise InvalidValueError(
@@ -92,7 +100,7 @@ def prepare_overlay(
     topology
         The map; its pyramid goes on above the places.
     factor
-        Any float (rows, cols), from 1 to 4096: a move costs its length times the mean of its two
+        Any float (rows, cols), from 1 to 1000: a move costs its length times the mean of its two
         cells; None for 1 everywhere.
     allow_unexplored
         Whether unexplored cells may be entered.

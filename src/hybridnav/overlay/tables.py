@@ -55,15 +55,20 @@ def fill_tables(levels: Levels, progress: Progress = no_progress) -> None:
     n_levels = len(levels.level_at) - 1
     for level in range(1, n_levels):
         fields = np.arange(levels.level_at[level], levels.level_at[level + 1], dtype=np.int32)
-        fields = fields[levels.is_stale[fields]]
-        on_stale = np.zeros(len(levels.parent), dtype=np.bool_)
-        on_stale[levels.parent[np.flatnonzero(levels.is_stale[: levels.level_at[level]])]] = True
-        fields = fields[~on_stale[fields]]
-        most = _in_threads(lambda part: _table_kernels.fill_tables(levels, part), fields, 1)
-        fits = fields[np.array(most, dtype=np.int64) < _LIMIT]
-        levels.is_stale[fits] = levels.is_lowered[fits] = False
-        levels.is_lowered[np.setdiff1d(fields, fits)] = True
+        fill_some(levels, fields)
         progress(level + 1, n_levels + 1)
+
+
+def fill_some(levels: Levels, fields: IntArray) -> None:
+    """Compute the stale tables of some fields of one upper level, as `fill_tables` does."""
+    stale = np.flatnonzero(levels.is_stale)
+    on_stale = np.zeros(len(levels.parent), dtype=np.bool_)
+    on_stale[levels.parent[stale[levels.parent[stale] >= 0]]] = True
+    fields = fields[levels.is_stale[fields] & ~on_stale[fields]]
+    most = _in_threads(lambda part: _table_kernels.fill_tables(levels, part), fields, 1)
+    fits = fields[np.array(most, dtype=np.int64) < _LIMIT]
+    levels.is_stale[fits] = levels.is_lowered[fits] = False
+    levels.is_lowered[np.setdiff1d(fields, fits)] = True
 
 
 def compute_top(levels: Levels, most_bytes: float) -> Top:
