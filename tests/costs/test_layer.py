@@ -228,3 +228,26 @@ def test_layers_of_other_shapes_and_closed_cells_of_other_kinds_are_refused() ->
         layer_of(np.ones((2, 3)), np.zeros((2, 3)))
     with pytest.raises(hn.InvalidValueError, match="costs of 3 x 2 cells are not those of a map"):
         layer.check_fits(grid_of(np.zeros((3, 3))))
+
+
+def test_a_changed_layer_differs_in_the_box_alone() -> None:
+    rng = np.random.default_rng(5)
+    old = layer_of(rng.uniform(1, 9, (6, 8)), rng.random((6, 8)) < 0.3)
+    part = layer_of(rng.uniform(1, 9, (2, 3)), np.eye(2, 3, dtype=np.bool_))
+    new = old.changed(part, 1, 4)
+    expected = old.factors.copy()
+    expected[1:3, 4:7] = part.factors
+    np.testing.assert_array_equal(new.factors, expected)
+    assert old.closed is not None
+    closed = old.closed.copy()
+    closed[1:3, 4:7] = part.closed
+    np.testing.assert_array_equal(new.closed, closed)
+    np.testing.assert_array_equal(new.closed_flat, np.flatnonzero(closed))
+    np.testing.assert_array_equal(new.units, (expected * 2**14).astype(np.int32))
+    assert not new.factors.flags.writeable
+    back = new.changed(old.part((1, 3, 4, 7)), 1, 4)
+    np.testing.assert_array_equal(back.factors, old.factors)
+    np.testing.assert_array_equal(back.closed, old.closed)
+    for row, col in ((-1, 0), (5, 0), (0, 6), (0, -1)):
+        with pytest.raises(hn.InvalidValueError, match="do not lie inside costs of 8 x 6 cells"):
+            old.changed(part, row, col)

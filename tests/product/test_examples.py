@@ -82,10 +82,12 @@ def _names() -> Iterator[str]:
 
 NAMES = list(_names())
 OTHERS = [
+    "CostLayer.changed",
     "CostLayer.clearance",
     "CostLayer.cost_of_cells",
     "CostLayer.keepout_mask",
     "CostLayer.speed_mask",
+    "HybridPlanner.update",
     "RoomLabels.at",
     "refine.curves.shortest_curve",
     "refine.footprint.Footprint",

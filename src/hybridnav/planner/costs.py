@@ -31,7 +31,7 @@ _ROUNDING_CELLS = 1e-6
 
 
 @copies_alike
-class Costs:
+class PlannerCosts:
     """The costs by which a planner plans: of its preset, joined with those given to it.
 
     Parameters
@@ -100,7 +100,7 @@ class Costs:
 def box_of_cells(
     changed: BaseGeometry | ArrayLike | None, frame: Frame, shape: tuple[int, int]
 ) -> Box:
-    """Return the box of all cells that an area meets.
+    """Return the box of all cells that an area overlaps.
 
     Parameters
     ----------
@@ -135,8 +135,8 @@ def box_of_cells(
         )
     corners = np.array([[x_min, y_min], [x_min, y_max], [x_max, y_min], [x_max, y_max]])
     positions = frame.positions_of(corners)
-    low = np.clip(np.floor(positions.min(axis=0) - _ROUNDING_CELLS), 0, shape).astype(int)
-    high = np.clip(np.ceil(positions.max(axis=0) + _ROUNDING_CELLS), 0, shape).astype(int)
+    low = np.clip(np.floor(positions.min(axis=0) + _ROUNDING_CELLS), 0, shape).astype(int)
+    high = np.clip(np.ceil(positions.max(axis=0) - _ROUNDING_CELLS), 0, shape).astype(int)
     return int(low[0]), int(high[0]), int(low[1]), int(high[1])
 
 

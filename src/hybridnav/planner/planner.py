@@ -15,7 +15,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import CellQuery, Updatable
 from hybridnav.planner.closed import ClosedCells, Closures
-from hybridnav.planner.costs import Costs, box_of_cells
+from hybridnav.planner.costs import PlannerCosts, box_of_cells
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point, read_points, read_pose
 from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.outcome import Outcomes
@@ -91,7 +91,7 @@ class HybridPlanner:
         self.preset = load_preset(preset)
         check_radius(topology.grid, self.preset)
         settings = self.preset.planner
-        self._costs = Costs(topology.grid, self.preset, costs)
+        self._costs = PlannerCosts(topology.grid, self.preset, costs)
         self._cells = cell_planner(topology, settings, prepared, self.costs)
         self._closures = Closures(topology)
         self._turns = Turns()

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.search import _astar_kernels as _kernels
 from hybridnav.search import _weighted_kernels as _weighted
 from hybridnav.search._move_kernels import legal_moves, trace_cells
@@ -64,6 +65,7 @@ class _Work:
         return self.generation
 
 
+@copies_alike
 class _Weights:
     """The factors of the cells in units, and what they determine.
 
