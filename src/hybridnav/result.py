@@ -28,6 +28,8 @@ Metric = Literal[
     "dubins",
     "reeds-shepp",
 ]
+COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
+"""Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
 
 
 class PlanStatus(StrEnum):

@@ -248,14 +248,18 @@ def _compared(grid_result: hn.PlanResult, result: hn.PlanResult | None) -> dict[
 
 def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
     """Return alternatives with the rooms and doors that they pass, and whether they are all."""
+    from hybridnav.result import COST_METRICS  # noqa: PLC0415 - loads numpy
+
     routes = []
+    by_costs = bool(found) and found[0].result.metric in COST_METRICS
     for number, other in enumerate(found):
         rooms = [
             (leg.room or f"the {leg.shape}") + (f" (door {leg.door.number})" if leg.door else "")
             for leg in other.tour.legs
         ]
-        first_m = found[0].tour.length_m
-        stretch = other.tour.length_m / first_m if number and first_m > 0 else 1.0
+        pair = found[0].tour, other.tour
+        first_m, own_m = (tour.cost if by_costs else tour.length_m for tour in pair)
+        stretch = own_m / first_m if number and first_m > 0 else 1.0
         routes.append(other.to_dict() | {"rooms": rooms, "stretch": stretch})
     return {
         "alternatives": routes,

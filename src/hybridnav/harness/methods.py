@@ -213,12 +213,13 @@ class HybridMethod:
         self._planner.close()
 
 
+LINE_METRICS: frozenset[Metric] = frozenset({"any-angle", "any-angle-weighted"})
 _GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
 
 
 def _line(result: PlanResult) -> AnyAngleResult | None:
     """Return the path of a solved query if it is an any-angle path."""
-    is_line = result.metric in ("any-angle", "any-angle-weighted")
+    is_line = result.metric in LINE_METRICS
     if not is_line or result.path is None or not result.solved:
         return None
     how = result.refinement

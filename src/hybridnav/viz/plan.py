@@ -10,6 +10,7 @@ from matplotlib import patheffects
 from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.result import COST_METRICS
 from hybridnav.route import corridor_of
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
@@ -181,7 +182,7 @@ def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None
     if result.path is None:
         return [*words, str(result.status)]
     words.append(f"path {result.path.length_m:.1f} m")
-    if result.metric in {"weighted", "any-angle-weighted"}:
+    if result.metric in COST_METRICS:
         words.append(f"cost {result.cost:.1f} m")
     if optimum_m is not None:
         loss = result.cost / optimum_m - 1 if optimum_m > 0 else 0.0

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.lines import Line2D
 
+from hybridnav.result import COST_METRICS
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
@@ -90,6 +91,8 @@ def plot_tour(
     'tour'
     """
     text = f"{tour.length_m:.1f} m" if tour.solved else str(tour.status)
+    if tour.solved and tour.metric in COST_METRICS:
+        text += f", cost {tour.cost:.1f} m"
     paths = [result.path.points for result in tour.results if result.path is not None]
     canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
     entries, _ = _draw_ground(canvas, topology, tour.legs, paths, 1.0)
@@ -166,7 +169,10 @@ def plot_alternatives(
         line.set_gid(f"route-{number + 1}")
         canvas.ax.add_line(line)
         sample = Line2D([], [], color=colour, linestyle=dashes or "-", lw=2.2 * canvas.sizes.line)
-        entries.append((sample, f"route {number + 1}, {one.path.length_m:.2f} m{_by(one.doors)}"))
+        by_costs = one.result.metric in COST_METRICS
+        cost = f", cost {one.result.cost:.2f} m" if by_costs else ""
+        length = f"{one.path.length_m:.2f} m{cost}"
+        entries.append((sample, f"route {number + 1}, {length}{_by(one.doors)}"))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
     along = np.concatenate(lines) if lines else np.empty((0, 2))
     draw_markers(canvas, markers, along, labels=labels)
