@@ -41,7 +41,7 @@ class CheapestCost:
     >>> grid = hn.OccupancyGrid(np.zeros((2, 3)), robot_radius_m=0)
     >>> layer = hn.CostLayer(np.array([[1.0, 9.0, 1.0], [1.0, 1.0, 1.0]]))
     >>> round(CheapestCost(grid, layer).cost_m((0, 0), (0, 2)), 3)
-    4.0
+    2.828
     """
 
     def __init__(self, grid: OccupancyGrid, layer: CostLayer | None = None) -> None:

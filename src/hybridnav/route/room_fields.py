@@ -65,15 +65,18 @@ class RoomFields:
 
 
 class Window(NamedTuple):
-    """The part of the map that a field spans: its lowest cell, the columns of the map, and of each
-    cell its class, 0 if closed, and its label, 0 in the field and -1 elsewhere; by costs the moves
-    inside the field."""
+    """The part of the map that a field spans."""
 
     corner: tuple[int, int]
+    """Its lowest cell, (row, col)."""
     cols: int
+    """Columns of the map."""
     classes: ByteArray
+    """uint8 (rows, cols), the class of each cell, 0 if closed."""
     label: IntArray
+    """int32 (rows, cols), 0 in the field and -1 elsewhere."""
     moves: csr_array[np.float64, tuple[int, int]] | None = None
+    """The moves inside the field with their costs; None for lengths."""
 
     def costs(self, cell: int, others: LongArray) -> LongArray:
         """Return the integer costs of the shortest paths inside the field from a flat cell of it to
