@@ -14,6 +14,21 @@ def _profile(share, off_axis):
 
 
 @njit(cache=True, nogil=True)
+def _box(apex, half_angle, far):
+    """Return the first and last row, and column, of cells that a cone may meet."""
+    low_row, high_row, low_col, high_col = apex[0], apex[0], apex[1], apex[1]
+    for k in range(-2, 3):
+        angle = apex[2] + k * half_angle / 2
+        row, col = apex[0] + far * math.sin(angle), apex[1] + far * math.cos(angle)
+        low_row, high_row = min(low_row, row), max(high_row, row)
+        low_col, high_col = min(low_col, col), max(high_col, col)
+    # Between two of these directions the arc bulges.
+    bulge = far * (1.0 - math.cos(half_angle / 4))
+    rows = math.floor(low_row - bulge), math.floor(high_row + bulge)
+    return rows, (math.floor(low_col - bulge), math.floor(high_col + bulge))
+
+
+@njit(cache=True, nogil=True)
 def add_cone(evidence, seen_at, corner, apex, reading, shape, changes, scan):
     """Add the reading of one sonar to a grid; see `SonarModel`.
 
@@ -42,18 +57,18 @@ def add_cone(evidence, seen_at, corner, apex, reading, shape, changes, scan):
     axis_row, axis_col = math.sin(apex[2]), math.cos(apex[2])
     far = reach + tolerance if is_echo else reach
     near = reach - tolerance if is_echo else reach
-    first_row, last_row = math.floor(apex[0] - far), math.floor(apex[0] + far)
-    first_col, last_col = math.floor(apex[1] - far), math.floor(apex[1] + far)
+    widest = math.tan(half_angle)
+    (first_row, last_row), (first_col, last_col) = _box(apex, half_angle, far)
     for row in range(first_row, last_row + 1):
         for col in range(first_col, last_col + 1):
             rows, cols = row + 0.5 - apex[0], col + 0.5 - apex[1]
+            ahead, aside = cols * axis_col + rows * axis_row, rows * axis_col - cols * axis_row
+            if abs(aside) > widest * ahead:  # most cells of the box
+                continue
             distance = math.hypot(rows, cols)
             if not least <= distance <= far:
                 continue
-            ahead, aside = cols * axis_col + rows * axis_row, rows * axis_col - cols * axis_row
             off_axis = math.atan2(aside, ahead) / half_angle
-            if abs(off_axis) > 1.0:
-                continue
             if distance >= near and is_echo:
                 share = _profile((distance - reach) / tolerance, off_axis)
                 probability = 0.5 + (when_hit - 0.5) * share
