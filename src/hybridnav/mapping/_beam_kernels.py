@@ -146,3 +146,56 @@ def add_beams(evidence, seen_at, corner, beams, scan, changes):
             if steps_col:
                 col += col_step
                 by_col += more_col
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def ray_lengths(classes, obstacle, start, targets):
+    """Return how far rays run before they enter a cell that stops them.
+
+    Parameters
+    ----------
+    classes
+        uint8 (rows, cols).
+    obstacle
+        The class of cells that stop rays. What lies outside the map stops none.
+    start
+        `(row, col)` in cells.
+    targets
+        float64 (n, 2), `(row, col)` in cells, within 2^14 cells of the start.
+
+    Returns
+    -------
+    FloatArray
+        float64 (n,), in cells; infinite where nothing stops the ray before its target.
+    """
+    lengths = np.full(len(targets), np.inf)
+    start_row, start_col = _on_lattice(start[0]), _on_lattice(start[1])
+    for k in range(len(targets)):
+        end_row, end_col = _on_lattice(targets[k, 0]), _on_lattice(targets[k, 1])
+        row, col, by_row, by_col, more_row, more_col = _start_of_walk(
+            start_row, start_col, end_row, end_col
+        )
+        up, right = end_row > start_row, end_col > start_col
+        last_row, last_col = end_row >> _SHIFT, end_col >> _SHIFT
+        share = 0.0
+        while True:
+            inside = 0 <= row < classes.shape[0] and 0 <= col < classes.shape[1]
+            if inside and classes[row, col] == obstacle:
+                lengths[k] = share * math.hypot(end_row - start_row, end_col - start_col)
+                lengths[k] /= 1 << _SHIFT
+                break
+            if row == last_row and col == last_col:
+                break
+            steps_row, steps_col = by_row <= by_col, by_col <= by_row
+            if steps_row:
+                row += 1 if up else -1
+                by_row += more_row
+                line = (row if up else row + 1) << _SHIFT
+                share = (line - start_row) / (end_row - start_row)
+            if steps_col:
+                col += 1 if right else -1
+                by_col += more_col
+                line = (col if right else col + 1) << _SHIFT
+                share = (line - start_col) / (end_col - start_col)
+    return lengths

@@ -1,0 +1,245 @@
+"""Simulated sensors: the scans that a robot would take in a map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.mapping._beam_kernels import ray_lengths
+from hybridnav.mapping.scans import LaserScan, SonarScan, sonar_ring
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray
+    from hybridnav.grid import OccupancyGrid
+
+_MOST_RANGE_CELLS = 2**14
+_MOST_RAYS = 1000
+
+
+def _check(max_range_m: float, noise_m: float) -> None:
+    if not (math.isfinite(max_range_m) and max_range_m > 0):
+        raise InvalidValueError(
+            f"max_range_m must be a finite, positive number of metres, got {max_range_m}"
+        )
+    if not (math.isfinite(noise_m) and noise_m >= 0):
+        raise InvalidValueError(f"noise_m must be a finite length in metres >= 0, got {noise_m}")
+
+
+def _ranges(
+    grid: OccupancyGrid, place: tuple[float, float], angles_rad: FloatArray, max_range_m: float
+) -> FloatArray:
+    """Return the distance to the first occupied cell in each direction, infinite if there is none
+    within the range."""
+    side_m = grid.resolution_m
+    if max_range_m / side_m > _MOST_RANGE_CELLS:
+        raise InvalidValueError(
+            f"a range of {max_range_m:g} m is more than {_MOST_RANGE_CELLS} cells of {side_m:g} m: "
+            "simulate a shorter one"
+        )
+    start = grid.frame.position_of(*place)
+    # Directions in the grid, which may be turned in the map frame.
+    turned = angles_rad - grid.frame.yaw_rad
+    reach = max_range_m / side_m
+    targets = np.stack(
+        [start[0] + reach * np.sin(turned), start[1] + reach * np.cos(turned)], axis=1
+    )
+    lengths: FloatArray = ray_lengths(grid.measured, int(CellClass.OCCUPIED), start, targets)
+    return lengths * side_m
+
+
+def _noisy(ranges_m: FloatArray, noise_m: float, rng: np.random.Generator) -> FloatArray:
+    if noise_m == 0:
+        return ranges_m
+    noisy: FloatArray = np.maximum(ranges_m + rng.normal(0.0, noise_m, ranges_m.shape), 0.0)
+    return noisy
+
+
+@dataclass(frozen=True)
+class SimulatedLaser:
+    """A laser that measures how far its beams run to the first occupied cell of a map.
+
+    Unexplored cells, and what lies outside the map, do not stop a beam.
+
+    Parameters
+    ----------
+    n_beams
+        Number of beams, at least 1.
+    start_rad, step_rad
+        Direction of the first beam relative to the heading, and the angle to the next one. By
+        default those of a SICK LMS: half a turn in steps of one degree.
+    max_range_m
+        Longer beams have no return.
+    noise_m
+        Standard deviation of readings, normally distributed.
+
+    Raises
+    ------
+    InvalidValueError
+        When a value is out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.mapping import SimulatedLaser
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 0.0, 0.0, 1.0]]), robot_radius_m=0)
+    >>> scan = SimulatedLaser(n_beams=1, start_rad=0.0).scan(grid, (0.5, 0.5, 0.0))
+    >>> scan.ranges_m.round(3)
+    array([2.5])
+    """
+
+    n_beams: int = 181
+    start_rad: float = -math.pi / 2
+    step_rad: float = math.pi / 180
+    max_range_m: float = 8.0
+    noise_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self.max_range_m, self.noise_m)
+        if self.n_beams < 1:
+            raise InvalidValueError(f"a laser needs at least one beam, got {self.n_beams}")
+
+    def scan(
+        self,
+        grid: OccupancyGrid,
+        pose: tuple[float, float, float],
+        *,
+        seed: int | np.random.Generator = 0,
+        time_s: float = math.nan,
+    ) -> LaserScan:
+        """Return what the laser would measure.
+
+        Parameters
+        ----------
+        grid
+            The world.
+        pose
+            `(x, y, heading)` of the laser, metres and radians, map frame.
+        seed
+            Of the noise; a generator, for noise that differs from scan to scan.
+        time_s
+            When the scan is taken.
+
+        Returns
+        -------
+        LaserScan
+            The readings; infinite without a return.
+
+        Raises
+        ------
+        InvalidValueError
+            When the pose is not finite, or the range more than 2^14 cells.
+        """
+        shape = LaserScan(
+            np.full(self.n_beams, math.inf), pose, self.start_rad, self.step_rad
+        )  # checks the pose
+        x_m, y_m, heading_rad = shape.pose
+        angles = (
+            heading_rad + self.start_rad + np.arange(self.n_beams, dtype=np.float64) * self.step_rad
+        )
+        ranges = _ranges(grid, (x_m, y_m), angles, self.max_range_m)
+        ranges = _noisy(ranges, self.noise_m, np.random.default_rng(seed))
+        return LaserScan(
+            ranges, shape.pose, self.start_rad, self.step_rad, self.max_range_m, time_s
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedSonars:
+    """Sonars that measure the distance to the nearest occupied cell in their cones.
+
+    The cone is searched by rays that are at most a cell apart at the greatest range. Every surface
+    returns an echo, at whatever angle it is met: the mirroring of smooth walls is not simulated.
+
+    Parameters
+    ----------
+    mounts
+        `(x, y, heading)` of each sonar on the robot, float64 (n, 3), metres and radians; by default
+        the ring of the Nomad 200.
+    half_angle_rad
+        Half of a cone's opening.
+    max_range_m
+        Greatest range; beyond there is no echo.
+    noise_m
+        Standard deviation of readings, normally distributed.
+
+    Raises
+    ------
+    InvalidValueError
+        When a value is out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.mapping import SimulatedSonars, sonar_ring
+    >>> grid = hn.OccupancyGrid(np.array([[0.0, 0.0, 0.0, 1.0]]), robot_radius_m=0)
+    >>> sonars = SimulatedSonars(sonar_ring(4, radius_m=0.0))
+    >>> sonars.scan(grid, (0.5, 0.5, 0.0)).ranges_m.round(2)
+    array([2.5, inf, inf, inf])
+    """
+
+    mounts: FloatArray = field(default_factory=sonar_ring, repr=False)
+    half_angle_rad: float = math.radians(12.5)
+    max_range_m: float = 6.477
+    noise_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self.max_range_m, self.noise_m)
+        if not 0 <= self.half_angle_rad < math.pi / 2:
+            raise InvalidValueError(
+                "half of a cone's opening must lie within 0 and pi / 2 radians, "
+                f"got {self.half_angle_rad}"
+            )
+
+    def scan(
+        self,
+        grid: OccupancyGrid,
+        pose: tuple[float, float, float],
+        *,
+        seed: int | np.random.Generator = 0,
+        time_s: float = math.nan,
+    ) -> SonarScan:
+        """Return what the sonars would measure.
+
+        Parameters
+        ----------
+        grid
+            The world.
+        pose
+            `(x, y, heading)` of the robot, metres and radians, map frame.
+        seed
+            Of the noise; a generator, for noise that differs from scan to scan.
+        time_s
+            When the scan is taken.
+
+        Returns
+        -------
+        SonarScan
+            The readings; infinite without an echo.
+
+        Raises
+        ------
+        InvalidValueError
+            When the pose or a mount is not finite, or the range more than 2^14 cells.
+        """
+        shape = SonarScan(np.full(len(self.mounts), math.inf), pose, self.mounts)
+        x_m, y_m, heading_rad = shape.pose
+        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+        half_cells = self.half_angle_rad * self.max_range_m / grid.resolution_m
+        n_aside = min(math.ceil(half_cells), _MOST_RAYS // 2)  # beside the ray on the axis
+        fan = np.linspace(-self.half_angle_rad, self.half_angle_rad, 2 * n_aside + 1)
+        ranges = np.array(
+            [
+                _ranges(
+                    grid,
+                    (x_m + cosine * ahead - sine * aside, y_m + sine * ahead + cosine * aside),
+                    heading_rad + turn + fan,
+                    self.max_range_m,
+                ).min()
+                for ahead, aside, turn in shape.mounts.tolist()
+            ]
+        )
+        ranges = _noisy(ranges, self.noise_m, np.random.default_rng(seed))
+        return SonarScan(ranges, shape.pose, shape.mounts, time_s)
