@@ -225,6 +225,13 @@ def finish(
     return canvas.ax
 
 
+def finish_with_axes(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
+    """Add the title, axes in metres and legend."""
+    label_axes(canvas)
+    add_title(canvas, words)
+    fit_height(canvas, add_legend(canvas, entries, bar=0, below=LABELS * canvas.sizes.font))
+
+
 def fit_height(canvas: Canvas, legend: Legend) -> None:
     """Set the height of a new figure to that of the map and the items round it."""
     if not canvas.is_new:

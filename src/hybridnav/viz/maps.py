@@ -11,7 +11,7 @@ from hybridnav.grid import CellClass
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.layout import LABELS, add_legend, add_title, fit_height, label_axes
+from hybridnav.viz.layout import finish_with_axes
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def plot_map(
     entries += ground_entries(grid)
     rows, cols = grid.shape
     words = [grid.name, f"{cols} x {rows} cells of {grid.resolution_m:g} m"]
-    _finish(canvas, entries, words if title is None else [title])
+    finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
 
 
@@ -124,7 +124,7 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
         entries.insert(0, _draw_arcs(canvas, drawn, self_loops=self_loops))
     n_free = int(drawn.free.sum())
     words = [level.grid.name, f"{n_free} free and {level.n_vertices - n_free} unexplored places"]
-    _finish(canvas, entries, words if title is None else [title])
+    finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
 
 
@@ -159,7 +159,7 @@ def plot_level(
     if level.n_vertices <= MAX_VERTICES_WITH_ARCS:
         entries.insert(0, _draw_arcs(canvas, drawn))
     sizes = f"{level.n_vertices:,} vertices, {level.n_arcs:,} arcs"
-    _finish(canvas, entries, [f"{level.grid.name}, level {level.index}: {sizes}"])
+    finish_with_axes(canvas, entries, [f"{level.grid.name}, level {level.index}: {sizes}"])
     return canvas.ax
 
 
@@ -203,10 +203,3 @@ def arc_handle(sizes: Sizes) -> Line2D:
     """Return the legend handle for an arc between two positions."""
     line = 0.9 * sizes.line
     return Line2D([], [], color=style.ARC, lw=line, marker="o", ms=3 * sizes.line, mfc=style.INK)
-
-
-def _finish(canvas: Canvas, entries: Sequence[Entry], words: Sequence[str]) -> None:
-    """Add the title, axes in metres and legend."""
-    label_axes(canvas)
-    add_title(canvas, words)
-    fit_height(canvas, add_legend(canvas, entries, bar=0, below=LABELS * canvas.sizes.font))

@@ -13,7 +13,7 @@ from hybridnav.topology import Rooms, TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.colouring import colour_vertices
-from hybridnav.viz.layout import finish
+from hybridnav.viz.layout import finish_with_axes
 from hybridnav.viz.maps import ground_entries, swatch
 from hybridnav.viz.room_names import RoomWriter
 
@@ -104,7 +104,8 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         entries += draw_doors(canvas, doors, f"{gaps} left out" if gaps else "")
         writer.number_doors(sorted(doors, key=lambda door: -door.width_m))
     entries += [*ground_entries(grid), *key]
-    return finish(canvas, entries, words if title is None else [title])
+    finish_with_axes(canvas, entries, words if title is None else [title])
+    return canvas.ax
 
 
 def _key(numbered: Sequence[int], names: Sequence[str]) -> list[Entry]:
