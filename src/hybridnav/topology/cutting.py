@@ -217,7 +217,8 @@ def _cut_in(ground: Ground, angle_rad: float, within: BoolArray, cut: BoolArray)
             for mask in (ground.wall, ground.free, within, np.zeros_like(cut))
         )
         slope = -math.tan(angle_rad) if turned else math.tan(angle_rad)
-        wall = ndimage.binary_dilation(wall, np.ones((2 * slack + 1, 1), dtype=np.bool_))
+        size = 2 * slack + 1
+        wall = ndimage.maximum_filter1d(wall.view(np.uint8), size, 0, mode="constant") > 0
         _segmentation_kernels.cut_along(wall, free, slope, inside, lengths, _FREE_SHARE, out)
         cut |= out.T if turned else out
 
@@ -237,10 +238,13 @@ def _basins(ground: Ground) -> IntArray:
 def _closed(free: BoolArray, occupied: BoolArray, reach: float) -> BoolArray:
     """Return free cells, and those that a closing by a disc fills, but no obstacle."""
     size = max(1, round(reach))
-    row, col = np.ogrid[-size : size + 1, -size : size + 1]
-    disc = row * row + col * col <= size * size + 1
-    wide = ndimage.binary_closing(np.pad(free, size + 1), disc)
-    closed: BoolArray = wide[size + 1 : -size - 1, size + 1 : -size - 1] & ~occupied
+    if not free.any():
+        return free.copy()
+    # Distances cost the same for every disc; a disc of cells below 2 mm has 20,000.
+    disc = math.sqrt(size * size + 1)
+    wide = ndimage.distance_transform_edt(~np.pad(free, size + 1)) <= disc
+    kept = ndimage.distance_transform_edt(wide) > disc
+    closed: BoolArray = kept[size + 1 : -size - 1, size + 1 : -size - 1] & ~occupied
     return closed
 
 
