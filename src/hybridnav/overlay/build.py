@@ -50,9 +50,9 @@ class Overlay:
     """Costs between the border cells of fields on several levels, exact at any time.
 
     `update` changes costs in a box of cells: the fields of the two finest levels that it touches
-    get their new costs at once. The tables of the fields around them become stale: until `renew`, searches go through the
-    levels below there, guided by the former tables as long as these are lower bounds. Updates wait
-    until the searches of other threads have ended.
+    get their new costs at once. The tables of the fields around them become stale: until `renew`,
+    searches go through the levels below there, guided by the former tables as long as these are
+    lower bounds. Updates wait until the searches of other threads have ended.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,7 +43,7 @@ def fill_cliques(ground: CellCosts, levels: Levels, fields: IntArray) -> None:
     most = _in_threads(
         lambda part: _clique_kernels.fill_cliques(levels, ground, part),
         fields,
-        max(1 if len(fields) < _LEAST_CHUNK else _LEAST_CHUNK, len(fields) // 64),
+        max(_LEAST_CHUNK, len(fields) // 64),
     )
     if max(most, default=0) >= _LIMIT:
         raise PathsTooLongError(
@@ -65,7 +66,10 @@ def fill_some(levels: Levels, fields: IntArray) -> None:
     on_stale = np.zeros(len(levels.parent), dtype=np.bool_)
     on_stale[levels.parent[stale[levels.parent[stale] >= 0]]] = True
     fields = fields[levels.is_stale[fields] & ~on_stale[fields]]
-    most = _in_threads(lambda part: _table_kernels.fill_tables(levels, part), fields, 1)
+    # A few fields of the level above the finest take less time than a start of threads.
+    is_quick = len(fields) < _LEAST_CHUNK and (fields < levels.level_at[2]).all()
+    fill = partial(_table_kernels.fill_tables, levels)
+    most = _in_threads(fill, fields, 1, fewest=_LEAST_CHUNK if is_quick else 2)
     fits = fields[np.array(most, dtype=np.int64) < _LIMIT]
     levels.is_stale[fits] = levels.is_lowered[fits] = False
     levels.is_lowered[np.setdiff1d(fields, fits)] = True
@@ -91,11 +95,13 @@ def compute_top(levels: Levels, most_bytes: float) -> Top:
     return Top(distance, True, none)
 
 
-def _in_threads(fill: Callable[[IntArray], int], items: IntArray, chunk: int) -> list[int]:
-    """Compute parts on all cores; return what each returned."""
+def _in_threads(
+    fill: Callable[[IntArray], int], items: IntArray, chunk: int, *, fewest: int = 2
+) -> list[int]:
+    """Compute parts on all cores, fewer than some on one; return what each returned."""
     parts = [items[k : k + chunk] for k in range(0, len(items), chunk)]
     n_threads = min(os.cpu_count() or 1, len(parts))
-    if n_threads < 2:  # noqa: PLR2004 - a thread more takes longer than a small part
+    if n_threads < 2 or len(parts) < fewest:  # noqa: PLR2004 - one thread
         return [fill(part) for part in parts]
     with ThreadPoolExecutor(n_threads) as threads:
         return list(threads.map(fill, parts))
