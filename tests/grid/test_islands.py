@@ -203,7 +203,10 @@ def test_smooth_wins_over_the_preset(raw_map, capsys):
     assert run([*query, "--set", "planner.smooth=line-of-sight", "--smooth", "none"]) == 0
     assert json.loads(capsys.readouterr().out)["metric"] == "octile"
     assert run([*query, "--smooth", "splines"]) == 2
-    assert "--smooth must be one of none, line-of-sight, got 'splines'" in capsys.readouterr().err
+    assert (
+        "--smooth must be one of none, line-of-sight, arcs, got 'splines'"
+        in capsys.readouterr().err
+    )
 
 
 def test_an_area_may_leave_unexplored_cells_alone_where_they_may_be_entered(tmp_path, capsys):
