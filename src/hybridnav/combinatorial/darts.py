@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
-from hybridnav.combinatorial._kernels import Darts, compact_darts, contract, simplify
+from hybridnav.combinatorial._kernels import CONTRACTED, Darts, compact_darts, contract, simplify
+from hybridnav.combinatorial._piece_kernels import base_sigma, next_at_cell
 
-__all__ = ["Darts", "compact_darts", "contract", "simplify"]
+__all__ = [
+    "CONTRACTED",
+    "Darts",
+    "base_sigma",
+    "compact_darts",
+    "contract",
+    "next_at_cell",
+    "simplify",
+]

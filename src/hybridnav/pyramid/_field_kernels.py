@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
+from hybridnav.combinatorial.darts import base_sigma, next_at_cell
 from hybridnav.search.arrays import find
 
 
@@ -149,40 +150,6 @@ def find_cracks(field_of, rows, cols):
     for i in range(count):
         root[i] = find(root, i)
     return cracks, root
-
-
-@njit(cache=True, nogil=True)
-def next_at_cell(cell, direction, edge_end, cols):
-    """Return the first dart of a base cell counter-clockwise after a direction, else -1.
-
-    Directions are 0 east to 3 south. Darts of the base are 2 * base edge + half; the full turn ends
-    with the direction itself.
-    """
-    for i in range(1, 5):
-        turned = (direction + i) & 3
-        if turned == 0:
-            dart = 4 * cell
-        elif turned == 1:
-            dart = 4 * cell + 2
-        elif turned == 2:
-            dart = 4 * (cell - 1) + 1
-        else:
-            dart = 4 * (cell - cols) + 3
-        if dart >= 0 and edge_end[dart >> 1] != 0:
-            return dart
-    return -1
-
-
-@njit(cache=True, nogil=True)
-def base_sigma(dart, edge_end, cols):
-    """Return the next dart counter-clockwise in the base."""
-    edge = dart >> 1
-    cell = edge >> 1
-    direction = edge & 1  # 0 east, 1 north of the lower cell
-    if dart & 1:
-        cell += cols if direction else 1
-        direction += 2
-    return next_at_cell(cell, direction, edge_end, cols)
 
 
 @njit(cache=True, nogil=True)

@@ -43,6 +43,8 @@ _FARTHEST = 2.0**62
 _NO_LIMIT = int(_FARTHEST)
 _NO_HULLS = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
 """Hulls where distances do not count."""
+_NO_PIECES = (np.empty(0, np.uint8), np.empty(0, np.int32), np.empty(0, np.uint8))
+"""Where blocks alone are in pieces, which need no record."""
 
 
 def squared_limit(merge_distance_m: float, resolution_m: float) -> int:
@@ -109,6 +111,17 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     return run.record, run.stats, places
 
 
+def contract_all(start: Start, linkage: Linkage, limit: int, seed: int) -> None:
+    """Contract stars from a start until no edge may be contracted, into the start's record.
+
+    Vertices of the start may be fields in pieces, for which the record is complete. The parameters
+    are those of `decimate`.
+    """
+    run = _Decimation(start, seed, _LINKAGES[linkage], limit)
+    run.fields_in_pieces = True
+    run.exhaust()
+
+
 def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
     places: Level,
     record: Record,
@@ -159,6 +172,9 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
 
 class _Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
+
+    fields_in_pieces = False
+    """Whether vertices other than blocks are in pieces at the start."""
 
     def __init__(
         self, start: Start, seed: int, linkage: int = _kernels.SURVIVOR, limit: int = _NO_LIMIT
@@ -249,6 +265,7 @@ class _Decimation:
             scratch.state,
             scratch.inverse,
             self._cols,
+            self._record_so_far(),
             self._vertices.whole_at,
             self._level,
             self._level > self._whole_at,
@@ -258,6 +275,16 @@ class _Decimation:
         self._note_loops()
         self._lap("compaction")
         return True
+
+    def _record_so_far(self) -> tuple[ByteArray, IntArray, ByteArray]:
+        """Return what states how vertices other than blocks are in pieces, up to this level."""
+        if not self.fields_in_pieces:
+            return _NO_PIECES
+        record, scratch = self.record, self._scratch
+        base_edge = self._darts.base_edge
+        gone = scratch.state[: len(base_edge)] == dart_kernels.CONTRACTED
+        record.edge_end[base_edge[gone]] = 2 * self._level
+        return record.vertex_end, record.vertex_parent, record.edge_end
 
     def _select(self, scratch: Scratch, count: int) -> None:
         """Choose the stars of this level from its first `count` candidates."""

@@ -31,6 +31,13 @@ class Record:
     edge_end: ByteArray
     """0: no edge; SURVIVES; else 2 * level, plus 1 where the edge is removed, not contracted."""
 
+    def up_to(self, level: int) -> Record:
+        """Return a copy with which all that is left at a level survives."""
+        vertex_end, edge_end = self.vertex_end.copy(), self.edge_end.copy()
+        vertex_end[vertex_end > level] = SURVIVES
+        edge_end[edge_end >= min(2 * level + 2, SURVIVES)] = SURVIVES
+        return Record(vertex_end, self.vertex_parent.copy(), edge_end)
+
 
 @dataclass(frozen=True)
 class LevelSize:

@@ -10,7 +10,7 @@ from hybridnav.combinatorial.darts import Darts
 from hybridnav.pyramid import _base_kernels, _field_kernels
 from hybridnav.pyramid._kernels import Vertices
 from hybridnav.pyramid.blocks import TEMPLATES, block_powers, max_power, steps_to_parents
-from hybridnav.pyramid.record import SURVIVES, Record
+from hybridnav.pyramid.record import Record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,16 +53,23 @@ def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
     return kinds
 
 
-def start_at_base(kinds: KindArray, limit: int) -> Start:
-    """Fill the record for the blocks of the base, and return their darts and vertices.
+class Blocks(NamedTuple):
+    """The blocks of a base."""
 
-    Parameters
-    ----------
-    kinds
-        uint8 or uint16 (rows, cols); see `kinds_of`.
-    limit
-        See `squared_limit`; no block is wider than half of it.
-    """
+    record: Record
+    """The record for the blocks alone; all else survives."""
+    power: ByteArray
+    """See `block_powers`."""
+    new_edge: IntArray
+    """int32 by base edge, the number of each edge between blocks."""
+    n_vertices: int
+    """Blocks and single cells."""
+    n_edges: int
+    """Edges between them."""
+
+
+def mark_blocks(kinds: KindArray, limit: int) -> Blocks:
+    """Fill the record for the blocks of the base; see `start_at_base` for the parameters."""
     record = Record(
         np.empty(kinds.size, np.uint8),
         np.empty(kinds.size, np.int32),
@@ -79,6 +86,20 @@ def start_at_base(kinds: KindArray, limit: int) -> Start:
         record.edge_end,
         new_edge,
     )
+    return Blocks(record, power, new_edge, n_vertices, n_edges)
+
+
+def start_at_base(kinds: KindArray, limit: int) -> Start:
+    """Fill the record for the blocks of the base, and return their darts and vertices.
+
+    Parameters
+    ----------
+    kinds
+        uint8 or uint16 (rows, cols); see `kinds_of`.
+    limit
+        See `squared_limit`; no block is wider than half of it.
+    """
+    record, power, new_edge, n_vertices, n_edges = mark_blocks(kinds, limit)
     vertices = Vertices(*_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices))
     darts = Darts(*_base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges))
     return Start(record, darts, vertices, 0, kinds.shape[1])
@@ -96,7 +117,7 @@ def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
     kinds
         uint8 or uint16 (rows, cols), kinds that no field of the level mixes.
     """
-    record = _up_to(level.index, record)
+    record = record.up_to(level.index)
     cols = kinds.shape[1]
     row, col = level.cells.T
     vertices = Vertices(
@@ -115,11 +136,3 @@ def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
         plane.base_edge.copy(),
     )
     return Start(record, darts, vertices, level.index, cols)
-
-
-def _up_to(level: int, record: Record) -> Record:
-    """Return a record with which all that is left at a level survives."""
-    vertex_end, edge_end = record.vertex_end.copy(), record.edge_end.copy()
-    vertex_end[vertex_end > level] = SURVIVES
-    edge_end[edge_end >= min(2 * level + 2, SURVIVES)] = SURVIVES
-    return Record(vertex_end, record.vertex_parent.copy(), edge_end)
