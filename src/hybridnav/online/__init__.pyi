@@ -1,0 +1,3 @@
+from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
+
+__all__: list[str]
