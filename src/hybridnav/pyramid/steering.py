@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
+from hybridnav.pyramid._kernels import ATTRIBUTE_MAX
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._typing import IntArray, LongArray
     from hybridnav.combinatorial.darts import Darts
     from hybridnav.pyramid._kernels import Vertices
+
+WORST_RANK: int = ATTRIBUTE_MAX
+"""Rank of the arcs that are contracted last."""
 
 
 class Resists(Protocol):
@@ -56,7 +61,7 @@ class Steering(Protocol):
         LongArray
             int64 (n,), arcs, ascending.
         LongArray
-            int64 (n,), from 0 to `ATTRIBUTE_MAX`, the least first.
+            int64 (n,), from 0 to `WORST_RANK`, the least first.
         """
 
     def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav.grid import Frame, OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid._kernels import ATTRIBUTE_MAX
+from hybridnav.pyramid.steering import WORST_RANK
 from hybridnav.topology import _merging_kernels
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import FloatArray, IntArray, LongArray
     from hybridnav.combinatorial.darts import Darts
-    from hybridnav.pyramid._kernels import Vertices
     from hybridnav.topology.judging import JudgedSegments
 
     Judge = Callable[[LongArray, FloatArray], FloatArray]
@@ -151,7 +150,7 @@ class GrowingSegments:
         self._of_arc = np.empty(0)
 
     def candidates(
-        self, field_of: Callable[[], IntArray], darts: Darts, vertices: Vertices
+        self, field_of: Callable[[], IntArray], darts: Darts, vertices: object
     ) -> tuple[LongArray, LongArray]:
         """Return the arcs that may be contracted, and that no better one keeps waiting."""
         u, v = self._segment_of[darts.origin.reshape(-1, 2).T]
@@ -170,7 +169,7 @@ class GrowingSegments:
             np.maximum.at(best, v[may], ratings[may])
             may[may] = ratings[may] >= np.maximum(best[u[may]], best[v[may]])
         arcs = np.flatnonzero(may)
-        return arcs, (ATTRIBUTE_MAX * (1.0 - ratings[arcs])).astype(np.int64)
+        return arcs, (WORST_RANK * (1.0 - ratings[arcs])).astype(np.int64)
 
     def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
         """Undo all joins of a star but the best: the others are rated again without it."""
