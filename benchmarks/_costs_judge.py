@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from hybridnav.harness.analysis import nanmean
+from hybridnav.harness.outcome import nanmean
 from hybridnav.search.moves import COL_STEP, ROW_STEP, legal_moves
 
 if TYPE_CHECKING:

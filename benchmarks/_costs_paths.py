@@ -9,7 +9,7 @@ import numpy as np
 import hybridnav as hn
 from hybridnav.costs import cost_along
 from hybridnav.grid.clearance import clearance_cells
-from hybridnav.harness.analysis import nanmean
+from hybridnav.harness.outcome import nanmean
 
 if TYPE_CHECKING:
     from benchmarks._costs_measure import Bench, Cell

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks._costs_judge import graph_of
 from benchmarks._costs_measure import clocked
-from hybridnav.harness.analysis import nanquantile
+from hybridnav.harness.outcome import nanquantile
 
 if TYPE_CHECKING:
     from benchmarks._costs_measure import Bench

@@ -35,7 +35,7 @@ from benchmarks._costs_changes import doors, scale
 from benchmarks._costs_measure import measure, prepared, warm_up
 from benchmarks._costs_paths import paths
 from benchmarks._costs_peer import peer
-from hybridnav.harness.analysis import nanquantile
+from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.tables import to_markdown
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
-from hybridnav.costs.layer import MOST_FACTOR, UNIT_BITS
+from hybridnav.costs.checks import MOST_FACTOR, UNIT_BITS
 from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import _cost_kernels as kernels
 from hybridnav.overlay.changes import change_in, fields_around
