@@ -188,3 +188,34 @@ def test_kernels_that_return_several_values_to_python_are_guarded() -> None:
 @pytest.mark.full
 def test_hundreds_of_signals_inside_the_kernels_of_a_build() -> None:
     assert strike_builds(400) > 0
+
+
+@pytest.mark.parametrize("preset", ["portals", "grid-astar"])
+def test_an_interrupted_update_leaves_the_costs_before_or_the_new_ones(preset: str) -> None:
+    topology = grown()
+    factors = np.random.default_rng(1).uniform(1, 5, GRID.shape).astype(np.float32)
+    before, after = hn.CostLayer(np.ones(GRID.shape, np.float32)), hn.CostLayer(factors)
+
+    def planner_by(layer: hn.CostLayer) -> hn.HybridPlanner:
+        planner = hn.HybridPlanner(topology, preset=preset, costs=layer)
+        planner.prepare()
+        return planner
+
+    def answer(planner: hn.HybridPlanner) -> float:
+        result = planner.plan(START, GOAL)
+        assert result.lower_bound <= result.cost * (1 + 1e-9)
+        return round(result.cost, 6)
+
+    expected = [answer(planner_by(layer)) for layer in (before, after)]
+    assert expected[0] < expected[1]
+    fresh = planner_by(before)
+    n_lines = lines_of(lambda: fresh.update(costs=after))
+    seen, n_struck = set(), 0
+    for at in spread(n_lines, 40):
+        planner = planner_by(before)
+        n_struck += struck(partial(planner.update, costs=after), at)
+        seen.add(answer(planner))
+        planner.update(costs=before)
+        assert answer(planner) == expected[0]
+    assert seen == set(expected)
+    assert n_struck > 10  # a later update has fewer lines than the first one

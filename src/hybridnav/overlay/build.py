@@ -7,8 +7,7 @@ not depend on costs; what depends on them is computed again when they change.
 from __future__ import annotations
 
 import math
-import threading
-from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,13 +27,15 @@ from hybridnav.overlay.tables import (
     fill_tables,
 )
 from hybridnav.search.moves import legal_moves
+from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Sequence
+    from contextlib import AbstractContextManager
 
     from hybridnav._progress import Progress
     from hybridnav._typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.overlay.changes import Change
+    from hybridnav.overlay.changes import Change, Window
     from hybridnav.overlay.layout import CellCosts, Levels, Top
 
 _ONE = 1 << UNIT_BITS
@@ -75,9 +76,9 @@ class Overlay:
         self.shape = (ground.moves.size // ground.cols, ground.cols)
         self._top_bytes = top_bytes
         self.top: Top = compute_top(levels, -1.0)
-        self._readers = 0
-        self._lock = threading.Lock()
-        self._writing = threading.Lock()
+        self._turns = Turns()
+        self._begun: Callable[[], None] | None = None
+        """The update that has begun and not ended; an interrupt leaves it here."""
 
     @property
     def cost_unit(self) -> float:
@@ -98,20 +99,14 @@ class Overlay:
             self.top.is_current or self.top.distance.size == 0
         )
 
-    @contextmanager
-    def reading(self) -> Iterator[None]:
-        """Keep updates away while a search runs; searches do not wait for each other."""
-        with self._lock:
-            self._readers += 1
-            if self._readers == 1:
-                self._writing.acquire()
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._readers -= 1
-                if self._readers == 0:
-                    self._writing.release()
+    def turn(self) -> AbstractContextManager[bool]:
+        """Return the lock to hold during a search: it keeps updates away, not other searches.
+
+        An update that was interrupted is completed first.
+        """
+        if self._begun is not None:
+            self._turns.alone(self._complete)
+        return self._turns.shared()
 
     def is_open(self, cell: tuple[int, int]) -> bool:
         """Return whether a path may enter a cell now."""
@@ -176,25 +171,71 @@ class Overlay:
                 )
             shut = shut | closed[rows, cols]
         units = units_of(factor, self.shape, ~shut, (rows, cols))
-        with self._writing:
-            change = change_in(self.ground, self.shape, (rows, cols), units)
+        given = np.where(shut, 1.0, factor[rows, cols]).astype(np.float64)
+        self._turns.alone(partial(self._take, (rows, cols), units, given))
+
+    def _take(self, box: Window, units: IntArray, given: FloatArray) -> None:
+        """Take new costs of a box of cells, in units and as given."""
+        self._complete()
+        change = change_in(self.ground, self.shape, box, units)
+        self._begun = partial(self._take_anew, box, units, given)
+        try:
             if len(change.touched):
                 self._apply(change)
                 self.version += 1
-            given = np.where(shut, 1.0, factor[rows, cols]).astype(np.float64)
-            if self._factor is None and not _are_whole(given):
-                self._factor = np.maximum(self.ground.units.reshape(self.shape), 1) / _ONE
-            if self._factor is not None:
-                self._factor[rows, cols] = given
+        except PathsTooLongError:
+            self._begun = None
+            raise
+        self._set_given(box, given)
+        self._begun = None
+
+    def _set_given(self, box: Window, given: FloatArray) -> None:
+        if self._factor is None and not _are_whole(given):
+            self._factor = np.maximum(self.ground.units.reshape(self.shape), 1) / _ONE
+        if self._factor is not None:
+            self._factor[box] = given
+
+    def _complete(self) -> None:
+        """Complete an update that was interrupted."""
+        begun = self._begun
+        if begun is not None:
+            try:
+                begun()
+            except PathsTooLongError:
+                self._begun = None
+                raise
+            self._begun = None
+
+    def _take_anew(self, box: Window, units: IntArray, given: FloatArray) -> None:
+        """Take new costs of a box of cells, and compute all costs of fields anew."""
+        ground, levels = self.ground, self.levels
+        ground.units.reshape(self.shape)[box] = units
+        is_open = (ground.field_of >= 0) & (ground.units > 0)
+        moves = legal_moves(np.ascontiguousarray(is_open.reshape(self.shape)), False)
+        ground.moves[:] = moves.ravel()
+        self.ground = ground._replace(least_units=int(ground.units[is_open].min(initial=_ONE)))
+        n_fields = int(levels.level_at[-1])
+        finest = int(levels.level_at[1])
+        fill_cliques(self.ground, levels, np.arange(finest, dtype=np.int32))
+        whole = (0, self.shape[0], 0, self.shape[1])
+        kernels.renew_moves(levels, self.ground, np.arange(n_fields, dtype=np.int32), whole)
+        levels.is_stale[finest:] = True
+        fill_tables(levels)
+        self.top = compute_top(levels, self._top_bytes)
+        self.version += 1
+        self._set_given(box, given)
 
     def renew(self, progress: Progress = no_progress) -> None:
         """Compute all stale tables again, so that queries are as fast as before any update."""
-        with self._writing:
-            if not self.is_current:
-                fill_tables(self.levels, progress)
-                self.top = compute_top(self.levels, self._top_bytes)
+        self._turns.alone(partial(self._renew, progress))
         n_steps = len(self.levels.level_at)
         progress(n_steps, n_steps)
+
+    def _renew(self, progress: Progress) -> None:
+        self._complete()
+        if not self.is_current:
+            fill_tables(self.levels, progress)
+            self.top = compute_top(self.levels, self._top_bytes)
 
     def _box(self, changed: tuple[int, int, int, int] | None) -> tuple[slice, slice]:
         if changed is None:

@@ -108,7 +108,7 @@ class OverlaySearch:
                 raise InvalidValueError(
                     f"cell {cell} is not on the map of {overlay.shape} rows and columns"
                 )
-        with overlay.reading():
+        with overlay.turn():
             if not (overlay.is_open(start) and overlay.is_open(goal)):
                 return OverlayPath(None, math.inf, math.inf, 0, 0)
             cols = overlay.shape[1]

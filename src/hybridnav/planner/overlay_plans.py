@@ -101,12 +101,12 @@ class OverOverlay:
             overlay = prepare_overlay(
                 self._topology, factor, allow_unexplored=allowed, progress=progress
             )
+            if costs is not None and len(costs.closed_flat):
+                overlay.update(factor, closed=costs.closed, changed=_box_of(costs))
+                overlay.renew()
         except PathsTooLongError:  # as with factors of hundreds in large fields
             self._cannot_build = True
             return
-        if costs is not None and len(costs.closed_flat):
-            overlay.update(factor, closed=costs.closed, changed=_box_of(costs))
-            overlay.renew()
         self._built = overlay, OverlaySearch(overlay)
 
     def update(self, costs: CostLayer, box: Box) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 from hybridnav._copies import copies_alike
@@ -21,10 +21,12 @@ from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.outcome import Outcomes
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
-from hybridnav.planner.turns import Turns
 from hybridnav.result import PlanStatus
+from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
 
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from hybridnav.costs import CostLayer
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlan, Prepared
+    from hybridnav.planner.costs import Box
     from hybridnav.planner.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
@@ -95,6 +98,8 @@ class HybridPlanner:
         self._cells = cell_planner(topology, settings, prepared, self.costs)
         self._closures = Closures(topology)
         self._turns = Turns()
+        self._begun: Callable[[], None] | None = None
+        """The update that has begun and not ended; an interrupt leaves it here."""
         self._preparing = threading.Lock()
         self._make_answers()
         self._ompl: OmplPlanner | None = None
@@ -181,6 +186,8 @@ class HybridPlanner:
             When a point is not two finite numbers, a name is not known, or a closed item is not on
             the map.
         """
+        if self._begun is not None:
+            self._turns.alone(self._complete)
         with self._turns.shared():
             return self._plan(start, goal, smooth, blocked, at)
 
@@ -330,14 +337,23 @@ class HybridPlanner:
         grid = self.topology.grid
         box = box_of_cells(changed, grid.frame, grid.shape)
         with self._preparing:
-            layer = self._costs.changed(costs, box)
-            with self._turns.alone():
-                self._costs.layer = layer
-                if isinstance(self._cells, Updatable):
-                    self._cells.update(layer, box)
-                else:
-                    self._cells = cell_planner(self.topology, self.preset.planner, None, layer)
-                self._make_answers()
+            self._turns.alone(self._complete)
+            self._begun = partial(self._take_costs, self._costs.changed(costs, box), box)
+            self._turns.alone(self._complete)
+
+    def _complete(self) -> None:
+        """Make an update that has begun, also one that was interrupted."""
+        if self._begun is not None:
+            self._begun()
+            self._begun = None
+
+    def _take_costs(self, layer: CostLayer, box: Box) -> None:
+        self._costs.layer = layer
+        if isinstance(self._cells, Updatable):
+            self._cells.update(layer, box)
+        else:
+            self._cells = cell_planner(self.topology, self.preset.planner, None, layer)
+        self._make_answers()
 
     def close(self) -> None:
         """End the OMPL process of a preset; the next query waits for another one."""
