@@ -29,7 +29,9 @@ def with_room(heap, size, more):
 def spread(ground, span, start, goal, limit, distance, touched):
     """Find the distances from a cell inside its field, by A* to a goal, or without one by Dijkstra.
 
-    Moves that turn by 135 degrees or more are not tried: the cell before has a cheaper one.
+    Moves that turn by 135 degrees or more are not tried: the cell before has a cheaper one. With a
+    goal the limit is its distance, so the order of expansion need not prove it: cells nearer to the
+    goal come first, and a cell whose distance is lowered is expanded again.
 
     Parameters
     ----------
@@ -56,8 +58,8 @@ def spread(ground, span, start, goal, limit, distance, touched):
     bend = (straight * ROOT >> 20) - straight
     goal_row, goal_col = goal // cols, goal % cols
     heap = np.empty((256, 2), np.int64)
-    key = _octile(start // cols - goal_row, start % cols - goal_col, straight, bend)
-    push(heap, 0, key, start << 4 | 8)
+    ahead = _octile(start // cols - goal_row, start % cols - goal_col, straight, bend)
+    push(heap, 0, _rank(np.int64(0), ahead), start << 4 | 8)
     distance[start], touched[0] = 0, start
     size, n, expanded = 1, 1, 0
     is_found = start == goal
@@ -69,7 +71,7 @@ def spread(ground, span, start, goal, limit, distance, touched):
         so_far = np.int64(distance[cell])
         row = np.int64(cell) // cols - goal_row
         col = np.int64(cell) % cols - goal_col
-        if key != so_far + _octile(row, col, straight, bend):
+        if key != _rank(so_far, _octile(row, col, straight, bend)):
             continue
         expanded += 1
         heap = with_room(heap, size, 8)
@@ -82,8 +84,8 @@ def spread(ground, span, start, goal, limit, distance, touched):
             cost = so_far + move_cost(own + units[other], k)
             if cost >= distance[other] or not span[0] <= field_of[other] < span[1]:
                 continue
-            key = cost + _octile(row + ROW_STEP[k], col + COL_STEP[k], straight, bend)
-            if key > limit:
+            ahead = _octile(row + ROW_STEP[k], col + COL_STEP[k], straight, bend)
+            if cost + ahead > limit:
                 continue
             if distance[other] == FAR:
                 if n == touched.size:
@@ -94,7 +96,7 @@ def spread(ground, span, start, goal, limit, distance, touched):
             if np.int64(other) == goal and cost == limit:
                 is_found = True
                 break
-            push(heap, size, key, np.int64(other) << 4 | k)
+            push(heap, size, _rank(cost, ahead), np.int64(other) << 4 | k)
             size += 1
     return touched, n, expanded
 
@@ -104,6 +106,12 @@ def _octile(rows, cols, straight, bend):
     """Return the cost of a straight path, by that of a straight move and what a diagonal adds."""
     rows, cols = abs(rows), abs(cols)
     return straight * max(rows, cols) + bend * min(rows, cols)
+
+
+@njit(cache=True, nogil=True)
+def _rank(so_far, ahead):
+    """Return the place of a cell in the order of expansion; a quarter saves most expansions."""
+    return so_far + ahead + (ahead >> 2)
 
 
 @njit(cache=True, nogil=True)
