@@ -59,7 +59,7 @@ def spread(ground, span, start, goal, limit, distance, touched):
     goal_row, goal_col = goal // cols, goal % cols
     heap = np.empty((256, 2), np.int64)
     ahead = _octile(start // cols - goal_row, start % cols - goal_col, straight, bend)
-    push(heap, 0, _rank(np.int64(0), ahead), start << 4 | 8)
+    push(heap, 0, rank(np.int64(0), ahead), start << 4 | 8)
     distance[start], touched[0] = 0, start
     size, n, expanded = 1, 1, 0
     is_found = start == goal
@@ -71,7 +71,7 @@ def spread(ground, span, start, goal, limit, distance, touched):
         so_far = np.int64(distance[cell])
         row = np.int64(cell) // cols - goal_row
         col = np.int64(cell) % cols - goal_col
-        if key != _rank(so_far, _octile(row, col, straight, bend)):
+        if key != rank(so_far, _octile(row, col, straight, bend)):
             continue
         expanded += 1
         heap = with_room(heap, size, 8)
@@ -96,7 +96,7 @@ def spread(ground, span, start, goal, limit, distance, touched):
             if np.int64(other) == goal and cost == limit:
                 is_found = True
                 break
-            push(heap, size, _rank(cost, ahead), np.int64(other) << 4 | k)
+            push(heap, size, rank(cost, ahead), np.int64(other) << 4 | k)
             size += 1
     return touched, n, expanded
 
@@ -109,8 +109,8 @@ def _octile(rows, cols, straight, bend):
 
 
 @njit(cache=True, nogil=True)
-def _rank(so_far, ahead):
-    """Return the place of a cell in the order of expansion; a quarter saves most expansions."""
+def rank(so_far, ahead):
+    """Return the place in the order of expansion; a quarter saves most expansions."""
     return so_far + ahead + (ahead >> 2)
 
 

@@ -1,15 +1,15 @@
-"""Kernels of the cells of a path, from the nodes of the highest level that it passes downwards."""
+"""Kernels of the nodes of a path, from those of the highest level that it passes downwards."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.overlay._cost_kernels import clique_place
-from hybridnav.overlay._field_kernels import append_back, forget, spread
+from hybridnav.overlay._cost_kernels import clique_place, least_cost
+from hybridnav.overlay._field_kernels import rank, with_room
 from hybridnav.overlay._lane_kernels import FAR, NO_PATH
 from hybridnav.overlay._node_kernels import START
-from hybridnav.search.arrays import grow
+from hybridnav.search.arrays import grow, pop, push
 
 
 @njit(cache=True, nogil=True)
@@ -245,79 +245,103 @@ def _walk_out(levels, node, child, below, row, nodes, n):
 
 
 @njit(cache=True, nogil=True)
-def append_field_path(ground, span, endpoints, limit, distance, touched, cells, n):
-    """Append the cells of a shortest path inside a field, without its first one.
+def to_finest(levels, ground, upper):
+    """Return the nodes of a path with those of the level above the finest replaced.
 
     Parameters
     ----------
-    ground
-        See `CellCosts`.
-    span
-        See `spread`.
-    endpoints
-        Its two flat cells.
-    limit
-        Its cost.
-    distance, touched
-        Work arrays, see `spread`.
-    cells, n
-        int64 (room,) and how many of them are filled.
-
-    Returns
-    -------
-    tuple
-        `cells` and `touched`, in new arrays if there was no room; the number of cells filled and of
-        cells expanded.
+    levels, ground
+        See `Levels` and `CellCosts`.
+    upper
+        int64 (n,), nodes of the two finest levels.
     """
-    touched, count, expanded = spread(
-        ground, span, endpoints[0], endpoints[1], limit, distance, touched
-    )
-    begin = n
-    cells, n = append_back(ground, span, distance, endpoints[1], cells, n)
-    cells[begin:n] = cells[begin:n][::-1].copy()
-    forget(distance, touched, count)
-    return cells, touched, n, expanded
+    if len(levels.level_at) == 2:
+        return upper
+    begin = levels.node_at[levels.level_at[1]]
+    nodes, n = np.empty(4 * upper.size + 64, np.int64), 0
+    for i in range(upper.size):
+        node = upper[i]
+        field = levels.field_of[node]
+        if i > 0 and node >= begin and levels.field_of[upper[i - 1]] == field:
+            first = levels.node_at[field]
+            place = clique_place(upper[i - 1] - first, node - first)
+            ends = np.int64(levels.below[upper[i - 1]]), np.int64(levels.below[node])
+            limit = np.int64(levels.clique[levels.clique_at[field] + place])
+            nodes, n = _over_inner(levels, ground, field, ends, limit, nodes, n)
+        else:
+            nodes = append(nodes, n, levels.below[node] if node >= begin else node)
+            n += 1
+    return nodes[:n]
 
 
 @njit(cache=True, nogil=True)
-def append_cells(ground, levels, nodes, distance, touched, cells, n):
-    """Append the cells of a path over nodes of the two finest levels, without the first one's.
+def _over_inner(levels, ground, field, ends, limit, nodes, n):
+    """Append the nodes of a shortest path inside a field over those of the level below, by A*.
 
     Parameters
     ----------
-    ground, levels
-        See `CellCosts` and `Levels`.
-    nodes
-        int64 (m,), m >= 1.
-    distance, touched
-        Work arrays, see `spread`.
-    cells, n
+    levels, ground
+        See `Levels` and `CellCosts`.
+    field
+        A field above the finest level.
+    ends
+        The first node, which is not appended, and the last one.
+    limit
+        Its cost.
+    nodes, n
         int64 (room,) and how many of them are filled.
 
     Returns
     -------
     tuple
-        As `append_field_path`.
+        `nodes`, in a new array if there was no room, and their number.
     """
-    expanded = 0
-    for i in range(1, nodes.size):
-        before, node = nodes[i - 1], nodes[i]
-        field = levels.field_of[node]
-        if levels.cell_of[before] == levels.cell_of[node]:
+    span = _inside(levels, field)
+    begin = np.int64(span[0])
+    distance = np.full(span[1] - begin, NO_PATH, np.int64)
+    before = np.empty(span[1] - begin, np.int32)
+    bound = np.full(span[1] - begin, -1, np.int64)
+    heap, size = np.empty((256, 2), np.int64), 1
+    goal_cell, cols = levels.cell_of[ends[1]], ground.cols
+    push(heap, 0, np.int64(0), ends[0])
+    distance[ends[0] - begin], before[ends[0] - begin], bound[ends[0] - begin] = 0, ends[0], 0
+    while size > 0 and distance[ends[1] - begin] > limit:
+        key = heap[0, 0]
+        node = pop(heap, size)
+        size -= 1
+        value, own = distance[node - begin], levels.field_of[node]
+        if key != rank(value, bound[node - begin]):
             continue
-        if levels.field_of[before] != field:
-            cells = append(cells, n, levels.cell_of[node])
-            n += 1
-            continue
-        first = levels.node_at[field]
-        place = levels.clique_at[field] + clique_place(before - first, node - first)
-        limit = levels.clique[place]
-        span = (np.int64(field), np.int64(field) + 1)
-        if field >= levels.level_at[1]:
-            span = (np.int64(levels.inner_at[field]), np.int64(levels.inner_at[field + 1]))
-        endpoints = (np.int64(levels.cell_of[before]), np.int64(levels.cell_of[node]))
-        cells, touched, n, more = append_field_path(
-            ground, span, endpoints, limit, distance, touched, cells, n
-        )
-        expanded += more
-    return cells, touched, n, expanded
+        inside, moves = levels.node_at[own], levels.move_at[node]
+        mark = np.int64(before[node - begin])
+        # After a distance over a clique comes a move.
+        count = levels.node_at[own + 1] - inside if mark >= 0 else 0
+        heap = with_room(heap, size, count + levels.move_at[node + 1] - moves)
+        for k in range(count + levels.move_at[node + 1] - moves):
+            if k < count:
+                place = levels.clique_at[own] + clique_place(node - inside, k)
+                other, cost, mark = inside + k, np.int64(levels.clique[place]), ~node
+            else:
+                other = np.int64(levels.move_to[moves + k - count])
+                cost, mark = np.int64(levels.move_cost[moves + k - count]), node
+                if not span[0] <= other < span[1]:
+                    continue
+            offered = value + cost
+            if offered > limit or offered >= distance[other - begin]:
+                continue
+            ahead = bound[other - begin]
+            if ahead < 0:
+                ahead = least_cost(levels.cell_of[other], goal_cell, cols, ground.least_units)
+                bound[other - begin] = ahead
+            if offered + ahead <= limit:
+                distance[other - begin], before[other - begin] = offered, mark
+                push(heap, size, rank(offered, ahead), other)
+                size += 1
+    first, node = n, ends[1]
+    while node != ends[0]:
+        nodes = append(nodes, n, node)
+        n += 1
+        mark = np.int64(before[node - begin])
+        node = mark if mark >= 0 else ~mark
+    nodes[first:n] = nodes[first:n][::-1].copy()
+    return nodes, n

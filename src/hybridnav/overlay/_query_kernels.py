@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
+from hybridnav.overlay._cell_kernels import append_cells
 from hybridnav.overlay._field_kernels import append_back, forget, spread
 from hybridnav.overlay._guide_kernels import aim
 from hybridnav.overlay._lane_kernels import FAR, NO_PATH
 from hybridnav.overlay._node_kernels import climb, join, over_cliques
 from hybridnav.overlay._path_kernels import (
     append,
-    append_cells,
     back_over_cliques,
     descend,
     join_ends,
     over_top,
+    to_finest,
 )
 
 
@@ -178,6 +179,7 @@ def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
     nodes = join_ends(
         levels, nodes, (around[0][0], around[1][0]), (reaches[0][0], reaches[1][0]), rows
     )
+    nodes = to_finest(levels, ground, nodes)
     first, last = levels.cell_of[nodes[0]], levels.cell_of[nodes[-1]]
     cells, n = append_back(ground, spans[0], from_start, first, cells, n)
     cells = append(cells, n, start)
