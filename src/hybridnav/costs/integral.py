@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridnav.costs.layer import CostLayer
     from hybridnav.grid import Frame, OccupancyGrid
 
-__all__ = ["cost_along", "line_cost", "positions_on", "segment_cost"]
+__all__ = ["cost_along", "segment_cost"]
 
 _QUANTUM = 2.0**-24
 _OFF = 1e-6
@@ -69,7 +69,7 @@ def cost_along(grid: OccupancyGrid, layer: CostLayer, points: ArrayLike) -> floa
         raise InvalidValueError(
             f"points must be finite numbers (x, y) of shape (n, 2), n >= 1, got shape {xy.shape}"
         )
-    positions = positions_on(grid.frame, xy)
+    positions = _positions_on(grid.frame, xy)
     most = np.array(grid.shape, dtype=np.float64)
     outside = ((positions < -_OFF) | (positions > most + _OFF)).any(axis=1)
     if outside.any():
@@ -79,7 +79,7 @@ def cost_along(grid: OccupancyGrid, layer: CostLayer, points: ArrayLike) -> floa
     return float(cost) * grid.resolution_m
 
 
-def positions_on(frame: Frame, points: FloatArray) -> FloatArray:
+def _positions_on(frame: Frame, points: FloatArray) -> FloatArray:
     """Return points `(x, y)` in metres as positions (row, col), rounded to 2^-24 of a cell."""
     rounded: FloatArray = np.rint(frame.positions_of(points) / _QUANTUM) * _QUANTUM
     return rounded

@@ -12,7 +12,6 @@ from hybridnav.costs import CostLayer, cost_along
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.closed import ClosedCells
-from hybridnav.poses import Motion
 from hybridnav.refine import CostLine
 from hybridnav.result import Path
 from hybridnav.search.moves import path_length_in_cells
@@ -190,10 +189,8 @@ class CostFinish:
         """Return the same path with rounded bends, and its cost in metres."""
         line, radius_m = self._line_for(closed), self._turning_radius_m
         found = line.arcs(cells, poses[0][:2], poses[1][:2], radius_m=radius_m)
-        motion = Motion(found.points, found.headings_rad, curved=True)
-        length_m = float(motion.lengths_m.sum())
-        path = Path(cells, found.points, length_m, found.headings_rad, is_curved=True)
-        return path, max(found.cost_m, length_m)
+        path = Path(cells, found.points, found.length_m, found.headings_rad, is_curved=True)
+        return path, max(found.cost_m, found.length_m)
 
     def _line_for(self, closed: ClosedCells | None) -> CostLine:
         """Return the shortener of paths; with closed cells, one for this query."""

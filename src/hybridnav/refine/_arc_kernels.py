@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridnav._jit import njit
 from hybridnav.costs.integral import segment_cost
+from hybridnav.refine._legal_cost_kernels import legal_cost
 from hybridnav.refine._segment_kernels import is_legal
 
 _FREE = 1
@@ -66,6 +67,8 @@ def arc_cost(free, factors, a, bend, c):
     out_row, out_col = c[0] - bend[0], c[1] - bend[1]
     ahead = math.hypot(in_row, in_col)
     turn = math.atan2(in_row * out_col - in_col * out_row, in_row * out_row + in_col * out_col)
+    if turn == 0:  # of a bend that rounding has made straight
+        return -1.0
     radius = ahead / math.tan(abs(turn) / 2)
     hand = 1.0 if turn > 0 else -1.0
     # Unit vectors ahead and towards the centre.
@@ -124,7 +127,7 @@ def _towards(first, last, distance):
 
 
 @njit(cache=True, nogil=True)
-def _joins(free, a, c):
+def _is_legal(free, a, c):
     """Return whether the straight line between two positions is legal, or none."""
     if a[0] == c[0] and a[1] == c[1]:
         return True
@@ -132,20 +135,9 @@ def _joins(free, a, c):
 
 
 @njit(cache=True, nogil=True)
-def _cost_through(free, factors, line, first, middle, last):
-    """Return the cost of a line from one of its points over a position to another point.
-
-    It is infinite if the line is not legal, or has no length.
-    """
-    a, c = line[first], line[last]
-    if (a[0] == c[0] and a[1] == c[1]) or not (_joins(free, a, middle) and _joins(free, middle, c)):
-        return np.inf
-    cost = 0.0
-    if a[0] != middle[0] or a[1] != middle[1]:
-        cost += segment_cost(factors, a[0], a[1], middle[0], middle[1])
-    if c[0] != middle[0] or c[1] != middle[1]:
-        cost += segment_cost(factors, middle[0], middle[1], c[0], c[1])
-    return cost
+def _cost_between(free, factors, a, c):
+    """Return the cost of the straight line between two positions, infinite if it is not legal."""
+    return legal_cost(free, factors, a[0], a[1], c[0], c[1], np.inf)
 
 
 @njit(cache=True, nogil=True)
@@ -155,6 +147,9 @@ def _merged(free, factors, line, n, i, spare):
     The cheapest of three places is taken: either point, or the middle between them. Return the
     added cost, infinite if nothing was done.
     """
+    a, c = line[i - 1], line[i + 2]
+    if a[0] == c[0] and a[1] == c[1]:
+        return np.inf
     before = 0.0
     for k in range(i - 1, i + 2):
         before += segment_cost(factors, line[k, 0], line[k, 1], line[k + 1, 0], line[k + 1, 1])
@@ -163,7 +158,9 @@ def _merged(free, factors, line, n, i, spare):
         middle = line[i].copy()
         for k in range(2):
             middle[k] = _on_grain(line[i, k] + share * (line[i + 1, k] - line[i, k]))
-        cost = _cost_through(free, factors, line, i - 1, middle, i + 2)
+        cost = _cost_between(free, factors, a, middle)
+        if cost < least:
+            cost += _cost_between(free, factors, middle, c)
         if cost < least:
             least = cost
             best[:] = middle
@@ -205,7 +202,7 @@ def _thinned(free, factors, line, radius, spare):
 
 @njit(cache=True, nogil=True)
 def round_bends(free, factors, line, radius, spare):
-    """Return the points of a line with rounded bends, the direction of travel at each, the cost.
+    """Return the points of a line with rounded bends, the directions at each, cost and length.
 
     Directions are unit vectors, float64 (m, 2) as the points. Between two points the path is
     straight if they have the same direction, else an arc; two equal points are a turn on the spot,
@@ -229,10 +226,11 @@ def round_bends(free, factors, line, radius, spare):
     n = line.shape[0]
     points, directions = np.empty((2 * n, 2)), np.empty((2 * n, 2))
     points[0], directions[0] = line[0], _direction(line, 0)
-    size, cost, last = 1, 0.0, line[0].copy()
+    size, cost, length, last = 1, 0.0, 0.0, line[0].copy()
     for i in range(1, n - 1):
         bend, ahead = line[i].copy(), line[i + 1].copy()
-        half = math.tan(max(_turn_at(line, i), _SMALLEST_TURN) / 2)
+        turn = max(_turn_at(line, i), _SMALLEST_TURN)
+        half = math.tan(turn / 2)
         most = math.hypot(ahead[0] - bend[0], ahead[1] - bend[1])
         if i < n - 2:
             kept = radius * math.tan(_turn_at(line, i + 1) / 2) + _MARGIN
@@ -243,7 +241,7 @@ def round_bends(free, factors, line, radius, spare):
         while most >= radius * half * (1 - _SMALLEST_TURN):
             a, c = _towards(bend, last, most), _towards(bend, ahead, most)
             arc = -1.0
-            if _joins(free, last, a) and _joins(free, c, ahead):
+            if _is_legal(free, last, a) and _is_legal(free, c, ahead):
                 arc = arc_cost(free, factors, a, bend, c)
             added = arc - segment_cost(factors, a[0], a[1], bend[0], bend[1])
             added -= segment_cost(factors, bend[0], bend[1], c[0], c[1])
@@ -255,9 +253,12 @@ def round_bends(free, factors, line, radius, spare):
                 break
             most = max(most / 2, radius * half)
         cost += segment_cost(factors, last[0], last[1], a[0], a[1]) + arc
+        length += math.hypot(a[0] - last[0], a[1] - last[1])
+        length += math.hypot(c[0] - a[0], c[1] - a[1]) * (turn / 2) / math.sin(turn / 2)
         points[size], directions[size] = a, directions[size - 1]
         points[size + 1], directions[size + 1] = c, _direction(line, i)
         size, last = size + 2, c
     points[size], directions[size] = line[n - 1], directions[size - 1]
     cost += segment_cost(factors, last[0], last[1], line[n - 1, 0], line[n - 1, 1])
-    return points[: size + 1].copy(), directions[: size + 1].copy(), cost
+    length += math.hypot(line[n - 1, 0] - last[0], line[n - 1, 1] - last[1])
+    return points[: size + 1].copy(), directions[: size + 1].copy(), cost, length

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav._copies import copies_alike
-from hybridnav.costs.integral import line_cost, positions_on
+from hybridnav.poses import wrapped
 from hybridnav.refine import _cost_line_kernels as kernels
 from hybridnav.refine._arc_kernels import round_bends
+from hybridnav.refine.open_cells import open_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
@@ -29,6 +30,8 @@ class ArcLine(NamedTuple):
     """float64 (m,), the direction of travel at each."""
     cost_m: float
     """The integral of the factors along it."""
+    length_m: float
+    """The length of lines and arcs."""
 
 
 @copies_alike
@@ -36,8 +39,9 @@ class CostLine:
     """Shortener of cell paths of one grid that never raises their cost; it holds a byte a cell.
 
     The points of the new path are start, goal, and centres of cells of the old path. A dynamic
-    program finds the cheapest path that leaves out some of these, up to 23 a segment; it is
-    repeated on the points that are left. Costs are exact integrals of the factors along the
+    program finds the cheapest path whose bends are six cells of the old one apart, or multiples of
+    that up to 24. Then bends move along the old path where that is cheaper, and the dynamic program
+    leaves out up to three at a time, in turn. Costs are exact integrals of the factors along the
     segments (`costs.cost_along`), and new segments are tested exactly, so a path never leaves the
     union of the closed squares of the enterable cells.
 
@@ -74,10 +78,7 @@ class CostLine:
         self._frame = grid.frame
         self._corner_cutting = grid.corner_cutting
         self._factors = layer.factors
-        free = grid.enterable(allow_unexplored=allow_unexplored)
-        free.flat[layer.closed_flat] = False
-        if closed is not None:
-            free.flat[closed] = False
+        free = open_cells(grid, layer.closed_flat, closed, allow_unexplored=allow_unexplored)
         self._free = free.view(np.uint8)
 
     def shorten(self, cells: LongArray, start: FloatArray, goal: FloatArray) -> FloatArray:
@@ -97,7 +98,7 @@ class CostLine:
             point if the two are the same. Never dearer than the line from `start` over the centres
             of the inner cells to `goal`; where corners may be cut, over those of all cells.
         """
-        return self._in_metres(self._short(self._line(cells, start, goal)), start, goal)
+        return self._in_metres(self._short(cells, start, goal)[0], start, goal)
 
     def arcs(
         self, cells: LongArray, start: FloatArray, goal: FloatArray, *, radius_m: float
@@ -121,34 +122,32 @@ class CostLine:
             Never dearer than the line over the centres of the cells (see `shorten`), and at most
             1 % dearer than what `shorten` returns.
         """
-        line = self._line(cells, start, goal)
-        short = self._short(line)
-        if len(short) == 1:
-            return ArcLine(np.array([start], dtype=np.float64), np.zeros(1), 0.0)
-        least = line_cost(self._factors, short)
-        spare = min(line_cost(self._factors, line) - least, _TOLERANCE * least)
-        radius_cells = radius_m / self._frame.resolution_m
-        points, ahead, cost = round_bends(
-            self._free, self._factors, short, radius_cells, max(spare, 0.0)
+        line, least, whole = self._short(cells, start, goal)
+        if len(line) == 1:
+            return ArcLine(np.array([start], dtype=np.float64), np.zeros(1), 0.0, 0.0)
+        spare = max(min(whole - least, _TOLERANCE * least), 0.0)
+        per_cell = self._frame.resolution_m
+        points, ahead, cost, length = round_bends(
+            self._free, self._factors, line, radius_m / per_cell, spare
         )
-        origin = self._frame.points_of_grid(np.zeros((1, 2)))
-        east, north = (self._frame.points_of_grid(ahead) - origin).T
+        headings = np.arctan2(ahead[:, 0], ahead[:, 1])
+        if self._frame.yaw_rad != 0:
+            headings = wrapped(headings + self._frame.yaw_rad)
         found = self._in_metres(points, start, goal)
-        return ArcLine(found, np.arctan2(north, east), float(cost) * self._frame.resolution_m)
+        return ArcLine(found, headings, cost * per_cell, length * per_cell)
 
-    def _line(self, cells: LongArray, start: FloatArray, goal: FloatArray) -> FloatArray:
-        """Return the positions of a cell path between two points, no two in a row equal."""
-        metres = np.array([start, goal], dtype=np.float64)
-        endpoints = np.clip(positions_on(self._frame, metres), cells[[0, -1]], cells[[0, -1]] + 1)
-        inner = cells if self._corner_cutting else cells[1:-1]
-        line = np.concatenate([endpoints[:1], inner + 0.5, endpoints[1:]])
-        repeated = np.concatenate([[False], (line[1:] == line[:-1]).all(axis=1)])
-        kept: FloatArray = line[~repeated]
-        return kept
-
-    def _short(self, line: FloatArray) -> FloatArray:
-        short: FloatArray = kernels.shorten(self._free, self._factors, line)
-        return short
+    def _short(
+        self, cells: LongArray, start: FloatArray, goal: FloatArray
+    ) -> tuple[FloatArray, float, float]:
+        """Return the positions of the short line, its cost in cells, and that of the cells."""
+        position_of = self._frame.position_of
+        ends = np.array([position_of(*start.tolist()), position_of(*goal.tolist())])
+        # Kernels are compiled for each memory layout, and again for read-only arrays.
+        cells = np.ascontiguousarray(cells).view()
+        cells.flags.writeable = False
+        path = kernels.line_of_cells(cells, ends, self._corner_cutting)
+        found: tuple[FloatArray, float, float] = kernels.shorten(self._free, self._factors, path)
+        return found
 
     def _in_metres(self, line: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return the points of positions, the first and last being exact."""
