@@ -6,6 +6,7 @@ import math
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
+from hybridnav.refine.open_cells import open_cells
 from hybridnav.search.grid_search import Cell, GridSearch
 from hybridnav.search.moves import path_length_in_cells
 
@@ -68,10 +69,10 @@ class GridRefiner:
     @cached_property
     def search(self) -> GridSearch:
         """The search of cells, built on first use."""
-        enterable = self.grid.enterable(allow_unexplored=self._allow_unexplored)
+        closed = None if self.costs is None else self.costs.closed_flat
+        enterable = open_cells(self.grid, closed, allow_unexplored=self._allow_unexplored)
         if self.costs is None:
             return GridSearch(enterable, corner_cutting=self.grid.corner_cutting)
-        enterable.flat[self.costs.closed_flat] = False
         corner_cutting, units = self.grid.corner_cutting, self.costs.units
         return GridSearch(enterable, corner_cutting=corner_cutting, units=units)
 

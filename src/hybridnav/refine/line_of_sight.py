@@ -13,6 +13,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine import _line_of_sight_kernels as kernels
 from hybridnav.refine._taut_kernels import marks_of
+from hybridnav.refine.open_cells import open_cells
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
@@ -64,10 +65,7 @@ class LineOfSight:
     ) -> None:
         self._frame = grid.frame
         self._corner_cutting = grid.corner_cutting
-        free = grid.enterable(allow_unexplored=allow_unexplored)
-        if closed is not None:
-            free.flat[closed] = False
-        self._marks = marks_of(free)
+        self._marks = marks_of(open_cells(grid, closed, allow_unexplored=allow_unexplored))
         self._per_metre = grid.frame.per_metre
         self._origin_m = np.array(grid.frame.origin_m)
 
