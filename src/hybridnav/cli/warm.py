@@ -19,11 +19,14 @@ if TYPE_CHECKING:
 _PLANS = ("shortest", "grid-astar", "octile", "paper", "robot")
 """Presets whose whole plans set-up compiles, what their searches have in common first."""
 _ENDPOINTS = ((2, 2), (60, 60))
+_LARGE = 160
+"""Rows of a map on which the overlay has all that those of buildings have."""
+_CHANGED = (1.0, 1.0, 2.0, 2.0)
 
 
-def small_grid() -> hn.OccupancyGrid:
+def small_grid(size: int = 64) -> hn.OccupancyGrid:
     """Return a map with the parts of buildings: rooms, doors, posts, unexplored cells."""
-    size, room = 64, 16
+    room = 16
     probability = np.zeros((size, size), np.float32)
     probability[::room] = probability[:, ::room] = 1.0
     for door in range(room // 2, size, room):
@@ -56,7 +59,7 @@ def compile_search(coarse: str) -> None:
 def compile_plan(preset: str) -> None:
     """Compile all kernels of a plan, by one on a small map; without a preset those of the pyramid
     alone."""
-    grid = small_grid()
+    grid = small_grid(_LARGE if preset == "robot" else 64)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
     if preset in _PLANS:
         endpoints = grid.frame.points_of(np.array(_ENDPOINTS))
@@ -64,7 +67,10 @@ def compile_plan(preset: str) -> None:
         planner.plan(*endpoints).to_dict()
         if preset == "robot":  # whose first plans need no overlay
             planner.prepare()
-            planner.plan(*endpoints)
+            path = planner.plan(*endpoints, smooth="line-of-sight").path
+            assert path is not None  # noqa: S101 - the rooms have doors
+            planner.plan(*endpoints, blocked={"cells": path.cells[len(path.cells) // 2][None]})
+            planner.update(costs=hn.CostLayer(np.full(grid.shape, 9.0)), changed=_CHANGED)
 
 
 def _end_with_parent() -> None:
