@@ -122,6 +122,13 @@ def test_answers_follow_updates_exactly(
             near = planner.plan(*ends, smooth="line-of-sight")
             assert near.solved == result.solved
             assert near.cost <= result.cost * (1 + 1e-9) or not near.solved
+            shut = cells[rng.random(len(cells)) < 0.1]
+            shut = shut[~(shut == start).all(axis=1) & ~(shut == goal).all(axis=1)]
+            is_left = is_open.copy()
+            is_left[tuple(shut.T)] = False
+            costs = weighted(move_graph(is_left), np.maximum(own, factors))
+            least = distances(costs, grid.shape, tuple(start))[tuple(goal)] * grid.resolution_m
+            check(planner.plan(*ends, blocked={"cells": shut}), least, is_left)
         if rng.random() < 0.3:
             planner.prepare()
 
