@@ -194,10 +194,7 @@ class CostFinish:
 
     def _line_for(self, closed: ClosedCells | None) -> CostLine:
         """Return the shortener of paths; with closed cells, one for this query."""
-        if closed is None:
-            return self._line
-        allowed = self._allow_unexplored
-        return CostLine(self._grid, self.layer, allow_unexplored=allowed, closed=closed.flat)
+        return self._line if closed is None else self._line.closing(closed.flat)
 
     @cached_property
     def _line(self) -> CostLine:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -53,8 +54,6 @@ class CostLine:
         Costs of its cells; closed ones are never entered.
     allow_unexplored
         Whether unexplored cells may be entered.
-    closed
-        int64 (n,), flat cells that may not be entered either; None for none.
 
     Examples
     --------
@@ -73,13 +72,26 @@ class CostLine:
         layer: CostLayer,
         *,
         allow_unexplored: bool = False,
-        closed: LongArray | None = None,
     ) -> None:
         self._frame = grid.frame
         self._corner_cutting = grid.corner_cutting
         self._factors = layer.factors
-        free = open_cells(grid, layer.closed_flat, closed, allow_unexplored=allow_unexplored)
+        free = open_cells(grid, layer.closed_flat, allow_unexplored=allow_unexplored)
         self._free = free.view(np.uint8)
+
+    def closing(self, closed: LongArray) -> CostLine:
+        """Return a shortener that does not enter some other cells either.
+
+        Parameters
+        ----------
+        closed
+            int64 (n,), flat cells.
+        """
+        free = self._free.copy()
+        free.flat[closed] = 0
+        other = copy(self)
+        vars(other)["_free"] = free
+        return other
 
     def shorten(self, cells: LongArray, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Shorten a cell path to an any-angle path between two points.
