@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from hybridnav.planner.cell_planner import CellPlan
 from hybridnav.planner.cell_plans import WholeMap, round_closed
 from hybridnav.refine import GridRefiner
 from hybridnav.result import PlanStats
+from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress
@@ -63,7 +63,7 @@ class OverOverlay:
         self._built: tuple[Overlay, OverlaySearch] | None = None
         self._cannot_build = topology.grid.corner_cutting
         self._expanded = 0
-        self._building = threading.Lock()
+        self._building = Turns()
 
     @cached_property
     def _worth(self) -> int:
@@ -87,12 +87,14 @@ class OverOverlay:
 
     def prepare(self, progress: Progress = no_progress) -> None:
         """Build the overlay, or renew what updates have made stale; see `CellPlanner`."""
-        with self._building:
-            if self._built is not None:
-                self._built[0].renew(progress)
-            elif not self._cannot_build:
-                self._build(progress)
+        self._building.alone(partial(self._build_or_renew, progress))
         progress(1, 1)
+
+    def _build_or_renew(self, progress: Progress) -> None:
+        if self._built is not None:
+            self._built[0].renew(progress)
+        elif not self._cannot_build:
+            self._build(progress)
 
     def _build(self, progress: Progress) -> None:
         costs, allowed = self._refiner.costs, self._allow_unexplored
@@ -111,17 +113,19 @@ class OverOverlay:
 
     def update(self, costs: CostLayer, box: Box) -> None:
         """Plan by other costs from now on; see `Updatable`."""
-        with self._building:
-            allowed = self._allow_unexplored
-            self._take(GridRefiner(self._topology.grid, allow_unexplored=allowed, costs=costs))
-            if self._built is None:
-                self._cannot_build = self._topology.grid.corner_cutting
-                return
-            factor: Any = costs.factors
-            try:
-                self._built[0].update(factor, closed=costs.closed, changed=box)
-            except PathsTooLongError:
-                self._built, self._cannot_build = None, True
+        self._building.alone(partial(self._take_costs, costs, box))
+
+    def _take_costs(self, costs: CostLayer, box: Box) -> None:
+        allowed = self._allow_unexplored
+        self._take(GridRefiner(self._topology.grid, allow_unexplored=allowed, costs=costs))
+        if self._built is None:
+            self._cannot_build = self._topology.grid.corner_cutting
+            return
+        factor: Any = costs.factors
+        try:
+            self._built[0].update(factor, closed=costs.closed, changed=box)
+        except PathsTooLongError:
+            self._built, self._cannot_build = None, True
 
     def plan(self, query: CellQuery) -> CellPlan:
         """Find a cheapest path, or one within epsilon of it; see `CellPlanner`."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from dataclasses import replace
 from functools import cached_property, partial
@@ -100,7 +99,7 @@ class HybridPlanner:
         self._turns = Turns()
         self._begun: Callable[[], None] | None = None
         """The update that has begun and not ended; an interrupt leaves it here."""
-        self._preparing = threading.Lock()
+        self._preparing = Turns()
         self._make_answers()
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
@@ -296,8 +295,7 @@ class HybridPlanner:
             Called after each step with the number of steps done and of all steps, as for a progress
             bar.
         """
-        with self._preparing:
-            self._cells.prepare(progress)
+        self._preparing.alone(lambda: self._cells.prepare(progress))
 
     def update(self, *, costs: CostLayer, changed: BaseGeometry | ArrayLike | None = None) -> None:
         """Plan by other costs from now on; the next answer is exact for these, with its proof.
@@ -336,10 +334,12 @@ class HybridPlanner:
         """
         grid = self.topology.grid
         box = box_of_cells(changed, grid.frame, grid.shape)
-        with self._preparing:
-            self._turns.alone(self._complete)
-            self._begun = partial(self._take_costs, self._costs.changed(costs, box), box)
-            self._turns.alone(self._complete)
+        self._preparing.alone(partial(self._update, costs, box))
+
+    def _update(self, costs: CostLayer, box: Box) -> None:
+        self._turns.alone(self._complete)
+        self._begun = partial(self._take_costs, self._costs.changed(costs, box), box)
+        self._turns.alone(self._complete)
 
     def _complete(self) -> None:
         """Make an update that has begun, also one that was interrupted."""

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.costs.integral import segment_cost
 from hybridnav.refine._legal_cost_kernels import legal_cost
 from hybridnav.refine._segment_kernels import is_legal
@@ -200,6 +200,7 @@ def _thinned(free, factors, line, radius, spare):
     return line[:n].copy(), spare
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def round_bends(free, factors, line, radius, spare):
     """Return the points of a line with rounded bends, the directions at each, cost and length.

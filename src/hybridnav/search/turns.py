@@ -32,12 +32,12 @@ class Turns:
             pass
         return self._slots[(threading.get_ident() >> 12) % _N_SLOTS]
 
-    def alone(self, change: Callable[[], None]) -> None:
+    def alone(self, change: Callable[[], object]) -> None:
         """Call a function while no query runs."""
         with self._door:
             self._hold(0, change)
 
-    def _hold(self, at: int, change: Callable[[], None]) -> None:
+    def _hold(self, at: int, change: Callable[[], object]) -> None:
         if at == _N_SLOTS:
             change()
             return
