@@ -160,8 +160,35 @@ def test_slight_bends_inside_a_room_are_told():
 
 def test_an_opening_is_no_door():
     words = hn.plan_tour(house(), [(13.9, 5.9), (2.2, 1.1)]).words()
-    assert re.fullmatch(r"after 7 m go through opening 1 \(\d\.\d m wide\) into the hall", words[2])
+    assert words[2] == "after 7 m go through opening 1 on the left (6.0 m wide) into the hall"
     assert words[1] == "after 3 m leave the den by door 5 into the corridor and turn right"
+
+
+# A corridor that opens into a hall beside it, and a hall whose door lies aslant on the way.
+ASLANT = (
+    "############################",
+    "#cccccccccccccccccccc#######",
+    "#cccccccccccccccccccc#######",
+    "#cccccccccccccccccccc#######",
+    "####################c#######",
+    "#oooooooooooooooooooooooooo#",
+    "#oooooooooooooooooooooooooo#",
+    "#oooooooooooooooooooooooooo#",
+    "#oooooooooooooooooooooooooo#",
+    "#oooooooooooooooooooooooooo#",
+    "#oooooooooooooooooooooooooo#",
+    "############################",
+)
+
+
+def test_the_side_of_a_door_is_that_of_its_wall():
+    """The line through the door bends slightly: its wall lies along the way all the same."""
+    planner = hn.HybridPlanner(topology_of(ASLANT))
+    start, goal = (0.9, 4.9), (12.9, 0.9)
+    there, back = planner.plan(start, goal), planner.plan(goal, start)
+    assert there.words()[1] == "after 10 m leave the corridor by door 1 on the right into the hall"
+    assert hands_of(there.words()) == []
+    assert back.words()[1] == "after 4 m leave the hall by door 1 into the corridor, then left"
 
 
 def test_mirrored_ground_swaps_left_and_right_in_every_sentence():

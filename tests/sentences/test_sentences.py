@@ -92,6 +92,18 @@ CASES = {
         "after 8 m go through opening 78 (7.5 m wide) into the hall",
         "nach 8 m durch Öffnung 78 (7,5 m breit) in die Halle gehen",
     ),
+    "opening beside": (
+        instruction(
+            "cross", doorway=Doorway(LAB, 78, 7.46, is_opening=True, beside="right", onward="left")
+        ),
+        "after 8 m go through opening 78 on the right (7.5 m wide) into l3_404, then left",
+        "nach 8 m durch Öffnung 78 (rechts, 7,5 m breit) in „l3_404“ gehen, dann nach links",
+    ),
+    "narrow opening beside": (
+        instruction("cross", doorway=Doorway(LAB, 78, 1.2, is_opening=True, beside="left")),
+        "after 8 m go through opening 78 on the left into l3_404",
+        "nach 8 m durch Öffnung 78 (links) in „l3_404“ gehen",
+    ),
     "no door": (
         instruction("cross", doorway=Doorway(Space(None, "room"))),
         "after 8 m go on into the room",

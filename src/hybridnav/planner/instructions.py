@@ -39,6 +39,10 @@ _BEYOND_M = 0.75
 _NEARER_RAD = math.radians(10.0)
 _SLIGHT_RAD = math.radians(25.0)
 """Turn below which one passes an opening straight on, however it lies."""
+_ASTRAY_RAD = math.radians(30.0)
+"""Turn in a door from which a person who goes straight on goes astray."""
+_ALONG_M = 6.0
+"""Length from which a path that passes an opening aslant leads along its wall before."""
 _LOOK_M, _CLEAR_M = 3.0, 0.5
 """Stretch of a path beside a door that has a direction: from 0.5 to 3 m off the door."""
 
@@ -71,6 +75,8 @@ class _Event:
     """The bend here, or into a door."""
     behind: Bend | None = None
     """The bend behind a door."""
+    is_oriented: bool = True
+    """Whether a person knows the direction of the path before it."""
 
     @property
     def door(self) -> Door | None:
@@ -120,6 +126,8 @@ def instructions_of(
         left = {door.number for door in stretches[0].doors}
         start = replace(start, landmark=landmarks.at_start(line, start.space.name, left))
     yield start
+    if heading_rad is None and start.landmark is None:
+        events[0] = replace(events[0], is_oriented=False)
     for event, following in zip(events, [*events[1:], None], strict=True):
         stretch = event.stretch
         left = {door.number for door in stretch.doors}
@@ -135,8 +143,6 @@ def instructions_of(
         if event.following is not None:
             until_m = line.length_m if following is None else following.at_m
             doorway = _doorway(line, event, event.following, landmarks, (before_m, until_m))
-            if before_m == 0 and heading_rad is None:
-                doorway = replace(doorway, beside=None)  # nobody knows which hand that is
             yield replace(instruction, doorway=replace(doorway, is_first=is_first))
             is_first, entered = False, left
         elif event.kind == "arrive":
@@ -277,7 +283,11 @@ def _doorway(
     landmarks: Landmarks,
     between_m: tuple[float, float],
 ) -> Doorway:
-    """Return a crossing for sentences: its door, and how the path comes and goes."""
+    """Return a crossing for sentences: its door, and how the path comes and goes.
+
+    Where it lies is told to a person who knows the direction of the path before it. A bend to the
+    hand at which the door lies is then told as one who stands in the door sees it.
+    """
     door, at_m = event.door, event.at_m
     if door is None:
         return Doorway(following.space, behind=_turn_of(event.behind))
@@ -291,11 +301,50 @@ def _doorway(
     way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
     comes = line.heading(max(at_m - _LOOK_M, between_m[0]), max(at_m - _CLEAR_M, between_m[0]))
     goes = line.heading(min(at_m + _CLEAR_M, between_m[1]), min(at_m + _LOOK_M, between_m[1]))
-    beside = None if event.turn or doorway.is_opening else _hand(_turned(comes, way))
-    onward = None if event.behind else _hand(_turned(way, goes))
-    if doorway.is_opening and abs(_turned(comes, goes)) < _SLIGHT_RAD:
-        onward = None
-    return replace(doorway, beside=beside, onward=onward)
+    into_rad, out_rad = _turned(comes, way), _turned(way, goes)
+    is_straight = doorway.is_opening and abs(_turned(comes, goes)) < _SLIGHT_RAD
+    is_beside = event.is_oriented and event.turn is None
+    if is_straight:
+        is_beside = is_beside and at_m - between_m[0] > _ALONG_M
+        return replace(doorway, beside=_hand(into_rad) if is_beside else None)
+    beside, onward = _hand(into_rad) if is_beside else None, _hand(out_rad)
+    behind = doorway.behind
+    if behind is not None and not (beside and beside == onward == behind.hand):
+        return replace(doorway, beside=beside)
+    if not (event.turn or beside or onward):
+        is_long = (
+            event.is_oriented and between_m[0] + _LOOK_M < at_m,
+            at_m + _LOOK_M < between_m[1],
+        )
+        beside, onward = _slight_hands(into_rad, out_rad, is_long)
+    return replace(doorway, beside=beside, behind=None, onward=onward)
+
+
+def _slight_hands(
+    into_rad: float, out_rad: float, is_long: tuple[bool, bool]
+) -> tuple[Hand | None, Hand | None]:
+    """Return the hands of a door that lies, or leads, slightly aside.
+
+    Parameters
+    ----------
+    into_rad
+        Turn from the path before the door to the right angle with its boundary.
+    out_rad
+        Turn from there to the path behind it.
+    is_long
+        Whether the path before it, and that behind it, has a direction.
+
+    Returns
+    -------
+    tuple of (str or None)
+        The hand at which it lies, and the one to which it leads: the greater turn alone, and
+        neither if the two cancel.
+    """
+    total = into_rad + out_rad
+    hand: Hand = "left" if total > 0 else "right"
+    if abs(into_rad) >= abs(out_rad):
+        return (hand if abs(total) >= _SLIGHT_RAD and is_long[0] else None), None
+    return None, (hand if abs(total) >= _ASTRAY_RAD and is_long[1] else None)
 
 
 def _turn_of(bend: Bend | None) -> Turn | None:

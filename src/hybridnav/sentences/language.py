@@ -121,6 +121,10 @@ class Language:
     """A wide opening; `{number}`, `{width}`."""
     narrow_opening: str
     """An opening as wide as a door, but without jambs; `{number}`."""
+    opening_beside: str
+    """A wide opening at one hand; `{number}`, `{beside}`, `{width}`."""
+    narrow_opening_beside: str
+    """A narrow one at one hand; `{number}`, `{beside}`."""
     out_turning: str
     """End of a sentence with a turn behind a door; `{turn}`."""
     arrive: str

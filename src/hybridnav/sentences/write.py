@@ -187,15 +187,18 @@ class _Writer:
         )
 
     def _door(self, doorway: Doorway) -> str:
-        words, number = self.words, doorway.door
-        if doorway.is_opening:
-            if doorway.width_m < _WIDE_M:
-                return words.narrow_opening.format(number=number)
-            width = f"{doorway.width_m:.1f}".replace(".", words.decimal)
-            return words.opening.format(number=number, width=width)
-        if doorway.beside is None:
-            return words.door.format(number=number)
-        return words.door_beside.format(number=number, beside=self._hand(doorway.beside).beside)
+        words, is_ahead = self.words, doorway.beside is None
+        if not doorway.is_opening:
+            template = words.door if is_ahead else words.door_beside
+        elif doorway.width_m < _WIDE_M:
+            template = words.narrow_opening if is_ahead else words.narrow_opening_beside
+        else:
+            template = words.opening if is_ahead else words.opening_beside
+        return template.format(
+            number=doorway.door,
+            beside="" if doorway.beside is None else self._hand(doorway.beside).beside,
+            width=f"{doorway.width_m:.1f}".replace(".", words.decimal),
+        )
 
     def _out(self, doorway: Doorway) -> str:
         if doorway.behind is not None:
