@@ -191,6 +191,35 @@ def test_the_side_of_a_door_is_that_of_its_wall():
     assert back.words()[1] == "after 4 m leave the hall by door 1 into the corridor, then left"
 
 
+def test_doors_before_the_right_one_are_counted_on_short_ways_too():
+    """Before the door to the archive lies that to the kitchen, at the same hand."""
+    words = house().plan((0.9, 3.0), (7.25, 5.9)).words()
+    assert words[1] == (
+        "after 6 m, past one door on the left, turn left and leave the corridor by door 3 "
+        "into the archive"
+    )
+    back = house().plan((11.0, 3.0), (7.25, 5.9)).words()
+    assert not any("past" in line for line in back)
+
+
+# A pillar hides the middle of the opening; the doors of the kitchen and the archive touch.
+HIDDEN = (
+    "##############################",
+    "#kkkkkkkkaaaaaaa##ooooooo#bbb#",
+    "#kkkkkkk##aaaaaa##ooooooo#bbb#",
+    "########ka########ooooooo##b##",
+    "#cccccccccccccccccccccccccccc#",
+    "#cccccccccccccccccccc#ccccccc#",
+    "#cccccccccccccccccccccccccccc#",
+    "##############################",
+)
+
+
+def test_doors_are_counted_that_touch_or_are_hidden_in_part():
+    words = hn.HybridPlanner(topology_of(HIDDEN)).plan((0.9, 0.9), (13.8, 0.9)).words()
+    assert "past three openings on the left" in words[1]
+
+
 def test_mirrored_ground_swaps_left_and_right_in_every_sentence():
     plain = house().topology
     width_m = plain.grid.shape[1] * SIDE

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.planner.landmarks import Landmarks
     from hybridnav.planner.legs import Leg
     from hybridnav.result import Path
-    from hybridnav.sentences import Space
+    from hybridnav.sentences import Passed, Space
     from hybridnav.sentences.instruction import Hand, Kind
     from hybridnav.topology import Door
 
@@ -43,6 +43,8 @@ _ASTRAY_RAD = math.radians(30.0)
 """Turn in a door from which a person who goes straight on goes astray."""
 _ALONG_M = 6.0
 """Length from which a path that passes an opening aslant leads along its wall before."""
+_LONG_M = 8.0
+"""Length above which a stretch needs landmarks at both hands."""
 _LOOK_M, _CLEAR_M = 3.0, 0.5
 """Stretch of a path beside a door that has a direction: from 0.5 to 3 m off the door."""
 
@@ -131,26 +133,44 @@ def instructions_of(
     for event, following in zip(events, [*events[1:], None], strict=True):
         stretch = event.stretch
         left = {door.number for door in stretch.doors}
+        doorway = None
+        if event.following is not None:
+            until_m = line.length_m if following is None else following.at_m
+            doorway = _doorway(line, event, event.following, landmarks, (before_m, until_m))
+            doorway = replace(doorway, is_first=is_first)
+        between_m = (before_m, event.at_m)
+        passed = landmarks.passed(line, between_m, stretch.space.name, entered | left)
         instruction = Instruction(
             event.kind,
             line.at(event.at_m),
             event.at_m,
             event.at_m - before_m,
             stretch.space,
-            landmarks.passed(line, (before_m, event.at_m), stretch.space.name, entered | left),
+            _needed(passed, event.at_m - before_m, _hand_of(event, doorway)),
             None if event.turn is None else Turn(event.turn.angle_rad),
+            doorway,
         )
         if event.following is not None:
-            until_m = line.length_m if following is None else following.at_m
-            doorway = _doorway(line, event, event.following, landmarks, (before_m, until_m))
-            yield replace(instruction, doorway=replace(doorway, is_first=is_first))
             is_first, entered = False, left
         elif event.kind == "arrive":
-            yield replace(instruction, waypoint=stretch.waypoint)
+            instruction = replace(instruction, waypoint=stretch.waypoint)
             is_first = True
-        else:
-            yield instruction
+        yield instruction
         before_m = event.at_m
+
+
+def _hand_of(event: _Event, doorway: Doorway | None) -> Hand | None:
+    """Return the hand at which a person looks for a door; None for no door, and for ahead."""
+    if doorway is None:
+        return None
+    return doorway.beside if event.turn is None else Turn(event.turn.angle_rad).hand
+
+
+def _needed(passed: tuple[Passed, ...], length_m: float, hand: Hand | None) -> tuple[Passed, ...]:
+    """Return what a person needs of what is passed: on a short stretch, the hand of the door."""
+    if length_m > _LONG_M:
+        return passed
+    return tuple(one for one in passed if one.hand == hand)
 
 
 def _start(line: Line, space: Space, heading_rad: float | None) -> Instruction:

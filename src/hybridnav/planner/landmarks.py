@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from hybridnav.sentences.instruction import Hand, Side
     from hybridnav.topology import Door, Rooms
 
-_LONG_M = 8.0
-"""Length above which a stretch needs landmarks."""
 _LATERAL_M = 3.5
 """Distance from the path at which a door counts as passed, at most."""
 _NARROWEST_M = 0.5
@@ -105,14 +103,14 @@ class Landmarks:
     def passed(
         self, line: Line, between_m: tuple[float, float], room: str | None, but: Collection[int]
     ) -> tuple[Passed, ...]:
-        """Return the doors and openings beside a long stretch of a path in one room.
+        """Return the doors and openings beside a stretch of a path in one room.
 
         Parameters
         ----------
         line
             The path.
         between_m
-            Begin and end of the stretch, by the length of the path; below 8 m nothing counts.
+            Begin and end of the stretch, by the length of the path.
         room
             The room in which it lies, None outside rooms.
         but
@@ -125,8 +123,6 @@ class Landmarks:
             beside it, and nothing occupied stands between.
         """
         begin_m, end_m = between_m
-        if end_m - begin_m <= _LONG_M:
-            return ()
         points, along = line.between(begin_m, end_m)
         counted: dict[Hand, list[Door]] = {"left": [], "right": []}
         for door in self._doors_of.get(room, ()):
@@ -139,7 +135,7 @@ class Landmarks:
             hand = self._hand_of(door, room, line.heading(at_m - _LOOK_M, at_m + _LOOK_M))
             if (
                 hand is not None
-                and self._is_seen(points[nearest].tolist(), door)
+                and self._is_seen_in_part(points[nearest].tolist(), door)
                 and not _is_known(door, counted[hand])
             ):
                 counted[hand].append(door)
@@ -196,11 +192,25 @@ class Landmarks:
             return None
         return "left" if sideways > 0 else "right"
 
+    def _is_seen_in_part(self, point: list[float], door: Door) -> bool:
+        """Return whether no occupied cell lies between a point and the middle of a door, or some
+        part of one between two rooms."""
+        if self._is_seen(point, door) or None in door.rooms:
+            return self._is_seen(point, door)
+        frame, cols = self._rooms.grid.frame, self._rooms.grid.shape[1]
+        flat = self._rooms.cells_beside(door.number)
+        ends = frame.points_of(np.column_stack(np.divmod(flat, cols))).tolist()
+        return any(self._is_free(point, end) for end in ends)
+
     def _is_seen(self, point: list[float], door: Door) -> bool:
         """Return whether no occupied cell lies between a point and the middle of a door."""
+        return self._is_free(point, list(door.position))
+
+    def _is_free(self, point: list[float], end: list[float]) -> bool:
+        """Return whether no occupied cell lies between two points."""
         grid = self._rooms.grid
-        count = 2 + math.ceil(2 * math.dist(point, door.position) / grid.resolution_m)
-        points = np.linspace(point, door.position, count)[1:-1]
+        count = 2 + math.ceil(2 * math.dist(point, end) / grid.resolution_m)
+        points = np.linspace(point, end, count)[1:-1]
         cells = grid.frame.cells_of(points)
         return not (grid.measured[tuple(cells.T)] == CellClass.OCCUPIED).any()
 
@@ -215,5 +225,9 @@ def _side(angle_rad: float) -> Side:
 
 
 def _is_known(door: Door, others: list[Door]) -> bool:
-    """Return whether a door is part of one that was counted."""
-    return any(math.dist(door.position, other.position) < _ONE_DOOR_M for other in others)
+    """Return whether a door is part of one that was counted: doors of two rooms are two."""
+    return any(
+        math.dist(door.position, other.position) < _ONE_DOOR_M
+        and (None in door.rooms + other.rooms or set(door.rooms) == set(other.rooms))
+        for other in others
+    )
