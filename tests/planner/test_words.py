@@ -202,6 +202,17 @@ def test_doors_before_the_right_one_are_counted_on_short_ways_too():
     assert not any("past" in line for line in back)
 
 
+def test_a_goal_has_a_door_beside_it():
+    """A person cannot see coordinates."""
+    goals = {
+        (7.25, 3.0): "in the corridor, with door 3 to the archive on the left",
+        (20.5, 2.75): "in the corridor, with door 6 to the lab on the left",
+        (19.75, 6.25): "in the lab",
+    }
+    for goal, last in goals.items():
+        assert house().plan((0.9, 3.0), goal).words()[-1].endswith(last)
+
+
 # A pillar hides the middle of the opening; the doors of the kitchen and the archive touch.
 HIDDEN = (
     "##############################",

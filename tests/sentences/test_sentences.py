@@ -196,6 +196,8 @@ def test_every_template_is_used_and_filled(code):
             for side in sides:
                 seen = Landmark(4, space, side, is_opening=is_opening)
                 written += sentences([instruction("start", 0.0, space, landmark=seen)], code)
+                there = instruction("arrive", 5.0, space, waypoint="sink", landmark=seen)
+                written += sentences([there], code)
             if turn is not None:
                 written += sentences([instruction(turn=turn, space=space, passed=passed)], code)
     text = "\n".join(written)
@@ -235,4 +237,19 @@ def test_a_landmark_shows_the_direction_at_the_start():
         "start in the corridor towards door 4 to l3_404",
         "start in the corridor with door 4 behind you",
         "Start im Flur, Tür 4 in „l3_404“ rechts",
+    ]
+
+
+def test_a_landmark_shows_where_the_goal_lies():
+    cases: tuple[tuple[str, Side], ...] = (("en", "right"), ("en", "ahead"), ("de", "behind"))
+    told = [
+        sentences(
+            [instruction("arrive", waypoint="(1, 2)", landmark=Landmark(4, LAB, side))], code
+        )[0]
+        for code, side in cases
+    ]
+    assert told == [
+        "after 8 m you are at (1, 2) in the corridor, with door 4 to l3_404 on the right",
+        "after 8 m you are at (1, 2) in the corridor, with door 4 to l3_404 ahead",
+        "nach 8 m am Ziel: (1, 2) im Flur, Tür 4 in „l3_404“ im Rücken",
     ]

@@ -153,7 +153,11 @@ def instructions_of(
         if event.following is not None:
             is_first, entered = False, left
         elif event.kind == "arrive":
-            instruction = replace(instruction, waypoint=stretch.waypoint)
+            is_point = stretch.waypoint is not None and stretch.waypoint != stretch.space.name
+            seen = landmarks.at_goal(line, between_m, stretch.space.name, entered)
+            instruction = replace(
+                instruction, waypoint=stretch.waypoint, landmark=seen if is_point else None
+            )
             is_first = True
         yield instruction
         before_m = event.at_m

@@ -29,6 +29,8 @@ _ONE_DOOR_M = 1.0
 _LOOK_M = 1.0
 _FARTHEST_M = 20.0
 """Distance at which a person recognises a door from the start, at most."""
+_NEARBY_M = 5.0
+"""Distance of a door that shows a person where a path ends, at most."""
 _NEAREST_M = 0.7
 """Distance from a door below which nobody can tell where it lies."""
 _AHEAD_RAD = math.radians(35.0)
@@ -163,10 +165,10 @@ class Landmarks:
         -------
         Landmark or None
             The exit if it lies ahead, over furniture too; else the nearest other door in sight,
-            within 20 m; else the exit in sight.
+            within 20 m; else the exit in sight; else the nearest other door that lies ahead.
         """
         (x, y), heading_rad = line.at(0.0), line.first_heading()
-        found: list[tuple[bool, float, int, Landmark]] = []
+        found: list[tuple[bool, bool, float, int, Landmark]] = []
         for door in () if math.isnan(heading_rad) else self._doors_of.get(room, ()):
             away_m, is_exit = math.dist((x, y), door.position), door.number in exits
             if away_m < _NEAREST_M or (away_m > _FARTHEST_M and not is_exit):
@@ -179,10 +181,49 @@ class Landmarks:
             seen = Landmark(door.number, Space(beyond), side, is_opening=door.is_opening)
             if is_exit and side == "ahead":
                 return seen
-            if not self._is_seen([x, y], door):
+            is_hidden = not self._is_seen([x, y], door)
+            if is_hidden and side != "ahead":
                 continue
-            found.append((is_exit, away_m, door.number, seen))
-        return min(found, key=lambda one: one[:3])[3] if found else None
+            found.append((is_hidden, is_exit, away_m, door.number, seen))
+        return min(found, key=lambda one: one[:4])[4] if found else None
+
+    def at_goal(
+        self, line: Line, between_m: tuple[float, float], room: str | None, but: Collection[int]
+    ) -> Landmark | None:
+        """Return the door that shows a person where a path ends.
+
+        Parameters
+        ----------
+        line
+            The path.
+        between_m
+            Begin and end of its last stretch, by the length of the path.
+        room
+            The room in which it ends, None outside rooms.
+        but
+            Numbers of the doors by which the path comes.
+
+        Returns
+        -------
+        Landmark or None
+            The nearest other door in sight, within 5 m.
+        """
+        begin_m, end_m = between_m
+        (x, y), heading_rad = line.at(end_m), line.heading(max(begin_m, end_m - _LOOK_M), end_m)
+        near = [
+            (away_m, door.number, door)
+            for door in self._doors_of.get(room, ())
+            for away_m in [math.dist((x, y), door.position)]
+            if _NEAREST_M <= away_m <= _NEARBY_M and door.number not in but
+            if not (door.is_opening and None in door.rooms) and self._is_seen([x, y], door)
+        ]
+        if not near or math.isnan(heading_rad):
+            return None
+        door = min(near)[2]
+        way = math.atan2(door.position[1] - y, door.position[0] - x)
+        beyond = door.rooms[1] if door.rooms[0] == room else door.rooms[0]
+        side = _side(math.remainder(way - heading_rad, math.tau))
+        return Landmark(door.number, Space(beyond), side, is_opening=door.is_opening)
 
     def _hand_of(self, door: Door, room: str | None, heading_rad: float) -> Hand | None:
         """Return the hand to which a door leads out of a room; None if it lies across the path."""

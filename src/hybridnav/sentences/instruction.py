@@ -92,7 +92,7 @@ class Passed:
 
 @dataclass(frozen=True)
 class Landmark:
-    """A door or an opening by which a person at the start finds the direction to go.
+    """A door or an opening by which a person finds the direction at the start, or the goal.
 
     Examples
     --------
@@ -179,7 +179,7 @@ class Instruction:
     waypoint: str | None = None
     """Name or coordinates of the waypoint at which one arrives."""
     landmark: Landmark | None = None
-    """What shows the direction at a start without a heading."""
+    """What shows the direction at a start without a heading, or where a goal lies."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the plain values for JSON."""

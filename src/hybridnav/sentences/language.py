@@ -129,6 +129,12 @@ class Language:
     """End of a sentence with a turn behind a door; `{turn}`."""
     arrive: str
     """At a waypoint; `{lead}`, `{waypoint}`, `{inside}`."""
+    at_beside: str
+    """End of an arrival near a door at one hand; `{landmark}`, `{beside}`."""
+    at_ahead: str
+    """The same with a door ahead; `{landmark}`."""
+    at_behind: str
+    """The same with a door behind; `{landmark}`."""
     arrive_at_goal: str
     """At a goal without a name; `{lead}`, `{inside}`."""
     arrive_inside: str

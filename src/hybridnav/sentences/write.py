@@ -136,9 +136,10 @@ class _Writer:
         if doorway is not None:
             return self._cross(instruction, doorway, lead)
         if instruction.kind == "arrive":
-            return self._arrival(instruction).format(
+            arrival = self._arrival(instruction).format(
                 lead=lead, inside=inside, waypoint=instruction.waypoint
             )
+            return arrival + self._at(instruction.landmark)
         if instruction.kind == "turn":
             assert turn is not None  # noqa: S101 - a turn has one
             return words.turn.format(inside=inside, lead=lead, turn=self._turn(turn))
@@ -150,17 +151,33 @@ class _Writer:
 
     def _start(self, landmark: Landmark, inside: str) -> str:
         """Return the first sentence with a landmark that shows the direction."""
-        words, beyond = self.words, self._space(landmark.beyond)
-        template = words.opening_to if landmark.is_opening else words.door_to
-        if landmark.beyond.name is None and not landmark.is_opening:
-            template = words.door
-        named = template.format(number=landmark.door, itself=beyond.itself, into=beyond.into)
+        words, named = self.words, self._landmark(landmark)
         if landmark.side == "ahead":
             return words.start_towards.format(inside=inside, landmark=named)
         if landmark.side == "behind":
             return words.start_away.format(inside=inside, landmark=named)
         beside = self._hand(landmark.side).beside
         return words.start_beside.format(inside=inside, landmark=named, beside=beside)
+
+    def _at(self, landmark: Landmark | None) -> str:
+        """Return the end of the sentence of an arrival: the landmark where one is."""
+        words = self.words
+        if landmark is None:
+            return ""
+        if landmark.side == "ahead":
+            return words.at_ahead.format(landmark=self._landmark(landmark))
+        if landmark.side == "behind":
+            return words.at_behind.format(landmark=self._landmark(landmark))
+        beside = self._hand(landmark.side).beside
+        return words.at_beside.format(landmark=self._landmark(landmark), beside=beside)
+
+    def _landmark(self, landmark: Landmark) -> str:
+        """Return the words for a door by what lies behind it."""
+        words, beyond = self.words, self._space(landmark.beyond)
+        template = words.opening_to if landmark.is_opening else words.door_to
+        if landmark.beyond.name is None and not landmark.is_opening:
+            template = words.door
+        return template.format(number=landmark.door, itself=beyond.itself, into=beyond.into)
 
     def _arrival(self, instruction: Instruction) -> str:
         """Return the template of an arrival."""
