@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from functools import cache
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -17,59 +16,12 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
+from tests.drawn_rooms import HOUSE, SIDE, house, topology_of
 from tests.oracle.bends import Windows, simplified_corners
 from tests.strategies import examples
 
 if TYPE_CHECKING:
     from hybridnav.sentences import Instruction
-
-SIDE = 0.5
-NAMES = {
-    "k": "kitchen",
-    "a": "archive",
-    "b": "bath",
-    "d": "den",
-    "l": "lab",
-    "c": "corridor",
-    "o": "hall",
-    "m": "maze",
-}
-# Four rooms over a corridor, and a hall that opens onto it by 6 m; cells of half a metre.
-HOUSE = (
-    "##############################################",
-    "#kkkkkkkk#aaaaaaaa#bbbbbbb#ddddddddd#llllllll#",
-    "#kkkkkkkk#aaaaaaaa#bbbbbbb#ddddddddd#llllllll#",
-    "#kkkkkkkk#aaaaaaaa#bbbbbbb#ddddddddd#llllllll#",
-    "#kkkkkkkk#aaaaaaaa#bbbbbbb#ddddddddd#llllllll#",
-    "####kk########aa#######bb######dd#######ll####",
-    "#cccccccccccccccccccccccccccccccccccccccccccc#",
-    "#cccccccccccccccccccccccccccccccccccccccccccc#",
-    "#cccccccccccccccccccccccccccccccccccccccccccc#",
-    "#############oooooooooooo#####################",
-    "#oooooooooooooooooooooooooooooo###############",
-    "#oooooooooooooooooooooooooooooo###############",
-    "#oooooooooooooooooooooooooooooo###############",
-    "##############################################",
-)
-
-
-def topology_of(lines, doors=None, **frame):
-    """A map drawn with a letter for each room, y up; `.` is free space without a name."""
-    letters = np.array([list(line) for line in reversed(lines)])
-    known = [letter for letter in NAMES if (letters == letter).any()]
-    label_of = np.full(letters.shape, -1, dtype=np.int32)
-    for label, letter in enumerate(known):
-        label_of[letters == letter] = label
-    rooms = hn.RoomLabels(tuple(NAMES[one] for one in known), label_of, doors=doors or {})
-    grid = hn.OccupancyGrid(
-        (letters == "#").astype(np.float32), hn.Frame(SIDE, **frame), robot_radius_m=0
-    )
-    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
-
-
-@cache
-def house(preset="shortest"):
-    return hn.HybridPlanner(topology_of(HOUSE), preset=preset)
 
 
 def turns_of(instructions: tuple[Instruction, ...]) -> list[tuple[float, float]]:
@@ -162,73 +114,6 @@ def test_an_opening_is_no_door():
     words = hn.plan_tour(house(), [(13.9, 5.9), (2.2, 1.1)]).words()
     assert words[2] == "after 7 m go through opening 1 on the left (6.0 m wide) into the hall"
     assert words[1] == "after 3 m leave the den by door 5 into the corridor and turn right"
-
-
-# A corridor that opens into a hall beside it, and a hall whose door lies aslant on the way.
-ASLANT = (
-    "############################",
-    "#cccccccccccccccccccc#######",
-    "#cccccccccccccccccccc#######",
-    "#cccccccccccccccccccc#######",
-    "####################c#######",
-    "#oooooooooooooooooooooooooo#",
-    "#oooooooooooooooooooooooooo#",
-    "#oooooooooooooooooooooooooo#",
-    "#oooooooooooooooooooooooooo#",
-    "#oooooooooooooooooooooooooo#",
-    "#oooooooooooooooooooooooooo#",
-    "############################",
-)
-
-
-def test_the_side_of_a_door_is_that_of_its_wall():
-    """The line through the door bends slightly: its wall lies along the way all the same."""
-    planner = hn.HybridPlanner(topology_of(ASLANT))
-    start, goal = (0.9, 4.9), (12.9, 0.9)
-    there, back = planner.plan(start, goal), planner.plan(goal, start)
-    assert there.words()[1] == "after 10 m leave the corridor by door 1 on the right into the hall"
-    assert hands_of(there.words()) == []
-    assert back.words()[1] == "after 4 m leave the hall by door 1 into the corridor, then left"
-
-
-def test_doors_before_the_right_one_are_counted_on_short_ways_too():
-    """Before the door to the archive lies that to the kitchen, at the same hand."""
-    words = house().plan((0.9, 3.0), (7.25, 5.9)).words()
-    assert words[1] == (
-        "after 6 m, past one door on the left, turn left and leave the corridor by door 3 "
-        "into the archive"
-    )
-    back = house().plan((11.0, 3.0), (7.25, 5.9)).words()
-    assert not any("past" in line for line in back)
-
-
-def test_a_goal_has_a_door_beside_it():
-    """A person cannot see coordinates."""
-    goals = {
-        (7.25, 3.0): "in the corridor, with door 3 to the archive on the left",
-        (20.5, 2.75): "in the corridor, with door 6 to the lab on the left",
-        (19.75, 6.25): "in the lab",
-    }
-    for goal, last in goals.items():
-        assert house().plan((0.9, 3.0), goal).words()[-1].endswith(last)
-
-
-# A pillar hides the middle of the opening; the doors of the kitchen and the archive touch.
-HIDDEN = (
-    "##############################",
-    "#kkkkkkkkaaaaaaa##ooooooo#bbb#",
-    "#kkkkkkk##aaaaaa##ooooooo#bbb#",
-    "########ka########ooooooo##b##",
-    "#cccccccccccccccccccccccccccc#",
-    "#cccccccccccccccccccc#ccccccc#",
-    "#cccccccccccccccccccccccccccc#",
-    "##############################",
-)
-
-
-def test_doors_are_counted_that_touch_or_are_hidden_in_part():
-    words = hn.HybridPlanner(topology_of(HIDDEN)).plan((0.9, 0.9), (13.8, 0.9)).words()
-    assert "past three openings on the left" in words[1]
 
 
 def test_mirrored_ground_swaps_left_and_right_in_every_sentence():
