@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from hybridnav.topology.cutting import _closed
+from hybridnav.topology.cutting import closed_by_disc
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -18,4 +18,4 @@ def test_a_closing_by_distances_is_that_by_a_disc(seed):
     disc = row * row + col * col <= size * size + 1
     wide = ndimage.binary_closing(np.pad(free, size + 1), disc)
     expected = wide[size + 1 : -size - 1, size + 1 : -size - 1] & ~occupied
-    assert (_closed(free, occupied, reach) == expected).all()
+    assert (closed_by_disc(free, occupied, reach) == expected).all()

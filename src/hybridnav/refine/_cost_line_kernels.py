@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.costs.integral import segment_cost
 from hybridnav.refine._legal_cost_kernels import legal_cost
 
@@ -169,6 +169,7 @@ def _moved(free, factors, path, at, costs):
     return found
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def shorten(free, factors, path):
     """Return a line through some of the points of a path of cells, no dearer, its cost, and that of

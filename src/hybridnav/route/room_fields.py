@@ -46,7 +46,7 @@ class RoomFields:
         found: LongArray = self._field_of.ravel()[cells].astype(np.int64)
         return found
 
-    def window(self, vertex: int) -> Window:
+    def window(self, vertex: int) -> FieldWindow:
         """Return the part of the map that a field spans."""
         spans = self._windows[vertex]
         corner = spans[0].start, spans[1].start
@@ -61,10 +61,10 @@ class RoomFields:
         moves = None
         if self._factors is not None:
             moves = _weighted_moves(classes, np.asarray(label == 0), self._factors[spans])
-        return Window(corner, self._field_of.shape[1], classes, label, moves)
+        return FieldWindow(corner, self._field_of.shape[1], classes, label, moves)
 
 
-class Window(NamedTuple):
+class FieldWindow(NamedTuple):
     """The part of the map that a field spans."""
 
     corner: tuple[int, int]

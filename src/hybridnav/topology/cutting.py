@@ -79,14 +79,14 @@ class Ground:
         measured = grid.measured == CellClass.FREE
         occupied = grid.measured == CellClass.OCCUPIED
         free = measured & ~outside
-        closed = _closed(free, occupied, _CLOSE_M / grid.resolution_m)
+        closed = closed_by_disc(free, occupied, _CLOSE_M / grid.resolution_m)
         rim = _rim(closed)
         n_unexplored = np.count_nonzero(rim & ~occupied & ~measured)
         unexplored = float(n_unexplored / max(1, int(np.count_nonzero(rim))))
         if unexplored > _NO_WALLS:
             occupied = occupied | (_rim(free) & ~measured)
         elif unexplored > _RAYS:
-            free = _closed(free, occupied, _CLOSE_RAYS_M / grid.resolution_m)
+            free = closed_by_disc(free, occupied, _CLOSE_RAYS_M / grid.resolution_m)
             holes, _ = ndimage.label(~free & ~occupied)
             small = np.bincount(holes.ravel()) * grid.resolution_m**2 < _HOLE_M2
             small[0] = False
@@ -235,7 +235,7 @@ def _basins(ground: Ground) -> IntArray:
     return basins.reshape(clearance.shape)[1:-1, 1:-1]
 
 
-def _closed(free: BoolArray, occupied: BoolArray, reach: float) -> BoolArray:
+def closed_by_disc(free: BoolArray, occupied: BoolArray, reach: float) -> BoolArray:
     """Return free cells, and those that a closing by a disc fills, but no obstacle."""
     size = max(1, round(reach))
     if not free.any():
