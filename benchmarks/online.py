@@ -90,7 +90,7 @@ def follow(
         update = version.update(now, changed=box)
         seconds.append(time.perf_counter() - began)
         flips, seen = flips + len(update.died), seen + version.n_places
-        version = update.pyramid
+        version = update.version
     return Run(seconds, flips, seen, version)
 
 
@@ -129,7 +129,7 @@ def growth() -> None:
                 changed[low : low + CHANGE, low : low + CHANGE] = 0
             now = with_classes(grid, changed)
             start = time.perf_counter()
-            version = version.update(now, changed=box).pyramid
+            version = version.update(now, changed=box).version
             taken.append(time.perf_counter() - start)
         update = float(np.median(taken[1:]))
         print(

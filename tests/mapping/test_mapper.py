@@ -279,6 +279,17 @@ def test_a_sonar_refuses_settings_out_of_range(values: dict[str, float]) -> None
         SonarModel(**values)
 
 
+def test_a_scan_without_a_reading_leaves_the_grid_where_later_ones_need_it() -> None:
+    mapper = Mapper(resolution_m=0.1, max_cells=1_000_000)
+    none, far = np.full(3, np.nan), (5000.0, 0.0, 0.0)
+    assert mapper.add(LaserScan(none, pose=far, start_rad=0.0, step_rad=0.1))
+    assert mapper.add(SonarScan(none, far, np.zeros((3, 3))))
+    assert not mapper.has_cells
+    near = LaserScan(np.full(3, 2.0), pose=(0.0, 0.0, 0.0), start_rad=0.0, step_rad=0.1)
+    assert mapper.add(near)
+    assert mapper.has_cells
+
+
 @pytest.mark.parametrize(
     "values",
     [

@@ -70,10 +70,10 @@ def numbers_of(version):
 
 def check_events(before, update, shift=(0, 0)):
     """What an update states about places is what the cells show."""
-    old, new = numbers_of(before), numbers_of(update.pyramid)
+    old, new = numbers_of(before), numbers_of(update.version)
     rows, cols = old.shape
     seen = new[shift[0] : shift[0] + rows, shift[1] : shift[1] + cols]
-    had, has = set(before.place_numbers.tolist()), set(update.pyramid.place_numbers.tolist())
+    had, has = set(before.place_numbers.tolist()), set(update.version.place_numbers.tolist())
     assert set(update.died) == had - has
     assert set(update.born) == has - had
     same = {place for place in had & has if np.array_equal(old == place, seen == place)}
@@ -121,7 +121,7 @@ class Robot(RuleBasedStateMachine):
         self.old = [(self.version, numbers_of(self.version))]
         update = self.version.update(grid, changed=changed)
         check_events(self.version, update, shift)
-        self.classes, self.version = classes, update.pyramid
+        self.classes, self.version = classes, update.version
 
     @rule(data=st.data(), kind=st.sampled_from([0, 1, 1, 2]), noisy=st.booleans())
     def paint(self, data, kind, noisy):
@@ -195,7 +195,7 @@ def test_a_thousand_updates_of_an_office_keep_places_as_many_as_a_fresh_build_ma
     office = hn.load_map(OFFICE, robot_radius_m=0.25)
     version = OnlinePyramid.of(hn.DualGraphPyramid.build(office))
     for at, (classes, box) in enumerate(random_changes(office, 1000), start=1):
-        version = version.update(with_classes(office, classes), changed=box).pyramid
+        version = version.update(with_classes(office, classes), changed=box).version
         if at % 25 == 0:
             level = version.pyramid[-1]
             rows, cols = classes.shape
@@ -209,7 +209,7 @@ def test_places_that_no_change_touches_keep_cells_levels_and_arcs():
     classes = np.ones((24, 60), np.uint8)
     version = version_of(classes)
     classes[10, 4] = 0
-    after = version.update(occupancy_grid(classes), changed=(10, 4, 10, 4)).pyramid
+    after = version.update(occupancy_grid(classes), changed=(10, 4, 10, 4)).version
     old, new = version.pyramid, after.pyramid
     far = np.zeros(classes.shape, dtype=bool)
     far[:, 25:] = True
@@ -225,11 +225,11 @@ def test_a_closed_door_splits_a_place_and_an_open_one_joins_its_parts():
     version = version_of(door_open, merge_distance_m=10.0)
     assert version.n_places == 1
     update = version.update(occupancy_grid(closed))
-    assert update.pyramid.n_places == 2
+    assert update.version.n_places == 2
     assert update.died == (0,)
     assert update.split == {0: update.born}
-    back = update.pyramid.update(occupancy_grid(door_open))
-    assert back.pyramid.n_places == 1
+    back = update.version.update(occupancy_grid(door_open))
+    assert back.version.n_places == 1
     assert len(back.changed) == len(back.merged) == 1
     assert set(back.merged.values()) == set(back.changed)
 
@@ -240,9 +240,9 @@ def test_a_place_that_loses_few_cells_keeps_its_number():
     classes[0, 0] = 0
     update = version.update(occupancy_grid(classes))
     assert (update.born, update.died, update.changed) == ((), (), (0,))
-    assert update.pyramid.place_at((0, 0)) == -1
-    assert update.pyramid.place_at((5, 5)) == 0
-    cells = {tuple(cell) for cell in update.pyramid.receptive_field(0).tolist()}
+    assert update.version.place_at((0, 0)) == -1
+    assert update.version.place_at((5, 5)) == 0
+    cells = {tuple(cell) for cell in update.version.receptive_field(0).tolist()}
     assert cells == {(row, col) for row in range(6) for col in range(6)} - {(0, 0)}
 
 
@@ -250,7 +250,7 @@ def test_unchanged_parts_of_a_map_are_shared_between_versions():
     classes = np.ones((300, 900), np.uint8)
     version = version_of(classes, merge_distance_m=20.0)
     classes[5, 5] = 0
-    after = version.update(occupancy_grid(classes), changed=(5, 5, 5, 5)).pyramid
+    after = version.update(occupancy_grid(classes), changed=(5, 5, 5, 5)).version
     assert len(version._state.tiles) == 24
     assert after._state.tiles.shared_with(version._state.tiles) >= 22
 
@@ -262,14 +262,38 @@ def test_the_robots_radius_reaches_beyond_the_stated_box():
     )
     probability[10, 10] = 1.0
     grid = OccupancyGrid(probability, Frame(0.1), robot_radius_m=0.3)
-    check_version(version.update(grid, changed=(10, 10, 10, 10)).pyramid)
+    check_version(version.update(grid, changed=(10, 10, 10, 10)).version)
+
+
+@pytest.mark.parametrize("beyond", [1, 4])
+def test_obstacles_in_new_cells_reach_into_old_ones(beyond):
+    small = OccupancyGrid(np.zeros((20, 20), np.float32), Frame(1.0), robot_radius_m=2.0)
+    version = OnlinePyramid.of(hn.DualGraphPyramid.build(small))
+    probability = np.zeros((20 + beyond, 20 + beyond), np.float32)
+    probability[10, 20] = probability[20, 3] = 1.0
+    grid = OccupancyGrid(probability, Frame(1.0), robot_radius_m=2.0)
+    update = version.update(grid, changed=np.zeros(grid.shape, np.bool_))
+    check_version(update.version)
+    assert update.version.place_at((10, 19)) == -1
+
+
+def test_a_narrow_map_grows_on_all_sides():
+    small = OccupancyGrid(np.zeros((1, 3), np.float32), Frame(1.0), robot_radius_m=3.0)
+    version = OnlinePyramid.of(hn.DualGraphPyramid.build(small))
+    probability = np.zeros((3, 5), np.float32)
+    probability[0, 0] = 1.0
+    grid = OccupancyGrid(probability, Frame(1.0, (-1.0, -1.0)), robot_radius_m=1.0)
+    version = version.update(grid).version
+    check_version(version)
+    wider = OccupancyGrid(np.pad(probability, 1), Frame(1.0, (-2.0, -2.0)), robot_radius_m=1.0)
+    check_version(version.update(wider, changed=(0, 0, 0, 0)).version)
 
 
 def test_cells_that_changed_elsewhere_are_reported():
     classes = np.ones((5, 5), np.uint8)
     version = version_of(classes)
     classes[4, 4] = 0
-    after = version.update(occupancy_grid(classes), changed=(0, 0, 1, 1)).pyramid
+    after = version.update(occupancy_grid(classes), changed=(0, 0, 1, 1)).version
     with pytest.raises(InvalidValueError, match=r"1 cells changed outside .* row 4, column 4"):
         after.pyramid  # noqa: B018 - a property
 
@@ -281,6 +305,8 @@ def test_cells_that_changed_elsewhere_are_reported():
         pytest.param(np.zeros((5, 5)), (1, 2), "box of four", id="half a box"),
         pytest.param(np.zeros((5, 5)), (0.5, 0, 1, 1), "box of four", id="fractions"),
         pytest.param(np.zeros((5, 5)), np.zeros((4, 5), dtype=bool), "mask of", id="mask"),
+        pytest.param(np.zeros((5, 5)), (3, 3, 1, 1), r"inside \(5, 5\)", id="inverted"),
+        pytest.param(np.zeros((5, 5)), (9, 9, 9, 9), r"inside \(5, 5\)", id="off the map"),
     ],
 )
 def test_wrong_arguments_end_in_one_line(grid, changed, message):

@@ -256,3 +256,17 @@ def test_a_preset_that_knows_lengths_only_refuses_updates(preset: str) -> None:
         planner.update(costs=layer_of(np.ones(grid.shape)))
     with pytest.raises(hn.InvalidValueError, match="are not those of a map of"):
         planner.update(costs=layer_of(np.ones((2, 2))))
+
+
+def test_closed_cells_that_make_paths_too_long_leave_the_search_of_the_grid() -> None:
+    grid = occupancy_grid(np.ones((2, 200), np.uint8))
+    factors, closed = np.ones(grid.shape, np.float32), np.zeros(grid.shape, np.bool_)
+    factors[1], closed[0, 5:195] = 1000.0, True
+    planner = hn.HybridPlanner(
+        topology_of(grid), preset="robot", costs=hn.CostLayer(factors, closed=closed)
+    )
+    planner.prepare()
+    ends = grid.frame.points_of([(0, 0), (0, 199)])
+    graph = weighted(move_graph(~closed), factors.astype(float))
+    least = distances(graph, grid.shape, (0, 0))[0, 199] * grid.resolution_m
+    assert planner.plan(*ends, smooth="none").cost >= least * (1 - 1e-9)

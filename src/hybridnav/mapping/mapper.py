@@ -135,6 +135,8 @@ class Mapper:
             (model.min_range_m, high_m, min(model.clear_range_m, high_m), model.tolerance_m),
             self.resolution_m,
         )
+        if not kinds.any():
+            return True
         if not self._grow(*box.tolist()):
             return False
         changes = log_odds_of(model.when_hit), log_odds_of(model.when_passed)
@@ -161,25 +163,31 @@ class Mapper:
             )
             for ahead, aside, turn in scan.mounts.tolist()
         ]
+        readings = [
+            (apex, range_m)
+            for apex, range_m in zip(apexes, scan.ranges_m.tolist(), strict=True)
+            if range_m > model.min_range_m
+        ]
+        if not readings:
+            return True
         reach = (model.max_range_m + model.tolerance_m) / side_m
-        rows, cols = ([apex[axis] for apex in apexes] for axis in range(2))
+        rows, cols = ([apex[axis] for apex, _ in readings] for axis in range(2))
         box = min(rows) - reach, max(rows) + reach, min(cols) - reach, max(cols) + reach
         if not self._grow(*(math.floor(value) for value in box)):
             return False
         changes = model.when_hit, model.when_passed, -log_odds_of(_LEAST_P)
         lengths = model.tolerance_m / side_m, model.min_range_m / side_m
-        for apex, range_m in zip(apexes, scan.ranges_m.tolist(), strict=True):
-            if range_m > model.min_range_m:
-                add_cone(
-                    self._evidence,
-                    self._seen_at,
-                    self._corner,
-                    apex,
-                    (min(range_m, model.max_range_m) / side_m, range_m < model.max_range_m),
-                    (model.half_angle_rad, *lengths),
-                    changes,
-                    self._n_scans + 1,
-                )
+        for apex, range_m in readings:
+            add_cone(
+                self._evidence,
+                self._seen_at,
+                self._corner,
+                apex,
+                (min(range_m, model.max_range_m) / side_m, range_m < model.max_range_m),
+                (model.half_angle_rad, *lengths),
+                changes,
+                self._n_scans + 1,
+            )
         return True
 
     def _grow(self, first_row: int, last_row: int, first_col: int, last_col: int) -> bool:

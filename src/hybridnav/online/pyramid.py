@@ -14,7 +14,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.online.dense import pyramid_of, state_of
 from hybridnav.online.draft import Draft, State
 from hybridnav.online.identities import settle
-from hybridnav.online.tiles import NO_PLACE, Box
+from hybridnav.online.tiles import Box
 from hybridnav.pyramid.record import SURVIVES
 from hybridnav.pyramid.window import Criterion
 
@@ -137,7 +137,10 @@ class OnlinePyramid:
         if box is None or _settings(grid) != _settings(self.grid) or grid.least_island_m2 > 0:
             box = whole
         old = Box(0, 0, *self.grid.shape).moved(rows, cols)
-        boxes = [box.common(old), *_outside(old, whole)]
+        # Obstacles in new cells reach into those at the former rim.
+        apart = old.narrowed(_reach(grid), whole)
+        inside = box.common(apart)
+        boxes = [*_outside(apart, whole), *([] if inside.is_empty else [inside])]
         draft = Draft(self._state, self._criterion)
         for part in boxes:
             draft.change(part.moved(*low), grid.classes[part.inside(whole)])
@@ -247,7 +250,7 @@ class Update:
     ((0,), {0: (1, 2)})
     """
 
-    pyramid: OnlinePyramid
+    version: OnlinePyramid
     """The new version."""
     born: tuple[int, ...]
     """Places that are none of the old ones; their numbers are new."""
@@ -273,6 +276,13 @@ def _box_of(changed: ArrayLike | None, grid: OccupancyGrid) -> Box | None:
         box = Box(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
     elif given.shape == (4,) and np.issubdtype(given.dtype, np.integer):
         low_row, low_col, high_row, high_col = given.tolist()
+        if not (
+            0 <= low_row <= high_row < grid.shape[0] and 0 <= low_col <= high_col < grid.shape[1]
+        ):
+            raise InvalidValueError(
+                f"changed is the box {tuple(given.tolist())}, expected the least row and column "
+                f"and the greatest, inside {grid.shape} cells"
+            )
         box = Box(low_row, low_col, high_row + 1, high_col + 1)
     else:
         raise InvalidValueError(
@@ -280,8 +290,12 @@ def _box_of(changed: ArrayLike | None, grid: OccupancyGrid) -> Box | None:
             f"of {grid.shape} cells or a box of four whole numbers: the least row and column, and "
             "the greatest"
         )
-    reach = math.ceil(grid.robot_radius_m / grid.resolution_m) + 1
-    return box.widened(reach).common(Box(0, 0, *grid.shape))
+    return box.widened(_reach(grid)).common(Box(0, 0, *grid.shape))
+
+
+def _reach(grid: OccupancyGrid) -> int:
+    """Return the cells within which an obstacle decides on the class of a cell, and one more."""
+    return math.ceil(grid.robot_radius_m / grid.resolution_m) + 1
 
 
 def _settings(grid: OccupancyGrid) -> tuple[Any, ...]:
@@ -312,6 +326,3 @@ def _check_sides(grid: OccupancyGrid) -> None:
             f"the grid has {grid.shape} cells, expected at most {MOST_SIDE} rows and columns: "
             "divide the map"
         )
-
-
-__all__ = ["NO_PLACE", "OnlinePyramid", "Update"]

@@ -61,6 +61,16 @@ class Box(NamedTuple):
         low_row, low_col, high_row, high_col = self
         return Box(low_row - cells, low_col - cells, high_row + cells, high_col + cells)
 
+    def narrowed(self, cells: int, within: Box) -> Box:
+        """Return the box without so many rows and columns on the sides inside another box."""
+        low_row, low_col, high_row, high_col = self
+        return Box(
+            min(low_row + cells * (low_row > within.low_row), within.high_row),
+            min(low_col + cells * (low_col > within.low_col), within.high_col),
+            max(high_row - cells * (high_row < within.high_row), within.low_row),
+            max(high_col - cells * (high_col < within.high_col), within.low_col),
+        )
+
     def moved(self, rows: int, cols: int) -> Box:
         """Return the box moved by so many rows and columns."""
         low_row, low_col, high_row, high_col = self

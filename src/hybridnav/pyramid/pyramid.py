@@ -132,7 +132,8 @@ class DualGraphPyramid:
                 )
         if resistance is not None and (rooms is not None or resistance.shape != grid.shape):
             raise InvalidValueError(
-                f"a resistance goes without rooms and with the clearance of {grid.shape} cells"
+                f"a resistance was given with rooms or for a map not of {grid.shape} cells: give "
+                "it alone, made from this map"
             )
         record, stats, darts = decimate(
             grid.classes,
