@@ -118,7 +118,7 @@ class CostLine:
         """Shorten a cell path, and round its bends by arcs of circles.
 
         Bends that lie too close to each other are merged. An arc has the radius or up to four times
-        that; no cell that it meets, or passes by less than a quarter of a cell, may be blocked.
+        that; no cell may be blocked that the box round any short piece of it meets.
         Where no such arc fits, the robot turns on the spot.
 
         Parameters
