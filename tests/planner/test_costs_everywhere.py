@@ -33,7 +33,7 @@ REFUSE = {"shortest", "octile"} | {
 }
 COMMANDS = {"plan", "build", "evaluate"}
 """Commands that make a planner."""
-NO_PLANNER = {"show", "rooms", "compare", "preset"}
+NO_PLANNER = {"show", "rooms", "compare", "preset", "map"}
 RADIUS_M = 0.25
 CLEARANCE = "clearance:multiplier=4"
 
@@ -117,8 +117,14 @@ def scene(request: Any) -> Scene:
     return scene_of("office", topology, hn.CostLayer.clearance(grid, multiplier=4.0))
 
 
+def preset_of(name: str) -> hn.Preset:
+    """A preset that plans paths of cells by the given costs alone."""
+    overrides = ["planner.smooth=none", "planner.costs=null"] if name == "robot" else []
+    return hn.load_preset(name, overrides=overrides)
+
+
 def planner_of(scene: Scene, preset: str) -> hn.HybridPlanner:
-    return hn.HybridPlanner(scene.topology, preset=preset, costs=scene.layer)
+    return hn.HybridPlanner(scene.topology, preset=preset_of(preset), costs=scene.layer)
 
 
 # --- functions ----------------------------------------------------------------------------------
@@ -196,7 +202,7 @@ def plan_alternatives(scene: Scene, preset: str, _tmp: Any) -> None:
 def model(scene: Scene, preset: str, tmp: Any) -> None:
     planner = planner_of(scene, preset)
     hn.save(planner, tmp / "kept.hnm")
-    kept = hn.load(tmp / "kept.hnm").planner(preset, costs=scene.layer)
+    kept = hn.load(tmp / "kept.hnm").planner(preset_of(preset), costs=scene.layer)
     for pair in scene.pairs:
         result = kept.plan(*scene.points(pair))
         scene.check(result, pair, cheapest=HONOUR[preset])
@@ -278,7 +284,7 @@ def test_the_commands_plan_and_judge_by_costs(
         points = grid.frame.points_of(list(pair))
         ends = [f"{x!r},{y!r}" for x, y in points.tolist()]
         query = ("plan", path, f"--start={ends[0]}", f"--goal={ends[1]}", "--robot-radius", "0")
-        done = cli(*query, "--preset", preset, "--costs", CLEARANCE, "--json")
+        done = cli(*query, "--preset", preset, "--costs", CLEARANCE, "--smooth", "none", "--json")
         least_m = distances(graph, grid.shape, pair[0])[pair[1]] * grid.resolution_m
         assert done.code == (0 if np.isfinite(least_m) else 1)
         if np.isfinite(least_m):

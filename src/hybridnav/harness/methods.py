@@ -92,7 +92,8 @@ def preset_spec(
 ) -> MethodSpec:
     """Return the method of a preset, with its merge distance and seed where they are given.
 
-    In a run with costs those take the place of the preset's own.
+    In a run with costs those take the place of the preset's own. Arcs are left out: judges read
+    lines, so such a preset finishes its paths by line of sight.
 
     Raises
     ------
@@ -103,6 +104,9 @@ def preset_spec(
     """
     preset = load_preset(source)
     _check_metric(preset, by_costs=by_costs)
+    if preset.planner.smooth == "arcs":
+        planner = preset.planner.model_copy(update={"smooth": LINE_OF_SIGHT})
+        preset = preset.model_copy(update={"planner": planner})
     pyramid = preset.pyramid.model_dump(exclude={"robot_radius_m"})
     smoothed = preset.planner.smooth == LINE_OF_SIGHT
     return MethodSpec(

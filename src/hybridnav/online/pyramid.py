@@ -52,7 +52,7 @@ class OnlinePyramid:
     >>> probability = grid.probability.copy()
     >>> probability[5, 13] = 1.0
     >>> update = online.update(replace(grid, probability=probability), changed=(5, 13, 5, 13))
-    >>> update.pyramid.place_at((5, 13)), update.changed
+    >>> update.version.place_at((5, 13)), update.changed
     (-1, (0, 2))
     """
 

@@ -265,9 +265,9 @@ def to_finest(levels, ground, upper):
         if i > 0 and node >= begin and levels.field_of[upper[i - 1]] == field:
             first = levels.node_at[field]
             place = clique_place(upper[i - 1] - first, node - first)
-            ends = np.int64(levels.below[upper[i - 1]]), np.int64(levels.below[node])
+            endpoints = np.int64(levels.below[upper[i - 1]]), np.int64(levels.below[node])
             limit = np.int64(levels.clique[levels.clique_at[field] + place])
-            nodes, n = _over_inner(levels, ground, field, ends, limit, nodes, n)
+            nodes, n = _over_inner(levels, ground, field, endpoints, limit, nodes, n)
         else:
             nodes = append(nodes, n, levels.below[node] if node >= begin else node)
             n += 1
@@ -275,7 +275,7 @@ def to_finest(levels, ground, upper):
 
 
 @njit(cache=True, nogil=True)
-def _over_inner(levels, ground, field, ends, limit, nodes, n):
+def _over_inner(levels, ground, field, endpoints, limit, nodes, n):
     """Append the nodes of a shortest path inside a field over those of the level below, by A*.
 
     Parameters
@@ -284,7 +284,7 @@ def _over_inner(levels, ground, field, ends, limit, nodes, n):
         See `Levels` and `CellCosts`.
     field
         A field above the finest level.
-    ends
+    endpoints
         The first node, which is not appended, and the last one.
     limit
         Its cost.
@@ -302,10 +302,14 @@ def _over_inner(levels, ground, field, ends, limit, nodes, n):
     before = np.empty(span[1] - begin, np.int32)
     bound = np.full(span[1] - begin, -1, np.int64)
     heap, size = np.empty((256, 2), np.int64), 1
-    goal_cell, cols = levels.cell_of[ends[1]], ground.cols
-    push(heap, 0, np.int64(0), ends[0])
-    distance[ends[0] - begin], before[ends[0] - begin], bound[ends[0] - begin] = 0, ends[0], 0
-    while size > 0 and distance[ends[1] - begin] > limit:
+    goal_cell, cols = levels.cell_of[endpoints[1]], ground.cols
+    push(heap, 0, np.int64(0), endpoints[0])
+    distance[endpoints[0] - begin], before[endpoints[0] - begin], bound[endpoints[0] - begin] = (
+        0,
+        endpoints[0],
+        0,
+    )
+    while size > 0 and distance[endpoints[1] - begin] > limit:
         key = heap[0, 0]
         node = pop(heap, size)
         size -= 1
@@ -337,8 +341,8 @@ def _over_inner(levels, ground, field, ends, limit, nodes, n):
                 distance[other - begin], before[other - begin] = offered, mark
                 push(heap, size, rank(offered, ahead), other)
                 size += 1
-    first, node = n, ends[1]
-    while node != ends[0]:
+    first, node = n, endpoints[1]
+    while node != endpoints[0]:
         nodes = append(nodes, n, node)
         n += 1
         mark = np.int64(before[node - begin])

@@ -29,14 +29,14 @@ _SLACK = 1e-13
 
 
 @njit(cache=True, nogil=True)
-def line_of_cells(cells, ends, corner_cutting):
+def line_of_cells(cells, endpoints, corner_cutting):
     """Return the positions of a path of cells between two points, no two in a row equal.
 
     Parameters
     ----------
     cells
         int64 (n, 2), legal moves.
-    ends
+    endpoints
         float64 (2, 2), start and goal as (row, col), in the first and the last cell but for
         rounding.
     corner_cutting
@@ -51,7 +51,7 @@ def line_of_cells(cells, ends, corner_cutting):
             if i == first - 1 or i == last:
                 end = 0 if i == first - 1 else 1
                 cell = cells[0 if end == 0 else n - 1, k]
-                position = np.rint(ends[end, k] * _GRAIN) / _GRAIN
+                position = np.rint(endpoints[end, k] * _GRAIN) / _GRAIN
                 line[size, k] = min(max(position, cell + 0.0), cell + 1.0)
             else:
                 line[size, k] = cells[i, k] + 0.5
