@@ -15,7 +15,6 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import SURVIVES, BuildStats, LevelSize
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import Linkage
 
@@ -69,12 +68,8 @@ def state_of(pyramid: DualGraphPyramid) -> State:
     places = PlaceTable({})
     places.write(range(level.n_vertices), table)
     places.close()
-    return State(tiles, places, _counts(end), _counts(cells["edges"]), level.n_vertices)
-
-
-def _counts(values: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> LongArray:
-    counts: LongArray = np.bincount(values.ravel(), minlength=SURVIVES + 1).astype(np.int64)
-    return counts
+    n_ends = np.bincount(end.ravel(), minlength=SURVIVES + 1).astype(np.int64)
+    return State(tiles, places, n_ends, level.n_vertices)
 
 
 def pyramid_of(state: State, box: Box, settings: Settings) -> DualGraphPyramid:

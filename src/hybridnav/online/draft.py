@@ -29,8 +29,6 @@ class State(NamedTuple):
     """Its places."""
     vertex_ends: LongArray
     """int64 (256,), how many cells have each end."""
-    edge_ends: LongArray
-    """int64 (256,), how many edges have each end; the first is not counted."""
     next_place: int
     """The least number that no place has ever had."""
 
@@ -51,7 +49,6 @@ class Draft:
         self.tiles = before.tiles.next_version()
         self.places = before.places.next_version()
         self.vertex_ends = before.vertex_ends.copy()
-        self.edge_ends = before.edge_ends.copy()
         self.next_place = before.next_place
         self._criterion = criterion
 
@@ -148,7 +145,6 @@ class Draft:
 
     def _count(self, cells: AnyArray, sign: int) -> None:
         self.vertex_ends += sign * np.bincount(cells["end"].ravel(), minlength=SURVIVES + 1)
-        self.edge_ends += sign * np.bincount(cells["edges"].ravel(), minlength=SURVIVES + 1)
 
     def close(self) -> State:
         """Close levels at which nothing ends any more, and return the version."""
@@ -157,7 +153,7 @@ class Draft:
             self._renumber_levels(ends)
         self.tiles.close()
         self.places.close()
-        return State(self.tiles, self.places, self.vertex_ends, self.edge_ends, self.next_place)
+        return State(self.tiles, self.places, self.vertex_ends, self.next_place)
 
     def _renumber_levels(self, levels: LongArray) -> None:
         """Give the levels at which cells end the numbers 1, 2, ...; this looks at every tile."""
@@ -174,7 +170,6 @@ class Draft:
         rows = self.places.read(places)
         rows["whole_at"] = new_level[rows["whole_at"]]
         self.places.write(places, rows)
-        for counts, new in ((self.vertex_ends, new_level), (self.edge_ends, new_end)):
-            before = counts.copy()
-            counts[:] = 0
-            np.add.at(counts, new, before)
+        before = self.vertex_ends.copy()
+        self.vertex_ends[:] = 0
+        np.add.at(self.vertex_ends, new_level, before)
