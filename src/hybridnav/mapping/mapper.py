@@ -11,7 +11,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.mapping._beam_kernels import add_beams, beam_ends
 from hybridnav.mapping._cone_kernels import add_cone
-from hybridnav.mapping.models import LaserModel, SonarModel, log_odds_of
+from hybridnav.mapping.models import MOST_RANGE_CELLS, LaserModel, SonarModel, log_odds_of
 from hybridnav.mapping.scans import LaserScan, SonarScan
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import IntArray
 
-_MOST_RANGE_CELLS = 2**14
-"""Cells of a beam that are walked exactly in int64."""
 _MARGIN_CELLS = 64
 """Cells beyond a scan by which extents grow at least, so that not every scan makes them grow."""
 _LEAST_P = 0.02
@@ -79,10 +77,10 @@ class Mapper:
             raise InvalidValueError(f"max_cells must be 1 to {MAX_CELLS}, got {max_cells}")
         self._max_cells = max_cells
         far_m = max(self._laser.max_range_m, self._sonar.max_range_m + self._sonar.tolerance_m)
-        if far_m / self.resolution_m > _MOST_RANGE_CELLS:
+        if far_m / self.resolution_m > MOST_RANGE_CELLS:
             raise InvalidValueError(
                 f"a range of {far_m:g} m is {far_m / self.resolution_m:.0f} cells of "
-                f"{self.resolution_m:g} m, more than {_MOST_RANGE_CELLS}: take larger cells or a "
+                f"{self.resolution_m:g} m, more than {MOST_RANGE_CELLS}: take larger cells or a "
                 "shorter range"
             )
         self._corner = (0, 0)

@@ -16,6 +16,9 @@ from dataclasses import dataclass
 
 from hybridnav.errors import InvalidValueError
 
+MOST_RANGE_CELLS = 2**14
+"""Cells of a beam that are walked exactly in int64."""
+
 
 def log_odds_of(probability: float) -> float:
     """Return the log odds of a probability within (0, 1)."""

@@ -11,13 +11,13 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.mapping._beam_kernels import ray_lengths
+from hybridnav.mapping.models import MOST_RANGE_CELLS
 from hybridnav.mapping.scans import LaserScan, SonarScan, sonar_ring
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.grid import OccupancyGrid
 
-_MOST_RANGE_CELLS = 2**14
 _MOST_RAYS = 1000
 
 
@@ -36,9 +36,9 @@ def _ranges(
     """Return the distance to the first occupied cell in each direction, infinite if there is none
     within the range."""
     side_m = grid.resolution_m
-    if max_range_m / side_m > _MOST_RANGE_CELLS:
+    if max_range_m / side_m > MOST_RANGE_CELLS:
         raise InvalidValueError(
-            f"a range of {max_range_m:g} m is more than {_MOST_RANGE_CELLS} cells of {side_m:g} m: "
+            f"a range of {max_range_m:g} m is more than {MOST_RANGE_CELLS} cells of {side_m:g} m: "
             "simulate a shorter one"
         )
     start = grid.frame.position_of(*place)
