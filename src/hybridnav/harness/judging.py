@@ -12,6 +12,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
+from hybridnav.harness.contradictions import SLACK
 from hybridnav.harness.cost_judge import CostJudge
 from hybridnav.harness.methods import HybridMethod, Prepared
 from hybridnav.harness.yardstick import AnyAngleOptimum
@@ -35,9 +36,6 @@ graph."""
 
 VISIBILITY_CORNERS = 6000
 """Convex corners up to which there is a visibility graph: about a second to prepare."""
-
-SLACK = 1e-9
-"""Relative difference that two sums of the same moves may have."""
 
 STATED_SLACK, STATED_SLACK_CELLS = 1e-5, 0.0051
 """Scenario files round lengths to two decimals or six digits."""
