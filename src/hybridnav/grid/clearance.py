@@ -94,3 +94,25 @@ def clearance_cells(occupied: BoolArray) -> FloatArray:
 
     distances: FloatArray = ndimage.distance_transform_edt(~occupied)
     return distances
+
+
+def closing(cells: BoolArray, radius_cells: float) -> BoolArray:
+    """Return the morphological closing of cells by a disc, bool of the same shape.
+
+    Distances take as long for a large disc as for a small one.
+
+    Parameters
+    ----------
+    cells
+        bool (rows, cols).
+    radius_cells
+        Radius of the disc, >= 1; a cell belongs to it if its centre does.
+    """
+    if not cells.any():
+        return cells.copy()
+    from scipy import ndimage  # noqa: PLC0415 - on demand, as above
+
+    margin = int(radius_cells) + 2
+    near = ndimage.distance_transform_edt(~np.pad(cells, margin)) <= radius_cells
+    closed: BoolArray = ndimage.distance_transform_edt(near) > radius_cells
+    return closed[margin:-margin, margin:-margin]

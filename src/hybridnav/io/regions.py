@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav.grid import NO_ROOM, CellClass
+from hybridnav.grid.clearance import closing
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, IntArray
@@ -92,10 +93,7 @@ def _without_bays(region_of: IntArray, is_kept: BoolArray, grid: OccupancyGrid) 
         )
         part = filled_of[window]
         squares = _squares(region_of[window] == room, size)
-        inside = np.pad(squares, margin)
-        near = ndimage.distance_transform_edt(~inside) <= radius
-        closed = ndimage.distance_transform_edt(near) > radius
-        bays = closed[margin:-margin, margin:-margin] & ~squares
+        bays = closing(squares, radius) & ~squares
         bays = bays.repeat(size, axis=0).repeat(size, axis=1)[: part.shape[0], : part.shape[1]]
         part[bays & (part == NO_ROOM) & ~is_kept[window]] = room
     return filled_of
