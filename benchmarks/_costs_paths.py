@@ -1,4 +1,4 @@
-"""Clearance and length of the paths of several presets."""
+"""Clearance, length, cost and time of the paths of several presets."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import hybridnav as hn
+from benchmarks._costs_measure import clocked
 from hybridnav.costs import cost_along
 from hybridnav.grid.clearance import clearance_cells
-from hybridnav.harness.outcome import nanmean
+from hybridnav.harness.outcome import nanmean, nanquantile
 
 if TYPE_CHECKING:
     from benchmarks._costs_measure import Bench, Cell
@@ -17,47 +18,62 @@ if TYPE_CHECKING:
     from hybridnav.harness.tables import Row
 
 _PAIRS = 25
-_SPACING_M = 0.05
+_WORDS = ("clearance m", "least m", "length m", "cost m")
+ASTAR = "A*"
+"""`grid-astar` with the same costs, as Nav2's planner searches the inflated costmap."""
 
 
 def paths(bench: Bench) -> tuple[Row, list[str]]:
-    """Return mean clearance, least clearance, length and cost of paths, over the pairs solved."""
-    names = [name for name in ("shortest", "robot") if name in hn.preset_names()]
-    planners: dict[str, hn.HybridPlanner] = {
-        str(name): hn.HybridPlanner(
-            bench.topology, preset=name, costs=None if name == "shortest" else bench.layer
-        )
-        for name in names
+    """Return means of the paths' figures over the pairs solved: mean and least clearance, length,
+    cost, and the time of a plan against that of A*."""
+    planners = {
+        "shortest": hn.HybridPlanner(bench.topology, preset="shortest"),
+        "robot": hn.HybridPlanner(bench.topology, preset="robot"),
+        ASTAR: hn.HybridPlanner(bench.topology, preset="grid-astar", costs=bench.layer),
     }
-    planners["grid-astar"] = hn.HybridPlanner(
-        bench.topology, preset="grid-astar", costs=bench.layer
-    )
+    planners["robot"].prepare()
     clearance_m = clearance_cells(bench.grid.measured == hn.CellClass.OCCUPIED)
     clearance_m *= bench.grid.resolution_m
     row: Row = {}
+    seconds: dict[str, FloatArray] = {}
     for name, planner in planners.items():
         figures = [_figures(bench, clearance_m, planner, pair) for pair in bench.pairs[:_PAIRS]]
-        means = [nanmean(np.array(column)) for column in zip(*figures, strict=True)]
-        for word, mean in zip(("clearance m", "least m", "length m", "cost m"), means, strict=True):
-            row[f"{name}: {word}"] = mean
-    return row, []
+        *columns, seconds[name] = (np.array(column) for column in zip(*figures, strict=True))
+        for word, column in zip(_WORDS, columns, strict=True):
+            row[f"{name}: {word}"] = nanmean(column)
+    ratios = seconds[ASTAR] / seconds["robot"]
+    row["robot: plan ms"] = 1e3 * nanquantile(seconds["robot"], 0.5)
+    row["robot: plan x"], row["robot: plan x, worst"] = (
+        nanquantile(ratios, share) for share in (0.5, 0.0)
+    )
+    return row, _dear(bench, planners["robot"])
+
+
+def _dear(bench: Bench, robot: hn.HybridPlanner) -> list[str]:
+    """Return a line for each path of `robot` that breaks its proof against A*."""
+    wrong = []
+    for pair in bench.pairs[:_PAIRS]:
+        result = robot.plan(*bench.grid.frame.points_of(np.array(pair)))
+        best = bench.by_cells(*pair) * bench.grid.resolution_m
+        bound = result.grid_bound
+        if bound is not None and not (
+            bound <= best * (1 + 1e-9) and result.cost <= best * (1.01 + 1e-4)
+        ):
+            wrong.append(f"{pair}: robot costs {result.cost}, bound {bound}, A* {best}")
+    return wrong
 
 
 def _figures(
     bench: Bench, clearance_m: FloatArray, planner: hn.HybridPlanner, pair: tuple[Cell, Cell]
-) -> tuple[float, float, float, float]:
-    """Return mean and least clearance, length and cost of the path between two cells."""
-    result = planner.plan(*bench.grid.frame.points_of(np.array(pair)))
+) -> tuple[float, ...]:
+    """Return mean and least clearance, length and cost of the path between two cells, and the
+    seconds of a second plan."""
+    ends = bench.grid.frame.points_of(np.array(pair))
+    result = planner.plan(*ends)
     if result.path is None:
-        return np.nan, np.nan, np.nan, np.nan
-    cells = bench.grid.frame.cells_of(_spaced(result.path.points))
-    clearance = clearance_m[tuple(cells.T)]
-    cost = cost_along(bench.grid, bench.layer, result.path.points)
-    return float(clearance.mean()), float(clearance.min()), result.path.length_m, cost
-
-
-def _spaced(points: FloatArray) -> FloatArray:
-    """Return points on a polyline, 5 cm apart."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    at = np.arange(0.0, along[-1], _SPACING_M)
-    return np.stack([np.interp(at, along, points[:, k]) for k in range(2)], axis=1)
+        return (np.nan,) * (len(_WORDS) + 1)
+    seconds = clocked(planner.plan, *ends)
+    poses = result.path.poses()[:, :2]  # arcs too, 5 cm apart
+    clearance = clearance_m[tuple(bench.grid.frame.cells_of(poses).T)]
+    cost = cost_along(bench.grid, bench.layer, poses)
+    return float(clearance.mean()), float(clearance.min()), result.path.length_m, cost, seconds

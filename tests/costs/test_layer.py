@@ -251,3 +251,30 @@ def test_a_changed_layer_differs_in_the_box_alone() -> None:
     for row, col in ((-1, 0), (5, 0), (0, 6), (0, -1)):
         with pytest.raises(hn.InvalidValueError, match="do not lie inside costs of 8 x 6 cells"):
             old.changed(part, row, col)
+
+
+def test_sources_do_not_grow_with_every_change() -> None:
+    layer = layer_of(np.ones((2, 9)))
+    for at in range(30):
+        part = hn.CostLayer(np.full((1, 1), 2.0, np.float32), None, {"kind": "door", "number": at})
+        layer = layer.changed(part, 0, at % 9)
+    numbers = [source.get("number") for source in layer.source["of"]]
+    assert numbers == [None, *range(23, 30)]
+    assert layer.source["left_out"] == 23
+    again = layer.changed(part, 1, 0)
+    assert again.source == layer.source
+
+
+def test_layers_with_other_contents_have_other_digests() -> None:
+    factors, closed = np.full((2, 3), 2.0), np.zeros((2, 3), np.bool_)
+    layer = layer_of(factors)
+    closed[0, 0] = True
+    others = [
+        layer_of(factors.T),
+        layer_of(factors + 2**-14),
+        layer_of(factors, closed),
+        layer_of(factors, closed[::-1]),
+    ]
+    assert len({each.digest for each in (layer, *others)}) == 5
+    assert layer_of(factors.copy()).digest == layer.digest
+    assert layer.changed(layer_of(np.full((1, 1), 3.0)), 0, 0).digest != layer.digest

@@ -59,7 +59,10 @@ def test_corners_are_cut_where_the_map_allows_it() -> None:
 
 def test_cells_and_layers_of_other_maps_are_refused() -> None:
     grid = grid_of(np.zeros((2, 3)), robot_radius_m=0)
-    with pytest.raises(hn.InvalidValueError, match=r"cell \(2, 0\) lies outside the map of 2 x 3"):
+    with pytest.raises(
+        hn.InvalidValueError,
+        match=r"goal is cell \(2, 0\), expected one of the map of 2 rows and 3 columns",
+    ):
         CheapestCost(grid).cost_m((0, 0), (2, 0))
     with pytest.raises(hn.InvalidValueError, match="costs of 4 x 4 cells are not those"):
         CheapestCost(grid, layer_of(np.ones((4, 4))))

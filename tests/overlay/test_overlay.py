@@ -17,6 +17,7 @@ from hybridnav.overlay import (
     build_overlay,
     prepare_overlay,
 )
+from hybridnav.overlay.prepare import overlay_fields
 from tests.overlay.judge import WeightedJudge
 from tests.strategies import examples
 
@@ -49,7 +50,8 @@ def world(seed, shape, share):
 def test_paths_cost_what_dijkstra_finds(seed, sizes, share, has_top, epsilon):
     free, factor = world(seed, (23, 31), share)
     overlay = build_overlay(free, nested(free, sizes), factor, top_bytes=1e9 if has_top else 0)
-    search, judge = OverlaySearch(overlay), WeightedJudge(free, factor)
+    search = OverlaySearch(overlay, near_cells=[0, 0, 10, 60, 1000][seed % 5])
+    judge = WeightedJudge(free, factor)
     cells = np.argwhere(free)
     rng = np.random.default_rng(seed)
     for start, goal in cells[rng.integers(len(cells), size=(12, 2))].tolist():
@@ -60,7 +62,7 @@ def test_fields_without_moves_are_passed_by():
     """The first field holds a single cell without a neighbour."""
     free = np.ones((8, 8), dtype=np.bool_)
     free[:2, :2] = [[True, False], [False, False]]
-    search = OverlaySearch(build_overlay(free, nested(free, (2, 4, 8))))
+    search = OverlaySearch(build_overlay(free, nested(free, (2, 4, 8))), near_cells=0)
     judge = WeightedJudge(free, np.ones((8, 8)))
     for start, goal in [((2, 0), (0, 3)), ((7, 7), (0, 2)), ((0, 0), (7, 7))]:
         judge.check(search.path(start, goal), start, goal)
@@ -68,7 +70,7 @@ def test_fields_without_moves_are_passed_by():
 
 def test_costs_of_one_need_no_array():
     free = np.ones((9, 9), dtype=np.bool_)
-    search = OverlaySearch(build_overlay(free, nested(free, [3])))
+    search = OverlaySearch(build_overlay(free, nested(free, [3])), near_cells=0)
     assert search.path((0, 0), (8, 8)).cost_cells == pytest.approx(8 * np.sqrt(2))
 
 
@@ -140,7 +142,7 @@ def test_paths_that_do_not_fit_are_refused_and_change_nothing():
     """A corridor of 24 cells whose factors add up to more than 16,000 cells."""
     free = np.ones((1, 24), dtype=np.bool_)
     overlay = build_overlay(free, nested(free, [24]))
-    search = OverlaySearch(overlay)
+    search = OverlaySearch(overlay, near_cells=0)
     with pytest.raises(PathsTooLongError, match="use smaller fields"):
         overlay.update(np.full((1, 24), 1000.0))
     assert search.path((0, 0), (0, 23)).lower_bound_cells == 23
@@ -151,7 +153,7 @@ def test_long_paths_over_fields_that_fit_are_found():
     free = np.ones((1, 80), dtype=np.bool_)
     factor = np.full((1, 80), 1000.0)
     overlay = build_overlay(free, nested(free, [4, 12]), factor)
-    found = OverlaySearch(overlay).path((0, 0), (0, 79))
+    found = OverlaySearch(overlay, near_cells=0).path((0, 0), (0, 79))
     assert found.lower_bound_cells == found.cost_cells == 79 * 1000
 
 
@@ -167,8 +169,44 @@ def test_endpoints_and_epsilon_out_of_range_are_refused():
                 search.path(*ends)
 
 
+@pytest.mark.parametrize("near_cells", [-1, 2_000_000, 0.5, np.nan, "all"])
+def test_a_first_search_of_no_whole_number_of_cells_is_refused(near_cells):
+    free = np.ones((4, 8), dtype=np.bool_)
+    overlay = build_overlay(free, nested(free, [4]))
+    with pytest.raises(InvalidValueError, match="expected a whole number from 0"):
+        OverlaySearch(overlay, near_cells=near_cells)
+
+
+def test_cells_close_together_need_no_border_cell():
+    """A search among cells settles them, also where one is walled in."""
+    free = np.ones((60, 60), dtype=np.bool_)
+    free[50:53, 50:53] = [[False] * 3, [False, True, False], [False] * 3]
+    factor = 1 + np.random.default_rng(0).random(free.shape)
+    search = OverlaySearch(build_overlay(free, nested(free, [5, 15]), factor))
+    judge = WeightedJudge(free, factor)
+    for start, goal in [((3, 3), (9, 12)), ((9, 12), (9, 12)), ((51, 51), (45, 45))]:
+        found = search.path(start, goal)
+        judge.check(found, start, goal)
+        assert found.expanded_border_cells == 0
+        assert 0 <= found.expanded <= 1000
+
+
 def test_grids_with_corner_cutting_are_refused():
     grid = hn.OccupancyGrid(np.zeros((6, 6), np.float32), robot_radius_m=0, corner_cutting=True)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     with pytest.raises(InvalidValueError, match="without corner cutting"):
         prepare_overlay(topology)
+
+
+def test_levels_whose_tables_do_not_fit_are_left_out():
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("office")))
+    enterable = topology.grid.enterable()
+    most, none = OverlayOptions(), OverlayOptions(table_bytes_per_cell=0)
+    assert len(overlay_fields(topology.pyramid, enterable, most)) == 3
+    assert len(overlay_fields(topology.pyramid, enterable, none)) == 2
+    ends = (48, 215), (531, 294)
+    costs = [
+        OverlaySearch(prepare_overlay(topology, options=options)).path(*ends).cost_cells
+        for options in (most, none)
+    ]
+    assert costs[0] == costs[1] < np.inf

@@ -1,6 +1,7 @@
 """Costs that change between queries: every answer is exact, and every bound holds."""
 
 import threading
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ class Changing(RuleBasedStateMachine):
         self.closed = np.zeros(SHAPE, dtype=np.bool_)
         labels = nested(self.free, sizes)
         self.overlay = build_overlay(self.free, labels, self.factor, top_bytes=top_bytes)
-        self.search = OverlaySearch(self.overlay)
+        self.search = OverlaySearch(self.overlay, near_cells=[0, 30, 0, 1000][seed % 4])
 
     def change(self, box, factor, closed):
         """Change the costs in a box."""
@@ -80,6 +81,12 @@ class Changing(RuleBasedStateMachine):
         """Open all cells in a box again."""
         self.change(box, self.factor, self.in_box(box, np.zeros_like, self.closed))
 
+    @rule(box=boxes, share=st.sampled_from([0.0, 0.5, 1.0]))
+    def rebuild(self, box, share):
+        """Free cells in a box that were walls, and make walls of free ones."""
+        self.free = self.in_box(box, lambda old: self.rng.random(old.shape) < share, self.free)
+        self.overlay.update(self.factor, enterable=self.free, closed=self.closed, changed=box)
+
     @rule()
     def renew(self):
         """Bring all tables up to date."""
@@ -90,6 +97,8 @@ class Changing(RuleBasedStateMachine):
     def ask(self, epsilon):
         """Ask for paths, and judge them."""
         cells = np.argwhere(self.free)
+        if len(cells) == 0:
+            return
         judge = WeightedJudge(self.free & ~self.closed, self.factor)
         for start, goal in cells[self.rng.integers(len(cells), size=(4, 2))].tolist():
             found = self.search.path(start, goal, epsilon=epsilon)
@@ -115,7 +124,7 @@ def test_ten_thousand_changes():
         machine.build(at, SIZES[at % len(SIZES)], [0.0, 0.2, 0.4][at % 3], top_bytes)
         for _ in range(200):
             rows, cols = (np.sort(rng.integers(0, side + 1, 2)).tolist() for side in SHAPE)
-            box, kind = (*rows, *cols), rng.integers(8)
+            box, kind = (*rows, *cols), rng.integers(9)
             if kind == 0:
                 machine.raise_costs(box, 1 + 2 * rng.random())
             elif kind == 1:
@@ -130,6 +139,8 @@ def test_ten_thousand_changes():
                 machine.free_again(box)
             elif kind == 5:
                 machine.renew()
+            elif kind == 6:
+                machine.rebuild(box, rng.choice([0.3, 0.8, 1.0]))
             else:
                 machine.ask([0.0, 0.0, 0.1][rng.integers(3)])
 
@@ -140,7 +151,7 @@ def test_threads_ask_while_another_one_changes_costs():
     low, high = np.ones((30, 30)), np.ones((30, 30))
     high[10:20, 3:27] = 7.0
     overlay = build_overlay(free, nested(free, [5, 15]), low)
-    search, wrong = OverlaySearch(overlay), []
+    search, wrong = OverlaySearch(overlay, near_cells=0), []
     costs = {WeightedJudge(free, factor).least((0, 12))[1][29, 15] for factor in (low, high)}
 
     def ask():
@@ -167,7 +178,7 @@ def test_tables_guide_searches_only_while_they_are_lower_bounds(before, after):
     factor = np.full((18, 36), 2.0)
     factor[:, 12:15] = before
     overlay = build_overlay(free, nested(free, [3, 9, 18]), factor, top_bytes=1e9)
-    search = OverlaySearch(overlay)
+    search = OverlaySearch(overlay, near_cells=0)
     factor[4:8, 12:15] = after
     overlay.update(factor, changed=(4, 8, 12, 15))
     levels = overlay.levels
@@ -189,11 +200,45 @@ def test_boxes_outside_the_map_are_refused(box):
         overlay.update(np.ones((6, 6)), changed=box)
 
 
-def test_closed_cells_of_another_shape_are_refused():
+@pytest.mark.parametrize("name", ["closed", "enterable"])
+def test_cells_of_another_shape_are_refused(name):
     free = np.ones((6, 6), dtype=np.bool_)
     overlay = build_overlay(free, nested(free, [3]))
+    cells: dict[str, Any] = {name: np.zeros((5, 6), dtype=np.bool_)}
     with pytest.raises(InvalidValueError, match="give one bool for each"):
-        overlay.update(np.ones((6, 6)), closed=np.zeros((5, 6), dtype=np.bool_))
+        overlay.update(np.ones((6, 6)), **cells)
+
+
+@pytest.mark.parametrize("sizes", [(4,), (4, 8), (4, 12, 24), (60,)])
+def test_a_wall_that_falls_opens_a_way_and_rooms_behind_it(sizes):
+    """A corridor in the middle; a door above it leads to a room as large as all fields were."""
+    free = np.zeros((40, 60), dtype=np.bool_)
+    free[20:23] = True
+    factor = 1 + np.random.default_rng(0).random((40, 60))
+    overlay = build_overlay(free, nested(free, sizes), factor, top_bytes=1e9)
+    search = OverlaySearch(overlay, near_cells=0)
+    assert search.path((5, 50), (21, 3)).cells is None
+    known = free.copy()
+    free[3:18, 5:55] = True
+    free[18:20, 9:11] = True
+    overlay.update(factor, enterable=free, changed=(3, 20, 5, 55))
+    for _ in range(2):
+        judge = WeightedJudge(free, factor)
+        for start, goal in [((5, 50), (21, 3)), ((21, 58), (17, 5)), ((3, 5), (4, 54))]:
+            judge.check(search.path(start, goal), start, goal)
+        overlay.renew()
+        assert overlay.is_current
+    overlay.update(factor, enterable=known, changed=(18, 20, 9, 11))
+    assert search.path((5, 50), (21, 3)).cells is None
+    overlay.update(factor, changed=(18, 20, 9, 11))
+    assert search.path((5, 50), (21, 3)).cells is None
+
+
+def test_an_overlay_without_a_field_cannot_grow():
+    walls = np.zeros((6, 6), dtype=np.bool_)
+    overlay = build_overlay(walls, nested(walls, [3]))
+    with pytest.raises(InvalidValueError, match="built without a free cell: build another one"):
+        overlay.update(np.ones((6, 6)), enterable=~walls)
 
 
 def test_a_change_of_nothing_leaves_the_tables_as_they_are():

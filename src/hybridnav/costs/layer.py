@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -27,8 +28,10 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import AnyArray, BoolArray, LongArray
     from hybridnav.grid import Frame, OccupancyGrid
+    from hybridnav.grid.areas import Box
 
-    Box = tuple[int, int, int, int]
+_MOST_SOURCES = 8
+"""Sources that a layer names after changes."""
 
 
 @copies_alike
@@ -52,7 +55,8 @@ class CostLayer:
     closed
         bool (rows, cols), cells that may not be entered, as in a keepout zone; None for none.
     source
-        Origin of the factors, which results record: plain values for JSON.
+        Origin of the factors, which results record: plain values for JSON. After changes it lists
+        the first one and the last seven, and counts the others as `left_out`.
 
     Raises
     ------
@@ -210,7 +214,9 @@ class CostLayer:
         A value costs round(2.54 value), as Nav2's `KeepoutFilter` converts it. Cells that cost 253
         or more are closed; the others have the factor 1 + multiplier * cost / 252. Unknown values
         (-1) and cells outside the mask cost nothing. The robot's centre keeps out of closed cells;
-        its radius is not added.
+        its radius is not added. The value at the centre of a map cell counts, as in Nav2; a cell is
+        also closed, other than in Nav2, if the centre of a closed cell of a finer mask lies in it,
+        so that no thin zone is lost.
 
         Parameters
         ----------
@@ -236,9 +242,12 @@ class CostLayer:
         value = checked_multiplier(checked_setting("multiplier", multiplier))
         costs = masks.keepout_costs()
         factor_of = rounded(1 + np.where(costs > HIGHEST, 0, value / HIGHEST * costs))
-        on_map = masks.on_map(grid, masks.checked_values(values), frame)
+        given = masks.checked_values(values)
+        on_map = masks.on_map(grid, given, frame)
+        closed = (costs > HIGHEST)[on_map]
+        closed |= masks.holding_centres(grid, (costs > HIGHEST)[given], frame)
         source = {"kind": "keepout mask", "multiplier": value}
-        return cls(factor_of[on_map], costs[on_map] > HIGHEST, source)
+        return cls(factor_of[on_map], closed, source)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -250,6 +259,12 @@ class CostLayer:
     def units(self) -> NDArray[np.int32]:
         """int32 (rows, cols), the factors in units of 2^-14."""
         return frozen((self.factors * np.float32(1 << UNIT_BITS)).astype(np.int32))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the factors and of the closed cells, for layers whose sources are alike."""
+        closed = b"" if self.closed is None else np.packbits(self.closed).tobytes()
+        return hashlib.sha256(repr(self.shape).encode() + self.units.tobytes() + closed).hexdigest()
 
     @cached_property
     def closed_flat(self) -> LongArray:
@@ -332,15 +347,12 @@ class CostLayer:
         if self.closed is not None or part.closed is not None:
             closed = np.zeros(self.shape, np.bool_) if self.closed is None else self.closed.copy()
             closed[inside] = False if part.closed is None else part.closed
-        sources = self.source["of"] if self.source["kind"] == "changed" else [self.source]
-        if part.source not in sources:
-            sources = [*sources, part.source]
         # Made without the checks of all cells: both layers have passed them.
         layer = object.__new__(CostLayer)
         object.__setattr__(layer, "factors", frozen(factors))
         kept = None if closed is None or not closed.any() else frozen(closed)
         object.__setattr__(layer, "closed", kept)
-        object.__setattr__(layer, "source", {"kind": "changed", "of": sources})
+        object.__setattr__(layer, "source", _changed_source(self.source, part.source))
         return layer
 
     def __or__(self, other: CostLayer) -> CostLayer:
@@ -369,3 +381,16 @@ class CostLayer:
         ]
         union = np.logical_or.reduce(closed) if closed else None
         return CostLayer(rounded(factors), union, {"kind": how, "of": parts})
+
+
+def _changed_source(before: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
+    """Return the source of a layer with a changed part; it does not grow with every change."""
+    is_changed = before["kind"] == "changed"
+    sources = before["of"] if is_changed else [before]
+    left_out = before.get("left_out", 0) if is_changed else 0
+    if part not in sources:
+        sources = [*sources, part]
+    if len(sources) > _MOST_SOURCES:
+        sources, left_out = [sources[0], *sources[2:]], left_out + 1
+    source = {"kind": "changed", "of": sources}
+    return source | {"left_out": left_out} if left_out else source

@@ -14,7 +14,7 @@ from hybridnav.grid.limits import MAX_CELLS
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.grid import Frame, OccupancyGrid
 
 Unit = Literal["percent", "m/s"]
@@ -124,13 +124,9 @@ def on_map(grid: OccupancyGrid, values: NDArray[np.int8], frame: Frame | None) -
 
     It is -1 outside the mask.
     """
-    if frame is None or frame == grid.frame:
-        if values.shape != grid.shape:
-            raise InvalidValueError(
-                f"a mask of shape {values.shape} is not that of a map of shape {grid.shape}: give "
-                "the frame of the mask"
-            )
+    if _is_cell_by_cell(grid, values, frame):
         return values
+    frame = grid.frame if frame is None else frame
     rows, cols = grid.shape
     found = np.full(grid.shape, _UNKNOWN, dtype=np.int8)
     for first in range(0, rows, _ROWS):
@@ -139,3 +135,37 @@ def on_map(grid: OccupancyGrid, values: NDArray[np.int8], frame: Frame | None) -
         is_inside = ((cells >= 0) & (cells < values.shape)).all(axis=-1)
         found[first : first + _ROWS][is_inside] = values[tuple(cells[is_inside].T)]
     return found
+
+
+def holding_centres(grid: OccupancyGrid, marked: BoolArray, frame: Frame | None) -> BoolArray:
+    """Return the cells of a map in which the centre of a marked cell of a mask lies.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    marked
+        bool (rows, cols), cells of the mask.
+    frame
+        Their place; None for that of the map.
+    """
+    if _is_cell_by_cell(grid, marked, frame):
+        return marked
+    frame = grid.frame if frame is None else frame
+    found = np.zeros(grid.shape, dtype=np.bool_)
+    for first in range(0, marked.shape[0], _ROWS):
+        own = np.argwhere(marked[first : first + _ROWS]) + np.array([first, 0])
+        cells = grid.frame.cells_of(frame.points_of(own))
+        is_inside = ((cells >= 0) & (cells < grid.shape)).all(axis=-1)
+        found[tuple(cells[is_inside].T)] = True
+    return found
+
+
+def _is_cell_by_cell(grid: OccupancyGrid, mask: AnyArray, frame: Frame | None) -> bool:
+    """Return whether each cell of a mask is one of the map."""
+    if frame is None and mask.shape != grid.shape:
+        raise InvalidValueError(
+            f"a mask of shape {mask.shape} is not that of a map of shape {grid.shape}: give the "
+            "frame of the mask"
+        )
+    return mask.shape == grid.shape and (frame is None or frame == grid.frame)

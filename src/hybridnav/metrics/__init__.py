@@ -6,6 +6,7 @@ exact comparison of two products, which tests hold against fractions.
 """
 
 from hybridnav.metrics.anyangle import MAX_CORNERS, AnyAnglePath, VisibilityGraph
+from hybridnav.metrics.arcs import Chords, chords_of
 from hybridnav.metrics.cheapest import CheapestCost
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
 from hybridnav.metrics.judge_line import judge_line, line_cells
@@ -26,12 +27,14 @@ __all__ = [
     "AnyAnglePath",
     "Buckets",
     "CheapestCost",
+    "Chords",
     "PairedDifference",
     "RoomAgreement",
     "ScipyOptimum",
     "Summary",
     "Verdict",
     "VisibilityGraph",
+    "chords_of",
     "compare_rooms",
     "distance_buckets",
     "judge_line",

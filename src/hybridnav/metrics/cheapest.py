@@ -8,6 +8,7 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.grid.checks import checked_cell, checked_type
 from hybridnav.metrics._cheapest_kernels import cheapest_cost
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class CheapestCost:
     Raises
     ------
     InvalidValueError
-        When the layer is one of another map.
+        When the grid or the layer is none, or the layer is one of another map.
 
     Examples
     --------
@@ -45,10 +46,15 @@ class CheapestCost:
     """
 
     def __init__(self, grid: OccupancyGrid, layer: CostLayer | None = None) -> None:
+        # What imports the other judges needs neither settings nor costs.
+        from hybridnav.costs import CostLayer  # noqa: PLC0415
+        from hybridnav.grid import OccupancyGrid  # noqa: PLC0415
+
+        checked_type("grid", grid, OccupancyGrid)
         free = np.array(grid.classes == CellClass.FREE)
         factors = np.ones(grid.shape)
         if layer is not None:
-            layer.check_fits(grid)
+            checked_type("layer", layer, CostLayer).check_fits(grid)
             factors = layer.factors.astype(np.float64)
             if layer.closed is not None:
                 free &= ~layer.closed
@@ -70,17 +76,19 @@ class CheapestCost:
         Raises
         ------
         InvalidValueError
-            When a cell lies outside the map.
+            When start or goal is no cell of the map.
 
         Notes
         -----
         E. W. Dijkstra: A note on two problems in connexion with graphs, 1959.
         """
         (rows, cols), flat = self._shape, []
-        for row, col in (start, goal):
+        for name, cell in (("start", start), ("goal", goal)):
+            row, col = checked_cell(name, cell)
             if not (0 <= row < rows and 0 <= col < cols):
                 raise InvalidValueError(
-                    f"cell ({row}, {col}) lies outside the map of {rows} x {cols} cells"
+                    f"{name} is cell ({row}, {col}), expected one of the map of {rows} rows and "
+                    f"{cols} columns: give a cell inside"
                 )
             flat.append((row + 1) * (cols + 2) + col + 1)
         if not self._factors.ravel()[flat].all():

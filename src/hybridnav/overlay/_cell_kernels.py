@@ -1,87 +1,124 @@
-"""Kernels of the cells of a path over nodes of the finest level."""
+"""Kernels of the cells between border cells of the finest fields, step by stored step."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.overlay._cost_kernels import clique_place
-from hybridnav.overlay._field_kernels import append_back, forget, spread
+from hybridnav.overlay._cost_kernels import move_cost, slot_of
+from hybridnav.overlay._lane_kernels import LANES, NO_PATH, STEP_BITS
 from hybridnav.overlay._path_kernels import append
+from hybridnav.search.moves import COL_STEP, ROW_STEP
 
 
 @njit(cache=True, nogil=True)
-def append_field_path(ground, span, endpoints, limit, distance, touched, cells, n):
-    """Append the cells of a shortest path inside a field, without its first one.
+def _steps_to(levels, field, i):
+    """Return where the steps to the i-th node of a field of the finest level begin, and its bit."""
+    blocks = (levels.node_at[field + 1] - levels.node_at[field] + LANES - 1) // LANES
+    size = (levels.steps_at[field + 1] - levels.steps_at[field]) // blocks
+    return levels.steps_at[field] + i // LANES * size, i % LANES
+
+
+@njit(cache=True, nogil=True)
+def _step(levels, slot, lane):
+    """Return the direction of the step from the cell in a slot; see `_steps_to`."""
+    at = lane[0] + STEP_BITS * np.int64(levels.place_of[slot])
+    steps, bit = levels.steps, lane[1]
+    low, middle, high = steps[at] >> bit & 1, steps[at + 1] >> bit & 1, steps[at + 2] >> bit & 1
+    return np.int64(low | middle << 1 | high << 2)
+
+
+@njit(cache=True, nogil=True)
+def reach_nodes(levels, ground, cell, reach):
+    """Compute the distances from a cell to the nodes of its field of the finest level, inside it.
 
     Parameters
     ----------
-    ground
-        See `CellCosts`.
-    span
-        See `spread`.
+    levels, ground
+        See `Levels` and `CellCosts`.
+    cell
+        Flat cell.
+    reach
+        int64 (n,), n >= the number of nodes, changed.
+    """
+    units, cols = ground.units, ground.cols
+    field = np.int64(ground.field_of[slot_of(ground, cell)])
+    first = levels.node_at[field]
+    for i in range(levels.node_at[field + 1] - first):
+        goal, here, total = np.int64(levels.cell_of[first + i]), np.int64(cell), np.int64(0)
+        lane, slot = _steps_to(levels, field, i), slot_of(ground, here)
+        while here != goal:
+            k = _step(levels, slot, lane)
+            other = here + ROW_STEP[k] * cols + COL_STEP[k]
+            # Without a path the steps end at the border, or at a wall.
+            if not ground.moves[slot] >> k & 1:
+                total = np.int64(NO_PATH)
+                break
+            next_slot = slot_of(ground, other)
+            if ground.field_of[next_slot] != field:
+                total = np.int64(NO_PATH)
+                break
+            total += move_cost(units[slot] + units[next_slot], k)
+            here, slot = other, next_slot
+        reach[i] = total
+
+
+@njit(cache=True, nogil=True)
+def append_steps(levels, ground, cell, node, cells, n):
+    """Append the cells of a shortest path inside a field from a cell to a node, without its first.
+
+    Parameters
+    ----------
+    levels, ground
+        See `Levels` and `CellCosts`.
+    cell, node
+        A flat cell, and a node of its field of the finest level that it reaches inside.
+    cells, n
+        int64 (room,) and how many of them are filled.
+
+    Returns
+    -------
+    tuple
+        `cells`, in a new array if there was no room, and the number filled.
+    """
+    field, cell = np.int64(levels.field_of[node]), np.int64(cell)
+    lane = _steps_to(levels, field, node - levels.node_at[field])
+    goal = np.int64(levels.cell_of[node])
+    while cell != goal:
+        k = _step(levels, slot_of(ground, cell), lane)
+        cell += ROW_STEP[k] * ground.cols + COL_STEP[k]
+        cells = append(cells, n, cell)
+        n += 1
+    return cells, n
+
+
+@njit(cache=True, nogil=True)
+def cells_of_path(levels, ground, endpoints, nodes):
+    """Return the flat cells of a path from a cell over nodes of the finest level to another cell.
+
+    Parameters
+    ----------
+    levels, ground
+        See `Levels` and `CellCosts`.
     endpoints
-        Its two flat cells.
-    limit
-        Its cost.
-    distance, touched
-        Work arrays, see `spread`.
-    cells, n
-        int64 (room,) and how many of them are filled.
-
-    Returns
-    -------
-    tuple
-        `cells` and `touched`, in new arrays if there was no room; the number of cells filled and of
-        cells expanded.
-    """
-    touched, count, expanded = spread(
-        ground, span, endpoints[0], endpoints[1], limit, distance, touched
-    )
-    begin = n
-    cells, n = append_back(ground, span, distance, endpoints[1], cells, n)
-    cells[begin:n] = cells[begin:n][::-1].copy()
-    forget(distance, touched, count)
-    return cells, touched, n, expanded
-
-
-@njit(cache=True, nogil=True)
-def append_cells(ground, levels, nodes, distance, touched, cells, n):
-    """Append the cells of a path over nodes of the finest level, without the first one's.
-
-    Parameters
-    ----------
-    ground, levels
-        See `CellCosts` and `Levels`.
+        The two flat cells.
     nodes
-        int64 (m,), m >= 1.
-    distance, touched
-        Work arrays, see `spread`.
-    cells, n
-        int64 (room,) and how many of them are filled.
-
-    Returns
-    -------
-    tuple
-        As `append_field_path`.
+        int64 (m,), m >= 1; some follow each other on the same cell.
     """
-    expanded = 0
+    cells = np.empty(512, np.int64)
+    cells[0] = endpoints[0]
+    cells, n = append_steps(levels, ground, endpoints[0], nodes[0], cells, 1)
     for i in range(1, nodes.size):
         before, node = nodes[i - 1], nodes[i]
-        field = levels.field_of[node]
-        if levels.cell_of[before] == levels.cell_of[node]:
-            continue
-        if levels.field_of[before] != field:
+        if levels.field_of[before] == levels.field_of[node]:
+            cells, n = append_steps(levels, ground, levels.cell_of[before], node, cells, n)
+        else:
             cells = append(cells, n, levels.cell_of[node])
             n += 1
-            continue
-        first = levels.node_at[field]
-        place = levels.clique_at[field] + clique_place(before - first, node - first)
-        limit = levels.clique[place]
-        span = (np.int64(field), np.int64(field) + 1)
-        endpoints = (np.int64(levels.cell_of[before]), np.int64(levels.cell_of[node]))
-        cells, touched, n, more = append_field_path(
-            ground, span, endpoints, limit, distance, touched, cells, n
-        )
-        expanded += more
-    return cells, touched, n, expanded
+    tail = np.empty(64, np.int64)
+    tail[0] = endpoints[1]
+    tail, m = append_steps(levels, ground, endpoints[1], nodes[-1], tail, 1)
+    for i in range(m - 2, -1, -1):
+        cells = append(cells, n, tail[i])
+        n += 1
+    return cells[:n]

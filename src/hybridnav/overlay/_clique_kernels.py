@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.overlay._cost_kernels import clique_place, field_moves
-from hybridnav.overlay._lane_kernels import FAR, LANES, relax_cell
+from hybridnav.overlay._cost_kernels import clique_place, field_moves, slot_of
+from hybridnav.overlay._lane_kernels import FAR, LANES, STEP_BITS, keep_steps, relax_cell
 
 
 @njit(cache=True, nogil=True)
@@ -49,8 +49,8 @@ def _largest_beside(near, cost, distance, is_reached):
 
 
 @njit(cache=True, nogil=True)
-def _clique_of(near, cost, sources, n, clique):
-    """Compute the distances inside a field between some of its cells.
+def _clique_of(near, cost, sources, n, clique, steps):
+    """Compute the distances inside a field between some of its cells, and the steps to them.
 
     Parameters
     ----------
@@ -62,6 +62,8 @@ def _clique_of(near, cost, sources, n, clique):
         Number of cells of the field.
     clique
         int32 (m * (m + 1) / 2,), changed: the distances; see `clique_place`.
+    steps
+        uint16 (blocks of LANES sources * n * STEP_BITS,), changed; see `Levels`.
 
     Returns
     -------
@@ -79,6 +81,9 @@ def _clique_of(near, cost, sources, n, clique):
             distance[sources[first + lane] * LANES + lane] = 0
         _sweep(near, cost, distance, n)
         most = max(most, largest(distance))
+        for i in range(n):
+            at = (first // LANES * n + i) * STEP_BITS
+            keep_steps(distance, near, cost, np.int64(i), steps, np.int64(at))
         for lane in range(lanes):
             for j in range(first + lane + 1):
                 clique[clique_place(first + lane, j)] = distance[sources[j] * LANES + lane]
@@ -96,7 +101,7 @@ def _cells_of(ground, box, field):
     cells, n = np.empty((box[1] - box[0]) * (box[3] - box[2]), np.int64), 0
     for row in range(box[0], box[1]):
         for cell in range(row * ground.cols + box[2], row * ground.cols + box[3]):
-            if ground.field_of[cell] == field:
+            if ground.field_of[slot_of(ground, cell)] == field:
                 cells[n] = cell
                 n += 1
     return cells[:n]
@@ -109,7 +114,7 @@ def fill_cliques(levels, ground, fields):
     Parameters
     ----------
     levels
-        See `Levels`; its cliques are changed.
+        See `Levels`; its cliques and steps are changed.
     ground
         See `CellCosts`.
     fields
@@ -120,7 +125,7 @@ def fill_cliques(levels, ground, fields):
     int
         Not less than half of the largest distance between two cells of one of these fields.
     """
-    place_of = np.empty(ground.moves.size, np.int32)
+    place_of = levels.place_of
     most = np.int32(0)
     for field in fields:
         first, last = levels.node_at[field], levels.node_at[field + 1]
@@ -128,7 +133,8 @@ def fill_cliques(levels, ground, fields):
         near, cost = field_moves(ground, cells, place_of)
         sources = np.empty(last - first, np.int32)
         for i in range(last - first):
-            sources[i] = place_of[levels.cell_of[first + i]]
+            sources[i] = place_of[slot_of(ground, np.int64(levels.cell_of[first + i]))]
         clique = levels.clique[levels.clique_at[field] : levels.clique_at[field + 1]]
-        most = max(most, _clique_of(near, cost, sources, cells.size, clique))
+        steps = levels.steps[levels.steps_at[field] : levels.steps_at[field + 1]]
+        most = max(most, _clique_of(near, cost, sources, cells.size, clique, steps))
     return most

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.overlay._cost_kernels import ROOT, move_cost
+from hybridnav.overlay._cost_kernels import move_cost, slot_of
 from hybridnav.overlay._lane_kernels import FAR
 from hybridnav.search.arrays import grow, pop, push
 from hybridnav.search.moves import COL_STEP, ROW_STEP
@@ -26,25 +26,19 @@ def with_room(heap, size, more):
 
 @guarded
 @njit(cache=True, nogil=True)
-def spread(ground, span, start, goal, limit, distance, touched):
-    """Find the distances from a cell inside its field, by A* to a goal, or without one by Dijkstra.
+def spread(ground, start, goal, distance, touched):
+    """Find the distance between two cells of a field inside it, by Dijkstra's algorithm.
 
-    Moves that turn by 135 degrees or more are not tried: the cell before has a cheaper one. With a
-    goal the limit is its distance, so the order of expansion need not prove it: cells nearer to the
-    goal come first, and a cell whose distance is lowered is expanded again.
+    Moves that turn by 135 degrees or more are not tried: the cell before has a cheaper one.
 
     Parameters
     ----------
     ground
         See `CellCosts`.
-    span
-        The fields of the finest level that paths pass: the first, and the one after the last.
     start, goal
-        Flat cells of these fields; -1 as the goal for all cells.
-    limit
-        Paths that cost more are not followed; with a goal its distance.
+        Flat cells of one field of the finest level.
     distance
-        int32 (rows * cols,), changed: the costs; those not on the way to the goal may be too large.
+        int32 (rows * cols,), changed: the costs.
     touched
         int64 (room,), the cells whose distance was changed; a new array if there was no room.
 
@@ -53,39 +47,32 @@ def spread(ground, span, start, goal, limit, distance, touched):
     tuple
         `touched`, their number, and the number of cells expanded.
     """
-    moves, field_of, units, cols, least_units = ground
-    straight = np.int64(2 * least_units) if goal >= 0 else np.int64(0)
-    bend = (straight * ROOT >> 20) - straight
-    goal_row, goal_col = goal // cols, goal % cols
+    field_of, units, cols = ground.field_of, ground.units, ground.cols
     heap = np.empty((256, 2), np.int64)
-    ahead = _octile(start // cols - goal_row, start % cols - goal_col, straight, bend)
-    push(heap, 0, rank(np.int64(0), ahead), start << 4 | 8)
+    push(heap, 0, np.int64(0), start << 4 | 8)
     distance[start], touched[0] = 0, start
-    size, n, expanded = 1, 1, 0
-    is_found = start == goal
-    while size > 0 and not is_found:
+    size, n, expanded, field = 1, 1, 0, field_of[slot_of(ground, start)]
+    while size > 0:
         key = heap[0, 0]
         entry = pop(heap, size)
-        cell, towards = np.uint64(entry >> 4), entry & 15
+        cell, towards = entry >> 4, entry & 15
         size -= 1
-        so_far = np.int64(distance[cell])
-        row = np.int64(cell) // cols - goal_row
-        col = np.int64(cell) % cols - goal_col
-        if key != rank(so_far, _octile(row, col, straight, bend)):
+        if key != distance[cell]:
             continue
         expanded += 1
+        if cell == goal:
+            break
         heap = with_room(heap, size, 8)
-        own, mask = units[cell], moves[cell]
+        slot = slot_of(ground, cell)
+        own, mask = units[slot], ground.moves[slot]
         for turn in range(-2, 3 if towards < 8 else 6):
             k = towards + turn & 7
             if not mask >> k & 1:
                 continue
-            other = np.uint64(np.int64(cell) + ROW_STEP[k] * cols + COL_STEP[k])
-            cost = so_far + move_cost(own + units[other], k)
-            if cost >= distance[other] or not span[0] <= field_of[other] < span[1]:
-                continue
-            ahead = _octile(row + ROW_STEP[k], col + COL_STEP[k], straight, bend)
-            if cost + ahead > limit:
+            other = cell + ROW_STEP[k] * cols + COL_STEP[k]
+            slot = slot_of(ground, other)
+            cost = key + move_cost(own + units[slot], k)
+            if cost >= distance[other] or field_of[slot] != field:
                 continue
             if distance[other] == FAR:
                 if n == touched.size:
@@ -93,19 +80,9 @@ def spread(ground, span, start, goal, limit, distance, touched):
                 touched[n] = other
                 n += 1
             distance[other] = cost
-            if np.int64(other) == goal and cost == limit:
-                is_found = True
-                break
-            push(heap, size, rank(cost, ahead), np.int64(other) << 4 | k)
+            push(heap, size, cost, other << 4 | k)
             size += 1
     return touched, n, expanded
-
-
-@njit(cache=True, nogil=True)
-def _octile(rows, cols, straight, bend):
-    """Return the cost of a straight path, by that of a straight move and what a diagonal adds."""
-    rows, cols = abs(rows), abs(cols)
-    return straight * max(rows, cols) + bend * min(rows, cols)
 
 
 @njit(cache=True, nogil=True)
@@ -122,41 +99,33 @@ def forget(distance, touched, n):
 
 
 @njit(cache=True, nogil=True)
-def append_back(ground, span, distance, last, cells, n):
-    """Append the path from a cell back to the start of a `spread`, without the start.
+def path_inside(ground, distance, goal):
+    """Return the flat cells of the path to a cell that a search reached.
 
     Parameters
     ----------
     ground
         See `CellCosts`.
-    span, distance
-        int32 (rows * cols,), as `spread` left it.
-    last
-        Flat cell that was reached.
-    cells, n
-        int64 (room,) and how many of them are filled.
-
-    Returns
-    -------
-    tuple
-        `cells`, in a new array if there was no room, and their number; the last cell appended has a
-        move from the start.
+    distance
+        int32 (rows * cols,), as the search left it: FAR where it has not been.
+    goal
+        Flat cell.
     """
-    moves, field_of, units, cols, _ = ground
-    cell = np.int64(last)
+    units, cols = ground.units, ground.cols
+    cells, n, cell = np.empty(64, np.int64), 1, np.int64(goal)
+    cells[0] = goal
     while distance[cell] > 0:
+        slot = slot_of(ground, cell)
+        for k in range(8):
+            if ground.moves[slot] >> k & 1:
+                other = cell + ROW_STEP[k] * cols + COL_STEP[k]
+                if distance[other] < FAR:
+                    cost = move_cost(units[slot] + units[slot_of(ground, other)], k)
+                    if distance[other] + cost == distance[cell]:
+                        cell = other
+                        break
         if n == cells.size:
             cells = grow(cells)
         cells[n] = cell
         n += 1
-        before = cell
-        for k in range(8):
-            if moves[cell] >> k & 1:
-                other = cell + ROW_STEP[k] * cols + COL_STEP[k]
-                if span[0] <= field_of[other] < span[1] and distance[other] < FAR:
-                    cost = move_cost(units[cell] + units[other], k)
-                    if distance[other] + cost == distance[cell]:
-                        before = other
-                        break
-        cell = before
-    return cells, n
+    return cells[:n][::-1].copy()

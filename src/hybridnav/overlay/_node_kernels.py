@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.overlay._cost_kernels import clique_place
+from hybridnav.overlay._cost_kernels import clique_place, least_cost, slot_of
+from hybridnav.overlay._exit_kernels import reach_over_exits
 from hybridnav.overlay._field_kernels import with_room
 from hybridnav.overlay._guide_kernels import ahead_of
 from hybridnav.overlay._lane_kernels import FAR, NO_PATH
+from hybridnav.overlay._path_kernels import START
 from hybridnav.search.arrays import pop, push
-
-START = -(1 << 30)
-"""Mark of the nodes at which a search began."""
 
 
 @njit(cache=True, nogil=True)
@@ -91,22 +90,28 @@ def _leave(levels, field, span, distance, is_new, is_old, nearest):
 def _cross(levels, field, begin, distance, is_new, is_old):
     """Lower the distances of the nodes of a field to those of its new ones plus the clique's."""
     first, n = levels.node_at[field] - begin, levels.node_at[field + 1] - levels.node_at[field]
-    at = levels.clique_at[field]
+    clique = levels.clique[levels.clique_at[field] : levels.clique_at[field + 1]]
     own = distance[first : first + n]
+    before = own.copy()
     for i in range(n):
         if not is_new[first + i]:
             continue
         is_new[first + i], is_old[first + i] = False, True
-        value = own[i]
-        for j in range(n):
-            cost = levels.clique[at + clique_place(i, j)]
-            if cost < FAR and value + cost < own[j]:
-                own[j] = value + cost
-                is_old[first + j] = True
+        value, row = own[i], clique_place(i, 0)
+        for j in range(i):
+            total = value + clique[row + j] if clique[row + j] < FAR else np.int64(NO_PATH)
+            own[j] = min(own[j], total)
+        place = clique_place(i + 1, i)
+        for j in range(i + 1, n):
+            total = value + clique[place] if clique[place] < FAR else np.int64(NO_PATH)
+            own[j] = min(own[j], total)
+            place += j + 1
+    for i in range(n):
+        is_old[first + i] |= own[i] < before[i]
 
 
 @njit(cache=True, nogil=True)
-def climb(levels, field, distance, reach):
+def climb(levels, field, reach):
     """Compute the distances from a cell to the nodes of its field on each level, inside it.
 
     Parameters
@@ -115,11 +120,9 @@ def climb(levels, field, distance, reach):
         See `Levels`.
     field
         The field of the cell on the finest level.
-    distance
-        int32 (rows * cols,), distances inside that field.
     reach
-        int64 (levels, most nodes of a field), changed; where tables are stale, these are the
-        distances before the changes.
+        int64 (levels, most nodes of a field), changed but for its first row, the distances inside
+        that field. Where tables are stale, these are not below the distances before the changes.
 
     Returns
     -------
@@ -128,71 +131,51 @@ def climb(levels, field, distance, reach):
         one; those of its own field with one level.
     """
     first, last = levels.node_at[field], levels.node_at[field + 1]
-    for node in range(first, last):
-        value = np.int64(distance[levels.cell_of[node]])
-        reach[0, node - first] = value if value < FAR else NO_PATH
     row = reach[0, : last - first]
     if len(reach) > 1:
-        child, field = field, levels.parent[field]
+        child, field = field, np.int64(levels.parent[field])
         row = _flood(levels, field, child, row)
-        first, last = levels.node_at[field], levels.node_at[field + 1]
         begin = levels.node_at[levels.inner_at[field]]
+        first, last = levels.node_at[field], levels.node_at[field + 1]
         for i in range(last - first):
             reach[1, i] = row[levels.below[first + i] - begin]
     for level in range(2, len(reach)):
-        inner, count = first, last - first
-        field = levels.parent[field]
-        first, last = levels.node_at[field], levels.node_at[field + 1]
-        begin = levels.node_at[levels.inner_at[field]]
-        width = levels.node_at[levels.inner_at[field + 1]] - begin
-        below = reach[level - 1, :count]
-        for i in range(last - first):
-            at = levels.table_at[field] + i * width + inner - begin
-            stored = levels.table[at : at + count]
-            least = np.int64(NO_PATH)
-            for j in range(count):
-                total = below[j] + stored[j] if stored[j] < FAR else np.int64(NO_PATH)
-                least = min(least, total)
-            reach[level, i] = least
+        reach_over_exits(levels, field, reach[level - 1], reach[level])
+        field = np.int64(levels.parent[field])
     return row
 
 
 @njit(cache=True, nogil=True)
-def join(levels, top, fields, reaches, limit):
-    """Return the least distance over the top, its two nodes, -1 when none is below the limit.
+def least_reach(levels, ground, cell, reach):
+    """Return lower bounds on the distances from a cell to the nodes of its field of the last level,
+    where that is stale and costs were not lowered.
+
+    Distances over a clique of later costs bound none over exits of former ones: a path may leave
+    the field elsewhere. There, distances without obstacles do.
 
     Parameters
     ----------
-    levels, top
-        See `Levels` and `Top`.
-    fields
-        The fields of start and goal on the last level.
-    reaches
-        Two int64 (n,), the distances inside them, from the start and to the goal.
-    limit
-        Only less is looked for.
+    levels, ground
+        See `Levels` and `CellCosts`.
+    cell
+        Flat cell.
+    reach
+        int64 (levels, n), as `climb` computed it.
     """
-    origin = levels.node_at[levels.level_at[len(levels.level_at) - 2]]
-    starts, goals = levels.node_at[fields[0]], levels.node_at[fields[1]]
-    n_starts = levels.node_at[fields[0] + 1] - starts
-    n_goals = levels.node_at[fields[1] + 1] - goals
-    best, ends = np.int64(limit), (np.int64(-1), np.int64(-1))
-    from_start, to_goal = reaches
-    for i in range(n_starts):
-        if from_start[i] >= best:
-            continue
-        row = top.distance[starts + i - origin, goals - origin : goals - origin + n_goals]
-        least = np.int64(NO_PATH)
-        for j in range(n_goals):
-            beyond = row[j] + to_goal[j] if row[j] < FAR else np.int64(NO_PATH)
-            least = min(least, beyond)
-        if from_start[i] + least < best:
-            best = from_start[i] + least
-            for j in range(n_goals):
-                if row[j] < FAR and row[j] + to_goal[j] == least:
-                    ends = (starts + i, goals + j)
-                    break
-    return best, ends[0], ends[1]
+    last, field = len(reach) - 1, np.int64(ground.field_of[slot_of(ground, cell)])
+    for _ in range(min(last, 1)):
+        field = np.int64(levels.parent[field])
+    if not levels.is_newer[field]:
+        return reach[last]
+    first, last_node = levels.node_at[field], levels.node_at[field + 1]
+    row, above = np.empty_like(reach[0]), np.empty_like(reach[0])
+    for node in range(first, last_node):
+        row[node - first] = least_cost(cell, levels.cell_of[node], ground.cols, ground.least_units)
+    for _ in range(2, len(reach)):
+        reach_over_exits(levels, field, row, above)
+        row, above = above, row
+        field = np.int64(levels.parent[field])
+    return row
 
 
 @njit(cache=True, nogil=True)

@@ -5,19 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.overlay._cell_kernels import append_cells
-from hybridnav.overlay._field_kernels import append_back, forget, spread
+from hybridnav.overlay._cell_kernels import cells_of_path, reach_nodes
+from hybridnav.overlay._cost_kernels import slot_of
+from hybridnav.overlay._exit_kernels import descend
+from hybridnav.overlay._field_kernels import forget, path_inside, spread
 from hybridnav.overlay._guide_kernels import aim
+from hybridnav.overlay._inner_kernels import to_finest
 from hybridnav.overlay._lane_kernels import FAR, NO_PATH
-from hybridnav.overlay._node_kernels import climb, join, over_cliques
-from hybridnav.overlay._path_kernels import (
-    append,
-    back_over_cliques,
-    descend,
-    join_ends,
-    over_top,
-    to_finest,
-)
+from hybridnav.overlay._near_kernels import search_near
+from hybridnav.overlay._node_kernels import climb, least_reach, over_cliques
+from hybridnav.overlay._path_kernels import back_over_cliques, join_ends
+from hybridnav.overlay._top_kernels import join
 
 
 @njit(cache=True, nogil=True)
@@ -72,11 +70,11 @@ def _across(levels, top, ground, around, reaches, goal, best, epsilon, work):
     highest = (_highest(levels, around[0]), _highest(levels, around[1]))
     if top.is_current:
         fields = (around[0][last], around[1][last])
-        total, first, end = join(levels, top, fields, (reaches[0][last], reaches[1][last]), best)
+        total, over = join(levels, top, fields, (reaches[0][last], reaches[1][last]), best)
         if total < best:
-            best, level_of = total, last
-            nodes = over_top(levels, top, first, end)
-    target = aim(levels, ground, top, goal, around[1][last], reaches[1][last])
+            best, level_of, nodes = total, last, over
+    to_goal = least_reach(levels, ground, goal, reaches[1]), reaches[1][last]
+    target = aim(levels, ground, top, goal, around[1][last], to_goal)
     for level in range(min(highest[0], highest[1])):
         if around[0][level + 1] != around[1][level + 1]:
             continue
@@ -107,9 +105,24 @@ def _across(levels, top, ground, around, reaches, goal, best, epsilon, work):
     return best, min(bound, best), level_of, nodes, expanded
 
 
+@njit(cache=True, nogil=True)
+def _inside(ground, endpoints, distance):
+    """Return the distance between two cells of a field inside it, NO_PATH for none, the flat cells
+    of the path, and the number of cells expanded; see `find_path`."""
+    touched, n, expanded = spread(
+        ground, endpoints[0], endpoints[1], distance, np.empty(256, np.int64)
+    )
+    least, cells = np.int64(NO_PATH), np.empty(0, np.int64)
+    if distance[endpoints[1]] < FAR:
+        least = np.int64(distance[endpoints[1]])
+        cells = path_inside(ground, distance, endpoints[1])
+    forget(distance, touched, n)
+    return least, cells, expanded
+
+
 @guarded
 @njit(cache=True, nogil=True)
-def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
+def find_path(ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work):
     """Find a path of least cost between two cells.
 
     Parameters
@@ -120,8 +133,10 @@ def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
         Two flat cells of fields.
     epsilon
         The search ends once no path can be cheaper by more than this part.
+    near_cells
+        Cells that the search among cells, which comes first, expands at most.
     cell_work
-        int32 (2, rows * cols), FAR before and after.
+        int32 (rows * cols,), FAR before and after.
     node_work
         See `NodeWork`.
 
@@ -132,45 +147,32 @@ def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
         the numbers of cells and of nodes expanded.
     """
     start, goal = endpoints
+    inside, cells, is_proved, expanded = search_near(ground, start, goal, near_cells, cell_work)
+    if is_proved:
+        return inside, inside, cells, expanded, 0
     n_levels = len(levels.level_at) - 1
-    from_start, to_goal = cell_work[0], cell_work[1]
-    fields = np.int64(ground.field_of[start]), np.int64(ground.field_of[goal])
-    spans = (fields[0], fields[0] + 1), (fields[1], fields[1] + 1)
-    touched, n_touched, expanded = spread(
-        ground, spans[0], start, np.int64(-1), np.int64(FAR), from_start, np.empty(256, np.int64)
-    )
-    others, n_others, more = spread(
-        ground, spans[1], goal, np.int64(-1), np.int64(FAR), to_goal, np.empty(256, np.int64)
-    )
-    expanded += more
     around = (
-        _fields(levels, fields[0], n_levels),
-        _fields(levels, fields[1], n_levels),
+        _fields(levels, ground.field_of[slot_of(ground, start)], n_levels),
+        _fields(levels, ground.field_of[slot_of(ground, goal)], n_levels),
     )
     most = 1
     for level in range(n_levels):
         for every in around:
             most = max(most, levels.node_at[every[level] + 1] - levels.node_at[every[level]])
     reaches = (np.empty((n_levels, most), np.int64), np.empty((n_levels, most), np.int64))
-    rows = (
-        climb(levels, around[0][0], from_start, reaches[0]),
-        climb(levels, around[1][0], to_goal, reaches[1]),
-    )
-    inside = np.int64(NO_PATH)
-    if around[0][0] == around[1][0] and from_start[goal] < FAR:
-        inside = np.int64(from_start[goal])
+    reach_nodes(levels, ground, endpoints[0], reaches[0][0])
+    reach_nodes(levels, ground, endpoints[1], reaches[1][0])
+    rows = climb(levels, around[0][0], reaches[0]), climb(levels, around[1][0], reaches[1])
+    if around[0][0] == around[1][0]:
+        least, passed, count = _inside(ground, endpoints, cell_work)
+        expanded += count
+        if least < inside:
+            inside, cells = least, passed
     cost, bound, level, nodes, n_expanded = _across(
-        levels, top, ground, around, reaches, goal, inside, epsilon, node_work
+        levels, top, ground, around, reaches, endpoints[1], inside, epsilon, node_work
     )
-    cells, n = np.empty(512, np.int64), 0
     if level < 0:
-        forget(to_goal, others, n_others)
-        if inside < NO_PATH:
-            cells, n = append_back(ground, spans[0], from_start, goal, cells, n)
-        cells = append(cells, n, start)
-        cells[: n + 1] = cells[: n + 1][::-1].copy()
-        forget(from_start, touched, n_touched)
-        return cost, bound, cells[: n + 1], expanded, n_expanded
+        return cost, bound, cells, expanded, n_expanded
     while level > 1:
         children = (around[0][level - 1], around[1][level - 1])
         both = (reaches[0][level - 1], reaches[1][level - 1])
@@ -180,19 +182,5 @@ def find_path(ground, levels, top, endpoints, epsilon, cell_work, node_work):
         levels, nodes, (around[0][0], around[1][0]), (reaches[0][0], reaches[1][0]), rows
     )
     nodes = to_finest(levels, ground, nodes)
-    first, last = levels.cell_of[nodes[0]], levels.cell_of[nodes[-1]]
-    cells, n = append_back(ground, spans[0], from_start, first, cells, n)
-    cells = append(cells, n, start)
-    n += 1
-    cells[:n] = cells[:n][::-1].copy()
-    forget(from_start, touched, n_touched)
-    cells, touched, n, more = append_cells(ground, levels, nodes, from_start, touched, cells, n)
-    tail, m = append_back(ground, spans[1], to_goal, last, np.empty(64, np.int64), 0)
-    forget(to_goal, others, n_others)
-    if m > 0:
-        for i in range(1, m):
-            cells = append(cells, n, tail[i])
-            n += 1
-        cells = append(cells, n, goal)
-        n += 1
-    return cost, bound, cells[:n], expanded + more, n_expanded
+    cells = cells_of_path(levels, ground, endpoints, nodes)
+    return cost, bound, cells, expanded, n_expanded

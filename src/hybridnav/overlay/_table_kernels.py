@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.overlay._clique_kernels import largest
 from hybridnav.overlay._cost_kernels import clique_place
-from hybridnav.overlay._lane_kernels import FAR, LANES, relax_row
+from hybridnav.overlay._exit_kernels import pack_table
+from hybridnav.overlay._inner_kernels import mark_paths
+from hybridnav.overlay._lane_kernels import FAR, LANES, match_row, relax_row
 
 
 @njit(cache=True, nogil=True)
@@ -85,7 +87,39 @@ def _across(levels, field, distance, first, last, is_new, is_old):
 
 
 @njit(cache=True, nogil=True)
-def distances_among(levels, fields, sources, table):
+def _note_exits(levels, fields, distance, is_exit):
+    """Note the nodes that no other node of their field is on the way for, a bit for each lane.
+
+    Parameters
+    ----------
+    levels
+        See `Levels`.
+    fields
+        The first field and the one after the last.
+    distance
+        int32 (n * LANES,), the distances to the nodes of these fields.
+    is_exit
+        uint16 (n,), changed.
+    """
+    begin = levels.node_at[fields[0]]
+    for field in range(fields[0], fields[1]):
+        first, count = levels.node_at[field] - begin, levels.node_at[field + 1] - begin
+        count -= first
+        at = levels.clique_at[field]
+        for i in range(count):
+            others, row = np.int32(0), np.int64(first + i)
+            for j in range(count):
+                if j != i:
+                    cost = levels.clique[at + clique_place(i, j)]
+                    others |= match_row(distance, row, np.int64(first + j), cost)
+            is_reached = np.int32(0)
+            for lane in range(LANES):
+                is_reached |= np.int32(distance[row * LANES + lane] < FAR) << lane
+            is_exit[first + i] = is_reached & ~others
+
+
+@njit(cache=True, nogil=True)
+def distances_among(levels, fields, sources, table, is_exit):
     """Compute distances over the nodes of some fields of one level, their cliques and moves.
 
     Parameters
@@ -98,6 +132,9 @@ def distances_among(levels, fields, sources, table):
         int32 (m,), nodes of these fields.
     table
         int32 (m, n), changed: the distance from each source to each node of the fields.
+    is_exit
+        uint16 (blocks of LANES sources, n), changed: a bit for each source, whether a node is an
+        exit towards it; nothing where exits are not asked for.
 
     Returns
     -------
@@ -127,42 +164,45 @@ def distances_among(levels, fields, sources, table):
                     _across(levels, field, distance, first, last, is_new, is_old)
             turn += 1
         most = max(most, largest(distance))
+        if len(is_exit) > 0:
+            _note_exits(levels, fields, distance, is_exit[begin // LANES])
         for i in range(n):
             for lane in range(lanes):
                 table[begin + lane, i] = distance[i * LANES + lane]
     return most
 
 
+@guarded
 @njit(cache=True, nogil=True)
-def fill_tables(levels, fields):
-    """Compute tables, where they are kept, and cliques of some fields of an upper level.
+def fill_clique(levels, field):
+    """Compute the clique of a field of an upper level, and its marks on the second one.
 
     Parameters
     ----------
     levels
-        Its tables and cliques are changed.
-    fields
-        int32 (k,), the fields.
+        Its marks and cliques are changed.
+    field
+        The field.
 
     Returns
     -------
-    int
-        The largest distance that was reached.
+    tuple
+        The largest distance that was reached, and what is stored of the exits inside the field,
+        nothing on the second level; see `pack_table`.
     """
-    most = np.int32(0)
-    for field in fields:
-        first, last = levels.node_at[field], levels.node_at[field + 1]
-        inside = (levels.inner_at[field], levels.inner_at[field + 1])
-        begin, end = levels.node_at[inside[0]], levels.node_at[inside[1]]
-        at = levels.table_at[field]
-        n, width = last - first, end - begin
-        if levels.table_at[field + 1] > at:
-            table = levels.table[at : at + n * width].reshape(n, width)
-        else:
-            table = np.empty((n, width), np.int32)
-        most = max(most, distances_among(levels, inside, levels.below[first:last], table))
-        at = levels.clique_at[field]
-        for i in range(n):
-            for j in range(i + 1):
-                levels.clique[at + clique_place(i, j)] = table[i, levels.below[first + j] - begin]
-    return most
+    first, last = levels.node_at[field], levels.node_at[field + 1]
+    inside = (levels.inner_at[field], levels.inner_at[field + 1])
+    begin, end = levels.node_at[inside[0]], levels.node_at[inside[1]]
+    n, width = last - first, end - begin
+    has_exits = inside[0] >= levels.level_at[1]
+    distance = np.empty((n, width), np.int32)
+    is_exit = np.empty(((n + LANES - 1) // LANES if has_exits else 0, width), np.uint16)
+    most = distances_among(levels, inside, levels.below[first:last], distance, is_exit)
+    at = levels.clique_at[field]
+    for i in range(n):
+        for j in range(i + 1):
+            levels.clique[at + clique_place(i, j)] = distance[i, levels.below[first + j] - begin]
+    if has_exits:
+        return most, pack_table(levels, field, distance, is_exit)
+    mark_paths(levels, field, distance)
+    return most, np.empty(0, np.int32)

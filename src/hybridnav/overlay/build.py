@@ -14,11 +14,14 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
-from hybridnav.costs.checks import MOST_FACTOR, UNIT_BITS
+from hybridnav.costs.checks import UNIT_BITS
 from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import _cost_kernels as kernels
-from hybridnav.overlay.changes import change_in, fields_around
-from hybridnav.overlay.layout import lay_out
+from hybridnav.overlay._gate_kernels import gates_of
+from hybridnav.overlay.changes import box_within, change_in, fields_around
+from hybridnav.overlay.factors import ONE, are_whole, numbers_of, units_of
+from hybridnav.overlay.growth import grow
+from hybridnav.overlay.layout import lay_out, slots_of
 from hybridnav.overlay.tables import (
     PathsTooLongError,
     compute_top,
@@ -36,14 +39,11 @@ if TYPE_CHECKING:
     from hybridnav._progress import Progress
     from hybridnav._typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.overlay.changes import Change, Window
+    from hybridnav.overlay.growth import Grown
     from hybridnav.overlay.layout import CellCosts, Levels, Top
 
-_ONE = 1 << UNIT_BITS
-"""Units of a factor of 1; a straight move over such cells costs twice as many."""
-TOP_BYTES_PER_CELL = 50.0
-"""Most bytes for each cell of the distances between the nodes of the last level, unless asked
-otherwise."""
-_SIDES = 4
+TOP_BYTES_PER_CELL = 10.0
+"""Most bytes for each cell of the distances over the last level, unless asked otherwise."""
 
 
 @copies_alike
@@ -53,7 +53,8 @@ class Overlay:
     `update` changes costs in a box of cells: the fields of the two finest levels that it touches
     get their new costs at once. The tables of the fields around them become stale: until `renew`,
     searches go through the levels below there, guided by the former tables as long as these are
-    lower bounds. Updates wait until the searches of other threads have ended.
+    lower bounds. Cells in no field that may be entered from then on join the nearest field, or
+    become fields. Updates wait until the searches of other threads have ended.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ class Overlay:
     factor
         Float (rows, cols), the factors as given, None where `ground` has them exactly.
     top_bytes
-        Most bytes of the distances between the nodes of the last level.
+        Most bytes of the distances over the last level.
     """
 
     def __init__(
@@ -71,9 +72,11 @@ class Overlay:
         self.ground = ground
         self.levels = levels
         self._factor = factor
+        self._enterable: BoolArray | None = None
+        """The cells that may be entered, None for those in fields."""
         self.version = 0
         """How often costs have changed."""
-        self.shape = (ground.moves.size // ground.cols, ground.cols)
+        self.shape = (ground.rows, ground.cols)
         self._top_bytes = top_bytes
         self.top: Top = compute_top(levels, -1.0)
         self._turns = Turns()
@@ -88,9 +91,9 @@ class Overlay:
     @property
     def memory_bytes(self) -> int:
         """Bytes of all arrays."""
-        arrays: list[AnyArray] = [*self.ground[:3], *self.levels, self.top.distance]
-        given = 0 if self._factor is None else self._factor.nbytes
-        return sum(array.nbytes for array in arrays) + given
+        arrays: list[AnyArray] = [*self.ground[:4], *self.levels, *self.top[:3]]
+        arrays += [array for array in (self._factor, self._enterable) if array is not None]
+        return sum(array.nbytes for array in arrays)
 
     @property
     def is_current(self) -> bool:
@@ -110,8 +113,10 @@ class Overlay:
 
     def is_open(self, cell: tuple[int, int]) -> bool:
         """Return whether a path may enter a cell now."""
-        flat = cell[0] * self.shape[1] + cell[1]
-        return bool(self.ground.field_of[flat] >= 0 and self.ground.units[flat] > 0)
+        # A call of `slots_of` would take as long as the search of cells close together.
+        flat = int(cell[0]) * self.shape[1] + int(cell[1])
+        slot = self.ground.block_at[flat >> kernels.BLOCK_BITS] + flat % (1 << kernels.BLOCK_BITS)
+        return bool(self.ground.field_of[slot] >= 0 and self.ground.units[slot] > 0)
 
     def cost_of(self, cells: LongArray) -> float:
         """Return the cost of a path in cells, by the factors as given.
@@ -122,8 +127,7 @@ class Overlay:
             int64 (n, 2), (row, col) of the cells passed.
         """
         if self._factor is None:
-            units = self.ground.units.reshape(self.shape)
-            straight, diagonal = kernels.sums_along(units, cells)
+            straight, diagonal = kernels.sums_along(self.ground, cells)
             return float(straight + diagonal * math.sqrt(2.0)) * self.cost_unit
         is_straight = (np.diff(cells, axis=0) == 0).any(axis=1)
         length = np.where(is_straight, 1.0, math.sqrt(2.0))
@@ -134,6 +138,7 @@ class Overlay:
         self,
         factor: FloatArray,
         *,
+        enterable: BoolArray | None = None,
         closed: BoolArray | None = None,
         changed: tuple[int, int, int, int] | None = None,
     ) -> None:
@@ -143,9 +148,10 @@ class Overlay:
         ----------
         factor
             Any float (rows, cols), the factor of each cell, from 1 to 1000 where it may be entered.
+        enterable
+            bool (rows, cols), cells that may be entered from now on; None for the same as before.
         closed
-            bool (rows, cols), cells that may not be entered for now, of those for which the overlay
-            was built; None for none.
+            bool (rows, cols), cells among them that may not be entered for now; None for none.
         changed
             First row, last row + 1, first column, last column + 1 of the box outside of which
             nothing is read; None for the whole map.
@@ -153,32 +159,65 @@ class Overlay:
         Raises
         ------
         InvalidValueError
-            When factors, closed cells or the box are not as described.
+            When factors, cells or the box are not as described, or the overlay has no field that
+            cells could join.
         PathsTooLongError
             When a path inside one of the finest fields costs more than 16,000 cells; nothing has
             changed then.
         """
-        factor = _numbers(factor)
-        rows, cols = self._box(changed)
-        field_of = self.ground.field_of.reshape(self.shape)[rows, cols]
-        shut = field_of < 0
+        factor = numbers_of(factor)
+        window = box_within(changed, self.shape)
+        own = None
+        if enterable is None:
+            shut = ~self._entered(window)
+        else:
+            own = self._checked("enterable", enterable)[window]
+            shut = ~own
         if closed is not None:
-            closed = np.asarray(closed)
-            if closed.shape != self.shape or closed.dtype != np.bool_:
-                raise InvalidValueError(
-                    f"closed has shape {closed.shape} and type {closed.dtype}: give one bool for "
-                    f"each of {self.shape} cells"
-                )
-            shut = shut | closed[rows, cols]
-        units = units_of(factor, self.shape, ~shut, (rows, cols))
-        given = np.where(shut, 1.0, factor[rows, cols]).astype(np.float64)
-        self._turns.alone(partial(self._take, (rows, cols), units, given))
+            shut = shut | self._checked("closed", closed)[window]
+        units = units_of(factor, self.shape, ~shut, window)
+        given = np.where(shut, 1.0, factor[window]).astype(np.float64)
+        if (units > 0).any() and self.levels.level_at[-1] == 0:
+            raise InvalidValueError("the overlay was built without a free cell: build another one")
+        self._turns.alone(partial(self._take, window, units, given, own))
 
-    def _take(self, box: Window, units: IntArray, given: FloatArray) -> None:
-        """Take new costs of a box of cells, in units and as given."""
+    def _entered(self, window: Window) -> BoolArray:
+        """Return the cells in a window that may be entered, closed ones too."""
+        if self._enterable is not None:
+            return self._enterable[window]
+        return self._in_fields(window)
+
+    @property
+    def _whole(self) -> Window:
+        return slice(0, self.shape[0]), slice(0, self.shape[1])
+
+    def _in_fields(self, window: Window) -> BoolArray:
+        """Return the cells of a window that are in fields."""
+        inside: BoolArray = self.ground.field_of[slots_of(self.ground, window)] >= 0
+        return inside
+
+    def _checked(self, name: str, cells: BoolArray) -> BoolArray:
+        cells = np.asarray(cells)
+        if cells.shape != self.shape or cells.dtype != np.bool_:
+            raise InvalidValueError(
+                f"{name} has shape {cells.shape} and type {cells.dtype}: give one bool for each "
+                f"of {self.shape} cells"
+            )
+        return cells
+
+    def _take(
+        self, box: Window, units: IntArray, given: FloatArray, enterable: BoolArray | None
+    ) -> None:
+        """Take new costs of a box of cells, in units and as given, and the cells to enter."""
         self._complete()
+        anew = partial(self._take_anew, box, units, given, enterable)
+        added = ~self._in_fields(box) & (units > 0)
+        if added.any():
+            grown = grow(self.ground, self.levels, self.top, added, box)
+            self._begun = partial(self._install_anew, grown, anew)
+            self._install(grown)
         change = change_in(self.ground, self.shape, box, units)
-        self._begun = partial(self._take_anew, box, units, given)
+        self._begun = anew
         try:
             if len(change.touched):
                 self._apply(change)
@@ -186,12 +225,31 @@ class Overlay:
         except PathsTooLongError:
             self._begun = None
             raise
-        self._set_given(box, given)
+        self._set_given(box, given, enterable)
         self._begun = None
 
-    def _set_given(self, box: Window, given: FloatArray) -> None:
-        if self._factor is None and not _are_whole(given):
-            self._factor = np.maximum(self.ground.units.reshape(self.shape), 1) / _ONE
+    def _install(self, grown: Grown) -> None:
+        """Take an overlay with more cells, and compute what is new of it."""
+        if self._enterable is None:
+            self._enterable = self._in_fields(self._whole)
+        self.ground, self.levels, self.top = grown.ground, grown.levels, grown.top
+        fill_cliques(grown.ground, grown.levels, grown.affected[0])
+        for fields in grown.affected[1:2]:
+            fill_some(grown.levels, fields)
+
+    def _install_anew(self, grown: Grown, anew: Callable[[], None]) -> None:
+        """Complete an update with more cells."""
+        self._install(grown)
+        anew()
+
+    def _set_given(self, box: Window, given: FloatArray, enterable: BoolArray | None) -> None:
+        if enterable is not None and (enterable != self._entered(box)).any():
+            if self._enterable is None:
+                self._enterable = self._in_fields(self._whole)
+            self._enterable[box] = enterable
+        if self._factor is None and not are_whole(given):
+            units = self.ground.units[slots_of(self.ground, self._whole)]
+            self._factor = np.maximum(units, 1) / ONE
         if self._factor is not None:
             self._factor[box] = given
 
@@ -206,24 +264,26 @@ class Overlay:
                 raise
             self._begun = None
 
-    def _take_anew(self, box: Window, units: IntArray, given: FloatArray) -> None:
+    def _take_anew(
+        self, box: Window, units: IntArray, given: FloatArray, enterable: BoolArray | None
+    ) -> None:
         """Take new costs of a box of cells, and compute all costs of fields anew."""
         ground, levels = self.ground, self.levels
-        ground.units.reshape(self.shape)[box] = units
+        ground.units[slots_of(ground, box)] = units
         is_open = (ground.field_of >= 0) & (ground.units > 0)
-        moves = legal_moves(np.ascontiguousarray(is_open.reshape(self.shape)), False)
-        ground.moves[:] = moves.ravel()
-        self.ground = ground._replace(least_units=int(ground.units[is_open].min(initial=_ONE)))
+        whole = slots_of(ground, self._whole)
+        ground.moves[whole] = legal_moves(np.ascontiguousarray(is_open[whole]), False)
+        self.ground = ground._replace(least_units=int(ground.units[is_open].min(initial=ONE)))
         n_fields = int(levels.level_at[-1])
         finest = int(levels.level_at[1])
         fill_cliques(self.ground, levels, np.arange(finest, dtype=np.int32))
-        whole = (0, self.shape[0], 0, self.shape[1])
-        kernels.renew_moves(levels, self.ground, np.arange(n_fields, dtype=np.int32), whole)
+        window = (0, self.shape[0], 0, self.shape[1])
+        kernels.renew_moves(levels, self.ground, np.arange(n_fields, dtype=np.int32), window)
         levels.is_stale[finest:] = True
-        fill_tables(levels)
-        self.top = compute_top(levels, self._top_bytes)
+        self.levels = fill_tables(levels)
+        self.top = compute_top(self.levels, self._top_bytes)
         self.version += 1
-        self._set_given(box, given)
+        self._set_given(box, given, enterable)
 
     def renew(self, progress: Progress = no_progress) -> None:
         """Compute all stale tables again, so that queries are as fast as before any update."""
@@ -234,34 +294,19 @@ class Overlay:
     def _renew(self, progress: Progress) -> None:
         self._complete()
         if not self.is_current:
-            fill_tables(self.levels, progress)
+            self.levels = fill_tables(self.levels, progress)
             self.top = compute_top(self.levels, self._top_bytes)
-
-    def _box(self, changed: tuple[int, int, int, int] | None) -> tuple[slice, slice]:
-        if changed is None:
-            return slice(0, self.shape[0]), slice(0, self.shape[1])
-        sides = tuple(changed) if isinstance(changed, tuple | list) else ()
-        fits = len(sides) == _SIDES and all(isinstance(side, int | np.integer) for side in sides)
-        if not fits or not (
-            0 <= sides[0] <= sides[1] <= self.shape[0]
-            and 0 <= sides[2] <= sides[3] <= self.shape[1]
-        ):
-            raise InvalidValueError(
-                f"changed is {changed!r:.80}: give first row, last row + 1, first column, last "
-                f"column + 1 inside {self.shape} cells"
-            )
-        return slice(int(sides[0]), int(sides[1])), slice(int(sides[2]), int(sides[3]))
 
     def _apply(self, change: Change) -> None:
         """Bring costs up to date, those that a change touches, and mark the tables around them."""
         ground, levels = self.ground, self.levels
-        units, moves = ground.units.reshape(self.shape), ground.moves.reshape(self.shape)
-        before = units[change.window].copy(), moves[change.window].copy()
-        units[change.window], moves[change.window] = change.units, change.moves
+        slots = slots_of(ground, change.window)
+        before = ground.units[slots], ground.moves[slots]
+        ground.units[slots], ground.moves[slots] = change.units, change.moves
         try:
             fill_cliques(ground, levels, change.touched)
         except PathsTooLongError:
-            units[change.window], moves[change.window] = before
+            ground.units[slots], ground.moves[slots] = before
             fill_cliques(ground, levels, change.touched)
             raise
         is_open = change.units > 0
@@ -278,13 +323,12 @@ class Overlay:
         for fields in lowered[1:]:
             levels.is_lowered[fields] = levels.is_stale[fields] | levels.is_lowered[fields]
         for fields in touched[1:2]:
+            levels.is_newer[fields] = len(touched) > 2  # noqa: PLR2004 - a table is above
             fill_some(levels, fields)
-        nodes = [
-            np.arange(levels.node_at[field], levels.node_at[field + 1], dtype=np.int32)
-            for field in lowered[-1]
-        ]
-        all_lowered = np.unique(np.concatenate([self.top.lowered, *nodes]))
-        self.top = self.top._replace(is_current=False, lowered=all_lowered)
+        if self.top.distance.size > 0:
+            near = gates_of(levels, self.top, lowered[-1])
+            self.top = self.top._replace(lowered=np.union1d(self.top.lowered, near))
+        self.top = self.top._replace(is_current=False)
 
 
 def build_overlay(
@@ -308,8 +352,8 @@ def build_overlay(
         Any float (rows, cols), from 1 to 1000: a move costs its length times the mean of its two
         cells; None for 1 everywhere. Rounded down to 1 / 2^14.
     top_bytes
-        Most bytes of the distances between the border cells of the last level: with more, queries
-        search these nodes. None for 50 for each cell that may be entered.
+        Most bytes of the distances over the last level: with more, queries search its border cells.
+        None for 10 for each cell that may be entered.
     progress
         Called after each level with the number of steps done and of all.
 
@@ -341,7 +385,7 @@ def build_overlay(
     for label in labels:
         if label.shape != enterable.shape or (label[enterable] < 0).any():
             raise InvalidValueError("every cell that may be entered must be in a field")
-    given = np.ones(enterable.shape) if factor is None else _numbers(factor)
+    given = np.ones(enterable.shape) if factor is None else numbers_of(factor)
     whole = slice(0, enterable.shape[0]), slice(0, enterable.shape[1])
     units = units_of(given, (enterable.shape[0], enterable.shape[1]), enterable, whole)
     moves = legal_moves(np.ascontiguousarray(enterable), False)
@@ -352,67 +396,7 @@ def build_overlay(
     if top_bytes is None:
         top_bytes = TOP_BYTES_PER_CELL * max(int(enterable.sum()), 1)
     kept = np.where(enterable, given, 1.0).astype(np.float64)
-    overlay = Overlay(ground, levels, None if _are_whole(kept) else kept, top_bytes)
+    factors = None if are_whole(kept) else kept
+    overlay = Overlay(ground, levels, factors, top_bytes)
     overlay.renew(progress)
     return overlay
-
-
-def units_of(
-    factor: FloatArray, shape: tuple[int, int], enterable: BoolArray, box: tuple[slice, slice]
-) -> IntArray:
-    """Return the factors of the cells in a box in units, rounded down, 0 where not enterable.
-
-    Parameters
-    ----------
-    factor
-        Any float (rows, cols).
-    shape
-        Rows and columns of the map.
-    enterable
-        bool, the cells of the box that may be entered.
-    box
-        Its rows and columns.
-
-    Raises
-    ------
-    InvalidValueError
-        When the shape is another one, or a factor of a cell that may be entered is out of range.
-    """
-    if factor.shape != shape:
-        raise InvalidValueError(
-            f"factors have shape {factor.shape}, the map has {shape}: give one per cell"
-        )
-    own = np.where(enterable, factor[box], 1.0)
-    if not ((own >= 1) & (own <= MOST_FACTOR)).all():
-        bad = own[~((own >= 1) & (own <= MOST_FACTOR))][0]
-        raise InvalidValueError(
-            f"a factor of a free cell is {bad}, expected a number from 1 to {MOST_FACTOR:.0f}: "
-            "close cells that must not be entered"
-        )
-    units: IntArray = np.where(enterable, np.floor(own * _ONE), 0).astype(np.int32)
-    return units
-
-
-def _numbers(factor: FloatArray) -> FloatArray:
-    """Return factors as an array of floats.
-
-    Raises
-    ------
-    InvalidValueError
-        When they are no numbers, or rows differ in length.
-    """
-    try:
-        array = np.asarray(factor)
-    except ValueError:
-        array = np.empty(0, dtype=np.bool_)
-    if array.dtype.kind not in "iuf":
-        raise InvalidValueError(
-            f"factors are {factor!r:.60}, expected one number per cell: give an array of rows and "
-            "columns"
-        )
-    return array
-
-
-def _are_whole(factor: FloatArray) -> bool:
-    """Return whether factors are whole units."""
-    return bool((np.floor(factor * _ONE) == factor * _ONE).all())

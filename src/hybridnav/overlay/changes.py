@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import ndimage
 
+from hybridnav.errors import InvalidValueError
+from hybridnav.overlay.layout import slots_of
 from hybridnav.search.moves import legal_moves
 
 if TYPE_CHECKING:
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 
     Window = tuple[slice, slice]
 
+_SIDES = 4
 _CLOSED = 1 << 30
 """Stands for the units of a closed cell when they are compared."""
 
@@ -36,6 +39,28 @@ class Change(NamedTuple):
     """int32 (k,), the fields with cells in the window."""
 
 
+def box_within(changed: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> Window:
+    """Return the rows and the columns of a box, of the whole map for None.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is no box of four sides inside the map.
+    """
+    if changed is None:
+        return slice(0, shape[0]), slice(0, shape[1])
+    sides = tuple(changed) if isinstance(changed, tuple | list) else ()
+    fits = len(sides) == _SIDES and all(isinstance(side, int | np.integer) for side in sides)
+    if not fits or not (
+        0 <= sides[0] <= sides[1] <= shape[0] and 0 <= sides[2] <= sides[3] <= shape[1]
+    ):
+        raise InvalidValueError(
+            f"changed is {changed!r:.80}: give first row, last row + 1, first column, last "
+            f"column + 1 inside {shape} cells"
+        )
+    return slice(int(sides[0]), int(sides[1])), slice(int(sides[2]), int(sides[3]))
+
+
 def change_in(ground: CellCosts, shape: tuple[int, int], box: Window, units: IntArray) -> Change:
     """Return what changes when the cells in a box get other units.
 
@@ -51,17 +76,16 @@ def change_in(ground: CellCosts, shape: tuple[int, int], box: Window, units: Int
         int32, the new units in the box, 0 for a closed cell.
     """
     window, around = _grown(box, shape, 1), _grown(box, shape, 2)
-    field_of = ground.field_of.reshape(shape)
-    before = ground.units.reshape(shape)[window]
-    in_all = ground.units.reshape(shape)[around].copy()
+    slots, slots_around = slots_of(ground, window), slots_of(ground, around)
+    before, in_all = ground.units[slots], ground.units[slots_around]
     in_all[_within(box, around)] = units
-    is_open = (field_of[around] >= 0) & (in_all > 0)
+    is_open = (ground.field_of[slots_around] >= 0) & (in_all > 0)
     moves = legal_moves(np.ascontiguousarray(is_open), False)[_within(window, around)]
     after = in_all[_within(window, around)]
-    is_touched = (before != after) | (ground.moves.reshape(shape)[window] != moves)
+    is_touched = (before != after) | (ground.moves[slots] != moves)
     is_lower = np.where(after > 0, after, _CLOSED) < np.where(before > 0, before, _CLOSED)
     near_lower = ndimage.binary_dilation(is_lower, np.ones((3, 3), dtype=np.bool_))
-    own = field_of[window]
+    own = ground.field_of[slots].astype(np.int32)
     return Change(
         window,
         after,

@@ -8,23 +8,39 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import _cost_kernels as kernels
-from hybridnav.overlay._lane_kernels import FAR
+from hybridnav.overlay._lane_kernels import LANES, STEP_BITS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav._typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
+
+
+MOST_CELLS = (1 << 16) - 1
+"""Most cells of a field of the finest level: places in it have 16 bits."""
+_BLOCK = 1 << kernels.BLOCK_BITS
+_MOST_SHORT = (1 << 15) - 1
+"""Most fields of the finest level whose numbers have 16 bits."""
 
 
 class CellCosts(NamedTuple):
-    """The cells: what moves over them cost, and the fields of the finest level."""
+    """The cells: what moves over them cost, and the fields of the finest level.
+
+    Cells have slots, in the order of their flat numbers: those in blocks of 16 without a cell of
+    any field share the first 16, which stand for cells of no field.
+    """
 
     moves: ByteArray
-    """uint8 (rows * cols,), masks of the legal moves; see `legal_moves`."""
-    field_of: IntArray
-    """int32 (rows * cols,), the field of each cell of the finest level, -1 for none."""
+    """uint8 (slots,), masks of the legal moves; see `legal_moves`."""
+    field_of: AnyArray
+    """int16 (slots,), the field of each cell of the finest level, -1 for none; int32 where there
+    are more fields."""
     units: IntArray
-    """int32 (rows * cols,), the factor of each cell; a straight move costs the sum of two."""
+    """int32 (slots,), the factor of each cell; a straight move costs the sum of two."""
+    block_at: IntArray
+    """int32 (blocks of 16 cells,), the slot of the first cell of each."""
+    rows: int
+    """Rows of the map."""
     cols: int
     """Columns of the map."""
     least_units: int
@@ -58,8 +74,8 @@ class Levels(NamedTuple):
     """int32 (nodes,), the node of the level above on the same cell, -1 for none."""
     box: IntArray
     """int32 (fields of the finest level, 4), rows and columns that hold each: first, last + 1."""
-    move_at: LongArray
-    """int64 (nodes + 1,), where the moves from each node to other fields of its level begin."""
+    move_at: IntArray
+    """int32 (nodes + 1,), where the moves from each node to other fields of its level begin."""
     move_to: IntArray
     """int32 (moves,), the nodes that they lead to."""
     move_cost: IntArray
@@ -68,29 +84,52 @@ class Levels(NamedTuple):
     """int64 (fields + 1,), where the clique of each field begins."""
     clique: IntArray
     """int32, for each field the distances inside it between its n nodes, n * (n + 1) / 2."""
+    place_of: AnyArray
+    """uint16 (slots,), the place of each cell among those of its field of the finest level, by
+    their flat numbers."""
+    steps_at: LongArray
+    """int64 (fields of the finest level + 1,), where the steps of each begin."""
+    steps: AnyArray
+    """uint16, for each 16 nodes of a field of the finest level, and each of its cells, the first
+    moves of shortest paths inside the field to these nodes: three numbers, the bits of the
+    directions."""
+    marks_at: LongArray
+    """int64 (fields + 1,), where the marks of each field begin; empty but on the level above the
+    finest."""
+    marks: ByteArray
+    """uint8, for each field n * m bits, n its nodes and m those of the level below in it: row by
+    row the nodes on shortest paths to one of its nodes from those before."""
     table_at: LongArray
-    """int64 (fields + 1,), where the table of each field begins; empty on the two finest
-    levels."""
+    """int64 (fields + 1,), where the table of each field begins; empty on the two finest levels,
+    and where it was never computed."""
     table: IntArray
-    """int32, for each field the distances inside it from its n nodes to the m nodes of the level
-    below that lie in it, n * m, row by row."""
+    """int32, for each field the distances inside it between its nodes and exits of the fields
+    inside; see `pack_table`."""
     is_stale: BoolArray
-    """bool (fields,), whether a table is that of former costs, or was never computed. Then those of
-    the fields around it are, too. Never on the finest level; on the next one only where distances
-    do not fit."""
+    """bool (fields,), whether a clique and a table are those of former costs, or were never
+    computed. Then those of the fields around it are, too. Never on the finest level; on the next
+    one only where distances do not fit."""
     is_lowered: BoolArray
     """bool (fields,), of a stale one: whether distances can be less than its table has."""
+    is_newer: BoolArray
+    """bool (fields,), whether the clique of a field is of later costs than the table around it."""
 
 
 class Top(NamedTuple):
-    """Distances between the nodes of the last level."""
+    """Distances over the last level between gates: of each move, one end is a gate."""
 
     distance: IntArray
-    """int32 (n, n), (0, 0) where they are not kept."""
+    """int32 (n * (n + 1) / 2,), for n gates; empty where they are not kept. See `clique_place`."""
+    gates: IntArray
+    """int32 (n,), the nodes, ascending."""
+    gate_of: IntArray
+    """int32 (nodes of the last level,), the place of each among the gates, -1 for none; empty
+    where distances are not kept."""
     is_current: bool
     """Whether these are the distances of now; else those of former costs."""
     lowered: IntArray
-    """int32 (k,), the nodes of the fields where costs were lowered since."""
+    """int32 (k,), the places of the gates in and beside the fields where costs were lowered
+    since."""
 
 
 class NodeWork(NamedTuple):
@@ -106,6 +145,17 @@ class NodeWork(NamedTuple):
     """int32 (nodes,), the nodes whose bound is known."""
     counts: LongArray
     """int64 (1,), their number."""
+
+
+class Numbering(NamedTuple):
+    """The fields of all levels and their numbers; see `Levels`."""
+
+    field_of: IntArray
+    """int32 (rows * cols,), the field of each cell of the finest level, -1 for none."""
+    level_at: LongArray
+    """int64 (levels + 1,), the first field of each level."""
+    parent: IntArray
+    """int32 (fields,), the field of the level above, -1 on the last one."""
 
 
 def lay_out(
@@ -126,25 +176,95 @@ def lay_out(
     Raises
     ------
     InvalidValueError
-        When the fields of two levels are not nested.
+        When the fields of two levels are not nested, or one of the finest has too many cells.
     """
     inside = labels[0] >= 0
     fields, parents = _numbered([label[inside] for label in labels])
     level_at = np.cumsum([0, *(len(parent) for parent in parents)])
-    flat = np.full((len(labels), moves.size), -1, dtype=np.int32)
-    flat[:, inside.ravel()] = fields
-    least = int(units[inside].min(initial=1 << 30))
-    ground = CellCosts(
-        moves.ravel(), flat[0], np.ascontiguousarray(units).ravel(), moves.shape[1], least
-    )
+    field_of = np.full(moves.size, -1, dtype=np.int32)
+    field_of[inside.ravel()] = fields[0]
     parent = np.concatenate(
         [
             above + level_at[k + 1] if k + 1 < len(labels) else above
             for k, above in enumerate(parents)
         ]
     ).astype(np.int32)
-    nodes = [_Nodes(ground, flat[k], int(level_at[k]), k) for k in range(len(labels))]
-    return ground, _gathered(ground, nodes, flat, level_at, parent)
+    numbering = Numbering(field_of, level_at, parent)
+    return lay_out_numbered(moves, units, numbering, np.flatnonzero(moves))
+
+
+def lay_out_numbered(
+    moves: ByteArray, units: IntArray, numbering: Numbering, cells: LongArray
+) -> tuple[CellCosts, Levels]:
+    """Number border cells as `lay_out` does, of fields that have their numbers.
+
+    Parameters
+    ----------
+    moves, units
+        See `lay_out`.
+    numbering
+        The fields.
+    cells
+        int64 (n,), ascending, the flat cells among which the border cells are.
+
+    Raises
+    ------
+    InvalidValueError
+        When one of the finest fields has too many cells.
+    """
+    field_of, level_at, parent = numbering
+    least = int(units.ravel()[field_of >= 0].min(initial=1 << 30))
+    block_at = _block_at(field_of)
+    number = np.int16 if level_at[1] <= _MOST_SHORT else np.int32
+    ground = CellCosts(
+        in_slots(moves, block_at),
+        in_slots(field_of.astype(number), block_at, empty=-1),
+        in_slots(units, block_at),
+        block_at,
+        moves.shape[0],
+        moves.shape[1],
+        least,
+    )
+    nodes, label = [], np.arange(level_at[1], dtype=np.int32)
+    for _ in range(len(level_at) - 1):
+        nodes.append(_Nodes(ground, label, cells))
+        cells, label = np.sort(nodes[-1].cells), parent[label]
+    return ground, _gathered(ground, nodes, numbering)
+
+
+def _block_at(field_of: IntArray) -> IntArray:
+    """Return the first slot of each block of cells; see `CellCosts`."""
+    begins = np.arange(0, field_of.size, _BLOCK)
+    is_used = np.logical_or.reduceat(field_of >= 0, begins) if len(begins) else begins > 0
+    return np.where(is_used, _BLOCK * np.cumsum(is_used), 0).astype(np.int32)
+
+
+def in_slots(dense: AnyArray, block_at: IntArray, *, empty: int = 0) -> AnyArray:
+    """Return the values of cells in the order of their slots.
+
+    Parameters
+    ----------
+    dense
+        The value of each cell of the map.
+    block_at
+        See `CellCosts`.
+    empty
+        Value of the slots that stand for cells of no field.
+    """
+    blocks = np.flatnonzero(block_at)
+    cells = (blocks[:, None] * _BLOCK + np.arange(_BLOCK)).ravel()
+    values: AnyArray = np.full(_BLOCK + len(cells), empty, dtype=dense.dtype)
+    is_cell = cells < dense.size
+    values[_BLOCK:][is_cell] = dense.ravel()[cells[is_cell]]
+    return values
+
+
+def slots_of(ground: CellCosts, box: tuple[slice, slice]) -> LongArray:
+    """Return the slots of the cells in a box, int64 (rows, cols)."""
+    rows, cols = (np.arange(side.start, side.stop) for side in box)
+    cells = rows[:, None] * ground.cols + cols
+    slots: LongArray = ground.block_at[cells // _BLOCK] + cells % _BLOCK
+    return slots
 
 
 def _numbered(labels: list[IntArray]) -> tuple[list[IntArray], list[IntArray]]:
@@ -172,28 +292,29 @@ def _numbered(labels: list[IntArray]) -> tuple[list[IntArray], list[IntArray]]:
 class _Nodes:
     """The nodes of one level, sorted by field."""
 
-    def __init__(self, ground: CellCosts, label: IntArray, first_field: int, level: int) -> None:
-        crossing = np.flatnonzero(kernels.crossing_cells(ground.moves, label, ground.cols))
-        order = np.argsort(label[crossing], kind="stable")
-        self.cells = crossing[order].astype(np.int32)
-        self.fields = label[self.cells] + first_field
-        self.level = level
+    def __init__(self, ground: CellCosts, label: IntArray, cells: AnyArray) -> None:
+        crossing = kernels.crossing_cells(ground, label, cells)
+        slots = ground.block_at[crossing // _BLOCK] + crossing % _BLOCK
+        own = label[ground.field_of[slots]]
+        order = np.argsort(own, kind="stable")
+        self.cells = crossing[order]
+        self.fields = own[order]
+        self.label = label
 
 
-def _gathered(
-    ground: CellCosts, nodes: list[_Nodes], label: IntArray, level_at: LongArray, parent: IntArray
-) -> Levels:
+def _gathered(ground: CellCosts, nodes: list[_Nodes], numbering: Numbering) -> Levels:
     """Join the levels, and number what lies between and below their nodes."""
+    cell_field, level_at, parent = numbering
     field_of = np.concatenate([level.fields for level in nodes]).astype(np.int32)
     node_at = np.searchsorted(field_of, np.arange(level_at[-1] + 1))
-    node_of = np.full(ground.moves.size, -1, dtype=np.int32)
+    node_of = np.full(cell_field.size, -1, dtype=np.int32)
     below, starts, ends, costs = [], [np.zeros(1, dtype=np.int64)], [], []
     first = n_moves = 0
     for level in nodes:
         below.append(node_of[level.cells])
         node_of.fill(-1)
         node_of[level.cells] = np.arange(first, first + len(level.cells), dtype=np.int32)
-        start, to, cost = kernels.crossing_moves(ground, label[level.level], level.cells, node_of)
+        start, to, cost = kernels.crossing_moves(ground, level.label, level.cells, node_of)
         starts.append(start[1:] + n_moves)
         ends.append(to)
         costs.append(cost)
@@ -204,13 +325,23 @@ def _gathered(
     n_nodes = np.diff(node_at)
     clique_at = np.concatenate([[0], np.cumsum(n_nodes * (n_nodes + 1) // 2)])
     n_inner = node_at[inner_at[1:]] - node_at[inner_at[:-1]]
-    n_inner[: level_at[min(2, len(nodes))]] = 0
-    table_at = np.concatenate([[0], np.cumsum(n_nodes * n_inner)])
+    second = slice(level_at[1], level_at[min(2, len(nodes))])
+    n_marks = np.zeros(level_at[-1], dtype=np.int64)
+    n_marks[second] = -(-n_nodes[second] * n_inner[second] // 8)
+    marks_at = np.concatenate([[0], np.cumsum(n_marks)])
     below_of = np.concatenate(below)
     has_below = below_of >= 0
     above = np.full(len(below_of), -1, dtype=np.int32)
     above[below_of[has_below]] = np.flatnonzero(has_below)
     is_stale = np.arange(level_at[-1]) >= level_at[1]
+    place_of, n_cells = kernels.places_of(ground.field_of, int(level_at[1]))
+    if n_cells.max(initial=0) > MOST_CELLS:
+        raise InvalidValueError(
+            f"a field of the finest level has {n_cells.max()} cells, expected at most "
+            f"{MOST_CELLS}: use smaller fields"
+        )
+    blocks = -(-n_nodes[: level_at[1]] // LANES)
+    steps_at = np.concatenate([[0], np.cumsum(blocks * n_cells * STEP_BITS)])
     return Levels(
         level_at=level_at,
         node_at=node_at,
@@ -220,14 +351,20 @@ def _gathered(
         field_of=field_of,
         below=below_of,
         above=above,
-        box=kernels.boxes_of(ground.field_of, ground.cols, int(level_at[1])),
-        move_at=np.concatenate(starts),
+        box=kernels.boxes_of(cell_field, ground.cols, int(level_at[1])),
+        move_at=np.concatenate(starts).astype(np.int32),
         move_to=np.concatenate(ends),
         move_cost=np.concatenate(costs),
         clique_at=clique_at,
         clique=np.empty(clique_at[-1], dtype=np.int32),
-        table_at=table_at,
-        table=np.full(table_at[-1], FAR, dtype=np.int32),
+        place_of=place_of,
+        steps_at=steps_at,
+        steps=np.zeros(steps_at[-1], dtype=np.uint16),
+        marks_at=marks_at,
+        marks=np.zeros(marks_at[-1], dtype=np.uint8),
+        table_at=np.zeros(level_at[-1] + 1, dtype=np.int64),
+        table=np.empty(0, dtype=np.int32),
         is_stale=is_stale,
         is_lowered=is_stale.copy(),
+        is_newer=np.zeros(level_at[-1], dtype=np.bool_),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,17 +10,20 @@ import numpy as np
 
 from hybridnav._progress import no_progress
 from hybridnav.errors import InvalidValueError
-from hybridnav.overlay.build import build_overlay
+from hybridnav.grid.checks import checked_type
+from hybridnav.overlay.build import TOP_BYTES_PER_CELL, build_overlay
+from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, IntArray
     from hybridnav.overlay.build import Overlay
     from hybridnav.pyramid import DualGraphPyramid
-    from hybridnav.topology import TopologicalMap
 
 _LEAST_GROWTH = 3
 """Least factor between the sizes of fields of two levels: closer levels save nothing."""
+_LEVELS_WITHOUT_TABLES = 2
+"""The finest levels, which keep none from their border cells to those below."""
 _LEAST_FIELDS = 4
 """Fields above the finest hold at most this part of the cells: fewer fields save nothing either."""
 
@@ -37,12 +41,18 @@ class OverlayOptions:
         Cells of the fields of each level of the overlay, the finest first, rising: the highest
         level of the pyramid on which a cell lies, on average, in a field of at most so many. The
         first speeds up preparation, changes, and the way from the ends of a path to the border of
-        a field of the second.
+        a field of the second. From the third on, a level of fields half as large is the last one
+        where the costs over it fit.
     region_cells
         Most cells of the regions of the pyramid; see `DualGraphPyramid.with_regions`.
     top_bytes_per_cell
-        Most bytes, for each cell that may be entered, of the costs between all border cells of the
-        last level. Where these take more, queries search the border cells.
+        Most bytes, for each cell that may be entered, of the costs over the last level. Where these
+        take more, queries search the border cells.
+    table_bytes_per_cell
+        Most bytes, for each cell that may be entered, of all costs from the border cells of one of
+        the coarser levels to those of the level below; about a third of them is stored. A level
+        with more is left out: fields of open halls have long borders, and costs across them would
+        fill the memory.
 
     Raises
     ------
@@ -58,10 +68,13 @@ class OverlayOptions:
 
     field_cells: tuple[int, ...] = (300, 2_000, 80_000, 1_000_000)
     region_cells: int = 80_000
-    top_bytes_per_cell: float = 50.0
+    top_bytes_per_cell: float = TOP_BYTES_PER_CELL
+    table_bytes_per_cell: float = 150.0
 
     def __post_init__(self) -> None:
-        are_numbers = all(isinstance(cells, int | float) for cells in self.field_cells)
+        are_numbers = isinstance(self.field_cells, Iterable) and all(
+            isinstance(cells, int | float) for cells in self.field_cells
+        )
         rising = (
             are_numbers
             and self.field_cells[:1]
@@ -75,11 +88,18 @@ class OverlayOptions:
                 f"field_cells of an overlay is {self.field_cells!r:.60}, expected rising numbers "
                 "of cells: leave it out for its default"
             )
-        if not self.top_bytes_per_cell >= 0:
+        if not (isinstance(self.region_cells, int | np.integer) and self.region_cells > 0):
             raise InvalidValueError(
-                f"top_bytes_per_cell of an overlay is {self.top_bytes_per_cell!r:.60}, expected a "
-                "number >= 0: leave it out for its default"
+                f"region_cells of an overlay is {self.region_cells!r:.60}, expected a whole number "
+                "of cells > 0: leave it out for its default"
             )
+        for name in ("top_bytes_per_cell", "table_bytes_per_cell"):
+            most = getattr(self, name)
+            if not (isinstance(most, int | float | np.number) and most >= 0):
+                raise InvalidValueError(
+                    f"{name} of an overlay is {most!r:.60}, expected a number >= 0: leave it out "
+                    "for its default"
+                )
 
 
 DEFAULT_OPTIONS = OverlayOptions()
@@ -129,8 +149,12 @@ def prepare_overlay(
     >>> search.path((8, 3), (8, 20)).cost_cells
     17.0
     """
-    if topology.grid.corner_cutting:
-        raise InvalidValueError("an overlay needs a grid without corner cutting")
+    checked_type("options", options, OverlayOptions)
+    if checked_type("topology", topology, TopologicalMap).grid.corner_cutting:
+        raise InvalidValueError(
+            "the grid lets paths cut corners, expected one without corner cutting: load the map "
+            "without it, or search its cells"
+        )
     enterable = topology.grid.enterable(allow_unexplored=allow_unexplored)
     return build_overlay(
         enterable,
@@ -161,26 +185,66 @@ def overlay_fields(
         int32 (rows, cols) each, at least one.
     """
     pyramid = pyramid.with_regions(options.region_cells)
-    sizes = [size.vertices for size in pyramid.stats.sizes]
+    n_cells = int(enterable.sum())
     found: list[IntArray] = []
     before = 0.0
     for cells in options.field_cells:
-        most = cells if not found else min(cells, int(enterable.sum()) / _LEAST_FIELDS)
-        if before * _LEAST_GROWTH > most:
-            continue
-        index = len(sizes) - 1
-        while index > 0 and sizes[0] > most * sizes[index]:
-            index -= 1
-        field_of = pyramid[index].field_of
-        size = _typical_size(field_of[enterable])
-        while index > 0 and size > most:
-            index -= 1
-            field_of = pyramid[index].field_of
-            size = _typical_size(field_of[enterable])
-        if size >= _LEAST_GROWTH * before:
-            found.append(field_of)
-            before = size
+        most = cells if not found else min(cells, n_cells / _LEAST_FIELDS)
+        has_table = len(found) >= _LEVELS_WITHOUT_TABLES
+        for size in (most / 2, most) if has_table else (most,):
+            if before * _LEAST_GROWTH > size:
+                continue
+            field_of = _fields_of(pyramid, enterable, size)
+            own = _typical_size(field_of[enterable])
+            if own < _LEAST_GROWTH * before or not _fits(field_of, found, enterable, options):
+                continue
+            is_last = has_table and _fits_top(field_of, enterable, options)
+            if is_last or size == most:
+                found.append(field_of)
+                before = own
+            if is_last:
+                return found
     return found
+
+
+def _fields_of(pyramid: DualGraphPyramid, enterable: BoolArray, most: float) -> IntArray:
+    """Return the fields of the highest level whose typical size is at most some number of cells."""
+    sizes = [size.vertices for size in pyramid.stats.sizes]
+    index = len(sizes) - 1
+    while index > 0 and sizes[0] > most * sizes[index]:
+        index -= 1
+    while index > 0 and _typical_size(pyramid[index].field_of[enterable]) > most:
+        index -= 1
+    field_of: IntArray = pyramid[index].field_of
+    return field_of
+
+
+def _fits_top(fields: IntArray, enterable: BoolArray, options: OverlayOptions) -> bool:
+    """Return whether the costs over a level take no more than they may, if it is the last one."""
+    gates = int(_on_border(fields, enterable).sum()) / 2
+    return 2 * gates**2 <= options.top_bytes_per_cell * int(enterable.sum())
+
+
+def _fits(
+    fields: IntArray, found: list[IntArray], enterable: BoolArray, options: OverlayOptions
+) -> bool:
+    """Return whether the tables of a level above others take no more than they may."""
+    if len(found) < _LEVELS_WITHOUT_TABLES:
+        return True
+    size = int(fields.max()) + 1
+    own = np.bincount(fields[_on_border(fields, enterable)], minlength=size)
+    inner = np.bincount(fields[_on_border(found[-1], enterable)], minlength=size)
+    return bool(4.0 * own @ inner <= options.table_bytes_per_cell * int(enterable.sum()))
+
+
+def _on_border(fields: IntArray, enterable: BoolArray) -> BoolArray:
+    """Return the cells beside whose sides another field begins."""
+    border = np.zeros(fields.shape, dtype=np.bool_)
+    for one, other in ((np.s_[1:], np.s_[:-1]), (np.s_[:, 1:], np.s_[:, :-1])):
+        differs = (fields[one] != fields[other]) & enterable[one] & enterable[other]
+        border[one] |= differs
+        border[other] |= differs
+    return border
 
 
 def _typical_size(fields: IntArray) -> float:

@@ -66,6 +66,10 @@ class GridRefiner:
         self.costs = costs
         self._allow_unexplored = allow_unexplored
 
+    def on(self, grid: OccupancyGrid) -> GridRefiner:
+        """Return the refiner of another map of the same shape, with the same costs."""
+        return GridRefiner(grid, allow_unexplored=self._allow_unexplored, costs=self.costs)
+
     @cached_property
     def search(self) -> GridSearch:
         """The search of cells, built on first use."""

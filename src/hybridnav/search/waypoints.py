@@ -12,7 +12,7 @@ from hybridnav.search.moves import legal_moves
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from hybridnav._typing import BoolArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
 
 
 def cheapest_waypoints(
@@ -63,3 +63,27 @@ def cheapest_waypoints(
     for pairs in reversed(origins):
         waypoints.append(int(pairs[np.argmax(pairs[:, 0] == waypoints[-1]), 1]))
     return waypoints[::-1]
+
+
+def costs_from(moves: ByteArray, cell: tuple[int, int], targets: LongArray) -> LongArray:
+    """Return the octile costs of shortest paths from a cell, int64 (rows * cols,), -1 where
+    unsettled.
+
+    Parameters
+    ----------
+    moves
+        uint8 (rows, cols), legal moves of each cell.
+    cell
+        Where the search starts, (row, col).
+    targets
+        int64 (n,), flat cells: the search ends once all that can be reached are settled.
+    """
+    cols = moves.shape[1]
+    is_target = np.zeros(moves.size, dtype=np.bool_)
+    is_target[targets] = True
+    source = np.array([cell[0] * cols + cell[1]])
+    start_cost = np.zeros(1, dtype=np.int64)
+    costs: LongArray = _waypoint_kernels.spread(
+        moves.ravel(), None, cols, source, start_cost, is_target, True
+    )[0]
+    return costs
