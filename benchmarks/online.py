@@ -3,7 +3,9 @@
     python -m benchmarks.online [--data FOLDER] [--updates 1000]
 
 All ratios are taken in one process. `--data` (or HYBRIDNAV_DATA) adds the Intel counting grid, of
-which a window moves as a robot's sight does: what it covers becomes known.
+which a window moves as a robot's sight does: what it covers becomes known. It also adds the scans
+of the Intel log, at most so many as there are updates: each is added to a map with cells of 5 cm,
+and the time is that of the update alone. The last table has each figure beside its aim.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import os
 import time
 import warnings
 from dataclasses import fields
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +23,7 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks.chain import OFFICE, RADIUS_M
+from hybridnav.mapping import Mapper
 from hybridnav.online import OnlinePyramid
 
 if TYPE_CHECKING:
@@ -28,12 +32,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Classes = NDArray[np.uint8]
-    Box = tuple[int, int, int, int]
+    Area = tuple[float, ...]
 
 INTEL = "radish_grids/intel.yaml"
+INTEL_LOG = "radish_logs/intel-corrected.log.gz"
 SIDES = (500, 1000, 2000, 4000)
 """Rows and columns of the maps on which growth is measured: 0.25 M to 16 M cells."""
 CHANGE = 60
+PLACES = 12
+"""Changes of each map: at the same cells of all maps, so that their sizes alone differ."""
 SIGHT = 80
 """Cells that a robot sees to each side: 4 m."""
 
@@ -47,13 +54,27 @@ class Run(NamedTuple):
     version: OnlinePyramid
 
 
+class Shown(NamedTuple):
+    """Figures of a row of the first table."""
+
+    median_ms: float
+    p95_ms: float
+    drift: float
+
+
 def with_classes(grid: hn.OccupancyGrid, classes: Classes) -> hn.OccupancyGrid:
     """Return a grid with other classes, without the work of making one."""
     values = {field.name: getattr(grid, field.name) for field in fields(grid)}
     return hn.OccupancyGrid.restored(**{**values, "classes": classes})
 
 
-def random_changes(grid: hn.OccupancyGrid, count: int) -> Iterator[tuple[Classes, Box]]:
+def area_of(frame: hn.Frame, low: tuple[int, int], high: tuple[int, int]) -> Area:
+    """Return the area in metres of a box of cells of a map that is not turned: from a row and a
+    column to the first ones beyond."""
+    return tuple(frame.points_of_grid([low, high]).ravel().tolist())
+
+
+def random_changes(grid: hn.OccupancyGrid, count: int) -> Iterator[tuple[Classes, Area]]:
     """Yield maps with things put into them and taken away, and the box of each change."""
     rng = np.random.default_rng(0)
     classes = grid.classes.copy()
@@ -63,10 +84,10 @@ def random_changes(grid: hn.OccupancyGrid, count: int) -> Iterator[tuple[Classes
         col = int(rng.integers(0, grid.shape[1] - wide))
         part = slice(row, row + high), slice(col, col + wide)
         classes[part] = grid.classes[part] if rng.random() < 0.5 else rng.integers(0, 3)
-        yield classes.copy(), (row, col, row + int(high) - 1, col + int(wide) - 1)
+        yield classes.copy(), area_of(grid.frame, (row, col), (row + int(high), col + int(wide)))
 
 
-def exploration(grid: hn.OccupancyGrid, count: int) -> Iterator[tuple[Classes, Box]]:
+def exploration(grid: hn.OccupancyGrid, count: int) -> Iterator[tuple[Classes, Area]]:
     """Yield what a robot knows that drives over a map from free cell to free cell, by steps."""
     known = np.full(grid.shape, 2, np.uint8)
     rows, cols = np.nonzero(grid.classes == 1)
@@ -75,17 +96,31 @@ def exploration(grid: hn.OccupancyGrid, count: int) -> Iterator[tuple[Classes, B
         row, col = int(rows[at]), int(cols[at])
         part = slice(max(row - SIGHT, 0), row + SIGHT), slice(max(col - SIGHT, 0), col + SIGHT)
         known[part] = grid.classes[part]
-        last = min(row + SIGHT, grid.shape[0]) - 1, min(col + SIGHT, grid.shape[1]) - 1
-        yield known.copy(), (max(row - SIGHT, 0), max(col - SIGHT, 0), *last)
+        low = max(row - SIGHT, 0), max(col - SIGHT, 0)
+        yield known.copy(), area_of(grid.frame, low, (row + SIGHT, col + SIGHT))
+
+
+def scans(log: Path, count: int) -> Iterator[tuple[hn.OccupancyGrid, Area | None]]:
+    """Yield the map after each laser scan of a log, and the area in which the scan lies."""
+    mapper = Mapper(resolution_m=0.05)
+    for scan in islice(hn.CarmenLog(log), count + 1):
+        area = mapper.add(scan)
+        yield mapper.to_grid(robot_radius_m=0), area
 
 
 def follow(
-    version: OnlinePyramid, grid: hn.OccupancyGrid, steps: Iterator[tuple[Classes, Box]]
+    version: OnlinePyramid, grid: hn.OccupancyGrid, steps: Iterator[tuple[Classes, Area]]
+) -> Run:
+    """Update a version with the classes of a map step by step."""
+    return follow_grids(version, ((with_classes(grid, classes), box) for classes, box in steps))
+
+
+def follow_grids(
+    version: OnlinePyramid, steps: Iterator[tuple[hn.OccupancyGrid, Area | None]]
 ) -> Run:
     """Update a version step by step."""
     seconds, flips, seen = [], 0, 0
-    for classes, box in steps:
-        now = with_classes(grid, classes)
+    for now, box in steps:
         began = time.perf_counter()
         update = version.update(now, changed=box)
         seconds.append(time.perf_counter() - began)
@@ -94,19 +129,31 @@ def follow(
     return Run(seconds, flips, seen, version)
 
 
-def show(name: str, run: Run, distance_m: float) -> None:
-    """Print a row of the first table."""
+def show(name: str, run: Run, distance_m: float) -> Shown:
+    """Print a row of the first table, and return its figures."""
+    began = time.perf_counter()
+    levels = len(run.version.pyramid)
+    read = time.perf_counter()
     fresh = hn.DualGraphPyramid.build(run.version.grid, merge_distance_m=distance_m)
+    built = time.perf_counter()
     median, high = np.percentile(run.seconds, [50, 95]) * 1000
     places = fresh[fresh.place_level].n_vertices
     print(
         f"| {name} | {len(run.seconds)} | {median:.1f} | {high:.1f} | {run.version.n_places} | "
-        f"{run.version.n_places / places - 1:+.1%} | {run.flips / max(run.seen, 1):.2%} |"
+        f"{run.version.n_places / places - 1:+.1%} | {run.flips / max(run.seen, 1):.2%} | "
+        f"{levels} | {(read - began) * 1e3:.0f} | {(built - read) * 1e3:.0f} |",
+        flush=True,
     )
+    return Shown(float(median), float(high), run.version.n_places / places - 1)
 
 
-def growth() -> None:
-    """Print the time of one change on maps of several sizes, and of a fresh build of each."""
+def growth() -> tuple[dict[int, float], dict[int, float]]:
+    """Print the time of one change on maps of several sizes, and of a fresh build of each.
+
+    Return, by the side of the map, the time of an update and how many times longer a build takes.
+    """
+    times: dict[int, float] = {}
+    ratios: dict[int, float] = {}
     print("\n| cells | an update, ms | a fresh build, ms | ratio |")
     print("|---|---|---|---|")
     tile = np.ones((250, 250), np.uint8)
@@ -121,20 +168,36 @@ def growth() -> None:
         hn.DualGraphPyramid.build(grid)
         fresh = time.perf_counter() - built
         taken = []
-        low = side // 2 + 20
-        box = (low, low, low + CHANGE - 1, low + CHANGE - 1)
-        for turn in range(11):
-            changed = classes.copy()
-            if turn % 2 == 0:
-                changed[low : low + CHANGE, low : low + CHANGE] = 0
-            now = with_classes(grid, changed)
-            start = time.perf_counter()
-            version = version.update(now, changed=box).version
-            taken.append(time.perf_counter() - start)
+        # At many places: how many places a change touches depends on where it lies.
+        for low in np.random.default_rng(0).integers(0, SIDES[0] - CHANGE, (PLACES, 2)).tolist():
+            part = tuple(slice(at, at + CHANGE) for at in low)
+            box = area_of(grid.frame, tuple(low), (low[0] + CHANGE, low[1] + CHANGE))
+            for there in (True, False):
+                changed = classes.copy()
+                if there:
+                    changed[part] = 0
+                now = with_classes(grid, changed)
+                start = time.perf_counter()
+                version = version.update(now, changed=box).version
+                taken.append(time.perf_counter() - start)
         update = float(np.median(taken[1:]))
         print(
-            f"| {side * side:,} | {update * 1e3:.1f} | {fresh * 1e3:.0f} | {fresh / update:.0f} |"
+            f"| {side * side:,} | {update * 1e3:.1f} | {fresh * 1e3:.0f} | {fresh / update:.0f} |",
+            flush=True,
         )
+        times[side], ratios[side] = update, fresh / update
+    return times, ratios
+
+
+def show_aims(rows: list[tuple[str, float, float, str]]) -> None:
+    """Print figures beside their aims: name, figure, aim, and "<" or ">=" between the two."""
+    load = "/".join(f"{value:.1f}" for value in os.getloadavg())
+    print(f"\nLoad of the machine at the end: {load} on {os.cpu_count()} processors.\n")
+    print("| figure | measured | aim | reached |")
+    print("|---|---|---|---|")
+    for name, figure, aim, sign in rows:
+        reached = figure < aim if sign == "<" else figure >= aim
+        print(f"| {name} | {figure:.3g} | {sign} {aim:g} | {'yes' if reached else 'no'} |")
 
 
 def main() -> None:
@@ -144,18 +207,46 @@ def main() -> None:
     parser.add_argument("--updates", type=int, default=1000)
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
-    print("| map | updates | median, ms | p95, ms | places | against a fresh build | ids lost |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| map | updates | median, ms | p95, ms | places | against a fresh build | ids lost "
+        "| levels | made when read, ms | a fresh build, ms |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
     office = hn.load_map(OFFICE, robot_radius_m=RADIUS_M)
     version = OnlinePyramid.of(hn.DualGraphPyramid.build(office))
-    follow(version, office, random_changes(office, 10))  # loads the kernels
-    show("office", follow(version, office, random_changes(office, arguments.updates)), 4.0)
+    warm = follow(version, office, random_changes(office, 10))
+    warm.version.pyramid  # noqa: B018 - loads the kernels
+    shown = [
+        show("office", follow(version, office, random_changes(office, arguments.updates)), 4.0)
+    ]
+    aims: list[tuple[str, float, float, str]] = []
     if arguments.data:
-        intel = hn.load_map(Path(arguments.data) / INTEL, robot_radius_m=0)
+        folder = Path(arguments.data)
+        intel = hn.load_map(folder / INTEL, robot_radius_m=0)
         unknown = with_classes(intel, np.full(intel.shape, 2, np.uint8))
         version = OnlinePyramid.of(hn.DualGraphPyramid.build(unknown))
-        show("Intel", follow(version, unknown, exploration(intel, arguments.updates)), 4.0)
-    growth()
+        run = follow(version, unknown, exploration(intel, arguments.updates))
+        shown.append(show("Intel", run, 4.0))
+        steps = scans(folder / INTEL_LOG, arguments.updates)
+        version = OnlinePyramid.of(hn.DualGraphPyramid.build(next(steps)[0]))
+        shown.append(show("Intel, scans", follow_grids(version, steps), 4.0))
+        aims.append(("Intel, a scan, median in ms", shown[-1].median_ms, 1.0, "<"))
+        aims.append(("Intel, a scan, p95 in ms", shown[-1].p95_ms, 10.0, "<"))
+    times, ratios = growth()
+    drift = max(abs(row.drift) for row in shown)
+    show_aims(
+        [
+            *aims,
+            ("60 x 60 cells of 4 M, times faster than a build", ratios[2000], 50.0, ">="),
+            ("longest time over shortest, 0.25 to 16 M", max_over_min(times), 1.3, "<"),
+            ("places against a fresh build, greatest share", drift, 0.15, "<"),
+        ]
+    )
+
+
+def max_over_min(times: dict[int, float]) -> float:
+    """Return the longest time over the shortest."""
+    return max(times.values()) / min(times.values())
 
 
 if __name__ == "__main__":

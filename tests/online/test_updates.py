@@ -20,10 +20,10 @@ from hypothesis.stateful import (
 
 import hybridnav as hn
 from benchmarks.chain import OFFICE
-from benchmarks.online import random_changes, with_classes
+from benchmarks.online import area_of, random_changes, with_classes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import Frame, OccupancyGrid
-from hybridnav.online import OnlinePyramid
+from hybridnav.online import OnlinePyramid, cellwise, draft
 from hybridnav.pyramid.cracks import find_cracks
 from tests.oracle.checks import check_base, check_cap, check_level, check_step, passes
 from tests.oracle.pyramid import Base
@@ -72,6 +72,10 @@ def check_events(before, update, shift=(0, 0)):
     """What an update states about places is what the cells show."""
     old, new = numbers_of(before), numbers_of(update.version)
     rows, cols = old.shape
+    classes = np.zeros(new.shape, np.uint8)
+    classes[shift[0] : shift[0] + rows, shift[1] : shift[1] + cols] = before.grid.classes
+    differs = update.version.grid.classes != classes
+    assert np.array_equal(update.cells, np.argwhere(differs))
     seen = new[shift[0] : shift[0] + rows, shift[1] : shift[1] + cols]
     had, has = set(before.place_numbers.tolist()), set(update.version.place_numbers.tolist())
     assert set(update.died) == had - has
@@ -97,20 +101,34 @@ def check_events(before, update, shift=(0, 0)):
         assert update.split.get(place, ()) == (tuple(parts) if len(parts) > 1 else ())
 
 
+def unread(version):
+    """Return a copy of a version of which nothing was read."""
+    again = copy.copy(version)
+    for name in [name for name in vars(again) if name not in version.__dataclass_fields__]:
+        vars(again).pop(name)
+    return again
+
+
 class Robot(RuleBasedStateMachine):
     """A map that changes and grows while a pyramid follows it."""
 
     old: Sequence[Any] = ()
     """The version before, and the number of the place of each of its cells."""
+    linkages = LINKAGES
+    """The linkages to choose from."""
+    keeps_levels = True
+    """Whether an update begins with the levels that were read of the version before."""
 
     @initialize(
         classes=class_grids(14),
-        linkage=st.sampled_from(LINKAGES),
+        data=st.data(),
         merge_distance_m=st.sampled_from([1.5, 2.0, 3.0, 4.0, 5.0, 8.0, 13.0, 40.0]),
+        keeps_levels=st.booleans(),
     )
-    def start(self, classes, linkage, merge_distance_m):
+    def start(self, classes, data, merge_distance_m, keeps_levels):
         """Build the first version."""
-        self.classes, self.origin = classes, (0.0, 0.0)
+        linkage = data.draw(st.sampled_from(self.linkages))
+        self.classes, self.origin, self.keeps_levels = classes, (0.0, 0.0), keeps_levels
         self.version = version_of(classes, linkage=linkage, merge_distance_m=merge_distance_m)
 
     def follow(self, classes, *, changed, shift=(0, 0)):
@@ -119,7 +137,10 @@ class Robot(RuleBasedStateMachine):
         frame = Frame(origin_m=self.origin)
         grid = OccupancyGrid(occupancy_grid(classes).probability, frame, robot_radius_m=0)
         self.old = [(self.version, numbers_of(self.version))]
-        update = self.version.update(grid, changed=changed)
+        if isinstance(changed, tuple):
+            changed = area_of(frame, changed[:2], changed[2:])
+        version = self.version if self.keeps_levels else unread(self.version)
+        update = version.update(grid, changed=changed)
         check_events(self.version, update, shift)
         self.classes, self.version = classes, update.version
 
@@ -137,7 +158,7 @@ class Robot(RuleBasedStateMachine):
             painted[:] = rng.integers(0, 3, painted.shape)
         else:
             painted[:] = kind
-        self.follow(classes, changed=(low, left, high, right))
+        self.follow(classes, changed=(low, left, high + 1, right + 1))
 
     @rule(
         by=st.tuples(*[st.integers(0, 3)] * 4),
@@ -168,13 +189,31 @@ class Robot(RuleBasedStateMachine):
     def the_version_before_is_as_it_was(self):
         """An update leaves the older version alone."""
         for version, numbers in self.old:
-            again = copy.copy(version)
-            vars(again).pop("pyramid", None)
-            vars(again).pop("place_numbers", None)
-            assert np.array_equal(numbers_of(again), numbers)
+            assert np.array_equal(numbers_of(unread(version)), numbers)
 
 
 def test_versions_follow_a_map():
+    run_state_machine_as_test(
+        Robot,
+        settings=settings(
+            max_examples=examples(20), stateful_step_count=8, deadline=None, derandomize=True
+        ),
+    )
+
+
+def test_versions_follow_a_map_where_whole_places_merge(monkeypatch):
+    monkeypatch.setattr(draft, "_ROUNDS", 0)
+    run_state_machine_as_test(
+        Robot,
+        settings=settings(
+            max_examples=examples(5), stateful_step_count=8, deadline=None, derandomize=True
+        ),
+    )
+
+
+def test_versions_follow_a_map_in_groups_of_changes(monkeypatch):
+    monkeypatch.setattr(cellwise, "_SMALL_CELLS", 0)
+    monkeypatch.setattr(Robot, "linkages", ("radius",))
     run_state_machine_as_test(
         Robot,
         settings=settings(
@@ -209,7 +248,7 @@ def test_places_that_no_change_touches_keep_cells_levels_and_arcs():
     classes = np.ones((24, 60), np.uint8)
     version = version_of(classes)
     classes[10, 4] = 0
-    after = version.update(occupancy_grid(classes), changed=(10, 4, 10, 4)).version
+    after = version.update(occupancy_grid(classes), changed=(4, 10, 5, 11)).version
     old, new = version.pyramid, after.pyramid
     far = np.zeros(classes.shape, dtype=bool)
     far[:, 25:] = True
@@ -250,9 +289,10 @@ def test_unchanged_parts_of_a_map_are_shared_between_versions():
     classes = np.ones((300, 900), np.uint8)
     version = version_of(classes, merge_distance_m=20.0)
     classes[5, 5] = 0
-    after = version.update(occupancy_grid(classes), changed=(5, 5, 5, 5)).version
-    assert len(version._state.tiles) == 24
-    assert after._state.tiles.shared_with(version._state.tiles) >= 22
+    after = version.update(occupancy_grid(classes), changed=(5, 5, 6, 6)).version
+    old, new = version._state.tiles.arrays(), after._state.tiles.arrays()
+    assert len(old) == 75
+    assert sum(new[key] is tile for key, tile in old.items()) >= 73
 
 
 def test_the_robots_radius_reaches_beyond_the_stated_box():
@@ -262,7 +302,7 @@ def test_the_robots_radius_reaches_beyond_the_stated_box():
     )
     probability[10, 10] = 1.0
     grid = OccupancyGrid(probability, Frame(0.1), robot_radius_m=0.3)
-    check_version(version.update(grid, changed=(10, 10, 10, 10)).version)
+    check_version(version.update(grid, changed=(1.0, 1.0, 1.1, 1.1)).version)
 
 
 @pytest.mark.parametrize("beyond", [1, 4])
@@ -286,14 +326,14 @@ def test_a_narrow_map_grows_on_all_sides():
     version = version.update(grid).version
     check_version(version)
     wider = OccupancyGrid(np.pad(probability, 1), Frame(1.0, (-2.0, -2.0)), robot_radius_m=1.0)
-    check_version(version.update(wider, changed=(0, 0, 0, 0)).version)
+    check_version(version.update(wider, changed=(-2, -2, -1, -1)).version)
 
 
 def test_cells_that_changed_elsewhere_are_reported():
     classes = np.ones((5, 5), np.uint8)
     version = version_of(classes)
     classes[4, 4] = 0
-    after = version.update(occupancy_grid(classes), changed=(0, 0, 1, 1)).version
+    after = version.update(occupancy_grid(classes), changed=(0, 0, 2, 2)).version
     with pytest.raises(InvalidValueError, match=r"1 cells changed outside .* row 4, column 4"):
         after.pyramid  # noqa: B018 - a property
 
@@ -302,11 +342,9 @@ def test_cells_that_changed_elsewhere_are_reported():
     ("grid", "changed", "message"),
     [
         pytest.param(np.zeros((4, 5)), None, "does not cover", id="smaller"),
-        pytest.param(np.zeros((5, 5)), (1, 2), "box of four", id="half a box"),
-        pytest.param(np.zeros((5, 5)), (0.5, 0, 1, 1), "box of four", id="fractions"),
-        pytest.param(np.zeros((5, 5)), np.zeros((4, 5), dtype=bool), "mask of", id="mask"),
-        pytest.param(np.zeros((5, 5)), (3, 3, 1, 1), r"inside \(5, 5\)", id="inverted"),
-        pytest.param(np.zeros((5, 5)), (9, 9, 9, 9), r"inside \(5, 5\)", id="off the map"),
+        pytest.param(np.zeros((5, 5)), (1, 2), "changed is", id="half a box"),
+        pytest.param(np.zeros((5, 5)), np.zeros((4, 5), dtype=bool), "mask of shape", id="mask"),
+        pytest.param(np.zeros((5, 5)), (3, 3, 1, 1), "changed is", id="inverted"),
     ],
 )
 def test_wrong_arguments_end_in_one_line(grid, changed, message):
@@ -329,6 +367,20 @@ def test_cells_must_stay_where_they_are(frame, message):
     version = version_of(np.ones((5, 5), np.uint8))
     with pytest.raises(InvalidValueError, match=message):
         version.update(OccupancyGrid(np.zeros((5, 5), np.float32), frame, robot_radius_m=0))
+
+
+def test_levels_that_were_read_are_not_made_again():
+    classes = np.ones((24, 60), np.uint8)
+    version = version_of(classes)
+    classes[10, 4] = 0
+    first = version.update(occupancy_grid(classes)).version
+    assert not first._state.has_levels
+    levels = first.pyramid.record
+    classes[10, 54] = 0
+    second = first.update(occupancy_grid(classes)).version
+    assert {*second._state.places.stale().tolist()} == {first.place_at((10, 54))}
+    near = np.repeat(np.arange(24 * 60) % 60 < 20, 2)
+    assert np.array_equal(levels.edge_end[near], second.pyramid.record.edge_end[near])
 
 
 def test_a_pyramid_with_rooms_is_refused():

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
+import weakref
 from collections import Counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import hybridnav as hn
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid._size_kernels import level_sizes
 from tests.oracle.checks import base_darts, protected_of, sigma_of
 from tests.oracle.inclusion import nested_scenes
 from tests.oracle.reference import PlaneMap
 from tests.strategies import MAX_SIDE, drawn, examples, occupancy_grid
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(20, MAX_SIDE)
@@ -236,3 +244,36 @@ def test_nothing_lies_below_the_base_or_above_the_apex(lines):
 def test_below_the_base_of_a_tall_pyramid_is_nothing_either():
     with pytest.raises((HybridNavError, IndexError), match=r"base|below level 0|levels 0 to"):
         small_pyramid().children(0, 0)
+
+
+def test_a_pyramid_that_nothing_uses_is_gone_without_a_collection_of_garbage() -> None:
+    topology = hn.TopologicalMap(
+        hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0).with_regions(300)
+    )
+    topology.inclusion.face_of_obstacle  # noqa: B018 - finds the islands
+    for level in topology.pyramid:
+        assert len(level.dual.kinds)  # outer faces are found from islands too
+    gone: list[Callable[[], object]] = [
+        weakref.ref(topology.pyramid),
+        *(weakref.ref(level) for level in topology.pyramid),
+    ]
+    gc.disable()
+    try:
+        del topology, level
+        assert [thing() for thing in gone] == [None] * len(gone)
+    finally:
+        gc.enable()
+
+
+@ORDINARY
+@given(nested_scenes(SIDE))
+def test_the_sizes_of_levels_can_be_counted_without_making_them(scene):
+    pyramid = scene.pyramid("radius")
+    grid, record = pyramid.grid, pyramid.record
+    sizes = level_sizes(
+        record.vertex_end, record.vertex_parent, record.edge_end, grid.shape[1], len(pyramid)
+    )
+    loops = [int(level.is_self_loop.sum()) for level in pyramid]
+    assert sizes.tolist() == [
+        [level.n_vertices, level.n_arcs, n] for level, n in zip(pyramid, loops, strict=True)
+    ]

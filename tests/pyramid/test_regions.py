@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
+from hybridnav.pyramid.lazy_islands import LazyIslands
 from tests.oracle.checks import check_attributes, check_level, check_step
 from tests.oracle.pyramid import Base, boundaries
 from tests.strategies import MAX_SIDE, Scene, drawn, examples, labelled, occupancy_grid, scenes
@@ -121,7 +122,7 @@ def test_the_darts_of_the_places_are_those_that_the_record_describes(
 ) -> None:
     pyramid = scene.pyramid(linkage)
     made, level = pyramid[-1].darts, pyramid[-1]
-    again = type(level)(level.grid, pyramid.record, level.index, lambda: pyramid.islands).darts
+    again = type(level)(level.grid, pyramid.record, level.index, LazyIslands(level.grid)).darts
     for name in ("sigma", "origin", "protected", "base_edge"):
         one, other = getattr(made, name), getattr(again, name)
         np.testing.assert_array_equal(one, other)

@@ -47,7 +47,7 @@ def join(tables, cell, found):
     # cells count.
     at, limits = np.full(8, cell), np.empty((8, 2), np.int64)
     for k in range(1, 8, 2):
-        limits[k, 0], limits[k, 1] = _limit(ahead[here, k - 1]), _limit(ahead[here, k + 1 & 7])
+        limits[k, 0], limits[k, 1] = limit_of(ahead[here, k - 1]), limit_of(ahead[here, k + 1 & 7])
     n_left = 4
     while n_left > 0:
         for k in range(1, 8, 2):
@@ -70,7 +70,7 @@ def join(tables, cell, found):
                     straight = at[k] + seen * step_of(along, width)
                     found[n_found] = order[corner_at(index, straight)]
                     n_found += 1
-                limits[k, i] = min(limits[k, i], _limit(seen))
+                limits[k, i] = min(limits[k, i], limit_of(seen))
     return n_found
 
 
@@ -87,7 +87,7 @@ def step_of(k, width):
 
 
 @njit(cache=True, nogil=True)
-def _limit(seen):
+def limit_of(seen):
     """Return the distance along a side from which no cell is the next corner cell any more.
 
     It holds further along the diagonal: a corner cell or a blocked one lies before that distance.

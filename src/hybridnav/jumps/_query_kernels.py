@@ -43,7 +43,7 @@ def _walk(cells, n_cells, rows, cols, is_straight_first):
 
 
 @njit(cache=True, nogil=True)
-def _cells_of(graph, endpoints, meeting, nodes, origin, cells, n_cells):
+def cells_of(graph, endpoints, meeting, nodes, origin, cells, n_cells):
     """Append the cells of a path to `cells`.
 
     Parameters
@@ -151,7 +151,7 @@ def paths(graph, middles, origin, endpoints, work):
             nodes = touched[:0]
             if meeting >= 0:
                 nodes = corners_between((first, middles), meeting, records)
-            cells, n_cells, counts[i, 0], counts[i, 1] = _cells_of(
+            cells, n_cells, counts[i, 0], counts[i, 1] = cells_of(
                 graph, pair, meeting, nodes, origin, cells, n_cells
             )
         for k in range(n_touched):

@@ -14,11 +14,12 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.jumps import _query_kernels as kernels
 from hybridnav.jumps._leg_kernels import legs_that_follow
+from hybridnav.jumps.patch import JumpPatch
 from hybridnav.search.moves import FAR
 from hybridnav.search.pool import Pool
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.jumps.build import JumpGraph
 
 KERNEL = kernels.paths
@@ -77,6 +78,10 @@ class JumpSearch:
     ----------
     graph
         The graph of the map's free cells, contracted or not.
+    patch
+        What changed since the graph was built, see `renewed`; None for nothing.
+    base
+        The patch of the graph without a change; None to make it when it is needed.
 
     Notes
     -----
@@ -91,12 +96,55 @@ class JumpSearch:
     3.8284271247461903
     """
 
-    def __init__(self, graph: JumpGraph) -> None:
+    def __init__(
+        self, graph: JumpGraph, patch: JumpPatch | None = None, *, base: JumpPatch | None = None
+    ) -> None:
         self.graph = graph
+        self.patch = patch
+        self._base = base
         tables = graph.index, graph.ahead, graph.order, graph.shape[1]
         arcs = graph.first, graph.arcs
         self._arrays = tables, graph.places, graph.component, legs_that_follow(), arcs
+        if patch is not None:
+            rows = np.arange(graph.n_corners, dtype=np.int32)
+            ordered = graph.index, graph.ahead, rows, graph.shape[1]
+            dirty = patch.tile_of, patch.codes, patch.hops
+            self._patched = ordered, dirty, patch.places, patch.is_stale, patch.first, patch.arcs
         self._works = Pool(partial(_Work, graph.n_corners, len(graph.arcs)))
+
+    def renewed(self, free: BoolArray, cells: LongArray) -> JumpSearch | None:
+        """Return the search of the map after some of its cells changed; this one stays as it is.
+
+        Its arcs are those of the graph, except at corner cells that look into the neighbourhood of
+        a change: a query that expands one of these looks again. Queries are as exact, but slower
+        than on a contracted graph.
+
+        Parameters
+        ----------
+        free
+            bool (rows, cols), the free cells of the map now.
+        cells
+            int64 (m, 2), (row, col) of those that changed since this search was made.
+
+        Returns
+        -------
+        JumpSearch | None
+            None if the graph had better be built anew: cells outside the rectangle of all free
+            cells became free, or changes lie in a quarter of the map.
+
+        Examples
+        --------
+        >>> from hybridnav.jumps import JumpSearch, build_jump_graph
+        >>> free = np.ones((3, 5), dtype=bool)
+        >>> search = JumpSearch(build_jump_graph(free))
+        >>> free[:2, 2] = False
+        >>> after = search.renewed(free, np.array([[0, 2], [1, 2]]))
+        >>> search.path((0, 0), (0, 4)).length_cells, after.path((0, 0), (0, 4)).length_cells
+        (4.0, 6.82842712474619)
+        """
+        before = self.patch or self._base or JumpPatch.of(self.graph)
+        patch = before.changed(self.graph, free, cells)
+        return None if patch is None else JumpSearch(self.graph, patch)
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:
         """Find a shortest path between two free cells."""
@@ -126,6 +174,14 @@ class JumpSearch:
 
     def _paths(self, endpoints: LongArray) -> tuple[Any, Any, Any]:
         """Return the offsets of the paths, their cells, and the moves and expansions of each."""
+        if self.patch is not None:
+            # Most searches never see a change.
+            from hybridnav.jumps._patch_search_kernels import paths_patched  # noqa: PLC0415
+
+            answer: tuple[Any, Any, Any] = paths_patched(
+                self._patched, self.graph.origin, endpoints
+            )
+            return answer
         with self._works.lent() as work:
             found: tuple[Any, Any, Any] = kernels.paths(
                 self._arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays

@@ -1,4 +1,4 @@
-"""Kernels that cut closed cells out of a mesh: the polygons that they touch, and the rest.
+"""Kernels that renew a mesh where cells changed: the polygons beside them, and the rest.
 
 Points are (row, col) in grid units, as for `merge_triangles`.
 """
@@ -47,8 +47,8 @@ def _touches_cell(corners, begins, low, high, row, col):
 
 @guarded
 @njit(cache=True, nogil=True)
-def touched_polygons(corners, sides, polygon_at, closed):
-    """Return the polygons that share a point with a closed cell, reached from inside it.
+def touched_polygons(corners, sides, place, cells):
+    """Return the polygons that share a point with a cell, reached from inside it.
 
     Parameters
     ----------
@@ -56,10 +56,11 @@ def touched_polygons(corners, sides, polygon_at, closed):
         int32 (n, 2).
     sides
         Arrays first, begins, twins, polygon_of of the mesh.
-    polygon_at
-        int32 (rows, cols), the polygon at the centre of each cell, -1 for none.
-    closed
-        int64 (m,), flat cells.
+    place
+        int32 (rows, cols), the polygon at the centre of each cell before the mesh was renewed, -1
+        for none; int32 (p,), component of each polygon, -1 for removed ones.
+    cells
+        int64 (m,), flat cells that were free.
 
     Returns
     -------
@@ -67,17 +68,19 @@ def touched_polygons(corners, sides, polygon_at, closed):
         bool (p,) whether each polygon is touched, int32 their numbers.
     """
     first, begins, twins, polygon_of = sides
+    polygon_at, component = place
     n = len(first) - 1
+    near = _polygons_near(corners, sides, component, cells, polygon_at.shape[1])
     is_touched = np.zeros(n, np.bool_)
     touched = np.empty(n, np.int32)
     seen = np.full(n, -1, np.int64)
     waiting = np.empty(n, np.int32)
     count = 0
-    for cell in closed:
+    for cell in cells:
         row, col = cell // polygon_at.shape[1], cell % polygon_at.shape[1]
         inner = polygon_at[row, col]
-        if inner < 0:
-            continue
+        if inner < 0 or component[inner] < 0:
+            inner = _polygon_with(corners, first, begins, near, row, col)
         waiting[0], size = inner, 1
         seen[inner] = cell
         while size:
@@ -98,6 +101,78 @@ def touched_polygons(corners, sides, polygon_at, closed):
                     waiting[size] = other
                     size += 1
     return is_touched, touched[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def _polygons_near(corners, sides, component, cells, n_cols):
+    """Return the polygons whose bounds meet those of some cells, without removed ones."""
+    first, begins = sides[:2]
+    bottom = left = np.int64(1) << 40
+    top = right = -bottom
+    for cell in cells:
+        bottom, top = min(bottom, cell // n_cols), max(top, cell // n_cols + 1)
+        left, right = min(left, cell % n_cols), max(right, cell % n_cols + 1)
+    near = np.empty(len(first) - 1, np.int32)
+    n = 0
+    for polygon in range(len(first) - 1):
+        if component[polygon] < 0:
+            continue
+        below = above = before = behind = True
+        for slot in range(first[polygon], first[polygon + 1]):
+            row, col = corners[begins[slot], 0], corners[begins[slot], 1]
+            below, above = below and row < bottom, above and row > top
+            before, behind = before and col < left, behind and col > right
+        if not (below or above or before or behind):
+            near[n] = polygon
+            n += 1
+    return near[:n]
+
+
+@njit(cache=True, nogil=True)
+def _polygon_with(corners, first, begins, near, row, col):
+    """Return the one of some polygons with the centre of a cell."""
+    for polygon in near:
+        low, high = first[polygon], first[polygon + 1]
+        holds = True
+        for slot in range(low, high):
+            a, b = begins[slot], begins[low if slot + 1 == high else slot + 1]
+            holds = holds and (
+                _cross(
+                    2 * corners[a, 0], 2 * corners[a, 1], 2 * corners[b, 0], 2 * corners[b, 1],
+                    2 * row + 1, 2 * col + 1,
+                )
+                >= 0
+            )  # fmt: skip
+        if holds:
+            return polygon
+    return near[0]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def freed_cells(free, changed):
+    """Return the changed cells that are free, and the free cells beside them, also at their
+    corners, that were free before; int64, flat, each once."""
+    rows, cols = free.shape
+    freed = np.empty(len(changed), np.int64)
+    n = 0
+    for cell in changed:
+        if free[cell // cols, cell % cols]:
+            freed[n] = cell
+            n += 1
+    freed = np.sort(freed[:n])
+    found = np.empty(8 * n, np.int64)
+    n = 0
+    for cell in freed:
+        row, col = cell // cols, cell % cols
+        for k in range(9):
+            r, c = row + k // 3 - 1, col + k % 3 - 1
+            if 0 <= r < rows and 0 <= c < cols and free[r, c]:
+                at = np.searchsorted(freed, r * cols + c)
+                if at == len(freed) or freed[at] != r * cols + c:
+                    found[n] = r * cols + c
+                    n += 1
+    return freed, np.unique(found[:n])
 
 
 @njit(cache=True, nogil=True)
@@ -132,17 +207,24 @@ def corners_of_cells(free, closed):
     return found, kinds
 
 
+@njit(cache=True, nogil=True)
+def _holds(points, at):
+    """Return the index of a flat lattice point in a sorted list, -1 if it is not there."""
+    found = np.searchsorted(points, at)
+    return found if found < len(points) and points[found] == at else -1
+
+
 @guarded
 @njit(cache=True, nogil=True)
-def walls_of_closed(free, closed, points):
-    """Return the walls between closed cells and free ones, from vertex to vertex.
+def walls_of_changed(free, changed, points):
+    """Return the walls at changed cells, from vertex to vertex.
 
     Parameters
     ----------
     free
-        bool (rows, cols), without the closed cells.
-    closed
-        int64 (m,), flat cells that are closed.
+        bool (rows, cols), the free cells now.
+    changed
+        int64 (m,), flat cells.
     points
         int64 (n,), flat lattice points that are vertices, sorted.
 
@@ -153,26 +235,30 @@ def walls_of_closed(free, closed, points):
     """
     rows, cols = free.shape
     wide = cols + 1
-    walls = np.empty((4 * len(closed), 2), np.int64)
+    walls = np.empty((4 * len(changed), 2), np.int64)
     n = 0
-    for cell in closed:
+    for cell in changed:
         row, col = cell // cols, cell % cols
         for side in range(4):
             # The other cell of the side, and the two endpoints of the side.
             down = row - 1 if side == 0 else row + 1 if side == 1 else row
             across = col - 1 if side == 2 else col + 1 if side == 3 else col
-            if not (0 <= down < rows and 0 <= across < cols and free[down, across]):
+            beyond = 0 <= down < rows and 0 <= across < cols and free[down, across]
+            if beyond == free[row, col]:
                 continue
             at = (row + (side == 1)) * wide + col + (side == 3)
             step = 1 if side < 2 else wide
-            begin = np.searchsorted(points, at)
-            if begin == len(points) or points[begin] != at:
-                continue  # a straight wall continues here
+            begin = _holds(points, at)
+            if begin < 0 and not free[row, col]:
+                continue  # the wall begins at another closed cell
+            while begin < 0:
+                at -= step
+                begin = _holds(points, at)
             end = at + step
-            stop = np.searchsorted(points, end)
-            while stop == len(points) or points[stop] != end:
+            stop = _holds(points, end)
+            while stop < 0:
                 end += step
-                stop = np.searchsorted(points, end)
+                stop = _holds(points, end)
             walls[n, 0], walls[n, 1] = begin, stop
             n += 1
     return walls[:n].copy()
@@ -198,7 +284,7 @@ def rim_of(sides, is_touched, touched):
 
 @guarded
 @njit(cache=True, nogil=True)
-def segments_of_rim(sides, rim, point_of, points, wide):
+def segments_of_rim(sides, rim, point_of, points, free):
     """Return the sides of a rim, divided at vertices, int64 (w, 2), indices of `points`.
 
     Parameters
@@ -211,32 +297,57 @@ def segments_of_rim(sides, rim, point_of, points, wide):
         int64 (n,), flat lattice point of each corner of the mesh.
     points
         int64 (k,), flat lattice points that are vertices, sorted.
-    wide
-        Lattice points in a row.
+    free
+        bool (rows, cols), the free cells now: sides of walls between two of them are left out.
     """
     first, begins, twins, polygon_of = sides
-    segments = np.empty((len(rim) + 2 * len(points), 2), np.int64)
+    wide = free.shape[1] + 1
+    segments = np.empty((2 * len(rim) + 4 * len(points), 2), np.int64)
     n = 0
     for slot in rim:
         polygon = polygon_of[slot]
         after = first[polygon] if slot + 1 == first[polygon + 1] else slot + 1
         at, end = point_of[begins[slot]], point_of[begins[after]]
-        here = np.searchsorted(points, at)
         if twins[slot] >= 0:
-            segments[n, 0], segments[n, 1] = here, np.searchsorted(points, end)
+            segments[n, 0], segments[n, 1] = _holds(points, at), _holds(points, end)
             n += 1
             continue
         step = wide if abs(end - at) >= wide else 1
         if end < at:
             step = -step
-        while at != end:
+        here, back = _holds(points, at), at
+        # Where a wall goes on at one of its former ends, this end is no vertex.
+        while here < 0 and _n_free(free, at, step) == 1:
+            back -= step
+            here = _holds(points, back)
+        left, there = abs(end - at) // abs(step), here
+        while left > 0 or (here >= 0 and there < 0):
+            n_free = _n_free(free, at, step)
+            if n_free == 2 or (left <= 0 and n_free == 0):
+                here = -1
             at += step
-            there = np.searchsorted(points, at)
-            if there < len(points) and points[there] == at:
-                segments[n, 0], segments[n, 1] = here, there
-                n += 1
+            left -= 1
+            there = _holds(points, at)
+            if there >= 0:
+                if here >= 0:
+                    segments[n, 0], segments[n, 1] = here, there
+                    n += 1
                 here = there
     return segments[:n].copy()
+
+
+@njit(cache=True, nogil=True)
+def _n_free(free, at, step):
+    """Return how many cells beside the side from a lattice point on are free."""
+    rows, cols = free.shape
+    wide = cols + 1
+    low = min(at, at + step)
+    row, col = low // wide, low % wide
+    if abs(step) == 1:
+        below = row > 0 and free[row - 1, col]
+        return int(below) + int(row < rows and free[row, col])
+    before = col > 0 and free[row, col - 1]
+    return int(before) + int(col < cols and free[row, col])
 
 
 @guarded

@@ -101,10 +101,10 @@ def polygons_of_endpoints(mesh, component, polygon_at, cells, endpoints, starts,
 
 @njit(cache=True, nogil=True)
 def _polygon_in(mesh, component, polygon_at, row, col):
-    """Return a polygon with the centre of a free cell; in a cut mesh, one of the last."""
+    """Return a polygon with the centre of a free cell; in a renewed mesh, one of the last."""
     cx, cy, _, first, begins, finishes, _, _ = mesh
     polygon = polygon_at[row, col]
-    if component[polygon] >= 0:
+    if polygon >= 0 and component[polygon] >= 0:
         return polygon
     for other in range(len(first) - 2, -1, -1):
         holds = component[other] >= 0

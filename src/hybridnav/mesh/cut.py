@@ -1,8 +1,8 @@
-"""A convex mesh with closed cells cut out of it."""
+"""A convex mesh of changed cells: only the polygons beside them are cut anew."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from hybridnav.mesh import _cut_kernels as kernels
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import MANY, NO_CORNER
-from hybridnav.mesh._merge_kernels import are_free
+from hybridnav.mesh._merge_kernels import are_free, polygons_of_cells
 from hybridnav.mesh.build import ConvexMesh, triangulate
 from hybridnav.mesh.merge import merge_triangles, select_triangles
 
@@ -19,25 +19,21 @@ if TYPE_CHECKING:
 
 
 def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh:
-    """Cut closed cells out of a mesh.
-
-    The polygons that share a point with a closed cell are triangulated and merged again; all others
-    stay, so that the work grows with the closed area. Only the blocks are always found again.
+    """Cut closed cells out of a mesh; see `renew_mesh`.
 
     Parameters
     ----------
     mesh
-        The mesh of the map's free space.
+        The mesh of the map's free space, with its `polygon_at`.
     free
         bool (rows, cols), the free cells without the closed ones.
     closed
-        int64 (m,), flat cells that are closed.
+        int64 (m,), flat cells that are closed; those that are not free cut nothing.
 
     Returns
     -------
     ConvexMesh
-        The polygons that were cut stay as walled-in ones, with -1 as their `component`; those in
-        their place come last. `polygon_at` is that of `mesh`.
+        The mesh itself if nothing is cut.
 
     Examples
     --------
@@ -47,30 +43,107 @@ def cut_mesh(mesh: ConvexMesh, free: BoolArray, closed: LongArray) -> ConvexMesh
     >>> cut_mesh(mesh, free, np.array([5])).n_polygons
     2
     """
-    closed = closed[mesh.polygon_at.ravel()[closed] >= 0]
-    if not len(closed):
+    return renew_mesh(mesh, free, closed[mesh.polygon_at.ravel()[closed] >= 0])
+
+
+def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexMesh:
+    """Return the mesh of free cells of which some have changed.
+
+    The polygons that share a point with a closed cell, or with a cell beside a freed one, are
+    triangulated and merged again together with the freed cells; all others stay, with their
+    numbers. Only the blocks are always found again.
+
+    Parameters
+    ----------
+    mesh
+        The mesh of the free cells before; unchanged.
+    free
+        bool (rows, cols), the free cells now.
+    changed
+        int64 (m,), flat cells that were free and are not, or are free and were not.
+
+    Returns
+    -------
+    ConvexMesh
+        The polygons that were removed stay as walled-in ones, with -1 as their `component`; those
+        in their place come last. `polygon_at` is that of `mesh`, see `locate_polygons`; a search
+        looks for cells of removed polygons, and for freed ones, among the last polygons.
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import build_mesh, renew_mesh
+    >>> free = np.ones((3, 4), dtype=bool)
+    >>> free[1, 2] = False
+    >>> mesh = build_mesh(free)
+    >>> free[1, 2] = True
+    >>> renewed = renew_mesh(mesh, free, np.array([6]))
+    >>> mesh.n_polygons, int((renewed.component >= 0).sum())
+    (4, 1)
+    """
+    if not len(changed):
         return mesh
+    freed, beside = kernels.freed_cells(free, changed)
     sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
-    is_cut, cut = kernels.touched_polygons(mesh.corners, sides, mesh.polygon_at, closed)
-    hole = _Hole(cut, kernels.rim_of(sides, is_cut, cut))
-    slots = np.concatenate([np.arange(*mesh.first[number : number + 2]) for number in cut])
-    vertices = _vertices_of(mesh, slots, free, closed)
-    anew = _polygons_in(mesh, hole, vertices, free, closed)
+    looked = np.concatenate([changed[~free.ravel()[changed]], beside])
+    place = mesh.polygon_at, mesh.component
+    is_cut, cut = kernels.touched_polygons(mesh.corners, sides, place, looked)
+    hole = _Hole(cut, kernels.rim_of(sides, is_cut, cut), freed)
+    slots = np.concatenate(
+        [np.empty(0, np.int64), *(np.arange(*mesh.first[number : number + 2]) for number in cut)]
+    )
+    vertices = _vertices_of(mesh, slots, free, (changed, freed))
+    anew = _polygons_in(mesh, hole, vertices, free, changed)
     polygons = _with_hole_filled(mesh, hole, slots, anew)
     blocks = blocks_of(polygons[0], *polygons[2:])
-    blocks[3][cut] = -1  # without a component
+    is_gone = np.concatenate([mesh.component < 0, np.zeros(len(anew[0]) - 1, np.bool_)])
+    is_gone[cut] = True
+    blocks[3][is_gone] = -1  # without a component
     arrays = (vertices.corners, vertices.kinds, *polygons, mesh.polygon_at, *blocks)
     for array in arrays:
         array.flags.writeable = False
     return ConvexMesh(*arrays)
 
 
+def locate_polygons(mesh: ConvexMesh, free: BoolArray) -> ConvexMesh:
+    """Return a renewed mesh whose `polygon_at` is that of its own polygons.
+
+    The work grows with the map.
+
+    Parameters
+    ----------
+    mesh
+        A mesh of `renew_mesh`; unchanged.
+    free
+        bool (rows, cols), its free cells.
+
+    Returns
+    -------
+    ConvexMesh
+        The same polygons.
+
+    Examples
+    --------
+    >>> from hybridnav.mesh import build_mesh, locate_polygons, renew_mesh
+    >>> free = np.ones((1, 3), dtype=bool)
+    >>> mesh = build_mesh(free)
+    >>> free[0, 1] = False
+    >>> locate_polygons(renew_mesh(mesh, free, np.array([1])), free).polygon_at.tolist()
+    [[1, -1, 2]]
+    """
+    # Later polygons lie in the place of earlier ones that were removed.
+    found = polygons_of_cells(mesh.first, mesh.begins, mesh.corners, free.shape)
+    found[~free] = -1
+    found.flags.writeable = False
+    return replace(mesh, polygon_at=found)
+
+
 @dataclass(frozen=True, eq=False)
 class _Hole:
-    """Polygons that are removed, and their slots round the hole that remains."""
+    """Polygons that are removed, their slots round the hole that remains, and freed cells."""
 
     polygons: IntArray
     rim: LongArray
+    freed: LongArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,15 +161,23 @@ class _Vertices:
 
 
 def _vertices_of(
-    mesh: ConvexMesh, slots: LongArray, free: BoolArray, closed: LongArray
+    mesh: ConvexMesh, slots: LongArray, free: BoolArray, cells: tuple[LongArray, LongArray]
 ) -> _Vertices:
-    """Return the corners of the removed polygons, and the points at which walls turn now."""
+    """Return the corners of the removed polygons, and the points at which walls turn now.
+
+    Points at freed cells where no wall turns any more are left out; no other polygon has them.
+    """
     wide = free.shape[1] + 1
+    changed, freed = cells
     old = np.unique(mesh.begins[slots])
     known = mesh.corners[old] @ np.array([wide, 1], dtype=np.int64)
+    at, kinds_at = kernels.corners_of_cells(free, changed)
+    if len(freed):
+        around, kinds_around = kernels.corners_of_cells(free, freed)
+        stays = ~np.isin(known, around[kinds_around == NO_CORNER])
+        old, known = old[stays], known[stays]
     order = np.argsort(known)
     old, known = old[order], known[order]
-    at, kinds_at = kernels.corners_of_cells(free, closed)
     made = np.setdiff1d(at[kinds_at != NO_CORNER], known)
     points = np.union1d(known, made)
     number_of = np.empty(len(points), np.int32)
@@ -110,19 +191,23 @@ def _vertices_of(
 
 
 def _polygons_in(
-    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray, closed: LongArray
+    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray, changed: LongArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """Fill a hole; return first slots, corners, twins and polygons of slots of the new polygons."""
     sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
     wide = free.shape[1] + 1
     around = mesh.corners @ np.array([wide, 1], dtype=np.int64)
-    rim = kernels.segments_of_rim(sides, hole.rim, around, vertices.points, wide)
-    walls = np.concatenate([rim, kernels.walls_of_closed(free, closed, vertices.points)])
+    rim = kernels.segments_of_rim(sides, hole.rim, around, vertices.points, free)
+    walls = np.concatenate([rim, kernels.walls_of_changed(free, changed, vertices.points)])
+    if len(hole.freed):
+        walls = np.unique(np.sort(walls, axis=1), axis=0)
     local = vertices.corners[vertices.number_of]
     triangles, neighbours = triangulate(local, walls)
     kept = are_free(local, triangles, free)
     triples = local[triangles[kept]].sum(axis=1, dtype=np.int64)
-    kept[kept] = kernels.are_inside(mesh.corners, mesh.first, mesh.begins, hole.polygons, triples)
+    inside = kernels.are_inside(mesh.corners, mesh.first, mesh.begins, hole.polygons, triples)
+    middles = triples // 3 @ np.array([free.shape[1], 1])
+    kept[kept] = inside | np.isin(middles, hole.freed)
     first, begins, twins, polygon_of = merge_triangles(
         local, *select_triangles(triangles, neighbours, kept)
     )

@@ -12,9 +12,10 @@ from hybridnav.online.places import PLACE, PlaceTable
 from hybridnav.online.tiles import CELL, NO_PLACE, Box, Tiles
 from hybridnav.online.windows import record_of
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.record import SURVIVES, BuildStats, LevelSize
+from hybridnav.pyramid.record import SURVIVES, BuildStats
 
 if TYPE_CHECKING:
+    from hybridnav._typing import AnyArray, LongArray
     from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import Linkage
 
@@ -65,7 +66,7 @@ def state_of(pyramid: DualGraphPyramid) -> State:
     whole_at = np.zeros(level.n_vertices, np.uint8)
     np.maximum.at(whole_at, level.field_of[row, col], end[row, col])
     table["whole_at"] = whole_at
-    places = PlaceTable({})
+    places = PlaceTable()
     places.write(range(level.n_vertices), table)
     places.close()
     n_ends = np.bincount(end.ravel(), minlength=SURVIVES + 1).astype(np.int64)
@@ -92,6 +93,7 @@ def pyramid_of(state: State, box: Box, settings: Settings) -> DualGraphPyramid:
             f"{int(differs.sum())} cells changed outside what the updates stated, the first at "
             f"row {row}, column {col}: pass changed=None to compare all cells"
         )
+    _close_levels(cells, state.vertex_ends)
     record = record_of(cells)
     record.vertex_parent[cells["place"].ravel() == NO_PLACE] = -1
     stats = BuildStats()
@@ -106,9 +108,16 @@ def pyramid_of(state: State, box: Box, settings: Settings) -> DualGraphPyramid:
     )
     n_levels = int(np.count_nonzero(state.vertex_ends[1:SURVIVES])) + 1
     stats.tops.append(n_levels - 1)
-    stats.sizes.extend(LevelSize(0, 0, 0) for _ in range(n_levels))
-    for index in range(n_levels):
-        level = pyramid[index]
-        loops = int(level.is_self_loop.sum())
-        stats.sizes[index] = LevelSize(level.n_vertices, level.n_arcs, loops)
+    stats.sizes.extend(record.sizes(settings.grid.shape[1], n_levels))
     return pyramid
+
+
+def _close_levels(cells: AnyArray, vertex_ends: LongArray) -> None:
+    """Give the levels at which cells end the numbers 1, 2, ..."""
+    levels = np.flatnonzero(vertex_ends[1:SURVIVES]) + 1
+    new_level = np.arange(SURVIVES + 1, dtype=np.uint8)
+    new_level[levels] = np.arange(1, len(levels) + 1)
+    new_end = np.arange(SURVIVES + 1, dtype=np.uint8)
+    new_end[2 * levels] = 2 * new_level[levels]
+    new_end[2 * levels + 1] = 2 * new_level[levels] + 1
+    cells["end"], cells["edges"] = new_level[cells["end"]], new_end[cells["edges"]]

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav.online.tiles import NO_PLACE
+from hybridnav.online import _tile_kernels
+from hybridnav.online.tiles import NO_PLACE, Box
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from hybridnav._typing import LongArray
+    from hybridnav.online.cellwise import CellDraft
     from hybridnav.online.draft import Draft
+
+    Overlap = tuple[int, int, int]
+    """An old place, a new one or -1 for none, and the cells that they have in common."""
 
 
 class Events(NamedTuple):
@@ -28,15 +36,13 @@ class Events(NamedTuple):
     """Old ones that bear their number still."""
 
 
-class _Overlaps(NamedTuple):
-    """Cells that an old place and a new one have in common, by pairs in ascending order."""
+class _Heirs(NamedTuple):
+    """The heirs of old places."""
 
-    old: LongArray
-    """The old place."""
-    new: LongArray
-    """The new place, -1 for none."""
-    cells: LongArray
-    """Cells in common."""
+    of: dict[int, int]
+    """The heir of each old place that has one, by the number that it has in the draft."""
+    name: dict[int, int]
+    """The final number of each heir."""
 
 
 def settle(draft: Draft) -> Events:
@@ -47,52 +53,98 @@ def settle(draft: Draft) -> Events:
     ties.
     """
     first = draft.before.next_place
-    found = _overlaps(draft)
-    gone = np.unique(found.old)
-    areas = draft.before.places.read(gone.tolist())["area"]
-    most = 2 * found.cells > areas[np.searchsorted(gone, found.old)]
-    most &= found.new != NO_PLACE
-    heir_of = dict(zip(found.old[most].tolist(), found.new[most].tolist(), strict=True))
-    shared = dict(zip(found.old[most].tolist(), found.cells[most].tolist(), strict=True))
-    name: dict[int, int] = {}
-    for old in sorted(heir_of, key=lambda place: (-shared[place], place)):
-        name.setdefault(heir_of[old], old)
-    new = [place for place in draft.places.numbers(first) if place not in name]
+    found = [overlap for overlap in _moved(draft) if overlap[0] != NO_PLACE]
+    areas = _areas_before(draft, {old for old, _, _ in found})
+    heirs = _heirs(found, areas)
+    new = [place for place in draft.places.numbers(first) if place not in heirs.name]
     born = {place: first + at for at, place in enumerate(new)}
-    name |= born
+    name = heirs.name | born
     _rename(draft, first, name)
     draft.next_place = first + len(born)
-    kept = set(name.values())
-    died = [place for place in gone.tolist() if place not in kept]
+    return _events(draft, found, _Heirs(heirs.of, name))
+
+
+def settle_cells(draft: CellDraft) -> Events:
+    """Give the places of a draft, in which cells moved, their final numbers; see `settle`.
+
+    Most of them bear these already.
+    """
+    first = draft.before.next_place
+    moved = _moved(draft)
+    seen = {place for overlap in moved for place in overlap[:2]} - {NO_PLACE}
+    stay = areas = _areas_before(draft, {place for place in seen if place < first})
+    lost: Counter[int] = Counter()
+    for old, _, cells in moved:
+        lost[old] += cells
+    found = [overlap for overlap in moved if overlap[0] != NO_PLACE]
+    found += [(old, old, area - lost[old]) for old, area in stay.items() if area > lost[old]]
+    heirs = _heirs(found, areas)
+    name = dict(heirs.name)
+    new = {place for _, place, _ in found} | set(draft.places.numbers(first))
+    for place in sorted(new - name.keys() - {NO_PLACE}):
+        name[place] = place
+        if place < first:
+            name[place] = draft.next_place
+            draft.next_place += 1
+    _renumber(draft, {place: final for place, final in name.items() if place != final})
+    return _events(draft, found, _Heirs(heirs.of, name))
+
+
+def _moved(draft: Draft | CellDraft) -> list[Overlap]:
+    """Return the cells in common of places that differ; old places are -1 where there was none."""
+    keys, count = np.empty(0, np.int64), 0
+    for before, after in draft.tiles.changed(draft.before.tiles):
+        if count + before.size > len(keys):
+            keys = np.concatenate([keys[:count], np.empty(count + 8 * before.size, np.int64)])
+        count = _tile_kernels.moved_cells(before, after, keys, count)
+    keys, counts = np.unique(keys[:count], return_counts=True)
+    old, new = (keys >> 32) - 1, (keys & 0xFFFFFFFF) - 1
+    return [*zip(old.tolist(), new.tolist(), counts.tolist(), strict=True)]
+
+
+def _areas_before(draft: Draft | CellDraft, places: Iterable[int]) -> dict[int, int]:
+    """Return the cells that old places had."""
+    numbers = sorted(places)
+    areas = draft.before.places.read(numbers)["area"].tolist()
+    return dict(zip(numbers, areas, strict=True))
+
+
+def _heirs(found: list[Overlap], areas: dict[int, int]) -> _Heirs:
+    """Return the heirs of old places, of which the cells that they had are given."""
+    of, shared = {}, {}
+    for old, new, cells in found:
+        if 2 * cells > areas[old] and new != NO_PLACE:
+            of[old], shared[old] = new, cells
+    name: dict[int, int] = {}
+    for old in sorted(of, key=lambda place: (-shared[place], place)):
+        name.setdefault(of[old], old)
+    return _Heirs(of, name)
+
+
+def _events(draft: Draft | CellDraft, found: list[Overlap], heirs: _Heirs) -> Events:
+    """Return what became of places whose final numbers are known."""
+    first, kept = draft.before.next_place, set(heirs.name.values())
+    old = sorted({place for place, _, _ in found})
+    died = [place for place in old if place not in kept]
     return Events(
-        tuple(sorted(born.values())),
+        tuple(sorted(place for place in kept if place >= first)),
         tuple(died),
-        {place: name[heir_of[place]] for place in died if place in heir_of},
-        _split(draft, found, name),
-        tuple(place for place in gone.tolist() if place in kept),
+        {place: heirs.name[heirs.of[place]] for place in died if place in heirs.of},
+        _split(draft, found, heirs.name),
+        tuple(place for place in old if place in kept),
     )
 
 
-def _overlaps(draft: Draft) -> _Overlaps:
-    """Count the cells of each pair of an old place and a new one that differ."""
-    pairs = []
-    for before, after in draft.tiles.changed(draft.before.tiles):
-        old, new = before["place"], after["place"]
-        differs = (old != new) & (old != NO_PLACE)
-        pairs.append(np.stack([old[differs], new[differs]], axis=1))
-    both = np.concatenate([*pairs, np.empty((0, 2), np.int32)]).astype(np.int64)
-    keys, counts = np.unique((both[:, 0] << 32) + both[:, 1] + 1, return_counts=True)
-    return _Overlaps(keys >> 32, (keys & 0xFFFFFFFF) - 1, counts.astype(np.int64))
-
-
-def _split(draft: Draft, found: _Overlaps, name: dict[int, int]) -> dict[int, tuple[int, ...]]:
+def _split(
+    draft: Draft | CellDraft, found: list[Overlap], name: dict[int, int]
+) -> dict[int, tuple[int, ...]]:
     """Return the places of which several new ones mostly consist."""
+    final = [name[new] for _, new, _ in found if new != NO_PLACE]
+    areas = dict(zip(final, draft.places.read(final)["area"].tolist(), strict=True))
     split: dict[int, list[int]] = {}
-    for old, new, cells in zip(*(values.tolist() for values in found), strict=True):
-        if new != NO_PLACE:
-            area = int(draft.places.read([name[new]])[0]["area"])
-            if 2 * cells > area:
-                split.setdefault(old, []).append(name[new])
+    for old, new, cells in found:
+        if new != NO_PLACE and 2 * cells > areas[name[new]]:
+            split.setdefault(old, []).append(name[new])
     return {old: tuple(sorted(parts)) for old, parts in split.items() if len(parts) > 1}
 
 
@@ -101,10 +153,25 @@ def _rename(draft: Draft, first: int, name: dict[int, int]) -> None:
     table = np.full(draft.next_place - first, NO_PLACE, np.int32)
     for number, final in name.items():
         table[number - first] = final
-    for _, cells in draft.tiles.changed(draft.before.tiles):
-        place = cells["place"]
+    for _, place in draft.tiles.changed(draft.before.tiles):
         drafted = place >= first
         place[drafted] = table[place[drafted] - first]
-    rows = draft.places.read(name)
+    rows = draft.places.read([*name])
     draft.places.drop(name)
-    draft.places.write(name.values(), rows)
+    draft.places.write([*name.values()], rows)
+
+
+def _renumber(draft: CellDraft, name: dict[int, int]) -> None:
+    """Write other numbers of places in place of some."""
+    if not name:
+        return
+    rows = draft.places.read([*name])
+    cells = []
+    for number, final, box in zip(name, name.values(), rows["box"].tolist(), strict=True):
+        place, of_class = draft.tiles.planes(Box(*box))
+        row, col = at = (place == number).nonzero()
+        finals: LongArray = np.full(len(row), final, np.int32)
+        cells.append((row + box[0], col + box[1], finals, of_class[at]))
+    draft.places.drop(name)
+    draft.places.write([*name.values()], rows)
+    draft.tiles.put(*(np.concatenate(values) for values in zip(*cells, strict=True)))

@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._copies import frozen
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid import OccupancyGrid
+from hybridnav.grid.areas import box_of_area, class_reach, class_rules
+from hybridnav.grid.checks import checked_cell, checked_type
+from hybridnav.online.cellwise import CellDraft
 from hybridnav.online.dense import pyramid_of, state_of
 from hybridnav.online.draft import Draft, State
-from hybridnav.online.identities import settle
+from hybridnav.online.identities import settle, settle_cells
+from hybridnav.online.levels import with_levels
+from hybridnav.online.shift import check_sides, shift_of
 from hybridnav.online.tiles import Box
+from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import SURVIVES
 from hybridnav.pyramid.window import Criterion
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+    from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._typing import LongArray
-    from hybridnav.grid import OccupancyGrid
-    from hybridnav.pyramid import DualGraphPyramid, Linkage
-
-MOST_SIDE = 32_767
-"""Rows or columns of the largest grid: steps between cells have two bytes."""
-_ALIGNED = 1e-6
-"""Part of a cell by which the origins of two grids may lie beside whole cells."""
+    from hybridnav._typing import IntArray, LongArray
+    from hybridnav.pyramid import Linkage
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class OnlinePyramid:
     (10, 0)
     >>> probability = grid.probability.copy()
     >>> probability[5, 13] = 1.0
-    >>> update = online.update(replace(grid, probability=probability), changed=(5, 13, 5, 13))
+    >>> update = online.update(replace(grid, probability=probability), changed=(1.3, 0.5, 1.4, 0.6))
     >>> update.version.place_at((5, 13)), update.changed
     (-1, (0, 2))
     """
@@ -81,12 +82,12 @@ class OnlinePyramid:
         InvalidValueError
             When the pyramid was built with rooms, or its grid is too long.
         """
-        if pyramid.rooms is not None:
+        if checked_type("pyramid", pyramid, DualGraphPyramid).rooms is not None:
             raise InvalidValueError(
                 "the pyramid was built with rooms, expected one without: "
                 "build it without rooms, and find them on a version"
             )
-        _check_sides(pyramid.grid)
+        check_sides(pyramid.grid)
         # Loading a version needs no decimation.
         from hybridnav.pyramid.decimation import squared_limit  # noqa: PLC0415
 
@@ -101,12 +102,16 @@ class OnlinePyramid:
             state_of(pyramid),
         )
 
-    def update(self, grid: OccupancyGrid, *, changed: ArrayLike | None = None) -> Update:
+    def update(
+        self, grid: OccupancyGrid, *, changed: BaseGeometry | ArrayLike | None = None
+    ) -> Update:
         """Return the next version, that of a changed map.
 
-        Fields of places that hold no changed cell keep their cells, their levels and their numbers,
-        unless they are merged with what was contracted anew beside them. All others are dissolved
-        into cells and contracted again, with the fields beside them taking part whole.
+        Places that hold no changed cell keep their cells, their levels and their numbers, unless
+        they take in new cells, or may merge with what changed beside them. With the linkage
+        "radius" the other places give away and take in single cells, and their levels are made
+        when they are read; with the other linkages they are dissolved into cells and contracted
+        again.
 
         Parameters
         ----------
@@ -114,10 +119,11 @@ class OnlinePyramid:
             The map now, with the cells of this version's grid: its frame may have its origin whole
             rows and columns lower, and it may be larger on any side.
         changed
-            Where measurements changed, as a mask, bool (rows, cols) of the new grid, or as a box of
-            four numbers, the least row and column and the greatest. The robot's radius is added on
-            all sides, and cells by which the map grew always count. Only there are cells compared.
-            None compares all cells, as do grids with another radius or other thresholds.
+            The area where measurements changed, as in `HybridPlanner.update`: a shapely geometry
+            in metres, map frame, whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a
+            mask, bool (rows, cols) of the new grid. The robot's radius is added on all sides, and
+            cells by which the map grew always count. Only there are cells compared. None compares
+            all cells, as do grids with another radius or other thresholds.
 
         Returns
         -------
@@ -128,52 +134,37 @@ class OnlinePyramid:
         ------
         InvalidValueError
             When the grid has cells of another size or at other points, or does not cover the one of
-            this version, or `changed` is no mask and no box of it.
+            this version, or `changed` is no area and no mask of it.
         """
-        rows, cols = self._shift(grid)
+        checked_type("grid", grid, OccupancyGrid)
+        rows, cols = shift_of(self.grid, grid, otherwise="build a new pyramid")
+        check_sides(grid)
         low = self.low[0] - rows, self.low[1] - cols
         whole = Box(0, 0, *grid.shape)
-        box = _box_of(changed, grid)
-        if box is None or _settings(grid) != _settings(self.grid) or grid.least_island_m2 > 0:
+        first_row, high_row, first_col, high_col = box_of_area(changed, grid.frame, grid.shape)
+        box = Box(first_row, first_col, high_row, high_col).widened(class_reach(grid)).common(whole)
+        if class_rules(grid) != class_rules(self.grid) or grid.least_island_m2 > 0:
             box = whole
         old = Box(0, 0, *self.grid.shape).moved(rows, cols)
         # Obstacles in new cells reach into those at the former rim.
-        apart = old.narrowed(_reach(grid), whole)
+        apart = old.narrowed(class_reach(grid), whole)
         inside = box.common(apart)
         boxes = [*_outside(apart, whole), *([] if inside.is_empty else [inside])]
-        draft = Draft(self._state, self._criterion)
-        for part in boxes:
-            draft.change(part.moved(*low), grid.classes[part.inside(whole)])
-        events = settle(draft)
+        state = vars(self).get("_with_levels", self._state)
+        draft: Draft | CellDraft
+        if self.linkage == "radius":
+            draft = CellDraft(state, self._criterion)
+            draft.change([part.moved(*low) for part in boxes], grid.classes, low)
+            events = settle_cells(draft)
+        else:
+            draft = Draft(state, self._criterion)
+            for part in boxes:
+                draft.change(part.moved(*low), grid.classes[part.inside(whole)])
+            events = settle(draft)
+        cells = draft.cells - np.array(low)
         version = replace(self, grid=grid, low=low, _state=draft.close())
-        return Update(version, *events)
-
-    def _shift(self, grid: OccupancyGrid) -> tuple[int, int]:
-        """Return the rows and columns by which cell (0, 0) lies lower than before, once checked."""
-        old, new = self.grid.frame, grid.frame
-        if (old.resolution_m, old.yaw_rad) != (new.resolution_m, new.yaw_rad):
-            raise InvalidValueError(
-                f"the grid has cells of {new.resolution_m:g} m with yaw {new.yaw_rad:g}, expected "
-                f"{old.resolution_m:g} m and {old.yaw_rad:g}: build a new pyramid"
-            )
-        exact = [-value for value in old.position_of(*new.origin_m)]
-        rows, cols = map(round, exact)
-        if max(abs(exact[0] - rows), abs(exact[1] - cols)) > _ALIGNED:
-            raise InvalidValueError(
-                f"the origin of the grid lies {exact[0]:g} rows and {exact[1]:g} columns lower, "
-                "expected whole numbers: keep the cells where they are"
-            )
-        if (
-            min(rows, cols) < 0
-            or rows + self.grid.shape[0] > grid.shape[0]
-            or cols + self.grid.shape[1] > grid.shape[1]
-        ):
-            raise InvalidValueError(
-                f"the grid of {grid.shape} cells, {rows} rows and {cols} columns lower, does not "
-                f"cover the one before, of {self.grid.shape} cells: mark lost cells as unexplored"
-            )
-        _check_sides(grid)
-        return rows, cols
+        order = np.argsort(cells[:, 0] * grid.shape[1] + cells[:, 1])
+        return Update(version, *events, frozen(cells[order]))
 
     @property
     def n_places(self) -> int:
@@ -183,15 +174,31 @@ class OnlinePyramid:
     @property
     def n_levels(self) -> int:
         """Levels up to that of the places, the base included."""
-        return int(np.count_nonzero(self._state.vertex_ends[1:SURVIVES])) + 1
+        return int(np.count_nonzero(self._with_levels.vertex_ends[1:SURVIVES])) + 1
+
+    @cached_property
+    def _with_levels(self) -> State:
+        """The state with all levels below the places."""
+        return with_levels(self._state, self._box(), self._criterion)
+
+    @cached_property
+    def number_of(self) -> IntArray:
+        """int32 (rows, cols), the number of the place of each cell of the grid, -1 for none."""
+        return frozen(self._state.tiles.planes(self._box())[0])
 
     def place_at(self, cell: tuple[int, int]) -> int:
         """Return the number of the place that holds a cell (row, col) of the grid.
 
-        -1 for an occupied cell and for one outside the grid.
+        `NO_PLACE`, -1, for an occupied cell and for one outside the grid.
+
+        Raises
+        ------
+        InvalidValueError
+            When it is no cell.
         """
-        row, col = cell[0] + self.low[0], cell[1] + self.low[1]
-        return int(self._state.tiles.read(Box(row, col, row + 1, col + 1))["place"][0, 0])
+        row, col = checked_cell("cell", cell)
+        row, col = row + self.low[0], col + self.low[1]
+        return int(self._state.tiles.planes(Box(row, col, row + 1, col + 1))[0][0, 0])
 
     def receptive_field(self, place: int) -> LongArray:
         """Return the cells of a place, int64 (n, 2), (row, col) of the grid, in the order of rows.
@@ -201,35 +208,36 @@ class OnlinePyramid:
         InvalidValueError
             When the version has no such place.
         """
-        if not self._state.places.has(place):
+        is_number = isinstance(place, int | np.integer)
+        if not is_number or not self._state.places.has(place):
             raise InvalidValueError(
                 f"there is no place {place!r:.40} in this version, expected one of its "
                 f"{self.n_places}: an update states what became of a place"
             )
         box = Box(*self._state.places.read([place])[0]["box"].tolist())
-        cells = np.argwhere(self._state.tiles.read(box)["place"] == place)
+        cells = np.argwhere(self._state.tiles.planes(box)[0] == place)
         found: LongArray = cells + np.array(box[:2]) - np.array(self.low)
         return found
 
     @cached_property
     def pyramid(self) -> DualGraphPyramid:
-        """The version as a pyramid of dense arrays; on large maps this takes far longer than an
-        update.
+        """The version as a pyramid of dense arrays, with all levels below the places.
+
+        Making it takes up to three times as long as a build, far longer than an update.
 
         Raises
         ------
         InvalidValueError
             When cells of the grid changed outside what an update stated.
         """
-        return pyramid_of(self._state, self._box(), self)
+        return pyramid_of(self._with_levels, self._box(), self)
 
     @cached_property
     def place_numbers(self) -> LongArray:
         """int64 (n_places,), the number of the place of each vertex of the last level of
         `pyramid`."""
         rows, cols = self.pyramid[-1].cells.T
-        place = self._state.tiles.read(self._box())["place"]
-        return frozen(place[rows, cols].astype(np.int64))
+        return frozen(self.number_of[rows, cols].astype(np.int64))
 
     def _box(self) -> Box:
         return Box(0, 0, *self.grid.shape).moved(*self.low)
@@ -248,6 +256,8 @@ class Update:
     >>> update = version.update(hn.OccupancyGrid(np.tile(wall, (3, 1)), robot_radius_m=0))
     >>> update.died, update.split
     ((0,), {0: (1, 2)})
+    >>> update.cells.tolist()
+    [[0, 2], [1, 2], [2, 2]]
     """
 
     version: OnlinePyramid
@@ -262,54 +272,16 @@ class Update:
     """Old places of which several new ones mostly consist, with these."""
     changed: tuple[int, ...]
     """Places that kept their number, and most of their cells, but not all that they were."""
-
-
-def _box_of(changed: ArrayLike | None, grid: OccupancyGrid) -> Box | None:
-    """Return the box of the cells that a change may touch, once checked; None for all."""
-    if changed is None:
-        return None
-    given = np.asarray(changed)
-    if given.dtype == np.bool_ and given.shape == grid.shape:
-        rows, cols = np.flatnonzero(given.any(axis=1)), np.flatnonzero(given.any(axis=0))
-        if not len(rows):
-            return Box(0, 0, 0, 0)
-        box = Box(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
-    elif given.shape == (4,) and np.issubdtype(given.dtype, np.integer):
-        low_row, low_col, high_row, high_col = given.tolist()
-        if not (
-            0 <= low_row <= high_row < grid.shape[0] and 0 <= low_col <= high_col < grid.shape[1]
-        ):
-            raise InvalidValueError(
-                f"changed is the box {tuple(given.tolist())}, expected the least row and column "
-                f"and the greatest, inside {grid.shape} cells"
-            )
-        box = Box(low_row, low_col, high_row + 1, high_col + 1)
-    else:
-        raise InvalidValueError(
-            f"changed cells are an array of {given.dtype} of shape {given.shape}, expected a mask "
-            f"of {grid.shape} cells or a box of four whole numbers: the least row and column, and "
-            "the greatest"
-        )
-    return box.widened(_reach(grid)).common(Box(0, 0, *grid.shape))
-
-
-def _reach(grid: OccupancyGrid) -> int:
-    """Return the cells within which an obstacle decides on the class of a cell, and one more."""
-    return math.ceil(grid.robot_radius_m / grid.resolution_m) + 1
-
-
-def _settings(grid: OccupancyGrid) -> tuple[Any, ...]:
-    """Return what decides on the class of a cell beside its probability."""
-    return (
-        grid.free_threshold,
-        grid.occupied_threshold,
-        grid.robot_radius_m,
-        grid.least_island_m2,
-    )
+    cells: LongArray
+    """int64 (n, 2), the cells (row, col) of the new grid whose `CellClass` is another than before,
+    in the order of rows. What lay outside the map before counts as occupied there. Whatever depends
+    on the classes of cells alone is as it was where none of these lies."""
 
 
 def _outside(inner: Box, outer: Box) -> list[Box]:
     """Return the boxes that make up an outer box without an inner one."""
+    if inner.is_empty:
+        return [outer]
     low, high = inner.low_row, inner.high_row
     boxes = [
         Box(outer.low_row, outer.low_col, low, outer.high_col),
@@ -318,11 +290,3 @@ def _outside(inner: Box, outer: Box) -> list[Box]:
         Box(low, inner.high_col, high, outer.high_col),
     ]
     return [box for box in boxes if not box.is_empty]
-
-
-def _check_sides(grid: OccupancyGrid) -> None:
-    if max(grid.shape) > MOST_SIDE:
-        raise InvalidValueError(
-            f"the grid has {grid.shape} cells, expected at most {MOST_SIDE} rows and columns: "
-            "divide the map"
-        )

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hybridnav._copies import frozen
+from hybridnav.online import _tile_kernels
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
-    from hybridnav._typing import AnyArray
+    from hybridnav._typing import AnyArray, ByteArray, IntArray, LongArray
 
-SIDE = 128
-"""Rows and columns of a tile: a copy takes 20 us, and a table for 16 M cells has 1,024 tiles."""
+SIDE = 64
+"""Rows and columns of a tile. A copy takes 3 us: larger tiles are beyond the size for which memory
+is taken anew from the system. A table for 16 M cells has 4,096 tiles, and its copy takes 30 us."""
 
 CELL = np.dtype(
     [
@@ -30,8 +33,11 @@ of its edges east and north (see `Record`); the number of its place. Steps inste
 stay what they are when the map grows."""
 
 NO_PLACE = -1
-NOTHING = frozen(np.array((0, 0, (0, 0), (0, 0), NO_PLACE), CELL))
-"""A cell that is no vertex, as is all that lies outside the tiles."""
+"""Number that stands for no place: that of occupied cells and of all outside the map."""
+
+
+_MORE = (16 * SIDE * SIDE, 4)
+"""Shape of the space that is taken for more cells at once."""
 
 
 class Box(NamedTuple):
@@ -102,63 +108,174 @@ class Box(NamedTuple):
         )
 
 
+class Differing(NamedTuple):
+    """Cells whose class changes."""
+
+    row: LongArray
+    """int64 (n,), rows."""
+    col: LongArray
+    """int64 (n,), columns."""
+    place: LongArray
+    """int64 (n,), the places that they are in, -1 for none."""
+    of_class: ByteArray
+    """uint8 (n,), the `CellClass` that they have now."""
+
+
+class Tile(NamedTuple):
+    """The cells of a square, in arrays of shape `(SIDE, SIDE)`."""
+
+    place: IntArray
+    """int32, the field `place` of `CELL`."""
+    of_class: ByteArray
+    """uint8, the field `class`."""
+    record: AnyArray
+    """All other fields."""
+
+
+_RECORD = np.dtype([(name, CELL[name]) for name in ("end", "parent", "edges")])
+_EMPTY = Tile(
+    frozen(np.full((SIDE, SIDE), NO_PLACE, np.int32)),
+    frozen(np.zeros((SIDE, SIDE), np.uint8)),
+    frozen(np.zeros((SIDE, SIDE), _RECORD)),
+)
+"""A tile of cells that are no vertices, as is all that lies outside the tiles."""
+
+
 class Tiles:
     """The tiles of a version, and those of the next one while it is made.
 
-    Tiles of a version never change: `write` copies a tile when it first changes it.
+    Arrays of a version never change: those of a tile are copied when they first change.
 
     Parameters
     ----------
     tiles
-        Read-only arrays of `CELL`, shape `(SIDE, SIDE)`, by row and column of tiles.
+        Tiles, their arrays read-only, by row and column of tiles.
     """
 
-    def __init__(self, tiles: Mapping[tuple[int, int], AnyArray]) -> None:
+    def __init__(self, tiles: Mapping[tuple[int, int], Tile]) -> None:
         self._tiles = dict(tiles)
         self._own: set[tuple[int, int]] = set()
+        self._own_records: set[tuple[int, int]] = set()
 
     def next_version(self) -> Tiles:
         """Return tiles that share all arrays of these."""
         return Tiles(self._tiles)
 
     def close(self) -> None:
-        """Make all tiles read-only: the version is complete."""
-        for key in self._own:
-            frozen(self._tiles[key])
+        """Make all arrays read-only: the version is complete."""
+        for key in self._own | self._own_records:
+            for values in self._tiles[key]:
+                frozen(values)
         self._own.clear()
+        self._own_records.clear()
 
     def read(self, box: Box) -> AnyArray:
         """Return a copy of the cells of a box, `CELL` of its shape."""
-        window = np.full(box.shape, NOTHING)
-        for key, part in _tiles_of(box):
-            tile = self._tiles.get(key)
-            if tile is not None:
-                window[part.inside(box)] = tile[_within(part, key)]
+        window = np.empty(box.shape, CELL)
+        for key, inside, within in _parts_of(box):
+            place, of_class, record = self._tiles.get(key, _EMPTY)
+            part = window[inside]
+            part["place"], part["class"] = place[within], of_class[within]
+            for name in _RECORD.names or ():
+                part[name] = record[name][within]
         return window
 
-    def write(self, box: Box, window: AnyArray) -> None:
-        """Set the cells of a box; tiles in which all is equal stay shared."""
-        for key, part in _tiles_of(box):
-            cells, within = window[part.inside(box)], _within(part, key)
-            tile = self._tiles.get(key)
-            if tile is None:
-                tile = np.full((SIDE, SIDE), NOTHING)
-            if _equal(tile[within], cells):
-                continue
-            if key not in self._own:
-                tile = tile.copy()
-                self._own.add(key)
-                self._tiles[key] = tile
-            tile[within] = cells
+    def planes(self, box: Box) -> tuple[IntArray, ByteArray]:
+        """Return copies of the places and the classes of the cells of a box."""
+        place, of_class = np.empty(box.shape, np.int32), np.empty(box.shape, np.uint8)
+        for key, inside, within in _parts_of(box):
+            tile = self._tiles.get(key, _EMPTY)
+            place[inside], of_class[inside] = tile.place[within], tile.of_class[within]
+        return place, of_class
 
-    def changed(self, before: Tiles) -> Iterator[tuple[AnyArray, AnyArray]]:
-        """Yield each tile that is not shared with a version, as it is there and as it is here.
+    def differing(
+        self, boxes: Iterable[Box], classes: ByteArray, low: tuple[int, int]
+    ) -> Differing:
+        """Return the cells of boxes whose class is another than that given for a map.
+
+        Parameters
+        ----------
+        boxes
+            Boxes on the map, no two of which have a cell in common.
+        classes
+            uint8 (rows, cols), `CellClass` of the cells of the map.
+        low
+            Row and column of its first cell.
+        """
+        found, count = np.empty((SIDE * SIDE, 4), np.int32), 0
+        for box in boxes:
+            at = tuple(box)
+            for row, col in _keys_of(box):
+                if count + SIDE * SIDE > len(found):
+                    found = np.concatenate([found[:count], np.empty(_MORE, np.int32)])
+                place, of_class, _ = self._tiles.get((row, col), _EMPTY)
+                tile = place, of_class, row * SIDE, col * SIDE
+                count = _tile_kernels.find_differing(tile, classes, low, at, found, count)
+        row, col, place, of_class = found[:count].T.astype(np.int64)
+        return Differing(row, col, place, of_class.astype(np.uint8))
+
+    def end_at(self, cell: tuple[int, int]) -> int:
+        """Return the end of a cell that is a vertex."""
+        row, col = cell
+        record = self._tiles[row // SIDE, col // SIDE].record
+        return int(record["end"][row % SIDE, col % SIDE])
+
+    def parent_of(self, cell: tuple[int, int]) -> tuple[int, int]:
+        """Return the cell that a cell went into."""
+        row, col = cell
+        record = self._tiles[row // SIDE, col // SIDE].record
+        steps = record["parent"][row % SIDE, col % SIDE]
+        return row + int(steps[0]), col + int(steps[1])
+
+    def put(self, row: LongArray, col: LongArray, place: IntArray, of_class: ByteArray) -> None:
+        """Set the places and the classes of some cells."""
+        keys = (row // SIDE << 32) + col // SIDE
+        order = np.argsort(keys, kind="stable")
+        bounds = [0, *(np.flatnonzero(np.diff(keys[order])) + 1).tolist(), len(order)]
+        for begin, end in pairwise(bounds if len(order) else ()):
+            part = order[begin:end]
+            at = int(row[part[0]]) // SIDE, int(col[part[0]]) // SIDE
+            tile, low = self._owned(at)[:2], (at[0] * SIDE, at[1] * SIDE)
+            _tile_kernels.put_cells(tile, low, (row, col, place, of_class), part)
+
+    def write(self, box: Box, window: AnyArray) -> None:
+        """Set the cells of a box; arrays in which all is equal stay shared."""
+        for key, inside, within in _parts_of(box):
+            cells, tile = window[inside], self._tiles.get(key, _EMPTY)
+            planes = (tile.place, cells["place"]), (tile.of_class, cells["class"])
+            if any((plane[within] != now).any() for plane, now in planes):
+                tile = self._owned(key)
+                tile.place[within], tile.of_class[within] = cells["place"], cells["class"]
+            if any((tile.record[n][within] != cells[n]).any() for n in _RECORD.names or ()):
+                record = self._owned_record(key)[within]
+                for name in _RECORD.names or ():
+                    record[name] = cells[name]
+
+    def _owned(self, key: tuple[int, int]) -> Tile:
+        """Return a tile whose places and classes may be written to."""
+        tile = self._tiles.get(key, _EMPTY)
+        if key not in self._own:
+            tile = Tile(tile.place.copy(), tile.of_class.copy(), tile.record)
+            self._tiles[key] = tile
+            self._own.add(key)
+        return tile
+
+    def _owned_record(self, key: tuple[int, int]) -> AnyArray:
+        """Return the record of a tile, to be written to."""
+        tile = self._tiles.get(key, _EMPTY)
+        if key not in self._own_records:
+            tile = tile._replace(record=tile.record.copy())
+            self._tiles[key] = tile
+            self._own_records.add(key)
+        return tile.record
+
+    def changed(self, before: Tiles) -> Iterator[tuple[IntArray, IntArray]]:
+        """Yield the places of each tile in which some changed, in a version before and here.
 
         Until `close`, the second array may be written to.
         """
-        nothing = np.full((SIDE, SIDE), NOTHING)
         for key in sorted(self._own):
-            yield before._tiles.get(key, nothing), self._tiles[key]
+            yield before._tiles.get(key, _EMPTY).place, self._tiles[key].place
 
     def boxes(self) -> list[Box]:
         """Return the box of each tile."""
@@ -167,35 +284,34 @@ class Tiles:
             for row, col in sorted(self._tiles)
         ]
 
-    def shared_with(self, other: Tiles) -> int:
-        """Count the tiles that are the same array in both versions."""
-        return sum(other._tiles.get(key) is tile for key, tile in self._tiles.items())
-
-    def __len__(self) -> int:
-        return len(self._tiles)
+    def arrays(self) -> dict[tuple[int, int], Tile]:
+        """Return each tile, by row and column of tiles."""
+        return dict(self._tiles)
 
 
-def _tiles_of(box: Box) -> Iterator[tuple[tuple[int, int], Box]]:
-    """Yield the tiles that a box meets, and the part of the box in each."""
+def _keys_of(box: Box) -> Iterator[tuple[int, int]]:
+    """Yield row and column of the tiles that a box meets."""
+    if not box.is_empty:
+        low_row, low_col, high_row, high_col = box
+        rows = range(low_row // SIDE, -(-high_row // SIDE))
+        yield from product(rows, range(low_col // SIDE, -(-high_col // SIDE)))
+
+
+def _parts_of(
+    box: Box,
+) -> Iterator[tuple[tuple[int, int], tuple[slice, slice], tuple[slice, slice]]]:
+    """Yield the tiles that a box meets, and slices of the box and of the tile for each."""
+    low_row, low_col, high_row, high_col = box
     if box.is_empty:
         return
-    for row in range(box.low_row // SIDE, (box.high_row - 1) // SIDE + 1):
-        for col in range(box.low_col // SIDE, (box.high_col - 1) // SIDE + 1):
-            tile = Box(row * SIDE, col * SIDE, (row + 1) * SIDE, (col + 1) * SIDE)
-            yield (row, col), box.common(tile)
+    cols = [_slices(at, low_col, high_col) for at in range(low_col // SIDE, -(-high_col // SIDE))]
+    for row in range(low_row // SIDE, -(-high_row // SIDE)):
+        _, of_box, of_tile = _slices(row, low_row, high_row)
+        for col, inside, within in cols:
+            yield (row, col), (of_box, inside), (of_tile, within)
 
 
-def _within(part: Box, key: tuple[int, int]) -> tuple[slice, slice]:
-    """Return the slices of a tile that hold a part of it."""
-    row, col = key[0] * SIDE, key[1] * SIDE
-    return part.inside(Box(row, col, row + SIDE, col + SIDE))
-
-
-def _equal(some: AnyArray, others: AnyArray) -> bool:
-    """Return whether two arrays of cells hold the same bytes."""
-    return np.array_equal(_words(some), _words(others))
-
-
-def _words(cells: AnyArray) -> AnyArray:
-    """Return cells as whole numbers, without their copy where it can be."""
-    return np.ascontiguousarray(cells).view(np.int32)
+def _slices(at: int, low: int, high: int) -> tuple[int, slice, slice]:
+    """Return the number of a tile along an axis, its slice of a box, and the box's slice of it."""
+    begin, end = max(at * SIDE, low), min((at + 1) * SIDE, high)
+    return at, slice(begin - low, end - low), slice(begin - at * SIDE, end - at * SIDE)

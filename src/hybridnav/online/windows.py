@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
+from hybridnav.online import _ring_kernels, _write_kernels
 from hybridnav.online.places import PLACE, PlaceTable
 from hybridnav.online.tiles import NO_PLACE, Box, Tiles
 from hybridnav.pyramid.record import SURVIVES, Record
-from hybridnav.pyramid.window import Cells, Fields, contract_window
+from hybridnav.pyramid.window import Cells, Fields, contract_beside, contract_window
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._typing import AnyArray, BoolArray, ByteArray, LongArray
+    from hybridnav.online.groups import Group
     from hybridnav.pyramid.window import Criterion
 
 _ALIGNED = 16
@@ -26,24 +28,13 @@ _FROZEN = np.uint8(2)
 _BESIDE = np.ones((3, 3), dtype=np.bool_)
 
 
-class Core(NamedTuple):
-    """Cells that begin anew."""
-
-    region: Box
-    """The box of the next two arrays; it holds all cells beside them."""
-    cells: BoolArray
-    """The cells that lose what the record states about them."""
-    classes: ByteArray
-    """uint8, `CellClass` of these cells now, 0 elsewhere."""
-
-
 @dataclass(frozen=True, eq=False)
 class Window:
     """A window after its decimation; its arrays have the shape of the box, or one row a field."""
 
     box: Box
-    before: AnyArray
-    """Its cells before, `CELL`."""
+    cells: AnyArray
+    """Its cells before, `CELL`; `cells_after` changes them."""
     kept: list[int]
     """The places that took part whole, or frozen."""
     rows: AnyArray
@@ -97,28 +88,25 @@ class Window:
         cells = tiles.read(self.box.widened(1))
         return places_beside(cells, np.isin(cells["place"], self.kept))
 
-    def cells_after(self, numbers: LongArray) -> AnyArray:
-        """Return the cells of the window as they are now; `numbers` are the places of the fields.
+    def cells_after(self, numbers: LongArray, n_ends: LongArray) -> AnyArray:
+        """Return the cells of the window as they are now.
 
-        Nothing changes beyond the cells that took part or began anew.
+        Parameters
+        ----------
+        numbers
+            The number of the place of each field.
+        n_ends
+            int64 (256,), how many cells have each end; changed.
         """
-        after = self.before.copy()
-        rows, cols = self.box.shape
-        record = self.fields.record
-        end = record.vertex_end.reshape(rows, cols)
-        flat = record.vertex_parent.reshape(rows, cols)
-        part = self.stays | (self.fresh > 0)
-        steps = np.zeros((rows, cols, 2), np.int16)
-        row, col = np.nonzero(part & (end != SURVIVES))
-        steps[row, col, 0] = flat[row, col] // cols - row
-        steps[row, col, 1] = flat[row, col] % cols - col
-        write = part | self.gone
-        after["class"][self.gone] = self.fresh[self.gone]
-        after["end"][write] = end[write]
-        after["parent"][write] = steps[write]
-        after["place"][write] = NO_PLACE
-        after["place"][part] = numbers[self.fields.field_of[part]]
-        _write_edges(after["edges"], record.edge_end.reshape(rows, cols, 2), part, self.gone)
+        after, record = self.cells, self.fields.record
+        _write_kernels.enter(
+            tuple(after[name] for name in ("class", "end", "parent", "edges", "place")),
+            (self.stays, self.gone, self.fresh),
+            (record.vertex_end, record.vertex_parent, record.edge_end),
+            self.fields.field_of,
+            numbers,
+            n_ends,
+        )
         return after
 
     def rows_of(self, fields: LongArray) -> AnyArray:
@@ -137,52 +125,143 @@ class Window:
         return rows
 
 
-def contract(  # noqa: PLR0913 - what a version consists of, and what changes in it
+def contract(
     tiles: Tiles,
     places: PlaceTable,
-    core: Core,
     kept: Sequence[int],
     criterion: Criterion,
     *,
     frozen: Sequence[int] = (),
 ) -> Window:
-    """Contract a core and whole places until no two of them may merge.
+    """Contract whole places until no two of them may merge.
 
     Parameters
     ----------
     tiles, places
         The version before.
-    core
-        The cells that begin anew.
     kept
-        Places that take part whole: all beside the core.
+        The places.
     criterion
         When two fields merge.
     frozen
         Places that merge with none, whose arcs to others may become one.
     """
     rows = places.read([*kept, *frozen])
-    box = core.region
-    if len(rows):
-        low, high = rows["box"][:, :2].min(axis=0), rows["box"][:, 2:].max(axis=0)
-        box = box.joined(Box(*low.tolist(), *high.tolist()))
-    low_row, low_col = (at // _ALIGNED * _ALIGNED for at in box[:2])
-    box = Box(low_row, low_col, box.high_row, box.high_col)
-    before = tiles.read(box)
-    inside = core.region.inside(box)
+    low, high = rows["box"][:, :2].min(axis=0), rows["box"][:, 2:].max(axis=0)
+    box = Box(*low.tolist(), *high.tolist())
+    cells = tiles.read(box)
     gone, fresh = np.zeros(box.shape, np.bool_), np.zeros(box.shape, np.uint8)
-    gone[inside], fresh[inside] = core.cells, core.classes
-    place = np.where(gone, NO_PLACE, before["place"])
+    fresh.flags.writeable = False  # as the classes of a grid are: another type compiles anew
+    place = cells["place"]
     stays = np.isin(place, [*kept, *frozen])
-    kinds = before["class"] + _FROZEN * np.isin(place, list(frozen)).astype(np.uint8)
+    kinds = cells["class"] + _FROZEN * np.isin(place, list(frozen)).astype(np.uint8)
     whole_at = np.zeros(box.shape, np.uint8)
     row, col = (rows["cell"] - np.array(box[:2])).T
     # None grows while another is in pieces: arcs between pieces are not in the graph.
     whole_at[row, col] = rows["whole_at"].max(initial=0)
+    fields = contract_window(Cells(fresh, stays, kinds, whole_at), record_of(cells), criterion)
+    return Window(box, cells, [*kept, *frozen], rows, stays, gone, fresh, fields)
+
+
+def contract_group(
+    tiles: Tiles,
+    places: PlaceTable,
+    region: Box,
+    changed: tuple[Group, ByteArray],
+    criterion: Criterion,
+) -> tuple[Window, list[tuple[int, int]]]:
+    """Contract places and cells among themselves, beside places that stay as they are.
+
+    Parameters
+    ----------
+    tiles, places
+        The version before.
+    region
+        A box that holds all of them and the cells beside them.
+    changed
+        The places and cells, and the `CellClass` of the cells of the group's box now.
+    criterion
+        When two fields merge.
+
+    Returns
+    -------
+    Window
+        In which no place takes part.
+    list of tuple
+        Each field that may merge with a place beside it, and that place.
+    """
+    group, classes = changed
+    low_row, low_col = (at // _ALIGNED * _ALIGNED for at in region[:2])
+    box = Box(low_row, low_col, region.high_row, region.high_col)
+    cells = tiles.read(box)
+    numbers = np.array(sorted(group.places), np.int64)
+    gone = _ring_kernels.in_places(cells["place"], numbers)
+    fresh = cells["class"] * gone
+    if not group.box.is_empty:
+        inside = group.box.inside(box)
+        gone[inside] |= group.differs
+        fresh[inside][group.differs] = classes[group.differs]
     fresh.flags.writeable = False  # as the classes of a grid are: another type compiles anew
-    cells = Cells(fresh, stays, kinds, whole_at)
-    fields = contract_window(cells, record_of(before), criterion)
-    return Window(box, before, [*kept, *frozen], rows, stays, gone, fresh, fields)
+    ring = _ring_kernels.ring_round(gone) & (cells["place"] != NO_PLACE)
+    fields = contract_beside(fresh, ring, joins_of(tiles, box, ring, cells), criterion)
+    stays = np.zeros(box.shape, np.bool_)
+    window = Window(box, cells, [], places.read([]), stays, gone, fresh, fields)
+    pairs = _ring_kernels.pairs_across(fields.field_of, fresh, ring, cells["class"], cells["place"])
+    may = [
+        (field, place)
+        for field, place in sorted(set(map(tuple, pairs.tolist())))
+        if _may_merge(window, field, (place, places.read([place])[0]), tiles, criterion)
+    ]
+    return window, may
+
+
+def joins_of(tiles: Tiles, box: Box, ring: BoolArray, cells: AnyArray) -> ByteArray:
+    """Return the level at which the two cells of each base edge in a ring join, flat."""
+    joins: ByteArray
+    joins, beyond = _ring_kernels.ring_joins(ring, cells["end"], cells["parent"], cells["place"])
+    beyond[:, 2:] += np.tile(np.array(box[:2]), 2)
+    for edge, reached, *cell, row, col in beyond.tolist():
+        level, first, second = reached, (cell[0], cell[1]), (row, col)
+        while first != second:
+            if tiles.end_at(first) > tiles.end_at(second):
+                first, second = second, first
+            level = max(level, tiles.end_at(first))
+            first = tiles.parent_of(first)
+        joins[edge] = level
+    return joins
+
+
+def _may_merge(
+    window: Window, field: int, beside: tuple[int, AnyArray], tiles: Tiles, criterion: Criterion
+) -> bool:
+    """Return whether a field and a place beside it, given with its row, may merge."""
+    place, row = beside
+    fields, low, limit = window.fields, np.array(window.box[:2]), criterion.limit
+    cell = np.array(divmod(int(fields.survivors[field]), window.box.shape[1])) + low
+    apart = cell - row["cell"]
+    if int(apart @ apart) >= limit:
+        return False
+    if criterion.linkage != "radius":
+        return True
+    of_field, far = fields.boxes[field] + np.array([0, 0, 1, 1]), _ring_kernels.farthest_squared
+    if _least_reach(row["cell"] - low, of_field) < limit and (
+        far(fields.field_of, field, of_field, *(row["cell"] - low)) < limit
+    ):
+        return True
+    if _least_reach(cell, row["box"]) >= limit:
+        return False
+    around = Box(*row["box"].tolist())
+    whole = np.array([0, 0, *around.shape])
+    found = far(tiles.read(around)["place"], place, whole, *(cell - np.array(around[:2])))
+    return bool(found < limit)
+
+
+def _least_reach(cell: LongArray, box: LongArray) -> int:
+    """Return the least squared distance from a cell to the farthest one of a field in a box.
+
+    The field has a cell at each side of its box.
+    """
+    return int(max(*(box[:2] - cell), *(cell - box[:2]), *(box[2:] - 1 - cell), 0)) ** 2
 
 
 def places_beside(cells: AnyArray, core: BoolArray) -> list[int]:
@@ -202,14 +281,3 @@ def record_of(cells: AnyArray) -> Record:
         np.where(cells["end"] == SURVIVES, -1, parent).ravel().astype(np.int32),
         cells["edges"].ravel(),
     )
-
-
-def _write_edges(edges: ByteArray, edge_end: ByteArray, part: BoolArray, gone: BoolArray) -> None:
-    """Set the ends of edges among the cells that took part or began anew."""
-    beside = np.zeros_like(part)
-    for north in (0, 1):
-        low = (slice(None, -1), slice(None)) if north else (slice(None), slice(None, -1))
-        high = (slice(1, None), slice(None)) if north else (slice(None), slice(1, None))
-        write = beside.copy()
-        write[low] = (part[low] & part[high]) | gone[low] | gone[high]
-        edges[..., north][write] = edge_end[..., north][write]

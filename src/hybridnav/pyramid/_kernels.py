@@ -37,7 +37,8 @@ class Vertices(NamedTuple):
     boxes: np.ndarray
     """int32 (n, 4), the field's least row and column and greatest row and column."""
     classes: np.ndarray
-    """uint8 or uint16 (n,), the kind of each vertex: only equal ones merge (see `decimation`)."""
+    """uint8, uint16 or int32 (n,), the kind of each vertex: only equal ones merge (see
+    `decimation`)."""
     whole_at: np.ndarray
     """uint8 (n,), the level from which the vertex is whole: below it, its block is in pieces."""
 

@@ -6,23 +6,6 @@ from hybridnav._jit import njit
 
 
 @njit(cache=True, nogil=True)
-def refuse_narrow_leaves(leaves, parent, kernel_dart, widths, peaks, share):
-    """Keep a leaf only if its arc does not resist the star as merged so far.
-
-    `leaves` are in the order of falling width. The first leaf of a star always stays: its arc was a
-    candidate.
-    """
-    peak = peaks.copy()
-    for v in leaves:
-        p = parent[v]
-        if widths[kernel_dart[v] >> 1] < share * min(peak[v], peak[p]):
-            parent[v] = v
-            kernel_dart[v] = -1
-        else:
-            peak[p] = max(peak[p], peak[v])
-
-
-@njit(cache=True, nogil=True)
 def refuse_large_leaves(leaves, parent, kernel_dart, areas, most_cells):
     """Keep a leaf only if the star as merged so far has room for it.
 

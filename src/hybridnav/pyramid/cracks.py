@@ -6,13 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.pyramid._field_kernels import find_cracks
+from hybridnav.pyramid._field_kernels import edges_to_rim, find_cracks
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import ByteArray, FloatArray, IntArray, LongArray
 
 
-__all__ = ["cell_pairs", "endpoints_of", "find_cracks", "middle_sides", "middles_of", "sides_of"]
+__all__ = [
+    "cell_pairs",
+    "endpoints_of",
+    "find_cracks",
+    "line_of_loop",
+    "middle_sides",
+    "middles_of",
+    "sides_of",
+]
 
 
 def endpoints_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:
@@ -67,3 +75,27 @@ def middles_of(sides: FloatArray, boundary: LongArray, count: int) -> FloatArray
     """Return the middle of the side that `middle_sides` returns, float64 (count, 2)."""
     middles: FloatArray = sides[middle_sides(sides, boundary, count)]
     return middles
+
+
+def line_of_loop(
+    base_edge: int, level: tuple[IntArray, ByteArray, int, int], came: ByteArray
+) -> LongArray:
+    """Return the base edges of the line of a self-loop's dual edge through its field.
+
+    The line leads to the face on either side.
+
+    Parameters
+    ----------
+    base_edge
+        The base edge that represents the self-loop.
+    level
+        Vertex of each flat cell, `edge_end` of the record, the index of the level, and the columns
+        of the grid.
+    came
+        Scratch, uint8 (rows * cols + cols,), zeros.
+    """
+    field_of, _, _, cols = level
+    cell = base_edge >> 1
+    faces = cell, cell - (1 if base_edge & 1 else cols)
+    parts = [edges_to_rim(face, field_of[cell], *level, came) for face in faces]
+    return np.concatenate([*parts, [base_edge]])

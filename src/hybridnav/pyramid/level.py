@@ -11,7 +11,8 @@ from hybridnav._copies import copies_alike, frozen
 from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels, _hull_kernels
-from hybridnav.pyramid.cracks import cell_pairs, endpoints_of, middles_of, sides_of
+from hybridnav.pyramid.certainty import Certainty, certainty_of
+from hybridnav.pyramid.cracks import cell_pairs, endpoints_of, line_of_loop, middles_of, sides_of
 from hybridnav.pyramid.dual import DualGraph, FaceKind
 from hybridnav.pyramid.export import multigraph, vertices_with_attributes
 from hybridnav.pyramid.record import SURVIVES
@@ -22,13 +23,13 @@ from hybridnav.search.moves import STRAIGHT, length_in_cells
 _SOUTH = 3
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     import networkx as nx
 
     from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.pyramid.islands import Islands
+    from hybridnav.pyramid.lazy_islands import LazyIslands
     from hybridnav.pyramid.record import Record
 
 
@@ -49,7 +50,7 @@ class Level:
     """
 
     def __init__(
-        self, grid: OccupancyGrid, record: Record, index: int, islands: Callable[[], Islands]
+        self, grid: OccupancyGrid, record: Record, index: int, islands: LazyIslands
     ) -> None:
         self.index = index
         self._grid = grid
@@ -238,11 +239,17 @@ class Level:
     def dual(self) -> DualGraph:
         """The dual graph: faces, their kinds, and the dual edge of each arc."""
         # The outer face lies south of the first cell of a component, in the order of rows.
-        outer = self.face_darts(self._islands().component_cell, _SOUTH)
+        outer = self.face_darts(self._islands.found.component_cell, _SOUTH)
         return DualGraph.of_map(self.darts, outer[outer >= 0])
 
-    def to_networkx(self) -> nx.MultiGraph[int]:
+    def to_networkx(self, *, certainty: bool = False) -> nx.MultiGraph[int]:
         """Return the level as a multigraph, with its parallel arcs and self-loops.
+
+        Parameters
+        ----------
+        certainty
+            Whether edges have `free_from`, `free_below`, `occupied_above` and `margin` of
+            `Certainty`, too.
 
         Returns
         -------
@@ -262,6 +269,7 @@ class Level:
             through_m=self.through_m.tolist(),
             n_cracks=self.n_cracks.tolist(),
             base_pair=self.base_pairs.tolist(),
+            **(self.certainty.columns() if certainty else {}),
         )
 
     def dual_to_networkx(self) -> nx.MultiGraph[int]:
@@ -364,6 +372,12 @@ class Level:
         return pairs
 
     @cached_property
+    def certainty(self) -> Certainty:
+        """The thresholds of the map at which each arc exists."""
+        table = self.boundary_table
+        return certainty_of(self._grid, self.field_of, self.classes, self.arcs, table)
+
+    @cached_property
     def boundary_middles(self) -> FloatArray:
         """float64 (n_arcs, 2), the middle of each arc's boundary, through which to draw the arc.
 
@@ -395,22 +409,11 @@ class Level:
         edges, arcs = [cracks], [arc_of_class[classes]]
         loops = np.flatnonzero(self.is_self_loop)
         came = np.zeros(rows * cols + cols if len(loops) else 0, np.uint8)
+        labels = self._labels[0], self._record.edge_end, self.index, cols
         for loop in loops:
-            line = self._line_of_loop(int(self.base_edges[loop]), came)
+            line = line_of_loop(int(self.base_edges[loop]), labels, came)
             edges.append(line)
             arcs.append(np.full(len(line), loop))
         edge, arc = np.concatenate(edges), np.concatenate(arcs)
         order = np.lexsort((edge, arc))
         return edge[order], arc[order]
-
-    def _line_of_loop(self, base_edge: int, came: ByteArray) -> LongArray:
-        """Return the base edges of the line of a self-loop's dual edge through its field.
-
-        The line leads to the face on either side; `came` is scratch.
-        """
-        field_of, cols = self._labels[0], self._grid.shape[1]
-        cell = base_edge >> 1
-        where = field_of[cell], field_of, self._record.edge_end, self.index, cols, came
-        faces = cell, cell - (1 if base_edge & 1 else cols)
-        parts = [_field_kernels.edges_to_rim(face, *where) for face in faces]
-        return np.concatenate([*parts, [base_edge]])

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, get_args, overload
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.pyramid.lazy_islands import LazyIslands
 from hybridnav.pyramid.level import Level
 from hybridnav.pyramid.record import Linkage
 
@@ -98,14 +99,14 @@ class DualGraphPyramid:
             touch merge, up to the apex, the building.
         resistance
             Lets contraction go on above the places, whatever U_d is, until every arc of the apex
-            resists: see `Resistance`. Not with rooms, which decide themselves what merges.
+            resists; rooms are found so. Not with rooms, which decide themselves what merges.
 
         Raises
         ------
         InvalidValueError
             When the merge distance is not positive, the linkage is not known, the seed is no
-            whole number, the rooms or the clearance are those of a grid of another shape, or both
-            are given.
+            whole number, the rooms or the resistance are those of a grid of another shape, or
+            both are given.
         """
         if math.isnan(merge_distance_m) or merge_distance_m <= 0:
             raise InvalidValueError(
@@ -255,7 +256,7 @@ class DualGraphPyramid:
         if self._below is not None and at <= self.place_level:
             return self._below[at]
         if at not in self._levels:  # one call, so that all threads share one level
-            self._levels.setdefault(at, Level(self.grid, self._record, at, self._find_islands))
+            self._levels.setdefault(at, Level(self.grid, self._record, at, self._lazy_islands))
         return self._levels[at]
 
     def ancestor(self, vertices: ArrayLike, *, level: int, to: int) -> IntArray:
@@ -343,17 +344,14 @@ class DualGraphPyramid:
             )
         return lower, upper
 
-    @cached_property
+    @property
     def islands(self) -> Islands:
         """Return the obstacles and components of the grid, with their nesting."""
-        if self._below is not None:
-            return self._below.islands
-        from hybridnav.pyramid.islands import Islands  # noqa: PLC0415 - loads scipy.ndimage
+        return self._lazy_islands.found if self._below is None else self._below.islands
 
-        return Islands.of_classes(self.grid.classes)
-
-    def _find_islands(self) -> Islands:
-        return self.islands
+    @cached_property
+    def _lazy_islands(self) -> LazyIslands:
+        return LazyIslands(self.grid)
 
     def __iter__(self) -> Iterator[Level]:
         return (self[index] for index in range(len(self)))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from hybridnav.pyramid._size_kernels import level_sizes
+
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, IntArray
 
@@ -37,6 +39,11 @@ class Record:
         vertex_end[vertex_end > level] = SURVIVES
         edge_end[edge_end >= min(2 * level + 2, SURVIVES)] = SURVIVES
         return Record(vertex_end, self.vertex_parent.copy(), edge_end)
+
+    def sizes(self, cols: int, n_levels: int) -> list[LevelSize]:
+        """Count what each level has, without making the levels; `cols` are those of the grid."""
+        ends = self.vertex_end, self.vertex_parent, self.edge_end
+        return [LevelSize(*size) for size in level_sizes(*ends, cols, n_levels).tolist()]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, IntArray
     from hybridnav.pyramid.level import Level
 
-    KindArray = NDArray[np.uint8] | NDArray[np.uint16]
+    KindArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.int32]
 
 N_CLASSES = 2
 """Classes of vertices: free and unexplored."""
@@ -68,14 +68,14 @@ class Blocks(NamedTuple):
     """Edges between them."""
 
 
-def mark_blocks(kinds: KindArray, limit: int) -> Blocks:
+def mark_blocks(kinds: KindArray, limit: int, *, in_blocks: KindArray | None = None) -> Blocks:
     """Fill the record for the blocks of the base; see `start_at_base` for the parameters."""
     record = Record(
         np.empty(kinds.size, np.uint8),
         np.empty(kinds.size, np.int32),
         np.empty(2 * kinds.size, np.uint8),
     )
-    power = block_powers(kinds, max_power(limit))
+    power = block_powers(kinds if in_blocks is None else in_blocks, max_power(limit))
     new_edge = np.empty(2 * kinds.size, np.int32)
     n_vertices, n_edges = _base_kernels.mark_base(
         kinds,
@@ -89,7 +89,7 @@ def mark_blocks(kinds: KindArray, limit: int) -> Blocks:
     return Blocks(record, power, new_edge, n_vertices, n_edges)
 
 
-def start_at_base(kinds: KindArray, limit: int) -> Start:
+def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None = None) -> Start:
     """Fill the record for the blocks of the base, and return their darts and vertices.
 
     Parameters
@@ -98,8 +98,11 @@ def start_at_base(kinds: KindArray, limit: int) -> Start:
         uint8 or uint16 (rows, cols); see `kinds_of`.
     limit
         See `squared_limit`; no block is wider than half of it.
+    in_blocks
+        The kinds of the cells that may lie in blocks, 0 elsewhere; None for all cells.
     """
-    record, power, new_edge, n_vertices, n_edges = mark_blocks(kinds, limit)
+    marked = mark_blocks(kinds, limit, in_blocks=in_blocks)
+    record, power, new_edge, n_vertices, n_edges = marked
     vertices = Vertices(*_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices))
     darts = Darts(*_base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges))
     return Start(record, darts, vertices, 0, kinds.shape[1])

@@ -1,4 +1,4 @@
-"""Decimation inside a window: some fields are contracted anew, others take part whole.
+"""Decimation inside a window: some fields are contracted anew, others take part whole or stay.
 
 The ends of the edges inside a field, and of those between two fields, depend on the cells of these
 fields alone: arcs are classes of cracks that blocks of two fields join, and self-loops are holes of
@@ -15,13 +15,16 @@ from hybridnav.combinatorial.darts import Darts
 from hybridnav.pyramid import _field_kernels
 from hybridnav.pyramid._kernels import Vertices
 from hybridnav.pyramid.cracks import endpoints_of
-from hybridnav.pyramid.decimation import contract_all
+from hybridnav.pyramid.decimation import contract_all, contract_within
 from hybridnav.pyramid.record import MAX_LEVELS, SURVIVES, Record
-from hybridnav.pyramid.start import Start, mark_blocks
+from hybridnav.pyramid.start import Start, mark_blocks, start_at_base
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
     from hybridnav.pyramid.record import Linkage
+
+_FIRST_KIND = 3
+"""The least number that is no class: cells of a ring have kinds of their own."""
 
 
 class Criterion(NamedTuple):
@@ -89,6 +92,103 @@ def contract_window(cells: Cells, kept: Record, criterion: Criterion) -> Fields:
     contract_all(start, criterion.linkage, criterion.limit, criterion.seed)
     field_of, survivors, areas, boxes = _fields(record, cells.dissolved.shape[1])
     return Fields(record, field_of.reshape(cells.dissolved.shape), survivors, areas, boxes)
+
+
+def contract_beside(
+    dissolved: ByteArray, ring: BoolArray, joins: ByteArray, criterion: Criterion
+) -> Fields:
+    """Contract dissolved cells among themselves, beside fields that stay as they are.
+
+    Only the cells of those fields beside the dissolved ones are looked at. They join one another at
+    the levels at which they do so in their fields, so that edges to them end where they must.
+
+    Parameters
+    ----------
+    dissolved
+        uint8 (rows, cols), `CellClass` of the cells that start as vertices of the base; 0
+        elsewhere. Read-only.
+    ring
+        bool (rows, cols), the cells beside them that stay: all that share a 2x2 block with one.
+    joins
+        uint8 by base edge, the level at which two cells of the ring join, 0 for all other edges.
+    criterion
+        When two fields merge.
+
+    Returns
+    -------
+    Fields
+        With the ends of all edges of dissolved cells. What is stated about cells of the ring is of
+        no use elsewhere.
+    """
+    return _contract_within(dissolved, dissolved, (ring, joins), criterion, None)
+
+
+def contract_places(
+    places: IntArray,
+    survivors: BoolArray,
+    beside: tuple[BoolArray, ByteArray],
+    criterion: Criterion,
+) -> Fields:
+    """Contract each of some places to its surviving cell, beside fields that stay as they are.
+
+    Parameters
+    ----------
+    places
+        int32 (rows, cols), the place of each cell that starts as a vertex of the base, from 1; 0
+        elsewhere.
+    survivors
+        bool (rows, cols), the cell of each place that survives. The linkage is "radius", and no
+        cell is too far from that of its place.
+    beside
+        The cells beside the places, and the levels at which these join; see `contract_beside`.
+    criterion
+        When two fields merge.
+
+    Returns
+    -------
+    Fields
+        One for each place, and those beside them; see `contract_beside`.
+    """
+    in_blocks = np.where(survivors, np.int32(0), places)
+    return _contract_within(places, in_blocks, beside, criterion, survivors.ravel())
+
+
+def contract_alone(classes: ByteArray, criterion: Criterion) -> Fields:
+    """Contract cells until no edge between two of them may be contracted.
+
+    Parameters
+    ----------
+    classes
+        uint8 (rows, cols), `CellClass`; what is 0 counts as no vertex.
+    criterion
+        When two fields merge.
+    """
+    classes.flags.writeable = False  # as the classes of a grid are: another type compiles anew
+    start = start_at_base(classes, criterion.limit)
+    contract_within(start, *criterion, np.empty(0, np.uint8))
+    field_of, survivors, areas, boxes = _fields(start.record, classes.shape[1])
+    return Fields(start.record, field_of.reshape(classes.shape), survivors, areas, boxes)
+
+
+def _contract_within(
+    dissolved: ByteArray | IntArray,
+    in_blocks: ByteArray | IntArray,
+    beside: tuple[BoolArray, ByteArray],
+    criterion: Criterion,
+    survivors: BoolArray | None,
+) -> Fields:
+    """Contract cells beside fields that stay; cells of different kinds stay apart."""
+    ring, joins = beside
+    kinds = np.where(ring, dissolved.dtype.type(1), dissolved)
+    kinds.flags.writeable = in_blocks.flags.writeable = False
+    record, darts, vertices, *rest = start_at_base(kinds, criterion.limit, in_blocks=in_blocks)
+    kind = vertices.classes.astype(np.int32)
+    on_ring = np.flatnonzero(ring[tuple(vertices.cells.T)])
+    kind[on_ring] = max(_FIRST_KIND, int(dissolved.max(initial=0)) + 1) + np.arange(len(on_ring))
+    start = Start(record, darts, vertices._replace(classes=kind), *rest)
+    contract_within(start, *criterion, joins, survivors=survivors)
+    field_of, found, areas, boxes = _fields(record, dissolved.shape[1])
+    return Fields(record, field_of.reshape(dissolved.shape), found, areas, boxes)
 
 
 def _fields(record: Record, cols: int) -> tuple[IntArray, LongArray, LongArray, IntArray]:

@@ -1,0 +1,101 @@
+"""How stable the numbers of places and rooms are while a robot maps a building.
+
+    python -m benchmarks.online_identities --data FOLDER [--every 10] [--rooms-every 5] [--scans N]
+
+The logs of Intel and Freiburg 079 are replayed in cells of 5 cm, with a robot of 0.25 m: a map
+after every so many scans. A cell flips if it stays free and changes the number of its place,
+although more than half of the cells of that place stay free; an untouched place, none of whose
+cells changes class, flips if its number is not on most of its cells any more. The last version is
+checked: at every level, arcs against boundaries read from the fields alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import hybridnav as hn
+from hybridnav.mapping import Mapper
+from hybridnav.online import OnlineRooms, ReplayFigures, grids_of_scans, replay
+
+LOGS = {
+    "Intel": "radish_logs/intel-corrected.log.gz",
+    "Freiburg 079": "radish_logs/freiburg-079-corrected.log.gz",
+}
+RESOLUTION_M = 0.05
+RADIUS_M = 0.25
+
+
+def agreement(rooms: OnlineRooms) -> float:
+    """Return the mean, over free cells, of the IoU of their room with that of a fresh build."""
+    fresh = hn.find_rooms(rooms.grid).label_of
+    both = (rooms.number_of >= 0) & (fresh >= 0) & (rooms.grid.measured == hn.CellClass.FREE)
+    ours, theirs = rooms.number_of[both], fresh[both]
+    keys, cells = np.unique(np.stack([ours, theirs]), axis=1, return_counts=True)
+    areas, others = np.bincount(ours), np.bincount(theirs)
+    iou = cells / (areas[keys[0]] + others[keys[1]] - cells)
+    return float((iou * cells).sum() / cells.sum())
+
+
+def followed(log: Path, every: int, rooms_every: int, scans: int | None) -> dict[str, Any]:
+    """Return the figures of a replay."""
+    figures, agreed = ReplayFigures(), 0.0
+    read = itertools.islice(hn.CarmenLog(log), scans)
+    mapper = Mapper(resolution_m=RESOLUTION_M)
+    grids = grids_of_scans(read, mapper, every=every, robot_radius_m=RADIUS_M)
+    step = None
+    for step in replay(grids, rooms_every=rooms_every):
+        figures.add(step)
+    if step is not None:
+        agreed = agreement(step.rooms)
+    return {**figures.figures(), "scans": mapper.n_scans, "agreement": agreed}
+
+
+def show(name: str, kind: str, found: dict[str, Any]) -> None:
+    """Print a row of the table."""
+    of = found[kind]
+    share = of["untouched_flipped"] / max(of["untouched"], 1)
+    events = " | ".join(f"{of[event]:,}" for event in ("born", "died", "merged", "split"))
+    print(
+        f"| {name}, {kind} | {found['scans']:,} | {of['updates']:,} | {of['median_ms']:.0f} | "
+        f"{of['p95_ms']:.0f} | {events} | {of['flipped_cells']:,.0f} | {of['flipped_share']:.2%} | "
+        f"{of['flips_per_untouched']:.3%} | {share:.1%} |",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, default=os.environ.get("HYBRIDNAV_DATA"))
+    parser.add_argument("--every", type=int, default=10)
+    parser.add_argument("--rooms-every", type=int, default=5)
+    parser.add_argument("--scans", type=int, default=None)
+    arguments = parser.parse_args()
+    if arguments.data is None:
+        parser.error("no folder of data: pass --data or set HYBRIDNAV_DATA")
+    print(
+        "| log | scans | updates | median, ms | p95, ms | born | died | merged | split | "
+        "cells that flip, an update | of free cells | untouched that flip, an update | ever |"
+    )
+    print("|" + "---|" * 13)
+    for name, file in LOGS.items():
+        log = Path(arguments.data) / file
+        found = followed(log, arguments.every, arguments.rooms_every, arguments.scans)
+        for kind in ("places", "rooms"):
+            show(name, kind, found)
+        n_faults, rooms = len(found["faults"]), found["n_rooms"]
+        print(
+            f"{name}: {found['levels']} levels, {n_faults} of them with faults; {rooms} rooms, "
+            f"agreement with those of a fresh build {found['agreement']:.3f}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,208 @@
+"""Kernels on the cells round those that are contracted anew."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridnav._jit import guarded, njit
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def ring_joins(ring, end, parent, place):
+    """Return the level at which the cells of each base edge in a ring join, flat, 0 for never.
+
+    The second result, int64 (n, 6), are edges whose cells have surviving cells beyond the window:
+    the edge, the level reached, and row and column of both, one of them beyond.
+
+    Parameters
+    ----------
+    ring
+        bool (rows, cols), the cells of the ring, in a window.
+    end, parent, place
+        Fields of `CELL` in the window.
+    """
+    rows, cols = ring.shape
+    joins = np.zeros(2 * rows * cols, np.uint8)
+    beyond = np.empty((16, 6), np.int64)
+    count = 0
+    for edge in range(2 * rows * cols):
+        row, col = (edge >> 1) // cols, (edge >> 1) % cols
+        to_row, to_col = row + (edge & 1), col + 1 - (edge & 1)
+        if not ring[row, col] or to_row == rows or to_col == cols or not ring[to_row, to_col]:
+            continue
+        if place[row, col] != place[to_row, to_col]:
+            continue
+        level = 0
+        while row != to_row or col != to_col:
+            if end[row, col] > end[to_row, to_col]:
+                row, col, to_row, to_col = to_row, to_col, row, col
+            level = max(level, end[row, col])
+            step_row, step_col = parent[row, col, 0], parent[row, col, 1]
+            row, col = row + step_row, col + step_col
+            if not (0 <= row < rows and 0 <= col < cols):
+                if count == len(beyond):
+                    longer = np.empty((2 * count, 6), np.int64)
+                    longer[:count] = beyond
+                    beyond = longer
+                beyond[count, 0], beyond[count, 1] = edge, level
+                beyond[count, 2], beyond[count, 3] = row, col
+                beyond[count, 4], beyond[count, 5] = to_row, to_col
+                count += 1
+                break
+        joins[edge] = level
+    return joins, beyond[:count].copy()
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def ring_round(dissolved):
+    """Return the cells that share a 2x2 block with one of a mask and are not in it, bool."""
+    rows, cols = dissolved.shape
+    ring = np.zeros((rows, cols), np.bool_)
+    for row in range(rows):
+        for col in range(cols):
+            if not dissolved[row, col]:
+                continue
+            for i in range(max(row - 1, 0), min(row + 2, rows)):
+                for j in range(max(col - 1, 0), min(col + 2, cols)):
+                    ring[i, j] |= not dissolved[i, j]
+    return ring
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def in_places(place, numbers):
+    """Return the cells whose place is one of some numbers, bool (rows, cols).
+
+    Parameters
+    ----------
+    place
+        int32 (rows, cols).
+    numbers
+        int64 (n,), ascending.
+    """
+    rows, cols = place.shape
+    found = np.zeros((rows, cols), np.bool_)
+    if numbers.size == 0:
+        return found
+    last, was_in = np.int64(-1), False
+    for row in range(rows):
+        for col in range(cols):
+            number = np.int64(place[row, col])
+            if number != last:
+                at = np.searchsorted(numbers, number)
+                last, was_in = number, at < numbers.size and numbers[at] == number
+            found[row, col] = was_in
+    return found
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def index_in(place, numbers):
+    """Return 1 plus the index of the place of each cell among some numbers, 0 for others.
+
+    The result is int32 (rows, cols); for the parameters see `in_places`.
+    """
+    rows, cols = place.shape
+    found = np.zeros((rows, cols), np.int32)
+    last, index = np.int64(-1), np.int64(0)
+    for row in range(rows):
+        for col in range(cols):
+            number = np.int64(place[row, col])
+            if number != last:
+                at = np.searchsorted(numbers, number)
+                is_in = at < numbers.size and numbers[at] == number
+                last, index = number, at + 1 if is_in else 0
+            found[row, col] = index
+    return found
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def box_groups(boxes):
+    """Return the group of each box, int64 (n,), the number of its first box.
+
+    The boxes round two groups have no cell in common, not even when one is a cell wider.
+
+    Parameters
+    ----------
+    boxes
+        int64 (n, 4), the least row and column and the first ones beyond; changed.
+    """
+    count = len(boxes)
+    group = np.arange(count)
+    grows = True
+    while grows:
+        grows = False
+        for i in range(count):
+            if group[i] != i:
+                continue
+            for j in range(i + 1, count):
+                if group[j] != j:
+                    continue
+                if (
+                    boxes[i, 0] <= boxes[j, 2]
+                    and boxes[j, 0] <= boxes[i, 2]
+                    and boxes[i, 1] <= boxes[j, 3]
+                    and boxes[j, 1] <= boxes[i, 3]
+                ):
+                    group[j] = i
+                    for k in range(2):
+                        boxes[i, k] = min(boxes[i, k], boxes[j, k])
+                        boxes[i, k + 2] = max(boxes[i, k + 2], boxes[j, k + 2])
+                    grows = True
+    for i in range(count):
+        group[i] = group[group[i]]
+    return group
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def pairs_across(field_of, fresh, ring, of_class, place):
+    """Return the pairs of a field and a place beside it of its class, int64 (n, 2), with repeats.
+
+    Parameters
+    ----------
+    field_of
+        int32 (rows, cols), the fields of the window.
+    fresh
+        uint8 (rows, cols), `CellClass` of the cells that were contracted, 0 elsewhere.
+    ring, of_class, place
+        bool, uint8 and int32 (rows, cols), the cells round those, and fields of `CELL`.
+    """
+    rows, cols = fresh.shape
+    pairs = np.empty((64, 2), np.int64)
+    count = 0
+    for row in range(rows):
+        for col in range(cols):
+            if not ring[row, col]:
+                continue
+            for step in range(4):
+                at_row = row + (1, -1, 0, 0)[step]
+                at_col = col + (0, 0, 1, -1)[step]
+                if not (0 <= at_row < rows and 0 <= at_col < cols):
+                    continue
+                if fresh[at_row, at_col] != of_class[row, col]:
+                    continue
+                first, second = field_of[at_row, at_col], place[row, col]
+                if count > 0 and pairs[count - 1, 0] == first and pairs[count - 1, 1] == second:
+                    continue
+                if count == len(pairs):
+                    longer = np.empty((2 * count, 2), np.int64)
+                    longer[:count] = pairs
+                    pairs = longer
+                pairs[count, 0], pairs[count, 1] = first, second
+                count += 1
+    return pairs[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def farthest_squared(labels, label, box, row, col):
+    """Return the squared distance from a cell to the farthest one with a label in a box."""
+    farthest = 0
+    for i in range(box[0], box[2]):
+        for j in range(box[1], box[3]):
+            if labels[i, j] == label:
+                farthest = max(farthest, (i - row) ** 2 + (j - col) ** 2)
+    return farthest

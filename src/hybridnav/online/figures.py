@@ -1,0 +1,149 @@
+"""Figures of a replay: times, events, flips, and a check of its last version."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav.pyramid.cracks import endpoints_of, find_cracks
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from hybridnav.online.replay import Flips, ReplayStep
+    from hybridnav.pyramid import Level
+
+_EVENTS = ("born", "died", "merged", "split")
+
+
+class _Identities:
+    """Events and flips of places, or of rooms, over a replay."""
+
+    def __init__(self) -> None:
+        self.seconds: list[float] = []
+        self.events: Counter[str] = Counter()
+        self._flips: list[tuple[int, int]] = []
+        self._compared = self._n_flips = 0
+        self._untouched: set[int] = set()
+        self._flipped: set[int] = set()
+
+    def add(self, update: object, flips: Flips, seconds: float) -> None:
+        """Count an update."""
+        self.seconds.append(seconds)
+        for event in _EVENTS:
+            self.events[event] += len(getattr(update, event))
+        self._flips.append((flips.cells, flips.free))
+        self._compared += len(flips.untouched)
+        self._n_flips += len(flips.flipped)
+        self._untouched |= flips.untouched
+        self._flipped |= flips.flipped
+
+    def figures(self) -> dict[str, Any]:
+        """Return plain values; None where there was no update."""
+        cells, free = np.array(self._flips).reshape(-1, 2).T
+        median, high = np.percentile(self.seconds, [50, 95]) if self.seconds else (None, None)
+        return {
+            "updates": len(self.seconds),
+            "median_ms": None if median is None else round(1000 * median, 3),
+            "p95_ms": None if high is None else round(1000 * high, 3),
+            **{event: self.events[event] for event in _EVENTS},
+            "flipped_cells": round(float(cells.mean()), 3) if len(cells) else None,
+            "flipped_share": round(float(cells.sum() / max(free.sum(), 1)), 8),
+            "untouched": len(self._untouched),
+            "untouched_flipped": len(self._flipped),
+            "flips_per_untouched": round(self._n_flips / max(self._compared, 1), 8),
+        }
+
+
+class ReplayFigures:
+    """What a replay did: times, what became of places and rooms, flips of their numbers.
+
+    Examples
+    --------
+    >>> from hybridnav.online import ReplayFigures, replay
+    >>> cells = np.zeros((9, 21))
+    >>> first = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
+    >>> cells[4, 10] = 1.0
+    >>> figures = ReplayFigures()
+    >>> for step in replay([first, hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)]):
+    ...     figures.add(step)
+    >>> figures.figures()["places"]["untouched_flipped"], figures.figures()["faults"]
+    (0, [])
+    """
+
+    def __init__(self) -> None:
+        self._places, self._rooms = _Identities(), _Identities()
+        self._last: ReplayStep | None = None
+        self._n_doors: Counter[str] = Counter()
+
+    def add(self, step: ReplayStep) -> None:
+        """Count a step."""
+        self._last = step
+        if step.place_flips is not None:
+            self._places.add(step.update, step.place_flips, step.seconds)
+        if step.rooms_update is not None and step.room_flips is not None:
+            self._rooms.add(step.rooms_update, step.room_flips, step.rooms_seconds)
+            self._n_doors["born"] += len(step.rooms_update.doors.born)
+            self._n_doors["died"] += len(step.rooms_update.doors.died)
+
+    def figures(self) -> dict[str, Any]:
+        """Return the figures as plain values for JSON.
+
+        Returns
+        -------
+        dict
+            `places` and `rooms` with `updates`, `median_ms` and `p95_ms` of an update, counts of
+            events, `flipped_cells` an update, their share of the cells that stayed free, how many
+            were ever `untouched`, and of these ever `untouched_flipped`, and the share of an update
+            in which an untouched one flips (see `Flips`);
+            `doors` with events; counts of the last map; `faults` of its levels, see `faults_of`.
+        """
+        last = self._last
+        if last is None:
+            return {}
+        pyramid = last.places.pyramid
+        return {
+            "maps": last.number + 1,
+            "cells": list(last.places.grid.shape),
+            "n_places": last.places.n_places,
+            "n_rooms": len(last.rooms.numbers),
+            "n_doors": sum(not door.is_gap for door in last.rooms.doors.values()),
+            "places": self._places.figures(),
+            "rooms": self._rooms.figures(),
+            "doors": {"born": self._n_doors["born"], "died": self._n_doors["died"]},
+            "levels": len(pyramid),
+            "faults": faults_of(pyramid),
+        }
+
+
+def faults_of(levels: Iterable[Level]) -> list[str]:
+    """Compare the arcs of every level with boundaries that are read from the fields alone.
+
+    A boundary is a set of cracks that are joined in 2 x 2 blocks with exactly two of them. Two
+    fields have as many arcs as boundaries.
+
+    Parameters
+    ----------
+    levels
+        Levels, such as those of a pyramid.
+
+    Returns
+    -------
+    list of str
+        A line on each level whose arcs are others; none if all is well.
+    """
+    return [fault for level in levels for fault in _faults(level)]
+
+
+def _faults(level: Level) -> Iterable[str]:
+    rows, cols = level.grid.shape
+    edges, classes = find_cracks(level.field_of.ravel(), rows, cols)
+    _, first = np.unique(classes, return_index=True)
+    one, other = endpoints_of(edges[first], cols)
+    fields = level.field_of.ravel()
+    read = np.sort(np.stack([fields[one], fields[other]], axis=1), axis=1)
+    arcs = np.sort(level.arcs[~level.is_self_loop], axis=1)
+    if not np.array_equal(read[np.lexsort(read.T)], arcs[np.lexsort(arcs.T)]):
+        yield f"level {level.index} has {len(arcs)} arcs, its fields have {len(read)} boundaries"

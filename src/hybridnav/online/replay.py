@@ -1,0 +1,283 @@
+"""Replays of maps that change: grid by grid, or scan by scan through a mapper."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass, OccupancyGrid
+from hybridnav.grid.checks import checked_type
+from hybridnav.online.pyramid import OnlinePyramid
+from hybridnav.online.room_versions import OnlineRooms
+from hybridnav.online.shift import placed, shift_of
+from hybridnav.pyramid import DualGraphPyramid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from hybridnav._typing import BoolArray, ByteArray, IntArray
+    from hybridnav.mapping import LaserScan, Mapper
+    from hybridnav.online.pyramid import Update
+    from hybridnav.online.room_versions import RoomsUpdate
+
+
+class Flips(NamedTuple):
+    """How stable the numbers of places or rooms are over one update.
+
+    A cell flips if it stays free and changes its number, although more than half of the cells of
+    its old place stay free. A place is untouched if none of its cells changes class; it flips if
+    its number is not on more than half of its cells any more. The same holds for rooms.
+
+    Examples
+    --------
+    >>> from hybridnav.online import replay
+    >>> grid = hn.OccupancyGrid(np.zeros((8, 8)), hn.Frame(0.25), robot_radius_m=0)
+    >>> first, second = replay([grid, grid])
+    >>> second.place_flips.cells, second.place_flips.free
+    (0, 64)
+    """
+
+    cells: int
+    """Cells that flip."""
+    free: int
+    """Cells that stay free."""
+    untouched: frozenset[int]
+    """Numbers of untouched places."""
+    flipped: frozenset[int]
+    """Those of them that flip."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayStep:
+    """A map of a replay, with its places and rooms.
+
+    Examples
+    --------
+    >>> from hybridnav.online import replay
+    >>> grid = hn.OccupancyGrid(np.zeros((8, 8)), hn.Frame(0.25), robot_radius_m=0)
+    >>> first, second = replay([grid, grid])
+    >>> second.number, second.rooms.numbers, second.update.died
+    (1, (1,), ())
+    """
+
+    number: int
+    """Number of the map, from 0."""
+    places: OnlinePyramid
+    """The places."""
+    rooms: OnlineRooms
+    """The newest rooms; they may be some maps old."""
+    update: Update | None
+    """What became of the places; None for the first map."""
+    rooms_update: RoomsUpdate | None
+    """What became of the rooms; None where they were not brought up to date."""
+    seconds: float
+    """Time of the update of the places; that of a build for the first map."""
+    rooms_seconds: float
+    """Time of the update of the rooms, 0 where there was none."""
+    place_flips: Flips | None
+    """Flips of places; None for the first map."""
+    room_flips: Flips | None
+    """Flips of rooms; None where they were not brought up to date."""
+
+
+def replay(
+    grids: Iterable[OccupancyGrid], *, merge_distance_m: float = 4.0, rooms_every: int = 1
+) -> Iterator[ReplayStep]:
+    """Follow a sequence of maps with places and rooms.
+
+    Parameters
+    ----------
+    grids
+        The maps; each has to cover the one before, cell on cell.
+    merge_distance_m
+        U_d of the places.
+    rooms_every
+        Maps after which rooms are brought up to date, at least 1; the last map always counts.
+
+    Yields
+    ------
+    ReplayStep
+        One for each map.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is no map, a map does not cover the one before, or a number is out of range.
+
+    Examples
+    --------
+    >>> from hybridnav.online import replay
+    >>> cells = np.zeros((9, 21))
+    >>> door_open = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
+    >>> cells[4, 10] = 1.0
+    >>> post = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
+    >>> [step.places.n_places for step in replay([door_open, post])]
+    [1, 1]
+    """
+    if not rooms_every >= 1:  # NaN too
+        raise InvalidValueError(f"rooms_every is {rooms_every}, expected 1 or more maps")
+    step: ReplayStep | None = None
+    for number, grid, is_last in _with_last(grids):
+        checked_type("a map of the replay", grid, OccupancyGrid)
+        if step is None:
+            step = _first(grid, merge_distance_m)
+        else:
+            step = _next(step, grid, with_rooms=is_last or number % rooms_every == 0)
+        yield step
+    if step is None:
+        raise InvalidValueError("there is no map to replay, expected one or more")
+
+
+def grids_of_scans(
+    scans: Iterable[LaserScan],
+    mapper: Mapper,
+    *,
+    every: int = 1,
+    robot_radius_m: float | None = None,
+) -> Iterator[OccupancyGrid]:
+    """Add scans to a map, and yield the map as it grows.
+
+    Parameters
+    ----------
+    scans
+        Scans with poses, such as those of a `CarmenLog`. Scans that the mapper refuses are left
+        out.
+    mapper
+        What they are added to.
+    every
+        Scans after which a map is yielded, at least 1; the last map has all scans.
+    robot_radius_m
+        Radius of the robot in metres; None is the default, 0.25 m.
+
+    Yields
+    ------
+    OccupancyGrid
+        The map so far, cut to the cells that scans have met.
+
+    Raises
+    ------
+    InvalidValueError
+        When `every` is below 1.
+
+    Examples
+    --------
+    >>> from hybridnav.mapping import LaserScan, Mapper
+    >>> from hybridnav.online import grids_of_scans
+    >>> beams = {"start_rad": 0.0, "step_rad": 0.1}
+    >>> scans = [LaserScan(np.full(9, 2.0), pose=(x, 0.0, 0.0), **beams) for x in (0.0, 1.0)]
+    >>> [grid.shape[1] for grid in grids_of_scans(scans, Mapper(resolution_m=0.5))]
+    [5, 7]
+    """
+    if every < 1:
+        raise InvalidValueError(f"every is {every}, expected 1 or more scans")
+    n_waiting = 0
+    for scan in scans:
+        n_waiting += bool(mapper.add(scan))
+        if n_waiting >= every and mapper.has_cells:
+            yield mapper.to_grid(robot_radius_m=robot_radius_m)
+            n_waiting = 0
+    if n_waiting and mapper.has_cells:
+        yield mapper.to_grid(robot_radius_m=robot_radius_m)
+
+
+def _with_last(grids: Iterable[OccupancyGrid]) -> Iterator[tuple[int, OccupancyGrid, bool]]:
+    """Yield the number of each grid, the grid, and whether it is the last one."""
+    number, waiting = -1, None
+    for number, grid in enumerate(grids):
+        if number:
+            yield number - 1, cast("OccupancyGrid", waiting), False
+        waiting = grid
+    if number >= 0:
+        yield number, cast("OccupancyGrid", waiting), True
+
+
+def _first(grid: OccupancyGrid, merge_distance_m: float) -> ReplayStep:
+    began = time.perf_counter()
+    pyramid = DualGraphPyramid.build(grid, merge_distance_m=merge_distance_m)
+    places = OnlinePyramid.of(pyramid)
+    built = time.perf_counter()
+    rooms = OnlineRooms.of(grid)
+    found = time.perf_counter()
+    return ReplayStep(0, places, rooms, None, None, built - began, found - built, None, None)
+
+
+def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayStep:
+    before, rooms = step.places, step.rooms
+    changed = changed_cells(before.grid, grid)
+    began = time.perf_counter()
+    update = before.update(grid, changed=changed)
+    updated = time.perf_counter()
+    rooms_update = rooms.update(grid) if with_rooms else None
+    found = time.perf_counter()
+    after = update.version
+    return ReplayStep(
+        step.number + 1,
+        after,
+        rooms if rooms_update is None else rooms_update.version,
+        update,
+        rooms_update,
+        updated - began,
+        found - updated if with_rooms else 0.0,
+        flips_between(_Numbered.of(before), _Numbered.of(after)),
+        None
+        if rooms_update is None
+        else flips_between(_Numbered.of(rooms), _Numbered.of(rooms_update.version)),
+    )
+
+
+def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
+    """Return bool (rows, cols) of the newer grid, the cells of the older one whose class differs.
+
+    Cells by which the map grew are left out, as updates look at them anyway.
+
+    Raises
+    ------
+    InvalidValueError
+        When the newer grid does not cover the older one, cell on cell.
+    """
+    rows, cols = shift_of(before, after, otherwise="begin a new replay")
+    changed = np.zeros(after.shape, np.bool_)
+    inside = np.s_[rows : rows + before.shape[0], cols : cols + before.shape[1]]
+    changed[inside] = after.classes[inside] != before.classes
+    return changed
+
+
+class _Numbered(NamedTuple):
+    """Cells with the numbers of their places or rooms."""
+
+    grid: OccupancyGrid
+    classes: ByteArray
+    number_of: IntArray
+
+    @classmethod
+    def of(cls, version: OnlinePyramid | OnlineRooms) -> _Numbered:
+        """Return the cells of a version; rooms know no robot."""
+        grid = version.grid
+        is_rooms = isinstance(version, OnlineRooms)
+        return cls(grid, grid.measured if is_rooms else grid.classes, version.number_of)
+
+
+def flips_between(before: _Numbered, after: _Numbered) -> Flips:
+    """Compare the numbers of cells of two versions; see `Flips`."""
+    shift = shift_of(before.grid, after.grid, otherwise="begin a new replay")
+    shape = after.grid.shape
+    free = before.classes == CellClass.FREE
+    old = placed(np.where(free, before.number_of, np.int32(-1)), shape, shift, -1)
+    stays = placed(free, shape, shift, 0) & (after.classes == CellClass.FREE)
+    inside = old >= 0
+    areas = np.bincount(old[inside])
+    kept = np.bincount(old[inside & stays], minlength=len(areas))
+    same = np.bincount(old[inside & (old == after.number_of)], minlength=len(areas))
+    moved = inside & stays & (old != after.number_of)
+    untouched = (areas > 0) & (kept == areas)
+    flipped = untouched & (2 * same <= areas)
+    return Flips(
+        int(np.count_nonzero((2 * kept > areas)[old[moved]])),
+        int(np.count_nonzero(stays)),
+        frozenset(np.flatnonzero(untouched).tolist()),
+        frozenset(np.flatnonzero(flipped).tolist()),
+    )

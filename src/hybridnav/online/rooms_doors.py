@@ -1,0 +1,182 @@
+"""Doors with lasting numbers: the boundaries between the rooms of a map that changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav._copies import frozen
+from hybridnav.grid import NO_ROOM, RoomLabels
+from hybridnav.topology.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from hybridnav._typing import IntArray, LongArray
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid.room_labels import Point
+
+_BIAS = 1 << 20
+"""Added to rows and columns so that none is negative."""
+
+
+@dataclass(frozen=True, eq=False)
+class OnlineDoor:
+    """A boundary between two rooms of a map that changes, with a number that lasts.
+
+    Examples
+    --------
+    >>> from hybridnav.online import OnlineRooms
+    >>> labels = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0)
+    >>> door = OnlineRooms.of(grid, labels).doors[1]
+    >>> door.rooms, door.position, door.width_m
+    ((1, 2), (2.0, 0.5), 1.0)
+    """
+
+    number: int
+    """Its number, from 1, never used again."""
+    rooms: tuple[int, int]
+    """Numbers of the rooms on both sides; -1 for what lies in no room."""
+    position: tuple[float, float]
+    """A point on the boundary, in its middle; `(x, y)` in metres, map frame."""
+    width_m: float
+    """As in `Door`."""
+    passage_m: float
+    """As in `Door`."""
+    cracks: LongArray
+    """int64 (n,), the base edges that it consists of, ascending, in a numbering that does not
+    change when the map grows."""
+
+    @property
+    def is_gap(self) -> bool:
+        """Whether its passage is below 0.3 m: lists and pictures count gaps and leave them out."""
+        return self.passage_m < LEAST_DOOR_M
+
+
+class DoorEvents(NamedTuple):
+    """What became of doors, by number.
+
+    Examples
+    --------
+    >>> from hybridnav.online import OnlineRooms
+    >>> labels = hn.RoomLabels(("kitchen", "hall"), np.array([[0, 0, 1, 1]]))
+    >>> rooms = OnlineRooms.of(hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=0), labels)
+    >>> wall = np.array([[0.0, 0.0, 1.0, 0.0]])
+    >>> rooms.update(hn.OccupancyGrid(wall, robot_radius_m=0)).doors.died
+    (1,)
+    """
+
+    born: tuple[int, ...]
+    """New doors; their numbers are new."""
+    died: tuple[int, ...]
+    """Doors that are no more."""
+    changed: tuple[int, ...]
+    """Doors that kept their number, but have other cells or rooms."""
+    split: dict[int, tuple[int, ...]]
+    """Doors of which several are left, with these: the one that kept the number among them."""
+
+
+def doors_of(
+    number_of: IntArray,
+    grid: OccupancyGrid,
+    low: tuple[int, int],
+    known: Mapping[int, Point],
+) -> list[OnlineDoor]:
+    """Return the doors between rooms.
+
+    Parameters
+    ----------
+    number_of
+        int32 (rows, cols), the number of the room of each cell, -1 for none.
+    grid
+        The map of these cells.
+    low
+        Row and column of cell (0, 0) in the lasting numbering.
+    known
+        A point of each door that has a number; see `RoomBoundaries.numbers`.
+    """
+    rooms, dense = np.unique(number_of, return_inverse=True)
+    first = int(np.searchsorted(rooms, 0))
+    label_of = np.maximum(dense.reshape(number_of.shape) - first, NO_ROOM).astype(np.int32)
+    labels = RoomLabels(tuple(f"room-{room}" for room in rooms[first:].tolist()), label_of)
+    found = RoomBoundaries.of(labels, grid, measured_clearance_m(grid))
+    room_of = np.append(rooms[first:], NO_ROOM)
+    numbers = found.numbers(known, {})
+    order = np.argsort(found.boundary_of, kind="stable")
+    ends = np.cumsum(np.bincount(found.boundary_of, minlength=found.n_boundaries))
+    row, col = np.divmod(found.edges >> 1, grid.shape[1])
+    cracks = ((row + low[0] + _BIAS) << 32) + ((col + low[1] + _BIAS) << 1) + (found.edges & 1)
+    sides = np.split(cracks[order], ends[:-1])
+    return [
+        OnlineDoor(
+            int(numbers[at]),
+            (int(room_of[found.labels[at, 0]]), int(room_of[found.labels[at, 1]])),
+            (float(found.middles[at, 0]), float(found.middles[at, 1])),
+            float(found.widths_m[at]),
+            float(found.passages_m[at]),
+            frozen(sides[at]),
+        )
+        for at in range(found.n_boundaries)
+    ]
+
+
+def follow_doors(
+    before: Mapping[int, OnlineDoor],
+    found: Iterable[OnlineDoor],
+    rooms: set[int],
+    first_number: int,
+) -> tuple[dict[int, OnlineDoor], DoorEvents]:
+    """Return the doors after a change, and what became of those before.
+
+    Parameters
+    ----------
+    before
+        The doors before.
+    found
+        The doors of a window that holds all doors of some rooms, those that are none of the old
+        ones with numbers that none of these has.
+    rooms
+        Numbers of these rooms, before and after the change; doors of others stay.
+    first_number
+        The least number that no door has had.
+    """
+    gone = {n: door for n, door in before.items() if not rooms.isdisjoint(door.rooms)}
+    doors = {n: door for n, door in before.items() if n not in gone}
+    new = [door for door in found if not rooms.isdisjoint(door.rooms)]
+    born: list[int] = []
+    for door in sorted(new, key=lambda door: door.number):
+        number = door.number
+        if number not in gone:
+            number = first_number + len(born)
+            born.append(number)
+        doors[number] = replace(door, number=number)
+    changed = tuple(
+        n for n, door in sorted(gone.items()) if n in doors and not _same(door, doors[n])
+    )
+    died = tuple(n for n in sorted(gone) if n not in doors)
+    fresh = [doors[n] for n in (*born, *changed)]
+    events = DoorEvents(tuple(born), died, changed, _split([gone[n] for n in sorted(gone)], fresh))
+    return dict(sorted(doors.items())), events
+
+
+def _same(one: OnlineDoor, other: OnlineDoor) -> bool:
+    return one.rooms == other.rooms and np.array_equal(one.cracks, other.cracks)
+
+
+def _split(old: list[OnlineDoor], new: list[OnlineDoor]) -> dict[int, tuple[int, ...]]:
+    """Return the old doors of whose cracks several new doors have some, with these."""
+    if not old or not new:
+        return {}
+    cracks = np.concatenate([door.cracks for door in new])
+    owner = np.repeat([door.number for door in new], [len(door.cracks) for door in new])
+    order = np.argsort(cracks)
+    split = {}
+    for door in old:
+        at = np.minimum(np.searchsorted(cracks[order], door.cracks), len(cracks) - 1)
+        parts = np.unique(owner[order][at[cracks[order][at] == door.cracks]])
+        if len(parts) > 1:
+            split[door.number] = tuple(parts.tolist())
+    return split
