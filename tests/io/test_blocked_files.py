@@ -175,9 +175,6 @@ def test_files_that_are_not_there_or_not_meant(grid: hn.OccupancyGrid, tmp_path:
     for name in ("none.geojson", "none.png"):
         with pytest.raises(hn.MapNotFoundError, match="no such file"):
             hn.load_blocked(tmp_path / name, grid)
-    (tmp_path / "keepout.yaml").write_text("image: keepout.pgm")
-    with pytest.raises(hn.MapError, match=r"expected GeoJSON .* or an image, got YAML"):
-        hn.load_blocked(tmp_path / "keepout.yaml", grid)
     (tmp_path / "works.txt").write_text("{}")
     with pytest.raises(hn.MapError, match="not an image"):
         hn.load_blocked(tmp_path / "works.txt", grid)
@@ -322,14 +319,18 @@ def test_a_comparison_closes_the_same_for_the_whole_grid(
     ("closed", "code", "words"),
     [
         ("door:9", 2, ["no door has the number 9", "from 1 to 3"]),
-        ("door:", 2, ["door:N, room:NAME or a file", "'door:'"]),
+        ("door:", 2, ["door:N, room:NAME, keepout:FILE or a file", "'door:'"]),
         ("door:x", 2, ["number of a door", "'x'"]),
         ("room:kichen", 2, ["'kichen'", "did you mean kitchen"]),
         ("room:", 2, ["'room:'"]),
         ("", 2, ["''"]),
         ("nothing.geojson", 3, ["nothing.geojson", "no such file"]),
         ("BAD", 3, ["bad.geojson, line 1"]),
-        ("MAP", 3, ["house.yaml", "got YAML"]),
+        ("keepout:", 2, ["'keepout:'"]),
+        ("keepout:zones.yaml,size=3", 2, ["keepout takes KEY=VALUE with", "'size=3'"]),
+        ("keepout:zones.yaml,multiplier=3", 2, ["keepout takes x, y and yaw"]),
+        ("keepout:zones.yaml,x=here", 2, ["x must be a number, got 'here'"]),
+        ("keepout:zones.yaml", 3, ["zones.yaml", "no such file"]),
     ],
 )
 def test_what_names_nothing_is_refused_by_the_command(  # noqa: PLR0913, PLR0917
@@ -341,7 +342,7 @@ def test_what_names_nothing_is_refused_by_the_command(  # noqa: PLR0913, PLR0917
     code: int,
     words: list[str],
 ) -> None:
-    closed = {"BAD": str(tmp_path / "bad.geojson"), "MAP": str(query[1])}.get(closed, closed)
+    closed = {"BAD": str(tmp_path / "bad.geojson")}.get(closed, closed)
     assert cli(*query, *endpoints, "--blocked", closed).refuses(code, *words)
 
 

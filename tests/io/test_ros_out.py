@@ -47,6 +47,7 @@ def written_again(path: Path, folder: Path) -> Path:
     thresholds(),
 )
 @settings(max_examples=examples(100))
+@pytest.mark.filterwarnings("ignore:.* cells have grey 205:hybridnav.MapWarning")
 def test_an_image_of_8_bits_is_written_with_equal_pixels(
     folder: Path,
     pixels: np.ndarray,

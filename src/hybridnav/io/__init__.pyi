@@ -1,6 +1,14 @@
+from .bags import BagLog as BagLog, load_bag_map as load_bag_map
+from .bags_out import save_bag as save_bag
 from .blocked import load_blocked as load_blocked
 from .carmen import CarmenLog as CarmenLog
 from .examples import example_map as example_map
+from .features_out import (
+    export_path as export_path,
+    export_places as export_places,
+    export_rooms as export_rooms,
+)
+from .graph_files import load_graph as load_graph
 from .maps import load as load, load_map as load_map
 from .models import Model as Model, save as save
 from .masks import load_keepout_mask as load_keepout_mask, load_speed_mask as load_speed_mask
@@ -9,6 +17,8 @@ from .movingai import (
     load_movingai_map as load_movingai_map,
     read_scenarios as read_scenarios,
 )
+from .movingai_out import write_movingai_map as write_movingai_map
+from .nav2 import export_nav2 as export_nav2
 from .rooms_in import load_rooms as load_rooms
 from .rooms_out import save_rooms as save_rooms
 from .ros import load_ros_map as load_ros_map

@@ -1,4 +1,4 @@
-"""Files of closed areas: GeoJSON in metres of the map frame, or a mask of the map's size."""
+"""Files of closed areas: GeoJSON in metres of the map frame, masks of Nav2, or images."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from hybridnav._files import printable
 from hybridnav.config.yaml_file import Limits, open_file
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.io.image import read_raster
+from hybridnav.io.masks import load_keepout_mask
 from hybridnav.planner.areas import parts_on
 from hybridnav.planner.blocked import Blocked
 
@@ -33,25 +34,32 @@ _MOST_OUTLINE_CELLS = 50_000
 seconds for the longest, with a radius of five cells."""
 
 _GEOJSON = (".geojson", ".json")
+_MASKS = (".yaml", ".yml")
 _KINDS = ("Polygon", "MultiPolygon", "LineString", "MultiLineString")
 _FEWEST = {"LineString": 2, "Polygon": 3}
 
 
-def load_blocked(path: PathLike, grid: OccupancyGrid) -> Blocked:
+def load_blocked(
+    path: PathLike, grid: OccupancyGrid, *, pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> Blocked:
     """Read the closed areas of a map from a file.
 
     Parameters
     ----------
     path
-        A GeoJSON file (`.geojson`, `.json`) or an image. GeoJSON is a `FeatureCollection`, a
-        `Feature` or a geometry, of `Polygon`, `MultiPolygon`, `LineString` and `MultiLineString`;
-        coordinates are `[x, y]` in metres, map frame, and the robot keeps its radius off the areas.
-        An image is a mask of one pixel a cell, in the orientation of the map's image: a pixel
-        closes its cell when it is opaque and its darkness, 1 - brightness in [0, 1], is at least
-        the map's occupied threshold; lighter and transparent pixels close nothing. The centre of
-        the robot does not enter these cells.
+        A GeoJSON file (`.geojson`, `.json`), a keepout mask of Nav2 (`.yaml`) or an image. GeoJSON
+        is a `FeatureCollection`, a `Feature` or a geometry, of `Polygon`, `MultiPolygon`,
+        `LineString` and `MultiLineString`; coordinates are `[x, y]` in metres, map frame, and the
+        robot keeps its radius off the areas. A keepout mask closes cells as
+        `CostLayer.keepout_mask` does, also for presets that know no costs. An image is a mask of
+        one pixel a cell, in the orientation of the map's image: a pixel closes its cell when it is
+        opaque and its darkness, 1 - brightness in [0, 1], is at least the map's occupied threshold;
+        lighter and transparent pixels close nothing. The centre of the robot does not enter the
+        cells of a mask.
     grid
         The map.
+    pose
+        `(x, y, yaw)` of the frame of a keepout mask in the map frame, in metres and radians.
 
     Returns
     -------
@@ -65,6 +73,8 @@ def load_blocked(path: PathLike, grid: OccupancyGrid) -> Blocked:
     MapError
         When the file cannot be read, closes nothing, an area closes no cell of the map, or a mask
         is not of the map's size.
+    InvalidValueError
+        When the pose is out of range, or given for a file that is no keepout mask.
 
     Examples
     --------
@@ -74,15 +84,29 @@ def load_blocked(path: PathLike, grid: OccupancyGrid) -> Blocked:
     >>> hn.load_blocked("closed.geojson", hn.example_map("figure1")).polygons
     (<LINESTRING (1 0, 1 2)>,)
     """
-    if Path(path).suffix.lower() in _GEOJSON:
-        return _areas(path, grid)
-    return _mask(path, grid)
+    suffix = Path(path).suffix.lower()
+    if suffix in _MASKS:
+        return _keepout(path, grid, pose)
+    if any(pose):
+        raise InvalidValueError(
+            f"blocked {printable(path)}: a pose goes with a keepout mask ({', '.join(_MASKS)}) "
+            "alone: leave it out"
+        )
+    return _areas(path, grid) if suffix in _GEOJSON else _image(path, grid)
 
 
-def _mask(path: PathLike, grid: OccupancyGrid) -> Blocked:
+def _keepout(path: PathLike, grid: OccupancyGrid, pose: tuple[float, float, float]) -> Blocked:
+    closed = load_keepout_mask(path, grid, pose=pose).closed
+    if closed is None:
+        raise MapError(
+            f"blocked {printable(path)}: the mask closes no cell of the map, expected occupied "
+            "cells on it: check its origin"
+        )
+    return Blocked(cells=np.argwhere(closed))
+
+
+def _image(path: PathLike, grid: OccupancyGrid) -> Blocked:
     where = f"blocked {printable(path)}"
-    if Path(path).suffix.lower() in {".yaml", ".yml"}:
-        raise MapError(f"{where}: expected GeoJSON ({', '.join(_GEOJSON)}) or an image, got YAML")
 
     def check_size(cols: int, rows: int) -> None:
         if (rows, cols) != grid.shape:

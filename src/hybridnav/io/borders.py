@@ -57,7 +57,46 @@ class Borders:
             The chains in the same order.
         """
         chains = shapely.get_parts(lines)[self.chains_of[room]]
-        return shapely.build_area(shapely.MultiLineString(list(chains)))
+        return shapely.build_area(shapely.MultiLineString(list(chains[shapely.length(chains) > 0])))
+
+    def without_short(self, at_most: float) -> Borders:
+        """Return borders on which chains as short as a given length are points.
+
+        All corners where chains meet that short chains join become one, in their middle. If borders
+        would then cross, or a part of a room would go, the result is these borders.
+
+        Parameters
+        ----------
+        at_most
+            Length in cells.
+        """
+        chains = shapely.get_parts(self.lines)
+        if not len(chains):
+            return self
+        points, chain = shapely.get_coordinates(chains, return_index=True)
+        begins = np.searchsorted(chain, np.arange(len(chains)))
+        ends = np.append(begins[1:], len(chain)) - 1
+        corners, at = np.unique(points[[begins, ends]].reshape(-1, 2), axis=0, return_inverse=True)
+        begin, end = at.reshape(2, -1)
+        short = (shapely.length(chains) <= at_most) & (begin != end)
+        group = _joined(len(corners), begin[short], end[short])
+        count = np.bincount(group)[:, None]
+        middles = np.stack([np.bincount(group, xy) for xy in corners.T], axis=1) / count
+        places = middles[group]
+        points[begins], points[ends] = places[begin], places[end]
+        inner = short[chain]
+        inner[begins] = inner[ends] = False
+        points[inner] = places[begin[chain[inner]]]
+        moved_chains = list(shapely.get_parts(shapely.linestrings(points, indices=chain)))
+        moved = Borders(shapely.MultiLineString(moved_chains), self.chains_of)
+        long = [one for one, is_short in zip(moved_chains, short, strict=True) if not is_short]
+        is_sound = shapely.is_simple(shapely.MultiLineString(long))
+        return moved if is_sound and moved._n_parts() == self._n_parts() else self
+
+    def _n_parts(self) -> list[int]:
+        """Return the number of parts of each room."""
+        areas = [self.area(room, self.lines) for room in range(len(self.chains_of))]
+        return [int(shapely.get_num_geometries(area)) for area in areas]
 
 
 def _sides(label_of: IntArray) -> FloatArray:
@@ -77,6 +116,16 @@ def _sides(label_of: IntArray) -> FloatArray:
     _, last = np.nonzero(ends)
     y = row + 1.0
     return np.stack([np.stack([first, y], axis=1), np.stack([last + 1.0, y], axis=1)], axis=1)
+
+
+def _joined(count: int, begin: LongArray, end: LongArray) -> LongArray:
+    """Return the number of the connected set of each of some nodes, joined by edges."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - on demand
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+    edges = coo_array((np.ones(len(begin), dtype=np.int8), (begin, end)), (count, count))
+    group: LongArray = connected_components(edges, directed=False)[1].astype(np.int64)
+    return group
 
 
 def _from_corner(chain: LineString) -> LineString:

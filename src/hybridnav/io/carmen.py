@@ -8,15 +8,14 @@ from __future__ import annotations
 import gzip
 import math
 import zlib
-from collections import Counter
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
-from hybridnav._files import printable
 from hybridnav.config.yaml_file import open_file
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
-from hybridnav.mapping import LaserScan, ScanSequence
+from hybridnav.io.scan_log import ScanLog
+from hybridnav.mapping import LaserScan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,7 +26,6 @@ _GZIP = b"\x1f\x8b"
 _MOST_BYTES = 2**20
 """Bytes of a line that are read; longer lines are damaged."""
 _MOST_BEAMS = 100_000
-_LONGEST_PAUSE_S = 600.0
 _KNOWN_STEPS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
 """Degrees between the beams of a SICK LMS by their number. FLASER does not state them."""
 _CUT_OFF = "line cut off"
@@ -38,7 +36,7 @@ class _DamagedLineError(Exception):
     """A line that is no scan; its text is the fault in a few words."""
 
 
-class CarmenLog:
+class CarmenLog(ScanLog):
     r"""A log of CARMEN, as an iterable of its laser scans.
 
     FLASER and ROBOTLASER1 are read; if a log holds both, those of the kind that comes first. Poses
@@ -74,54 +72,27 @@ class CarmenLog:
     'left out 1 of 3 scans: 1 line cut off'
     """
 
+    expected = "lines FLASER or ROBOTLASER1"
+
     def __init__(self, path: PathLike) -> None:
         self._path = path
         with self._open() as file:
-            self.size_bytes = file.seek(0, 2)
-            """Size of the file, for a progress bar."""
-        self._start()
-
-    def _start(self) -> None:
-        self.n_scans = 0
-        """Scans that were read and hold."""
-        self.skipped: Counter[str] = Counter()
-        """Scans that were left out, by fault."""
-        self.n_no_readings = 0
-        """Readings of the scans that hold which are no finite length of 0 or more."""
-        self.bytes_read = 0
-        """Bytes of the file that were read so far."""
-        self.duration_s = 0.0
-        """Seconds from scan to scan, in all; without pauses of more than ten minutes, most of which
-        are clocks that were set."""
+            super().__init__(path, file.seek(0, 2))
 
     def _open(self) -> BinaryIO:
         return open_file(self._path, what="log", error=MapError, missing=MapNotFoundError)
 
-    def __iter__(self) -> Iterator[LaserScan]:
-        """Yield the scans; a second iteration reads the file again."""
-        self._start()
-        reader, sequence = _LineReader(), ScanSequence()
-        time_s = math.nan
+    def _read(self) -> Iterator[LaserScan | str]:
+        reader = _LineReader()
         with self._open() as file:
             for line in self._lines(file):
                 try:
                     scan = reader.scan_of(line)
                 except _DamagedLineError as fault:
-                    self.skipped[str(fault)] += 1
+                    yield str(fault)
                     continue
-                if scan is None:
-                    continue
-                fault_or_none = sequence.fault_of(scan)
-                if fault_or_none is not None:
-                    self.skipped[fault_or_none] += 1
-                    continue
-                self.n_scans += 1
-                readings = scan.ranges_m
-                self.n_no_readings += int((~np.isfinite(readings) | (readings < 0)).sum())
-                if 0 < scan.time_s - time_s < _LONGEST_PAUSE_S:
-                    self.duration_s += scan.time_s - time_s
-                time_s = scan.time_s
-                yield scan
+                if scan is not None:
+                    yield scan
 
     def _lines(self, file: BinaryIO) -> Iterator[bytes]:
         """Yield the lines of the log, an empty one for each that is too long."""
@@ -140,31 +111,6 @@ class CarmenLog:
         except (EOFError, OSError, zlib.error):
             self.skipped["rest of the file damaged"] += 1
         self.bytes_read = self.size_bytes
-
-    def leave_out(self, fault: str) -> None:
-        """Count the scan that was yielded last among those that were left out.
-
-        Parameters
-        ----------
-        fault
-            Why, in a few words.
-        """
-        self.n_scans -= 1
-        self.skipped[fault] += 1
-
-    def summary(self) -> str:
-        """Return one line on what was left out so far."""
-        n_skipped = self.skipped.total()
-        text = f"left out {n_skipped} of {self.n_scans + n_skipped} scans"
-        if n_skipped:
-            faults = sorted(self.skipped.items(), key=lambda item: (-item[1], item[0]))
-            text += ": " + ", ".join(f"{count} {fault}" for fault, count in faults)
-        if self.n_no_readings:
-            text += f"; {self.n_no_readings} readings are no lengths"
-        return text
-
-    def __repr__(self) -> str:
-        return f"CarmenLog({printable(self._path)!r})"
 
 
 class _LineReader:

@@ -18,9 +18,11 @@ if TYPE_CHECKING:
 
 _KEYS = {
     "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),
-    "speed": ("base", "multiplier", "unit", "full_speed_mps"),
-    "keepout": ("multiplier",),
+    "speed": ("base", "multiplier", "unit", "full_speed_mps", "x", "y", "yaw"),
+    "keepout": ("multiplier", "x", "y", "yaw"),
 }
+_POSE = ("x", "y", "yaw")
+"""Keys of the pose of a mask's frame in the map frame."""
 _TEXTS = frozenset({"unit"})
 
 
@@ -35,13 +37,20 @@ class CostSpec:
     settings: dict[str, Any] = field(default_factory=dict)
     """Settings by name."""
 
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Pose of the frame of a mask in the map frame, `(x, y, yaw)`."""
+        x, y, yaw = (self.settings.get(key, 0.0) for key in _POSE)
+        return x, y, yaw
+
     def layer(self, grid: OccupancyGrid) -> CostLayer:
         """Return the costs of the cells of a map; see `CostLayer` and `load_speed_mask`."""
+        others = {key: value for key, value in self.settings.items() if key not in _POSE}
         if self.kind == "clearance":
-            return CostLayer.clearance(grid, **self.settings)
+            return CostLayer.clearance(grid, **others)
         if self.kind == "speed":
-            return load_speed_mask(self.file, grid, **self.settings)
-        return load_keepout_mask(self.file, grid, **self.settings)
+            return load_speed_mask(self.file, grid, pose=self.pose, **others)
+        return load_keepout_mask(self.file, grid, pose=self.pose, **others)
 
 
 def parse_costs(texts: Sequence[str]) -> tuple[CostSpec, ...]:
@@ -51,7 +60,8 @@ def parse_costs(texts: Sequence[str]) -> tuple[CostSpec, ...]:
     ----------
     texts
         `clearance[:KEY=VALUE,...]`, at most once, `speed:FILE[,KEY=VALUE,...]` or
-        `keepout:FILE[,multiplier=M]`.
+        `keepout:FILE[,KEY=VALUE,...]`; keys are the parameters of `CostLayer.clearance`,
+        `load_speed_mask` and `load_keepout_mask`, and x, y, yaw instead of a pose.
 
     Raises
     ------

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
 
 
-def load_speed_mask(  # noqa: PLR0913 - the last five have defaults
+def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
     path: PathLike,
     grid: OccupancyGrid,
     *,
@@ -21,6 +21,7 @@ def load_speed_mask(  # noqa: PLR0913 - the last five have defaults
     multiplier: float = -1.0,
     unit: Literal["percent", "m/s"] = "percent",
     full_speed_mps: float | None = None,
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
     max_cells: int = DEFAULT_MAX_CELLS,
 ) -> CostLayer:
     """Read a speed mask of Nav2: a metre in a slow zone costs as much more as it takes longer.
@@ -34,6 +35,9 @@ def load_speed_mask(  # noqa: PLR0913 - the last five have defaults
         The map. The mask may have another resolution, place and size.
     base, multiplier, unit, full_speed_mps
         As in `CostLayer.speed_mask`.
+    pose
+        `(x, y, yaw)` of the frame of the mask in the map frame, in metres and radians; the default
+        is for a mask in the map frame.
     max_cells
         The most cells that the mask may have.
 
@@ -49,7 +53,7 @@ def load_speed_mask(  # noqa: PLR0913 - the last five have defaults
     MapError
         When a file cannot be read, or holds too many cells.
     InvalidValueError
-        When a setting is out of range.
+        When a setting or the pose is out of range.
 
     Examples
     --------
@@ -67,7 +71,7 @@ def load_speed_mask(  # noqa: PLR0913 - the last five have defaults
     return CostLayer.speed_mask(
         grid,
         values,
-        frame,
+        frame.moved(pose),
         base=base,
         multiplier=multiplier,
         unit=unit,
@@ -80,13 +84,14 @@ def load_keepout_mask(
     grid: OccupancyGrid,
     *,
     multiplier: float = 2.0,
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
     max_cells: int = DEFAULT_MAX_CELLS,
 ) -> CostLayer:
     """Read a keepout mask of Nav2: zones that are closed, and lanes of preference.
 
     Parameters
     ----------
-    path, grid, max_cells
+    path, grid, pose, max_cells
         As in `load_speed_mask`.
     multiplier
         As in `CostLayer.keepout_mask`.
@@ -103,7 +108,7 @@ def load_keepout_mask(
     MapError
         When a file cannot be read, or holds too many cells.
     InvalidValueError
-        When the multiplier is out of range.
+        When the multiplier or the pose is out of range.
 
     Examples
     --------
@@ -118,4 +123,4 @@ def load_keepout_mask(
     array([[False,  True, False]])
     """
     values, frame = read_mask(path, max_cells=max_cells)
-    return CostLayer.keepout_mask(grid, values, frame, multiplier=multiplier)
+    return CostLayer.keepout_mask(grid, values, frame.moved(pose), multiplier=multiplier)

@@ -21,6 +21,8 @@ _SLACK = 1.02
 """Steps of a cell are within a tolerance of a cell, whatever the rounding."""
 _COLLINEAR_M = 0.01
 """Distance from a straight line at which a corner is none any more."""
+_SHORT_M = 0.2
+"""Length up to which a border between two rooms is a corner."""
 _DECIMALS = 2
 """Decimals of coordinates: centimetres."""
 
@@ -46,7 +48,8 @@ class Outlines:
 
         region_of = regions_of(label_of, grid)
         self._grid = grid
-        self._borders = Borders.of(region_of, n_rooms)
+        self._steps = Borders.of(region_of, n_rooms)
+        self._borders = self._steps.without_short(_SHORT_M / grid.resolution_m)
         self._directions = wall_directions(_rim(region_of), grid.resolution_m)
 
     def within(self, tolerance_m: float) -> list[list[FloatArray]]:
@@ -80,7 +83,7 @@ class Outlines:
 
     def _exact(self, room: int) -> list[FloatArray]:
         """Return the outline of a room that is too thin for rounded corners."""
-        return _rings(self._borders.area(room, self._borders.lines), self._grid, _DECIMALS + 1)
+        return _rings(self._steps.area(room, self._steps.lines), self._grid, _DECIMALS + 1)
 
 
 def _has_area(rings: list[FloatArray]) -> bool:

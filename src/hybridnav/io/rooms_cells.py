@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import lzma
 import zlib
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,9 @@ _LINE = 120
 """Characters in a line."""
 _MOST_BYTES = 2**20
 _BITS = 7
+_FORMAT = lzma.FORMAT_RAW
+_FILTERS = [{"id": lzma.FILTER_LZMA2, "dict_size": _MOST_BYTES, "lc": 0, "lp": 0, "pb": 0}]
+"""For bytes that are small numbers: no bits of those before, nor of their positions."""
 
 
 def fingerprint(rings: Sequence[FloatArray]) -> int:
@@ -55,16 +59,22 @@ def packed(
     """
     cells = np.flatnonzero(missed)
     labels = label_of.ravel()[cells]
-    numbers = [_signature(grid)]
+    heads: list[int] = []
+    starts: list[LongArray] = []
+    lengths: list[LongArray] = []
     packed_rooms: set[int] = set()
     for label, number in [(NO_ROOM, NAMELESS), *outlines]:
         mine = cells[(labels == label) & (label not in packed_rooms)]
         packed_rooms.add(label)
         begins = np.flatnonzero(np.diff(mine, prepend=-2) != 1)
-        lengths = np.diff(begins, append=len(mine))
-        starts = np.diff(mine[begins], prepend=0)
-        numbers += [number, len(begins), *starts.tolist(), *lengths.tolist()]
-    text = base64.b64encode(zlib.compress(b"".join(map(_varint, numbers)), 9)).decode()
+        heads += [number, len(begins)]
+        starts.append(np.diff(mine[begins], prepend=0))
+        lengths.append(np.diff(begins, append=len(mine)))
+    # Numbers of a kind beside each other take fewer bytes.
+    runs = np.concatenate([*starts, *lengths]).tolist()
+    numbers = [_signature(grid), len(heads) // 2, *heads, *runs]
+    content = lzma.compress(b"".join(map(_varint, numbers)), _FORMAT, filters=_FILTERS)
+    text = base64.b64encode(content).decode()
     return [text[at : at + _LINE] for at in range(0, len(text), _LINE)]
 
 
@@ -95,31 +105,40 @@ def unpacked(lines: Sequence[Any], where: str, grid: OccupancyGrid) -> Mapping[i
     damaged = RoomsError(f"{where}: cells: damaged, delete the list: the outlines alone then count")
     try:
         text = "".join(lines)
-        inflate = zlib.decompressobj()
-        content = inflate.decompress(base64.b64decode(text, validate=True), _MOST_BYTES)
+        reader = lzma.LZMADecompressor(_FORMAT, filters=_FILTERS)
+        content = reader.decompress(base64.b64decode(text, validate=True), _MOST_BYTES)
         numbers = _varints(content)
         if next(numbers) != _signature(grid):
             return {}
-        return dict(_runs(numbers, label_cells=grid.shape[0] * grid.shape[1]))
-    except (TypeError, ValueError, binascii.Error, zlib.error, StopIteration, RuntimeError):
+        return dict(_runs(numbers, grid.shape))
+    except (TypeError, ValueError, binascii.Error, lzma.LZMAError, StopIteration, RuntimeError):
         raise damaged from None
 
 
-def _runs(numbers: Iterator[int], label_cells: int) -> Iterator[tuple[int, Runs]]:
-    for number in numbers:
-        count = next(numbers)
-        if count > _MOST_BYTES:
-            raise ValueError
-        starts, lengths = (
-            np.array([next(numbers) for _ in range(count)], dtype=np.int64) for _ in range(2)
-        )
-        starts = np.cumsum(starts)
-        ends = starts + lengths
-        if count and (starts.min() < 0 or lengths.min() < 0 or ends.max() > label_cells):
+def _runs(numbers: Iterator[int], shape: tuple[int, int]) -> Iterator[tuple[int, Runs]]:
+    rows, cols = shape
+    n_outlines = _limited(next(numbers))
+    heads = [(next(numbers), _limited(next(numbers))) for _ in range(n_outlines)]
+    count = _limited(sum(count for _, count in heads))
+    steps, lengths = ([next(numbers) for _ in range(count)] for _ in range(2))
+    at = 0
+    for number, n_runs in heads:
+        here = slice(at, at + n_runs)
+        at += n_runs
+        starts = np.cumsum(np.array(steps[here], dtype=np.int64))
+        sizes = np.array(lengths[here], dtype=np.int64)
+        ends = starts + sizes
+        if n_runs and (starts.min() < 0 or sizes.min() < 0 or ends.max() > rows * cols):
             raise ValueError
         if (starts[1:] < ends[:-1]).any():
             raise ValueError
-        yield number, (starts, lengths)
+        yield number, (starts, sizes)
+
+
+def _limited(count: int) -> int:
+    if count > _MOST_BYTES:
+        raise ValueError
+    return count
 
 
 def _signature(grid: OccupancyGrid) -> int:

@@ -1,0 +1,127 @@
+"""The tables of route graphs: how long their routes are beside shortest paths, on 13 buildings.
+
+    python -m benchmarks.nav2 [--data FOLDER] [--maps GLOB] [--nodes 200,800,0] [--pairs 3000]
+
+The office of `maps/office`; with FOLDER the 12 buildings of `benchmarks.costs` as well. Robot
+radius 0.25 m, without rooms. `--nodes` are the numbers to aim at, 0 for as many as the routes need.
+Pairs are random free points with a path between them, other ones than those that the graph is
+built with; `from 2 m` leaves out those whose shortest path is shorter. Edges of each graph are
+tested against the cells by the tests of the metrics, which the builder does not use. A wrong edge,
+or a graph that is cut where free space is not, is listed on stderr, and the exit code is 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+
+import hybridnav as hn
+from benchmarks.costs import files_of
+from hybridnav.graphs.edges import parts_of
+from hybridnav.harness.tables import to_markdown
+from hybridnav.metrics import segment_faults
+
+if TYPE_CHECKING:
+    from hybridnav.graphs import Excess
+    from hybridnav.harness.tables import Row
+
+_RADIUS_M = 0.25
+_APART_M = 2.0
+_AIMS = {"best mean %": 2.0, "best max %": 10.0}
+_POLICIES = ("best", "nearest")
+
+
+def measure(file: Path, nodes: int, pairs: int) -> tuple[Row, list[str]]:
+    """Build the graph of a map and judge it; return its row and what is wrong with it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", hn.MapWarning)
+        grid = hn.load_map(file, robot_radius_m=_RADIUS_M)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    began = time.perf_counter()
+    graph = hn.build_route_graph(topology, nodes=nodes or None)
+    seconds = time.perf_counter() - began
+    every = hn.judge_route_graph(graph, pairs=pairs)
+    apart = hn.judge_route_graph(graph, pairs=pairs, least_m=_APART_M)
+    row: Row = {"map": file.stem, "aim": nodes or "none", "nodes": graph.n_nodes}
+    row |= {"edges": graph.n_edges, "build s": seconds}
+    row["solved %"] = 100 * every.best.solved
+    for name in _POLICIES:
+        excess: Excess = getattr(every, name)
+        row[f"{name} mean %"] = 100 * excess.mean
+        row[f"{name} p95 %"] = 100 * excess.p95
+        row[f"{name} max %"] = 100 * excess.greatest
+        row[f"{name} max from 2 m %"] = 100 * getattr(apart, name).greatest
+    return row, _faults(graph)
+
+
+def _faults(graph: hn.RouteGraph) -> list[str]:
+    ends = graph.points[graph.edges]
+    wrong = [
+        f"edge {k} is not free" for k, end in enumerate(ends) if segment_faults(graph.grid, end)
+    ]
+    label, _ = ndimage.label(graph.grid.enterable(allow_unexplored=False))
+    rows, cols = np.minimum(graph.positions.astype(int), np.array(label.shape) - 1).T
+    # A node on a lattice corner may lie beside its part: only those inside cells are compared.
+    inside = (graph.positions % 1 != 0).all(axis=1)
+    parts, cells = parts_of(graph.edges, graph.n_nodes)[inside], label[rows, cols][inside]
+    pairs = {(part, cell) for part, cell in zip(parts.tolist(), cells.tolist(), strict=True)}
+    if len({part for part, _ in pairs}) != len(pairs) or len({c for _, c in pairs}) != len(pairs):
+        wrong.append("its parts are not those of free space")
+    return wrong
+
+
+def _summary(rows: list[Row]) -> list[Row]:
+    """Return the mean and worst figures over all maps of each aim, beside the aims."""
+    table: list[Row] = []
+    for aim in dict.fromkeys(row["aim"] for row in rows):
+        own = [row for row in rows if row["aim"] == aim]
+        line: Row = {"nodes aimed at": aim, "maps": len(own)}
+        for key in own[0]:
+            if key.endswith("%"):
+                values = np.array([float(row[key]) for row in own])
+                worst = values.min() if key.startswith("solved") else values.max()
+                line[key] = float(worst if "max" in key or "solved" in key else values.mean())
+        for key, most in _AIMS.items():
+            met = sum(float(row[key]) <= most for row in own)
+            line[f"{key} <= {most:g}"] = f"{met} of {len(own)} maps"
+        table.append(line)
+    return table
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, default=os.environ.get("HYBRIDNAV_DATA"))
+    parser.add_argument("--maps", action="append", default=[])
+    parser.add_argument("--nodes", default="200,800,0")
+    parser.add_argument("--pairs", type=int, default=3000)
+    arguments = parser.parse_args()
+    data = None if arguments.data is None else Path(arguments.data)
+    files = [file for file, kind in files_of(data, arguments.maps).items() if kind == "building"]
+    rows: list[Row] = []
+    n_wrong = 0
+    for nodes in map(int, arguments.nodes.split(",")):
+        for file in files:
+            row, wrong = measure(file, nodes, arguments.pairs)
+            rows.append(row)
+            n_wrong += len(wrong)
+            for line in wrong:
+                sys.stderr.write(f"wrong: {file.stem}: {line}\n")
+            sys.stderr.write(f"{row}\n")
+    sys.stdout.write(f"## Route graphs\n\n{to_markdown(rows)}\n")
+    sys.stdout.write(
+        f"## Means, and worst figures for max and solved\n\n{to_markdown(_summary(rows))}"
+    )
+    sys.exit(1 if n_wrong else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,285 @@
+"""`hybridnav export`: a route graph of a map, its rooms or its places, for other programs."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybridnav as hn
+from hybridnav._files import printable
+from hybridnav.cli.common import (
+    Reading,
+    answer,
+    check_output,
+    check_picture,
+    check_room_to_be,
+    grow_topology,
+    load_model,
+    progress_bar,
+    read_settings,
+    stage,
+    timings,
+)
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import (
+    FreeOption,
+    JsonOption,
+    LeastIslandOption,
+    MapArgument,
+    MaxCellsOption,
+    OccupiedOption,
+    PlotOption,
+    PresetOption,
+    RadiusOption,
+    RoomsOption,
+    SeedOption,
+)
+from hybridnav.grid import DEFAULT_MAX_CELLS
+
+if TYPE_CHECKING:
+    from hybridnav.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
+
+_ENDINGS = {
+    "nav2": (".geojson", ".json"),
+    "rooms": (".csv", ".geojson"),
+    "places": (".csv", ".geojson"),
+}
+"""Endings of the file of each format."""
+_SPACING_M, _STRETCH = 2.0, 1.02
+_MOST_PAIRS = 1_000_000
+
+OutOption = Annotated[
+    Path,
+    typer.Option(
+        "-o", "--out", metavar="FILE", help="The file: .geojson; of rooms and places also .csv."
+    ),
+]
+FormatOption = Annotated[
+    str, typer.Option("--format", metavar="NAME", help=f"What to write: {', '.join(_ENDINGS)}.")
+]
+NodesOption = Annotated[
+    int | None,
+    typer.Option(
+        "--nodes", metavar="N", min=1, help="Nodes to aim at: fewer nodes, longer routes."
+    ),
+]
+SpacingOption = Annotated[
+    float,
+    typer.Option(
+        "--spacing", metavar="D", help="Distance in metres within which points see a node."
+    ),
+]
+StretchOption = Annotated[
+    float,
+    typer.Option(
+        "--stretch",
+        metavar="S",
+        help="Most by which routes between nodes in sight are longer, as a factor.",
+    ),
+]
+LanesOption = Annotated[
+    float | None,
+    typer.Option(
+        "--lanes",
+        metavar="APART",
+        help="Where two robots fit side by side, a lane on the right for each direction; APART is "
+        "the distance in metres between the robots.",
+    ),
+]
+PolylinesOption = Annotated[
+    bool,
+    typer.Option(
+        "--polylines",
+        help="Nodes at rooms, doors and places only; bends are polylines in the metadata of edges.",
+    ),
+]
+FrameOption = Annotated[
+    str, typer.Option("--frame", metavar="NAME", help="Name of the map frame in the file.")
+]
+ReportOption = Annotated[
+    int | None,
+    typer.Option(
+        "--report",
+        metavar="N",
+        min=1,
+        max=_MOST_PAIRS,
+        help="Compare the routes of N random pairs with shortest paths.",
+    ),
+]
+
+
+def export(
+    map_file: MapArgument,
+    out: OutOption,
+    kind: FormatOption = "nav2",
+    nodes: NodesOption = None,
+    spacing_m: SpacingOption = _SPACING_M,
+    stretch: StretchOption = _STRETCH,
+    lanes_m: LanesOption = None,
+    polylines: PolylinesOption = False,
+    frame: FrameOption = "map",
+    report: ReportOption = None,
+    rooms_file: RoomsOption = None,
+    preset: PresetOption = None,
+    robot_radius_m: RadiusOption = None,
+    seed: SeedOption = None,
+    free_threshold: FreeOption = None,
+    occupied_threshold: OccupiedOption = None,
+    least_island_m2: LeastIslandOption = 0.0,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    as_json: JsonOption = False,
+    plot: PlotOption = None,
+) -> None:
+    """Write a graph of MAP's free space for Nav2's route server, or its rooms or places."""
+    if kind not in _ENDINGS:
+        raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
+    if polylines and (report is not None or plot is not None or lanes_m is not None):
+        raise UsageError(
+            "--polylines does not go with --report, --plot and --lanes, which are for straight "
+            "edges: leave them out"
+        )
+    check_output(out, "--out", _ENDINGS[kind])
+    check_picture(plot)
+    if kind != "nav2":
+        given = {
+            "--nodes": nodes is not None,
+            "--spacing": spacing_m != _SPACING_M,
+            "--stretch": stretch != _STRETCH,
+            "--lanes": lanes_m is not None,
+            "--polylines": polylines,
+            "--report": report is not None,
+            "--plot": plot is not None,
+        }
+        _check_plain(kind, given)
+    settings = read_settings(preset, None, robot_radius_m, seed, map_file=map_file)
+    seconds: dict[str, float] = {}
+    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
+    model = load_model(map_file, settings, seconds, reading)
+    check_room_to_be(model.grid)
+    find_rooms = kind != "places"
+    topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=find_rooms)
+    if kind != "nav2":
+        with stage(f"writing {out}", seconds, "write"):
+            _write_parts(topology, kind, out, frame)
+        answer(_parts_answer(topology, kind, (out, map_file), seconds, as_json=as_json))
+        return
+    began = time.perf_counter()
+    with progress_bar("building the graph") as advance:
+        graph = hn.build_route_graph(
+            topology,
+            nodes=nodes,
+            spacing_m=spacing_m,
+            stretch=stretch,
+            seed=settings.pyramid.seed,
+            progress=advance,
+        )
+        if lanes_m is not None:
+            graph = hn.keep_right(topology, graph, apart_m=lanes_m)
+    seconds["graph"] = round(time.perf_counter() - began, 6)
+    with stage(f"writing {out}", seconds, "write"):
+        written = hn.merge_bends(graph) if polylines else graph
+        hn.export_nav2(written, out, frame=frame)
+    judged = None
+    if report is not None:
+        with stage("comparing routes", seconds, "report"):
+            judged = hn.judge_route_graph(graph, pairs=report)
+    figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
+    text = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
+    lines = [*_summary(out, written, graph.grid, judged), f"seconds    {timings(seconds)}"]
+    answer((text if as_json else "\n".join(lines)) + "\n")
+    if plot is not None:
+        from hybridnav.viz import plot_route_graph, save_figure  # noqa: PLC0415 - on demand
+
+        save_figure(plot_route_graph(graph), plot)
+
+
+def _check_plain(kind: str, given: dict[str, bool]) -> None:
+    """Refuse options of graphs for a format that has none."""
+    for option, is_given in given.items():
+        if is_given:
+            raise UsageError(f"{option} is for --format nav2, got {kind}: leave it out")
+
+
+def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) -> None:
+    if kind == "rooms":
+        hn.export_rooms(topology.rooms, out, frame=frame)
+    else:
+        hn.export_places(topology, out, frame=frame)
+
+
+def _parts_answer(
+    topology: hn.TopologicalMap,
+    kind: str,
+    files: tuple[Path, Path],
+    seconds: dict[str, float],
+    *,
+    as_json: bool,
+) -> str:
+    """Return what is printed of rooms or places that were written."""
+    out, map_file = files
+    counts = {"places": topology.n_places, "arcs": topology.n_arcs}
+    if kind == "rooms":
+        doors = sum(not door.is_gap for door in topology.rooms.doors)
+        counts = {"rooms": len(topology.rooms.names), "doors": doors}
+    if as_json:
+        figures = counts | {"file": str(out), "map": str(map_file), "seconds": seconds}
+        return json.dumps(figures, allow_nan=False) + "\n"
+    grid = topology.grid
+    counted = ", ".join(f"{count:,} {name}" for name, count in counts.items())
+    lines = [
+        f"file       {printable(out)}, {counted}",
+        f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
+        f"seconds    {timings(seconds)}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _summary(
+    out: Path,
+    graph: RouteGraph | WaypointGraph,
+    grid: hn.OccupancyGrid,
+    judged: GraphReport | None,
+) -> list[str]:
+    counts = _counts(graph)
+    lines = [
+        f"graph      {printable(out)}, {graph.n_nodes:,} nodes, {graph.n_edges:,} edges",
+        f"map        {printable(grid.name)}, robot radius {grid.robot_radius_m:g} m",
+        f"nodes      {', '.join(f'{count:,} {kind}' for kind, count in counts.items())}",
+    ]
+    if judged is not None:
+        lines += [
+            f"pairs      {judged.pairs:,}, {judged.in_sight:.1%} of them in sight of each other",
+            f"best       {_line(judged.best)}",
+            f"nearest    {_line(judged.nearest)}",
+        ]
+    return lines
+
+
+def _line(excess: Excess) -> str:
+    return (
+        f"routes longer by {excess.mean:.2%} on average, {excess.p95:.1%} at the 95th percentile, "
+        f"{excess.greatest:.1%} at most; {excess.solved:.1%} solved"
+    )
+
+
+def _counts(graph: RouteGraph | WaypointGraph) -> dict[str, int]:
+    if isinstance(graph, hn.WaypointGraph):
+        kinds = [facts["metadata"]["class"] for facts in graph.node_facts.values()]
+    else:
+        kinds = list(graph.kinds)
+    return {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+
+
+def _figures(graph: RouteGraph | WaypointGraph, judged: GraphReport | None) -> dict[str, Any]:
+    report = None if judged is None else asdict(judged)
+    return {
+        "nodes": graph.n_nodes,
+        "edges": graph.n_edges,
+        "kinds": _counts(graph),
+        "report": report,
+    }

@@ -1,0 +1,15 @@
+from .build import build_route_graph as build_route_graph
+from .check import GraphCheck as GraphCheck, check_graph as check_graph
+from .findings import KINDS as KINDS, Example as Example, Finding as Finding
+from .judge import (
+    Excess as Excess,
+    GraphReport as GraphReport,
+    judge_route_graph as judge_route_graph,
+)
+from .lanes import keep_right as keep_right
+from .polylines import merge_bends as merge_bends
+from .route_graph import RouteGraph as RouteGraph
+from .route_messages import route_messages as route_messages
+from .waypoint_graph import WaypointGraph as WaypointGraph
+
+__all__: list[str]

@@ -1,0 +1,199 @@
+"""Routes between points that are no nodes: how their ends join the graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.graphs._spanner_kernels import routes
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.refine import Sight
+
+_CANDIDATES = 100
+"""Nearest nodes of a point that are tested for sight."""
+
+Offsets = tuple["LongArray", "LongArray", "FloatArray"]
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A graph ready for routes between any positions."""
+
+    sight: Sight
+    positions: FloatArray
+    """float64 (n, 2), the nodes."""
+    graph: tuple[LongArray, LongArray, FloatArray]
+    """First edge of each node, head and length of each edge."""
+    usable: LongArray
+    """int64 (k,), the nodes that ends may join: those in free space."""
+
+    @classmethod
+    def of(
+        cls,
+        sight: Sight,
+        positions: FloatArray,
+        edges: LongArray,
+        usable: LongArray | None = None,
+    ) -> Network:
+        """Prepare a graph.
+
+        Parameters
+        ----------
+        sight
+            Tests of segments.
+        positions
+            float64 (n, 2), the nodes, (row, col) in grid units.
+        edges
+            int64 (m, 2), tail and head of each edge.
+        usable
+            int64 (k,), the nodes in free space; None for all.
+        """
+        usable = np.arange(len(positions)) if usable is None else usable
+        return cls(sight, positions, adjacency(positions, edges), usable)
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        from scipy.spatial import KDTree  # noqa: PLC0415 - on demand
+
+        return KDTree(self.positions[self.usable])
+
+    def in_sight(self, points: FloatArray) -> Offsets:
+        """Return the usable nodes in sight of points, among the 100 nearest of each.
+
+        Parameters
+        ----------
+        points
+            float64 (p, 2), free positions.
+
+        Returns
+        -------
+        tuple
+            int64 (p + 1,) offsets, int64 (k,) nodes, the nearest of each point first, and float64
+            (k,) distances to them.
+        """
+        near = min(_CANDIDATES, len(self.usable))
+        if not near:
+            nothing = np.zeros(len(points) + 1, dtype=np.int64)
+            return nothing, np.empty(0, dtype=np.int64), np.empty(0)
+        away, found = self._tree.query(points, k=list(range(1, near + 1)))
+        away, nodes = np.asarray(away), self.usable[np.asarray(found)]
+        tails = np.repeat(points, near, axis=0)
+        seen = self.sight.clear(tails, self.positions[nodes.ravel()]).reshape(nodes.shape)
+        offsets = np.concatenate([[0], np.cumsum(seen.sum(axis=1))]).astype(np.int64)
+        return offsets, nodes[seen].astype(np.int64), away[seen]
+
+    def join(self, starts: FloatArray, goals: FloatArray) -> Attached:
+        """Find the nodes in sight of pairs.
+
+        Parameters
+        ----------
+        starts, goals
+            float64 (p, 2), free positions.
+        """
+        return Attached(self, starts, goals, self.in_sight(starts), self.in_sight(goals))
+
+
+@dataclass(frozen=True, eq=False)
+class Attached:
+    """Pairs of positions, with the nodes in sight of each end."""
+
+    network: Network
+    starts: FloatArray
+    goals: FloatArray
+    from_start: Offsets
+    """Offsets, nodes in sight, and distances to them, the nearest first."""
+    from_goal: Offsets
+
+    @cached_property
+    def direct(self) -> BoolArray:
+        """The pairs whose ends see each other, bool (p,)."""
+        return self.network.sight.clear(self.starts, self.goals)
+
+    def best(self) -> FloatArray:
+        """Return the length of the best route over any nodes in sight of the ends, or of the
+        segment between ends that see each other; float64 (p,) in cells, infinite for none."""
+        lengths, _, _ = _routes(self.network.graph, self.from_start, self.from_goal)
+        steps = self.goals - self.starts
+        straight = np.where(self.direct, np.hypot(steps[:, 0], steps[:, 1]), np.inf)
+        return np.minimum(lengths, straight)
+
+    def nearest(self) -> FloatArray:
+        """Return the lengths of the routes of `nearest_lines`, float64 (p,) in cells, infinite for
+        none."""
+        lines, _ = self.nearest_lines()
+        return np.array(
+            [np.inf if line is None else np.hypot(*np.diff(line, axis=0).T).sum() for line in lines]
+        )
+
+    def nearest_lines(self) -> tuple[list[FloatArray | None], LongArray]:
+        """Return the routes from the nearest node in sight of the start to the nearest one in sight
+        of the goal.
+
+        As in Nav2, the robot leaves out the first edge if it has passed its first node, and the
+        last one likewise; here only if the next node is in sight. Ends that see each other need no
+        graph.
+
+        Returns
+        -------
+        tuple
+            For each pair float64 (k, 2), the positions from start to goal, or None; and int64 (p,),
+            the number of nodes that the search has expanded.
+        """
+        starts, goals = _first_only(self.from_start), _first_only(self.from_goal)
+        lengths, passed, expanded = _routes(self.network.graph, starts, goals)
+        lines: list[FloatArray | None] = []
+        for pair, is_direct in enumerate(self.direct.tolist()):
+            inner = np.empty((0, 2)) if is_direct else None
+            if not is_direct and np.isfinite(lengths[pair]):
+                nodes = self.network.positions[passed[pair]]
+                nodes = self._without_passed(self.starts[pair], nodes)
+                inner = self._without_passed(self.goals[pair], nodes[::-1])[::-1]
+            ends = self.starts[pair, None], self.goals[pair, None]
+            line = None if inner is None else np.concatenate([ends[0], inner, ends[1]])
+            lines.append(line)
+        return lines, expanded
+
+    def _without_passed(self, point: FloatArray, nodes: FloatArray) -> FloatArray:
+        """Return the nodes of a route without the first, if the robot has passed it."""
+        if len(nodes) < 2 or (nodes[1] - nodes[0]) @ (point - nodes[0]) <= 0:  # noqa: PLR2004
+            return nodes
+        is_seen = self.network.sight.clear(point[None], nodes[None, 1])[0]
+        return nodes[1:] if is_seen else nodes
+
+
+def adjacency(positions: FloatArray, edges: LongArray) -> tuple[LongArray, LongArray, FloatArray]:
+    """Return the first edge of each node, and head and length of each edge."""
+    edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+    first = np.searchsorted(edges[:, 0], np.arange(len(positions) + 1)).astype(np.int64)
+    steps = positions[edges[:, 1]] - positions[edges[:, 0]]
+    return first, np.ascontiguousarray(edges[:, 1]), np.hypot(steps[:, 0], steps[:, 1])
+
+
+def _first_only(seen: Offsets) -> Offsets:
+    """Return only the nearest node in sight of each point."""
+    offsets, nodes, away = seen
+    has = offsets[1:] > offsets[:-1]
+    kept = offsets[:-1][has]
+    return np.concatenate([[0], np.cumsum(has)]).astype(np.int64), nodes[kept], away[kept]
+
+
+def _routes(
+    graph: tuple[LongArray, LongArray, FloatArray], starts: Offsets, goals: Offsets
+) -> tuple[FloatArray, list[LongArray], LongArray]:
+    """Return the costs of the shortest routes, the nodes of each from first to last, and the number
+    of expanded nodes."""
+    room = 64 * len(starts[0])
+    while True:
+        passed = np.empty(room, dtype=np.int64)
+        costs, offsets, expanded = routes(graph, starts, goals, passed)
+        if offsets[-1] >= 0:
+            parts = np.split(passed[: offsets[-1]], offsets[1:-1])
+            return costs, [part[::-1] for part in parts], expanded
+        room *= 2

@@ -1,0 +1,115 @@
+"""Edges of a route graph: a spanner of sight, joined wherever free space is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.graphs._spanner_kernels import spanner
+
+if TYPE_CHECKING:
+    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav.graphs.nodes import Nodes
+
+_NEAREST = 200
+"""Number of nearest nodes to which a node may have edges."""
+_TRIED = 8
+"""Nearest nodes of other parts that are tried as partners of a part without connection."""
+
+
+def sight_edges(nodes: Nodes, stretch: float, needed: LongArray) -> LongArray:
+    """Choose edges between nodes in sight of each other.
+
+    Parameters
+    ----------
+    nodes
+        The nodes.
+    stretch
+        For two nodes in sight, a route over the chosen edges is at most this many times as long as
+        the segment between them.
+    needed
+        int64 (k, 2), pairs in sight that count although others are nearer.
+
+    Returns
+    -------
+    LongArray
+        int64 (m, 2), lower node first, by length.
+
+    Notes
+    -----
+    I. Althöfer, G. Das, D. Dobkin, D. Joseph, J. Soares: On sparse spanners of weighted graphs,
+    1993 (the greedy spanner).
+    """
+    from scipy.spatial import KDTree  # noqa: PLC0415 - most uses of the package need no graph
+
+    positions = nodes.positions
+    if len(positions) < 2:  # noqa: PLR2004
+        return np.empty((0, 2), dtype=np.int64)
+    near = min(_NEAREST, len(positions) - 1)
+    heads = np.asarray(KDTree(positions).query(positions, k=list(range(2, near + 2)))[1])
+    tails = np.repeat(np.arange(len(positions)), near)
+    pairs = np.stack([tails, heads.ravel()], axis=1).astype(np.int64)
+    pairs = np.concatenate([pairs, needed])
+    # One number a pair: sorting rows takes ten times as long.
+    pairs = np.unique(pairs.min(axis=1) * len(positions) + pairs.max(axis=1))
+    pairs = np.stack(np.divmod(pairs, len(positions)), axis=1)
+    pairs = pairs[nodes.space.sight.clear(positions[pairs[:, 0]], positions[pairs[:, 1]])]
+    steps = positions[pairs[:, 1]] - positions[pairs[:, 0]]
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    order = np.argsort(lengths, kind="stable")
+    pairs, lengths = pairs[order], lengths[order]
+    found: LongArray = pairs[spanner(positions, pairs, lengths, stretch)]
+    return found
+
+
+def parts_of(edges: LongArray, n_nodes: int) -> LongArray:
+    """Return the connected part that each node belongs to, int64 (n,)."""
+    from scipy.sparse import coo_array  # noqa: PLC0415 - on demand, as above
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+    ones = np.ones(len(edges))
+    graph = coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_nodes, n_nodes))
+    found: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)
+    return found
+
+
+def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
+    """Find paths that join parts of a graph which free space connects.
+
+    Parameters
+    ----------
+    nodes
+        The nodes.
+    edges
+        The edges between them.
+
+    Returns
+    -------
+    list of FloatArray
+        For each part but the largest in its part of free space, the shortest path to one of the
+        nearest nodes of another part, (row, col) in grid units.
+    """
+    positions = nodes.positions
+    part = parts_of(edges, len(positions))
+    component = nodes.space.components_at(positions)
+    starts, goals = [], []
+    for where in np.unique(component).tolist():
+        inside = np.flatnonzero(component == where)
+        parts, sizes = np.unique(part[inside], return_counts=True)
+        for one in np.delete(parts, int(sizes.argmax())).tolist():
+            mine, others = inside[part[inside] == one], inside[part[inside] != one]
+            steps = positions[others][:, None] - positions[mine][None]
+            away = (steps**2).sum(axis=2).min(axis=1)
+            for other in others[np.argsort(away, kind="stable")[:_TRIED]].tolist():
+                steps = positions[mine] - positions[other]
+                starts.append(mine[int((steps**2).sum(axis=1).argmin())])
+                goals.append(other)
+    if not starts:
+        return []
+    paths = nodes.space.paths(positions[starts], positions[goals])
+    best: dict[int, int] = {}
+    for k, start in enumerate(starts):
+        known = best.get(int(part[start]), k)
+        best[int(part[start])] = min(known, k, key=lambda at: paths.length_cells[at])
+    return [paths.positions[paths.path_start[k] : paths.path_start[k + 1]] for k in best.values()]

@@ -1,0 +1,109 @@
+"""What is wrong with a graph, by kinds, with a bounded number of examples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Point = tuple[float, float]
+
+MOST_EXAMPLES = 1000
+"""Examples of each kind that are kept: a damaged file may have a million."""
+
+KINDS = {
+    "no-coordinates": "nodes without coordinates",
+    "repeated-id": "ids that occur more than once",
+    "bad-id": "ids that Nav2 cannot hold",
+    "unknown-node": "edges to nodes that are not there",
+    "bad-cost": "costs that are negative or no number",
+    "null": "facts that are null, which Nav2's loader refuses",
+    "line-elsewhere": "lines that do not run from node to node of their edge",
+    "node-outside": "nodes outside the map",
+    "node-in-wall": "nodes where the robot does not fit",
+    "node-unexplored": "nodes in unexplored space",
+    "edge-through-wall": "edges that the robot cannot follow",
+    "edge-unexplored": "edges through unexplored space",
+    "loop": "edges from a node to itself",
+    "repeated-edge": "edges beside another one from the same node to the same node",
+    "same-point": "nodes at the point of another node",
+    "alone": "nodes without edges, beside others",
+    "components": "components of the graph that no edge connects, though free space does",
+    "one-way": "nodes that cannot be both reached and left",
+    "missing-door": "doors that the robot fits through and no edge passes",
+    "missing-room": "rooms that the robot fits in and no node lies in",
+    "missing-part": "parts of free space without nodes",
+}
+"""Kinds of findings, in the order of a report, and what each counts."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """One case of a finding.
+
+    Examples
+    --------
+    >>> from hybridnav.graphs import Example
+    >>> Example("node 7", ((1.0, 2.0),)).where
+    'node 7'
+    """
+
+    where: str
+    """The node, edge, door or room, and what is known about the case."""
+    points: tuple[Point, ...] = ()
+    """`(x, y)` in metres, map frame: one for a node, two for an edge, none if it is nowhere."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """All cases of one kind.
+
+    Examples
+    --------
+    >>> from hybridnav.graphs import Finding
+    >>> Finding("loop", 3, ()).text
+    'edges from a node to itself'
+    """
+
+    kind: str
+    """A key of `KINDS`."""
+    count: int
+    """Number of cases."""
+    examples: tuple[Example, ...]
+    """The first 1,000 cases."""
+
+    @property
+    def text(self) -> str:
+        """What is counted."""
+        return KINDS[self.kind]
+
+
+@dataclass
+class Findings:
+    """Findings while they are collected."""
+
+    _counts: dict[str, int] = field(default_factory=dict)
+    _examples: dict[str, list[Example]] = field(default_factory=dict)
+
+    def add(self, kind: str, where: str, *points: Point) -> None:
+        """Add a case."""
+        self._counts[kind] = self._counts.get(kind, 0) + 1
+        examples = self._examples.setdefault(kind, [])
+        if len(examples) < MOST_EXAMPLES:
+            examples.append(Example(where, points))
+
+    def add_all(self, findings: Iterable[Finding]) -> None:
+        """Add what has been found before."""
+        for found in findings:
+            self._counts[found.kind] = self._counts.get(found.kind, 0) + found.count
+            self._examples.setdefault(found.kind, []).extend(found.examples)
+
+    def collected(self) -> tuple[Finding, ...]:
+        """Return all findings, in the order of `KINDS`."""
+        return tuple(
+            Finding(kind, self._counts[kind], tuple(self._examples[kind]))
+            for kind in KINDS
+            if kind in self._counts
+        )

@@ -1,0 +1,138 @@
+"""Lanes: where two robots pass each other, each direction of an edge keeps to the right."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.graphs.facts import described
+from hybridnav.graphs.nodes import Nodes
+from hybridnav.graphs.route_graph import LANE, RouteGraph
+from hybridnav.graphs.space import FreeSpace
+from hybridnav.grid.checks import checked_between, checked_type
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+
+_SHORTEST = 4.0
+"""Least length of an edge with lanes, in distances of a lane from the edge: one to enter, one to
+leave, and two side by side."""
+_FRACTION = 2.0**24
+
+
+def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -> RouteGraph:
+    """Give each direction of an edge a lane of its own, where two robots fit side by side.
+
+    A lane runs parallel to the edge, on its right by half of `apart_m`. It leaves the first node
+    and joins the second one at 45 degrees, by two nodes of its own, and is free for the robot by
+    exact tests. Edges between walls that are too near, and edges shorter than twice `apart_m`, stay
+    as they are. Where nodes are connected, they stay connected in both directions. At the nodes
+    lanes meet: who goes first there is for a fleet manager.
+
+    Parameters
+    ----------
+    topology
+        The map that the graph was built from.
+    graph
+        The graph.
+    apart_m
+        Distance in metres between the centres of two robots that pass each other, at least twice
+        the robot's radius.
+
+    Returns
+    -------
+    RouteGraph
+        The graph with nodes of the kind "lane".
+
+    Raises
+    ------
+    InvalidValueError
+        When `apart_m` is out of range, or the graph was built from another map.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.zeros((20, 80)), hn.Frame(0.1), robot_radius_m=0.2)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
+    >>> graph = hn.keep_right(topology, hn.build_route_graph(topology), apart_m=0.6)
+    >>> "lane" in graph.kinds
+    True
+    """
+    grid = checked_type("topology", topology, TopologicalMap).grid
+    checked_type("graph", graph, RouteGraph)
+    checked_between("apart_m", apart_m, max(2 * grid.robot_radius_m, 1e-3), 100)
+    if graph.grid is not grid:
+        raise InvalidValueError(
+            f"the graph is one of map {graph.grid.name!r}, expected one that was built from this "
+            f"topology of {grid.name!r}: build it again"
+        )
+    space = FreeSpace.of(grid)
+    off = apart_m / 2 / grid.resolution_m
+    edges, positions = graph.edges, graph.positions
+    first, second = _lane(positions, edges, off)
+    fits = _fits(space, positions, edges, (first, second), off)
+    fits &= fits[_opposite(edges, graph.n_nodes)]
+    lanes = np.flatnonzero(fits)
+    # Two lanes may have a node in common.
+    new, place = np.unique(
+        np.concatenate([first[lanes], second[lanes]]), axis=0, return_inverse=True
+    )
+    entries, exits = (graph.n_nodes + place).reshape(2, -1)
+    parts = [
+        edges[~fits],
+        np.stack([edges[lanes, 0], entries], axis=1),
+        np.stack([entries, exits], axis=1),
+        np.stack([exits, edges[lanes, 1]], axis=1),
+    ]
+    chosen = np.unique(np.concatenate(parts), axis=0).astype(np.int64)
+    nodes = Nodes(
+        space,
+        graph.n_nodes + len(new),
+        np.concatenate([positions, new]),
+        [*graph.kinds, *[LANE] * len(new)],
+        [*graph.doors.tolist(), *[0] * len(new)],
+    )
+    return described(topology, nodes, chosen)
+
+
+def _lane(positions: FloatArray, edges: LongArray, off: float) -> tuple[FloatArray, FloatArray]:
+    """Return the first and last positions of the lane of each edge, float64 (m, 2)."""
+    tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
+    steps = heads - tails
+    along = steps / np.maximum(np.hypot(steps[:, 0], steps[:, 1]), 1e-9)[:, None]
+    # Rows run upwards: the right of (down, across) is (-across, down).
+    right = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    first, second = tails + off * (right + along), heads + off * (right - along)
+    return np.round(first * _FRACTION) / _FRACTION, np.round(second * _FRACTION) / _FRACTION
+
+
+def _fits(
+    space: FreeSpace,
+    positions: FloatArray,
+    edges: LongArray,
+    lane: tuple[FloatArray, FloatArray],
+    off: float,
+) -> BoolArray:
+    """Return the edges whose lane is free, bool (m,)."""
+    tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
+    steps = heads - tails
+    fits = np.asarray(np.hypot(steps[:, 0], steps[:, 1]) >= _SHORTEST * off, dtype=np.bool_)
+    for end in lane:
+        fits &= ((end >= 0) & (end <= space.free.shape)).all(axis=1)
+        cells = space.cells_at(end[fits])
+        inside = np.asarray((cells < space.free.shape).all(axis=1), dtype=np.bool_)
+        inside[inside] = space.free[tuple(cells[inside].T)]
+        fits[fits] = inside
+    for one, other in ((tails, lane[0]), lane, (lane[1], heads)):
+        fits[fits] = space.sight.clear(one[fits], other[fits])
+    return fits
+
+
+def _opposite(edges: LongArray, n_nodes: int) -> LongArray:
+    """Return the index of each edge's opposite; graphs of maps have one for each."""
+    keys = edges[:, 0] * n_nodes + edges[:, 1]
+    order = np.argsort(keys)
+    found: LongArray = order[np.searchsorted(keys[order], edges[:, 1] * n_nodes + edges[:, 0])]
+    return found

@@ -1,0 +1,178 @@
+"""Bags of ROS 1 and ROS 2 by the package rosbags: their topics, and their messages one by one."""
+
+from __future__ import annotations
+
+import reprlib
+from contextlib import contextmanager
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridnav._files import printable
+from hybridnav.errors import HybridNavError, MapError, MapNotFoundError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from rosbags.highlevel import AnyReader
+
+    from hybridnav._typing import PathLike
+
+GRID, LASER, ODOMETRY, PATH = (
+    f"{package}/msg/{name}"
+    for package, name in (
+        ("nav_msgs", "OccupancyGrid"),
+        ("sensor_msgs", "LaserScan"),
+        ("nav_msgs", "Odometry"),
+        ("nav_msgs", "Path"),
+    )
+)
+TRANSFORMS = frozenset({"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
+
+
+class Bag:
+    """A bag: a file of ROS 1 (.bag), a folder of ROS 2, or one of its files (.mcap, .db3).
+
+    Parameters
+    ----------
+    path
+        The file or folder.
+
+    Raises
+    ------
+    MapNotFoundError
+        When it does not exist.
+    MapError
+        When rosbags is not installed.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        self._path = Path(path)
+        self.where = f"bag {printable(path)}"
+        """Name of the bag in messages."""
+        try:
+            is_there = self._path.exists()
+        except (OSError, ValueError):
+            is_there = False
+        if not is_there:
+            raise MapNotFoundError(f"{self.where}: no such file or folder")
+        check_rosbags(self.where)
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of its files."""
+        path = self._path
+        files = path.iterdir() if path.is_dir() else [path]
+        return sum(file.stat().st_size for file in files if file.is_file())
+
+    @cached_property
+    def topics(self) -> dict[str, tuple[str, int]]:
+        """The type of the messages of each topic, and how many there are.
+
+        Raises
+        ------
+        MapError
+            When the file is no bag, or damaged.
+        """
+        with self._open() as reader:
+            return {
+                name: (topic.msgtype or "", topic.msgcount) for name, topic in reader.topics.items()
+            }
+
+    def topics_of(self, msgtypes: Collection[str]) -> list[str]:
+        """Return the topics of messages of some types, in order; errors as for `topics`."""
+        return sorted(name for name, (kind, _) in self.topics.items() if kind in msgtypes)
+
+    def topic_of(self, msgtype: str, topic: str | None) -> str:
+        """Return the topic of messages of a type.
+
+        Parameters
+        ----------
+        msgtype
+            The type.
+        topic
+            Name of the topic; None for the only one.
+
+        Raises
+        ------
+        MapError
+            When there is none, more than one and none was named, or the file is damaged.
+        """
+        found = self.topics_of({msgtype})
+        short = msgtype.replace("/msg/", "/")
+        if topic is None and len(found) == 1:
+            return found[0]
+        if topic in found:
+            return str(topic)
+        named = "a topic" if topic is None else f"topic {reprlib.repr(topic)}"
+        if not found:
+            raise MapError(f"{self.where}: expected {named} of {short}, got no topic of that type")
+        raise MapError(
+            f"{self.where}: expected {named} of {short}, got {', '.join(found):.200}: name one"
+        )
+
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[str, Any]]:
+        """Yield the messages of some topics with these, in the order in which they were recorded.
+
+        Raises
+        ------
+        MapError
+            When the file is damaged; what was yielded before is sound.
+        """
+        with self._open() as reader:
+            wanted = [each for each in reader.connections if each.topic in topics]
+            if not wanted:
+                return
+            for connection, _, raw in reader.messages(wanted):
+                yield connection.topic, reader.deserialize(raw, connection.msgtype)
+
+    def last(self, topic: str) -> Any:
+        """Return the last message of a topic.
+
+        Raises
+        ------
+        MapError
+            When there is none, or the file is damaged.
+        """
+        with self._open() as reader:
+            wanted = [each for each in reader.connections if each.topic == topic]
+            found = None
+            for connection, _, raw in reader.messages(wanted):
+                found = connection, raw
+            if found is None:
+                raise MapError(f"{self.where}: topic {topic} has no message")
+            return reader.deserialize(found[1], found[0].msgtype)
+
+    @contextmanager
+    def _open(self) -> Iterator[AnyReader]:
+        from rosbags.highlevel import AnyReader  # noqa: PLC0415 - an extra
+
+        try:
+            with AnyReader([self._path], default_typestore=_usual_types()) as reader:
+                yield reader
+        except HybridNavError:
+            raise
+        except MemoryError:  # sizes stand in the file, and may be any number
+            raise MapError(f"{self.where}: damaged, or larger than the memory") from None
+        except Exception as failure:  # noqa: BLE001 - the parsers raise anything
+            text = printable(" ".join(str(failure).split())[:100]) or type(failure).__name__
+            raise MapError(f"{self.where}: no bag, or damaged ({text})") from None
+
+
+@cache
+def _usual_types() -> Any:
+    """Return the types of messages, for bags of ROS 2 that do not define theirs."""
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - an extra
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def check_rosbags(where: str) -> None:
+    """Raise `MapError` if the package that reads and writes bags is not installed."""
+    try:
+        import rosbags.highlevel  # noqa: F401, PLC0415 - an extra
+    except ImportError:
+        raise MapError(
+            f"{where}: the package rosbags is needed, and is not installed: "
+            "python -m pip install 'hybridnav[bags]'"
+        ) from None

@@ -1,0 +1,135 @@
+"""`hybridnav export`: a route graph from a map file."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, cast
+
+from rosbags.highlevel import AnyReader
+
+import hybridnav as hn
+from tests.nav2_reader import read_nav2
+
+FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
+SMALL = ("--robot-radius", "0", "--spacing", "1")
+
+
+def test_a_map_becomes_a_graph_with_a_report_and_a_picture(cli, tmp_path):
+    out, plot = tmp_path / "graph.geojson", tmp_path / "graph.png"
+    done = cli("export", FIGURE, "-o", out, *SMALL, "--report", "50", "--plot", plot, "--json")
+    assert (done.code, done.err) == (0, "")
+    graph, report = read_nav2(out), done.answer["report"]
+    assert (done.answer["nodes"], done.answer["edges"]) == (len(graph.points), len(graph.edges))
+    assert sum(done.answer["kinds"].values()) == len(graph.points)
+    assert report["best"]["solved"] == 1.0
+    assert 0 <= report["best"]["mean"] <= report["nearest"]["mean"]
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_summary_describes_the_graph_and_its_routes(cli, tmp_path):
+    done = cli("export", FIGURE, "-o", tmp_path / "graph.geojson", *SMALL, "--report", "20")
+    assert done.code == 0
+    words = [line.split()[0] for line in done.out.splitlines()]
+    assert words == ["graph", "map", "nodes", "pairs", "best", "nearest", "seconds"]
+
+
+def test_lanes_for_robots_that_pass_each_other(cli, tmp_path):
+    out = tmp_path / "graph.geojson"
+    done = cli("export", FIGURE, "-o", out, *SMALL, "--lanes", "0.1", "--json")
+    assert (done.code, done.err) == (0, "")
+    assert done.answer["kinds"]["lane"] > 0
+    facts = read_nav2(out).edge_facts.values()
+    assert {one.get("lane") for one in facts} == {None, "right"}
+    assert cli("export", FIGURE, "-o", out, *SMALL, "--lanes", "-1").refuses(2, "apart_m")
+
+
+def test_edges_that_bend(cli, tmp_path):
+    out = tmp_path / "graph.geojson"
+    done = cli("export", FIGURE, "-o", out, *SMALL, "--polylines", "--json")
+    assert (done.code, done.err) == (0, "")
+    assert set(done.answer["kinds"]) <= {"room", "door", "place"}
+    assert sum(done.answer["kinds"].values()) == done.answer["nodes"] == len(read_nav2(out).points)
+    done = cli("check", FIGURE, out, *SMALL[:2], "--along-lines", "--json")
+    assert (done.code, done.answer["findings"]) == (0, {})
+    refused = cli("export", FIGURE, "-o", out, "--polylines", "--report", "5")
+    assert refused.refuses(2, "--polylines does not go with --report")
+
+
+def test_wrong_usage_ends_in_one_line(cli, tmp_path):
+    out = tmp_path / "graph.geojson"
+    assert cli("export", FIGURE, "-o", tmp_path / "graph.txt").refuses(2, "--out", ".geojson")
+    assert cli("export", FIGURE, "-o", out, "--format", "rmf").refuses(2, "--format", "nav2")
+    assert cli("export", FIGURE, "-o", tmp_path / "no" / "g.json").refuses(2, "no folder")
+    assert cli("export", FIGURE, "-o", out, *SMALL[:2], "--spacing", "nan").refuses(2, "spacing_m")
+    assert cli("export", FIGURE, "-o", out, "--stretch", "0.9", *SMALL).refuses(2, "stretch")
+    assert cli("export", FIGURE, "-o", out, "--report", 10**20, *SMALL).refuses(2, "--report")
+    assert cli("export", tmp_path / "none.yaml", "-o", out).refuses(3, "none.yaml")
+    assert not out.exists()
+
+
+def test_rooms_and_places_are_written_as_tables_and_features(cli, tmp_path):
+    for kind, counted in (("rooms", ["rooms", "doors"]), ("places", ["places", "arcs"])):
+        for ending in ("csv", "geojson"):
+            out = tmp_path / f"{kind}.{ending}"
+            done = cli("export", FIGURE, *SMALL[:2], "--format", kind, "-o", out, "--json")
+            assert (done.code, done.err) == (0, "")
+            assert list(done.answer)[:2] == counted
+        lines = (tmp_path / f"{kind}.csv").read_text().splitlines()
+        assert len(lines) == 1 + done.answer[kind]
+        features = json.loads((tmp_path / f"{kind}.geojson").read_text())["features"]
+        assert len(features) == sum(done.answer[name] for name in counted)
+    shown = cli("export", FIGURE, *SMALL[:2], "--format", "places", "-o", tmp_path / "p.csv").out
+    assert [line.split()[0] for line in shown.splitlines()] == ["file", "map", "seconds"]
+
+
+def test_options_of_graphs_are_refused_for_rooms_and_places(cli, tmp_path):
+    places = ("export", FIGURE, "--format", "places", "-o", tmp_path / "p.csv")
+    for option in (
+        ("--nodes", 5),
+        ("--spacing", 3),
+        ("--stretch", 1.5),
+        ("--report", 9),
+        ("--plot", tmp_path / "p.png"),
+    ):
+        assert cli(*places, *option).refuses(2, option[0], "--format nav2")
+    assert cli(*places[:-1], tmp_path / "p.json").refuses(2, "--out", ".csv, .geojson")
+    graph = ("export", FIGURE, "-o", tmp_path / "g.csv")
+    assert cli(*graph).refuses(2, "--out", ".geojson, .json")
+
+
+def test_a_path_is_written_as_a_line(cli, tmp_path):
+    out = tmp_path / "path.geojson"
+    query = ("plan", FIGURE, "--robot-radius", 0, "--start", "0.5,0.5", "--goal", "2.0,2.5")
+    done = cli(*query, "--poses", out, "--json")
+    assert done.code == 0
+    (line,) = json.loads(out.read_text())["features"]
+    assert line["geometry"]["coordinates"] == done.answer["points"]
+    assert line["properties"]["length_m"] == done.answer["length_m"]
+    assert cli(*query, "--poses", tmp_path / "path.gpx").refuses(2, ".csv, .json, .geojson")
+
+
+def test_a_plan_is_written_into_a_bag(cli, tmp_path, monkeypatch):
+    query = ("plan", FIGURE, "--robot-radius", 0, "--start", "0.5,0.5", "--goal", "2.0,2.5")
+    for name in ("plan.bag", "plan"):
+        bag = tmp_path / name
+        done = cli(*query, "--bag", bag, "--json")
+        assert (done.code, done.err) == (0, "")
+        assert (hn.load_bag_map(bag).measured == hn.load_map(FIGURE).measured).all()
+        with AnyReader([bag]) as reader:
+            (plan,) = [each for each in reader.connections if each.topic == "/plan"]
+            ((_, _, raw),) = reader.messages([plan])
+            last = cast("Any", reader.deserialize(raw, plan.msgtype)).poses[-1].pose.position
+        assert [last.x, last.y] == done.answer["points"][-1]
+        assert cli(*query, "--bag", bag).refuses(2, "--bag", "exists, expected a new name")
+    assert cli(*query, "--bag", tmp_path / "none" / "a.bag").refuses(2, "--bag: there is no folder")
+    assert cli(*query, "--bag", tmp_path / ("x" * 300)).refuses(2, "--bag", "too long")
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "rosbags.highlevel", None)
+        assert cli(*query, "--bag", tmp_path / "c.bag").refuses(3, "--bag", "rosbags is needed")
+    several = (*query, "--alternatives", 2, "--bag", tmp_path / "b.bag")
+    assert cli(*several).refuses(2, "--bag writes one path")
+    far = cli(*query[:-1], "99,99", "--bag", tmp_path / "far.bag")
+    assert far.code == 1
+    assert not (tmp_path / "far.bag").exists()
