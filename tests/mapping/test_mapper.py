@@ -147,11 +147,71 @@ def test_a_scan_that_needs_too_many_cells_changes_nothing() -> None:
     near = LaserScan(np.full(4, 2.0), (0, 0, 0), start_rad=0, step_rad=1)
     far = LaserScan(np.full(4, 2.0), (1e8, -1e8, 0), start_rad=0, step_rad=1)
     assert mapper.add(near)
+    assert mapper.add(near)
     before = mapper.to_grid()
-    assert not mapper.add(far)
-    assert mapper.n_scans == 1
+    assert mapper.add(far) is None
+    assert mapper.n_scans == 2
     assert np.array_equal(mapper.to_grid().probability, before.probability, equal_nan=True)
     assert mapper.add(near)
+
+
+def test_a_wrong_first_pose_does_not_cost_the_map() -> None:
+    mapper, alone = Mapper(resolution_m=0.1, max_cells=10_000), Mapper(resolution_m=0.1)
+    near = LaserScan(np.full(4, 2.0), (0, 0, 0), start_rad=0, step_rad=1)
+    far = LaserScan(np.full(4, 2.0), (1e8, -1e8, 0), start_rad=0, step_rad=1)
+    alone.add(near)
+    alone.add(near)
+    assert mapper.add(far)
+    assert mapper.add(near)
+    assert mapper.n_scans == 1
+    assert mapper.add(near)
+    assert not mapper.add(far)
+    assert mapper.n_scans == 2
+    found, expected = mapper.to_grid(), alone.to_grid()
+    assert found.frame == expected.frame
+    assert np.array_equal(found.probability, expected.probability, equal_nan=True)
+
+
+@given(st.lists(scans(reach=20.0), min_size=1, max_size=4), MODELS, st.integers(0, 3))
+@settings(max_examples=examples(60))
+def test_a_scan_changes_cells_of_its_area_alone(
+    given_scans: list[LaserScan], model: LaserModel, n_sonars: int
+) -> None:
+    """The area lies on sides of cells, and shrinks to what the cells of the next grid need."""
+    corner_m, mounts = (0.1, -0.2), sonar_ring(n_sonars + 1)
+    mapper = Mapper(resolution_m=0.25, laser=model, corner_m=corner_m)
+    frame = hn.Frame(0.25, (corner_m[0] - 50.0, corner_m[1] - 50.0))
+
+    def evidence() -> Any:
+        whole = np.full((400, 400), np.nan, np.float32)
+        if mapper.has_cells:
+            grid = mapper.to_grid(robot_radius_m=0)
+            row, col = frame.cells_of(grid.frame.points_of([0, 0]))
+            whole[row : row + grid.shape[0], col : col + grid.shape[1]] = grid.probability
+        return whole
+
+    readings = np.abs(given_scans[0].ranges_m[:1]).repeat(n_sonars + 1)
+    all_scans: list[Any] = [*given_scans, SonarScan(readings, (1.0, 2.0, 0.5), mounts)]
+    for scan in all_scans:
+        before, area = evidence(), mapper.add(scan)
+        after = evidence()
+        assert area is not None
+        changed = ~((before == after) | (np.isnan(before) & np.isnan(after)))
+        low, high = (np.round(frame.positions_of(np.array(at)), 6) for at in (area[:2], area[2:]))
+        cells = np.argwhere(changed)
+        assert (cells >= low).all()
+        assert (cells + 1 <= high).all()
+        if len(cells) and isinstance(scan, LaserScan):
+            assert (low == np.floor(low)).all()
+            assert (high - low <= 2 * np.array(model.max_range_m / 0.25 + 2)).all()
+
+
+def test_a_mapper_refuses_what_is_no_scan() -> None:
+    wrong: list[Any] = [None, np.ones(3), "scan"]
+    for thing in wrong:
+        with pytest.raises(hn.InvalidValueError, match="make a LaserScan") as refused:
+            Mapper().add(thing)
+        assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("far_m", [1e6, 1e9])
@@ -237,6 +297,12 @@ BAD_SCANS: dict[str, Any] = {
     "too far": {"pose": (1e10, 0.0, 0.0)},
     "step": {"step_rad": 1e308},
     "range": {"max_range_m": math.nan},
+    "words": {"ranges_m": "far"},
+    "lists of two lengths": {"ranges_m": [[1.0], [1.0, 2.0]]},
+    "no pose": {"pose": None},
+    "a position": {"pose": (0.0, 0.0)},
+    "no angle": {"start_rad": "left"},
+    "no time": {"time_s": []},
 }
 
 
@@ -249,7 +315,8 @@ def test_a_scan_refuses_values_that_are_none(change: dict[str, Any]) -> None:
 
 
 def test_sonars_need_one_finite_mount_each() -> None:
-    for mounts in (np.zeros((2, 3)), np.full((3, 3), np.nan), np.full((3, 3), 1e300)):
+    wrong: list[Any] = [np.zeros((2, 3)), np.full((3, 3), np.nan), np.full((3, 3), 1e300), "ring"]
+    for mounts in wrong:
         with pytest.raises(hn.InvalidValueError, match="mounts"):
             SonarScan(np.ones(3), (0.0, 0.0, 0.0), mounts)
 
@@ -263,6 +330,8 @@ def test_sonars_need_one_finite_mount_each() -> None:
         {"min_range_m": 40.0},
         {"clear_range_m": 31.0},
         {"tolerance_m": -1.0},
+        {"max_range_m": "far"},
+        {"when_hit": None},
     ],
 )
 def test_a_laser_refuses_settings_out_of_range(values: dict[str, float]) -> None:
@@ -272,7 +341,13 @@ def test_a_laser_refuses_settings_out_of_range(values: dict[str, float]) -> None
 
 @pytest.mark.parametrize(
     "values",
-    [{"when_hit": 1.0}, {"half_angle_rad": 2.0}, {"tolerance_m": 0.0}, {"max_range_m": 0.1}],
+    [
+        {"when_hit": 1.0},
+        {"half_angle_rad": 2.0},
+        {"tolerance_m": 0.0},
+        {"max_range_m": 0.1},
+        {"half_angle_rad": "wide"},
+    ],
 )
 def test_a_sonar_refuses_settings_out_of_range(values: dict[str, float]) -> None:
     with pytest.raises(hn.InvalidValueError):
@@ -297,8 +372,26 @@ def test_a_scan_without_a_reading_leaves_the_grid_where_later_ones_need_it() -> 
         {"resolution_m": 1e-4},
         {"corner_m": (math.nan, 0.0)},
         {"max_cells": 0},
+        {"max_cells": "many"},
+        {"resolution_m": "fine"},
+        {"corner_m": 3},
+        {"laser": "SICK"},
+        {"sonar": LaserModel()},
     ],
 )
 def test_a_mapper_refuses_settings_out_of_range(values: dict[str, Any]) -> None:
     with pytest.raises(hn.InvalidValueError):
         Mapper(**values)
+
+
+def test_a_map_of_an_area_is_cut_out_of_the_whole_one():
+    mapper = Mapper(resolution_m=0.5, corner_m=(0.25, 0.0))
+    mapper.add(LaserScan(np.full(60, 4.0), pose=(1.0, 2.0, 0.3), start_rad=0.0, step_rad=0.1))
+    whole, part = mapper.to_grid(), mapper.to_grid(area=(0.3, 1.1, 2.0, 3.4))
+    rows, cols = whole.frame.cells_of(part.frame.points_of(np.argwhere(part.probability >= 0))).T
+    assert part.shape == (5, 4)
+    assert np.array_equal(part.probability.ravel(), whole.probability[rows, cols])
+    with pytest.raises(hn.InvalidValueError, match="at least one scan"):
+        mapper.to_grid(area=(90.0, 90.0, 91.0, 91.0))
+    with pytest.raises(hn.InvalidValueError, match=r"expected \(x_min, y_min, x_max, y_max\)"):
+        mapper.to_grid(area=(2.0, 1.0, 1.0, 2.0))

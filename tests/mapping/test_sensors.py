@@ -18,6 +18,10 @@ from tests.layers import grid_of
 from tests.oracle.beams import position
 from tests.strategies import examples
 
+LASER: Any = SimulatedLaser
+SONARS: Any = SimulatedSonars
+RING: Any = sonar_ring
+"""To be called with values of wrong types."""
 WORLDS = arrays(np.bool_, st.tuples(st.integers(1, 8), st.integers(1, 8)))
 FAR_M = 10.0
 
@@ -106,19 +110,25 @@ def office() -> hn.OccupancyGrid:
 
 
 @pytest.mark.parametrize(
-    ("sensor", "least_m2"),
-    [(SimulatedLaser(noise_m=0.01), 50.0), (SimulatedSonars(noise_m=0.01), 20.0)],
+    ("sensor", "least_m2", "off_m"),
+    [(SimulatedLaser(noise_m=0.01), 140.0, 0.05), (SimulatedSonars(noise_m=0.01), 70.0, 0.4)],
     ids=["laser", "sonars"],
 )
-def test_a_map_of_simulated_scans_is_the_world(sensor: Any, least_m2: float) -> None:
+def test_a_map_of_simulated_scans_is_the_world(sensor: Any, least_m2: float, off_m: float) -> None:
+    """What the map calls free is free, and nine tenths of what it calls occupied are at a wall."""
     world = office()
     mapped = driven(sensor, world)
-    free = np.argwhere(mapped.measured == hn.CellClass.FREE)
-    rows, cols = world.frame.cells_of(mapped.frame.points_of(free)).T
-    inside = (rows >= 0) & (rows < world.shape[0]) & (cols >= 0) & (cols < world.shape[1])
-    truth = world.measured[rows[inside], cols[inside]]
-    assert inside.sum() * 0.05**2 > least_m2
-    assert (truth == hn.CellClass.OCCUPIED).mean() < 0.01
+
+    def true_cells(kind: hn.CellClass) -> Any:
+        cells = np.argwhere(mapped.measured == kind)
+        there = world.frame.cells_of(mapped.frame.points_of(cells))
+        return there[((there >= 0) & (there < world.shape)).all(axis=1)].T
+
+    free, occupied = (true_cells(kind) for kind in (hn.CellClass.FREE, hn.CellClass.OCCUPIED))
+    assert free.shape[1] * 0.05**2 > least_m2
+    assert (world.measured[tuple(free)] == hn.CellClass.OCCUPIED).mean() < 1e-3
+    wall_m = distance_transform_edt(world.measured != hn.CellClass.OCCUPIED) * 0.05
+    assert np.quantile(wall_m[tuple(occupied)], 0.9) <= off_m
 
 
 def test_noise_depends_on_the_seed_alone() -> None:
@@ -139,6 +149,17 @@ def test_noise_depends_on_the_seed_alone() -> None:
         lambda: SimulatedLaser().scan(office(), (math.nan, 0.0, 0.0)),
         lambda: SimulatedLaser(max_range_m=1e5).scan(office(), (0.0, 0.0, 0.0)),
         lambda: SimulatedSonars(np.full((2, 3), np.nan)).scan(office(), (0.0, 0.0, 0.0)),
+        lambda: SONARS(7).scan(office(), (0.0, 0.0, 0.0)),
+        lambda: SONARS(half_angle_rad="wide"),
+        lambda: LASER(n_beams=1.5),
+        lambda: LASER(max_range_m="far"),
+        lambda: LASER(noise_m=None),
+        lambda: LASER(step_rad=[]),
+        lambda: LASER().scan("office", (0.0, 0.0, 0.0)),
+        lambda: LASER().scan(office(), "here"),
+        lambda: LASER().scan(office(), (0.0, 0.0, 0.0), seed="noise"),
+        lambda: RING(2.5),
+        lambda: RING(4, radius_m="wide"),
     ],
 )
 def test_values_out_of_range_are_refused(make: Any) -> None:

@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from hybridnav.grid import CellClass
-from hybridnav.topology.growing import Likely, Small, contract
-from tests.strategies import MAX_SIDE, class_grids
+import hybridnav as hn
+from hybridnav.grid import CellClass, RoomLabels
+from hybridnav.topology.growing import Growth, Likely, Small, contract
+from tests.strategies import MAX_SIDE, class_grids, occupancy_grid
 from tests.topology.test_judging import segments_of
 
 
@@ -130,6 +131,20 @@ def test_a_map_without_free_cells_has_no_levels_above():
     segments = segments_of(np.zeros((3, 3), dtype=bool), np.full((3, 3), -1))
     assert contract(segments, [Small(4)])[-1].n_vertices == 0
     assert (segments.label_of == -1).all()
+
+
+def test_a_resistance_of_another_map_or_with_rooms_is_refused():
+    grid = occupancy_grid(np.ones((3, 3), dtype=np.uint8))
+    rooms = RoomLabels(("a",), np.zeros((3, 3), dtype=np.int32))
+
+    def growth(side):
+        label_of = np.zeros((side, side), dtype=np.int32)
+        return Growth(segments_of(np.ones((side, side), dtype=bool), label_of), [Small(4)])
+
+    with pytest.raises(hn.InvalidValueError, match=r"resistance was given .* not of"):
+        hn.DualGraphPyramid.build(grid, resistance=growth(2))
+    with pytest.raises(hn.InvalidValueError, match="resistance was given with rooms"):
+        hn.DualGraphPyramid.build(grid, resistance=growth(3), rooms=rooms)
 
 
 @pytest.mark.parametrize("n_segments", [300, 1000])

@@ -100,6 +100,34 @@ class Frame:
         """Rows, then columns, in a metre along x and along y, float64 (2, 2)."""
         return self.axes_m / self.resolution_m**2
 
+    def moved(self, pose: tuple[float, float, float]) -> Frame:
+        """Return this frame where a pose puts the coordinates in which it is given.
+
+        Parameters
+        ----------
+        pose
+            `(x, y, yaw)` in metres and radians, of those coordinates in the new ones: a point p
+            becomes R(yaw) p + (x, y).
+
+        Raises
+        ------
+        InvalidValueError
+            When the pose is not three finite numbers, or the frame would lie too far away.
+
+        Examples
+        --------
+        >>> hn.Frame(0.5, (1.0, 2.0)).moved((10.0, 0.0, 0.5)).yaw_rad
+        0.5
+        """
+        try:
+            x, y, yaw = map(float, pose)
+        except (TypeError, ValueError):
+            raise InvalidValueError(
+                f"a pose must be three numbers (x, y, yaw), got {pose!r:.80}"
+            ) from None
+        origin = Frame(origin_m=(x, y), yaw_rad=yaw).points_of_grid(self.origin_m[::-1])
+        return Frame(self.resolution_m, (origin[0], origin[1]), self.yaw_rad + yaw)
+
     def points_of(self, cells: ArrayLike) -> FloatArray:
         """Return the centres of cells in the map frame.
 

@@ -16,6 +16,7 @@ from hybridnav.grid.clearance import within_radius
 from hybridnav.grid.frame import Frame
 from hybridnav.grid.islands import DroppedIslands, without_islands
 from hybridnav.grid.limits import MAX_CELLS
+from hybridnav.grid.messages import grid_message, percentages, read_probability
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -159,6 +160,76 @@ class OccupancyGrid:
         ):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+
+    @classmethod
+    def from_message(
+        cls,
+        message: Any,
+        *,
+        robot_radius_m: float | None = None,
+        free_threshold: float = 0.196,
+        occupied_threshold: float = 0.65,
+        name: str = "map",
+    ) -> OccupancyGrid:
+        """Make a grid of a `nav_msgs/OccupancyGrid`; ROS is not needed.
+
+        Parameters
+        ----------
+        message
+            Any object or mapping with the fields of the message, of ROS 1 or ROS 2: `data`, and
+            `info` with `width`, `height`, `resolution` and `origin`. Values 0 to 100 are
+            percentages, -1 was never measured. A resolution in float32 is read as the decimal
+            number that it was made of.
+        robot_radius_m, free_threshold, occupied_threshold, name
+            As in the class.
+
+        Raises
+        ------
+        InvalidValueError
+            When a field is missing, not finite or out of range, `data` has not width x height
+            values, a value is not within -1 to 100, or the orientation of the origin is no unit
+            quaternion or tilted by more than 0.02 radians.
+
+        Examples
+        --------
+        >>> message = hn.OccupancyGrid(np.array([[0.0, np.nan, 1.0]])).to_message()
+        >>> message["data"]
+        [0, -1, 100]
+        >>> hn.OccupancyGrid.from_message(message, robot_radius_m=0).classes
+        array([[1, 2, 0]], dtype=uint8)
+        """
+        probability, frame = read_probability(message)
+        return cls(
+            probability,
+            frame,
+            free_threshold=free_threshold,
+            occupied_threshold=occupied_threshold,
+            robot_radius_m=robot_radius_m,
+            name=name,
+        )
+
+    def to_message(self, frame_id: str = "map", *, stamp_ns: int = 0) -> dict[str, Any]:
+        """Return the map as a `nav_msgs/OccupancyGrid` of ROS 2, in plain dictionaries and lists.
+
+        `hybridnav.messages.fill_message` puts it into a message. What was measured is
+        returned: the robot's radius and dropped islands are no part of it. Percentages are rounded,
+        but never across a threshold.
+
+        Parameters
+        ----------
+        frame_id
+            Name of the map frame.
+        stamp_ns
+            Time in nanoseconds since 1970.
+
+        Raises
+        ------
+        InvalidValueError
+            When the frame has no name, or the time is negative or too large.
+        """
+        thresholds = self.free_threshold, self.occupied_threshold
+        values = percentages(self.probability, self.measured, thresholds)
+        return grid_message(values, self.frame, frame_id, stamp_ns)
 
     @classmethod
     def restored(cls, **attributes: Any) -> OccupancyGrid:

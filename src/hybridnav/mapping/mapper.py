@@ -9,8 +9,10 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
+from hybridnav.grid.checks import checked_type
 from hybridnav.mapping._beam_kernels import add_beams, beam_ends
 from hybridnav.mapping._cone_kernels import add_cone
+from hybridnav.mapping.checks import checked_array, checked_count, checked_number
 from hybridnav.mapping.models import MOST_RANGE_CELLS, LaserModel, SonarModel, log_odds_of
 from hybridnav.mapping.scans import LaserScan, SonarScan
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._typing import IntArray
+
+    Area = tuple[float, float, float, float]
 
 _MARGIN_CELLS = 64
 """Cells beyond a scan by which extents grow at least, so that not every scan makes them grow."""
@@ -33,6 +37,9 @@ class Mapper:
     of 0.02 and 0.98. The extents grow with the scans: cells lie on a lattice that never moves, so a
     grid that grew is bit for bit one that was large from the start.
 
+    A scan that does not fit into the greatest size with those before is refused. While only one
+    scan has met cells, it is the earlier one that goes: a wrong first pose does not cost the map.
+
     Parameters
     ----------
     resolution_m
@@ -42,8 +49,8 @@ class Mapper:
     corner_m
         A corner of the lattice of cells, `(x, y)` in metres, map frame.
     max_cells
-        The most cells that the grid may have. A scan that needs more is refused: its pose is a
-        mistake, or the resolution too fine.
+        The most cells that the grid may have. A scan that needs more has a wrong pose, or the
+        resolution is too fine.
 
     Raises
     ------
@@ -56,7 +63,7 @@ class Mapper:
     >>> mapper = Mapper(resolution_m=1.0)
     >>> pose = (0.5, 0.5, 0.0)
     >>> mapper.add(LaserScan(np.array([3.0]), pose=pose, start_rad=0.0, step_rad=0.0))
-    True
+    (0.0, 0.0, 4.0, 1.0)
     >>> mapper.to_grid(robot_radius_m=0).classes
     array([[1, 1, 1, 0]], dtype=uint8)
     """
@@ -70,12 +77,18 @@ class Mapper:
         corner_m: tuple[float, float] = (0.0, 0.0),
         max_cells: int = DEFAULT_MAX_CELLS,
     ) -> None:
-        self._frame = Frame(resolution_m, corner_m)
+        corner = checked_array("corner_m", corner_m)
+        if corner.shape != (2,):
+            raise InvalidValueError(
+                f"corner_m is {corner_m!r:.80}, expected (x, y): give two numbers of metres"
+            )
+        x_m, y_m = corner.tolist()
+        self._frame = Frame(checked_number("resolution_m", resolution_m), (x_m, y_m))
         self._laser = LaserModel() if laser is None else laser
         self._sonar = SonarModel() if sonar is None else sonar
-        if not 1 <= max_cells <= MAX_CELLS:
-            raise InvalidValueError(f"max_cells must be 1 to {MAX_CELLS}, got {max_cells}")
-        self._max_cells = max_cells
+        checked_type("laser", self._laser, LaserModel)
+        checked_type("sonar", self._sonar, SonarModel)
+        self._max_cells = checked_count("max_cells", max_cells, MAX_CELLS)
         far_m = max(self._laser.max_range_m, self._sonar.max_range_m + self._sonar.tolerance_m)
         if far_m / self.resolution_m > MOST_RANGE_CELLS:
             raise InvalidValueError(
@@ -88,6 +101,8 @@ class Mapper:
         self._evidence: NDArray[np.float32] = np.zeros((0, 0), np.float32)
         self._seen_at: IntArray = np.zeros((0, 0), np.int32)
         self._n_scans = 0
+        self._n_met = 0
+        """Number of scans in the grid that have met cells."""
 
     @property
     def resolution_m(self) -> float:
@@ -104,7 +119,25 @@ class Mapper:
         """Whether any scan has met a cell, so that there is a grid."""
         return bool((self._seen_at > 0).any())
 
-    def add(self, scan: LaserScan | SonarScan) -> bool:
+    def _grown(self, box: tuple[int, int, int, int]) -> Area | None:
+        """Make the arrays hold the first and last row and column of a box of cells that a scan may
+        meet, and return the box in metres; None if they cannot."""
+        if not self._grow(*box):
+            if self._n_met != 1:
+                return None
+            before = self._corner, self._evidence, self._seen_at
+            self._evidence, self._seen_at = self._evidence[:0, :0], self._seen_at[:0, :0]
+            if not self._grow(*box):
+                self._corner, self._evidence, self._seen_at = before
+                return None
+            self._n_met, self._n_scans = 0, self._n_scans - 1
+        self._n_met += 1
+        first_row, last_row, first_col, last_col = box
+        corners = [[first_row, first_col], [last_row + 1, last_col + 1]]
+        (x_min, y_min), (x_max, y_max) = self._frame.points_of_grid(corners).tolist()
+        return x_min, y_min, x_max, y_max
+
+    def add(self, scan: LaserScan | SonarScan) -> Area | None:
         """Add a scan.
 
         Parameters
@@ -114,15 +147,27 @@ class Mapper:
 
         Returns
         -------
-        bool
-            Whether the scan was added; False if the grid would exceed its greatest size with it,
-            and has not changed.
-        """
-        added = self._add_laser(scan) if isinstance(scan, LaserScan) else self._add_sonars(scan)
-        self._n_scans += added
-        return added
+        tuple or None
+            `(x_min, y_min, x_max, y_max)` in metres, map frame, along sides of cells: the area that
+            holds all cells whose evidence the scan may have changed, as `OnlinePyramid.update` and
+            `HybridPlanner.update` take it. It is the sensor's position if the scan has no reading.
+            None if the grid would exceed its greatest size with the scan, and has not changed.
 
-    def _add_laser(self, scan: LaserScan) -> bool:
+        Raises
+        ------
+        InvalidValueError
+            When it is no scan.
+        """
+        if not isinstance(scan, LaserScan | SonarScan):
+            raise InvalidValueError(
+                f"a map grows by scans, got {scan!r:.80} of type {type(scan).__name__}: make a "
+                "LaserScan or a SonarScan of the readings and the pose"
+            )
+        area = self._add_laser(scan) if isinstance(scan, LaserScan) else self._add_sonars(scan)
+        self._n_scans += area is not None
+        return area
+
+    def _add_laser(self, scan: LaserScan) -> Area | None:
         model, (x, y, heading_rad) = self._laser, scan.pose
         x0, y0 = self._frame.origin_m
         high_m = min(model.max_range_m, scan.max_range_m)
@@ -134,9 +179,10 @@ class Mapper:
             self.resolution_m,
         )
         if not kinds.any():
-            return True
-        if not self._grow(*box.tolist()):
-            return False
+            return x, y, x, y
+        area = self._grown(tuple(box.tolist()))
+        if area is None:
+            return None
         changes = log_odds_of(model.when_hit), log_odds_of(model.when_passed)
         limit = -log_odds_of(_LEAST_P)
         add_beams(
@@ -147,9 +193,9 @@ class Mapper:
             self._n_scans + 1,
             (np.float32(changes[0]), np.float32(changes[1]), np.float32(limit)),
         )
-        return True
+        return area
 
-    def _add_sonars(self, scan: SonarScan) -> bool:
+    def _add_sonars(self, scan: SonarScan) -> Area | None:
         model, (x, y, heading_rad) = self._sonar, scan.pose
         (x0, y0), side_m = self._frame.origin_m, self.resolution_m
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
@@ -167,12 +213,14 @@ class Mapper:
             if range_m > model.min_range_m
         ]
         if not readings:
-            return True
-        reach = (model.max_range_m + model.tolerance_m) / side_m
-        rows, cols = ([apex[axis] for apex, _ in readings] for axis in range(2))
-        box = min(rows) - reach, max(rows) + reach, min(cols) - reach, max(cols) + reach
-        if not self._grow(*(math.floor(value) for value in box)):
-            return False
+            return x, y, x, y
+        reach = np.minimum([range_m for _, range_m in readings], model.max_range_m)[:, np.newaxis]
+        centres, far = np.array([apex[:2] for apex, _ in readings]), reach + model.tolerance_m
+        low = np.floor((centres - far / side_m).min(axis=0)).astype(np.int64).tolist()
+        high = np.floor((centres + far / side_m).max(axis=0)).astype(np.int64).tolist()
+        area = self._grown((low[0], high[0], low[1], high[1]))
+        if area is None:
+            return None
         changes = model.when_hit, model.when_passed, -log_odds_of(_LEAST_P)
         lengths = model.tolerance_m / side_m, model.min_range_m / side_m
         for apex, range_m in readings:
@@ -186,7 +234,7 @@ class Mapper:
                 changes,
                 self._n_scans + 1,
             )
-        return True
+        return area
 
     def _grow(self, first_row: int, last_row: int, first_col: int, last_col: int) -> bool:
         """Make the arrays hold a box of cells; return whether it is within the greatest size."""
@@ -218,6 +266,22 @@ class Mapper:
         self._corner = (top, left)
         return True
 
+    def _part(self, area: Area | None) -> tuple[tuple[int, int], tuple[slice, slice]]:
+        """Return the first cell of an area on the lattice, and the slices of the arrays for it."""
+        (top, left), (rows, cols) = self._corner, self._seen_at.shape
+        if area is None:
+            return (top, left), np.s_[:rows, :cols]
+        sides = checked_array("area", area)
+        if sides.shape != (4,) or (sides[2:] < sides[:2]).any():
+            raise InvalidValueError(
+                f"area is {area!r:.80}, expected (x_min, y_min, x_max, y_max) in metres"
+            )
+        low, high = (self._frame.position_of(*corner) for corner in sides.reshape(2, 2).tolist())
+        first = np.clip(np.floor(low) - (top, left), 0, (rows, cols)).astype(int).tolist()
+        beyond = np.clip(np.ceil(high) - (top, left), 0, (rows, cols)).astype(int).tolist()
+        corner = top + first[0], left + first[1]
+        return corner, np.s_[first[0] : beyond[0], first[1] : beyond[1]]
+
     def to_grid(
         self,
         *,
@@ -225,6 +289,7 @@ class Mapper:
         free_threshold: float = 0.196,
         occupied_threshold: float = 0.65,
         name: str = "map",
+        area: Area | None = None,
     ) -> OccupancyGrid:
         """Return the occupancy grid of all scans so far, cut to the cells that they have met.
 
@@ -236,6 +301,9 @@ class Mapper:
             U1 and U2 of the grid.
         name
             Name of the map.
+        area
+            `(x_min, y_min, x_max, y_max)` in metres, map frame: only cells that it meets, and
+            nothing beyond them. None for all.
 
         Returns
         -------
@@ -245,16 +313,18 @@ class Mapper:
         Raises
         ------
         InvalidValueError
-            When no scan has met a cell, or a threshold or the radius is out of range.
+            When no scan has met a cell, there or at all, or a threshold or the radius is out of
+            range.
         """
-        met = self._seen_at > 0
+        (top, left), within = self._part(area)
+        evidence, met = self._evidence[within], self._seen_at[within] > 0
         rows, cols = (np.flatnonzero(met.any(axis=axis)) for axis in (1, 0))
         if not rows.size:
             raise InvalidValueError("a map needs at least one scan with a reading, add one first")
         window = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-        probability = 1.0 / (1.0 + np.exp(-self._evidence[window].astype(np.float64)))
+        probability = 1.0 / (1.0 + np.exp(-evidence[window].astype(np.float64)))
         probability[~met[window]] = math.nan
-        first = [int(rows[0]) + self._corner[0], int(cols[0]) + self._corner[1]]
+        first = [int(rows[0]) + top, int(cols[0]) + left]
         x, y = self._frame.points_of_grid(first).tolist()
         return OccupancyGrid(
             probability.astype(np.float32),

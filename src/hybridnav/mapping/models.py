@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.mapping.checks import checked_number
 
 MOST_RANGE_CELLS = 2**14
 """Cells of a beam that are walked exactly in int64."""
@@ -26,18 +27,19 @@ def log_odds_of(probability: float) -> float:
 
 
 def _check_probabilities(when_hit: float, when_passed: float) -> None:
-    if not 0 < when_passed < 0.5 < when_hit < 1:  # noqa: PLR2004 - the prior
+    least = checked_number("when_passed", when_passed)
+    if not 0 < least < 0.5 < checked_number("when_hit", when_hit) < 1:  # noqa: PLR2004 - the prior
         raise InvalidValueError(
-            "a model needs 0 < when_passed < 0.5 < when_hit < 1, the prior of a cell being 0.5, "
-            f"got when_passed {when_passed} and when_hit {when_hit}"
+            f"when_passed is {when_passed} and when_hit {when_hit}, expected 0 < when_passed < 0.5 "
+            "< when_hit < 1: give probabilities on both sides of 0.5, the prior of a cell"
         )
 
 
 def _check_lengths(**lengths_m: float) -> None:
     for name, length_m in lengths_m.items():
-        if not (math.isfinite(length_m) and length_m >= 0):
+        if not 0 <= checked_number(name, length_m) < math.inf:
             raise InvalidValueError(
-                f"{name} must be a finite length in metres >= 0, got {length_m}"
+                f"{name} is {length_m}, expected a finite length >= 0: give it in metres"
             )
 
 
@@ -98,8 +100,9 @@ class LaserModel:
         )
         if not self.min_range_m < self.max_range_m or self.clear_range_m > self.max_range_m:
             raise InvalidValueError(
-                "a laser needs min_range_m < max_range_m and clear_range_m <= max_range_m, got "
-                f"{self.min_range_m}, {self.max_range_m} and {self.clear_range_m}"
+                f"min_range_m is {self.min_range_m}, clear_range_m {self.clear_range_m} and "
+                f"max_range_m {self.max_range_m}, expected the least below and the clearing range "
+                "not above the greatest: give ranges in that order"
             )
 
 
@@ -158,13 +161,14 @@ class SonarModel:
             max_range_m=self.max_range_m,
             min_range_m=self.min_range_m,
         )
-        if not 0 < self.half_angle_rad < math.pi / 2:
+        if not 0 < checked_number("half_angle_rad", self.half_angle_rad) < math.pi / 2:
             raise InvalidValueError(
-                "half of a cone's opening must lie within 0 and pi / 2 radians, "
-                f"got {self.half_angle_rad}"
+                f"half_angle_rad is {self.half_angle_rad}, expected an angle within 0 and pi / 2: "
+                "give half of the cone's opening in radians"
             )
         if not (self.tolerance_m > 0 and self.min_range_m < self.max_range_m):
             raise InvalidValueError(
-                "a sonar needs tolerance_m > 0 and min_range_m < max_range_m, got "
-                f"{self.tolerance_m}, {self.min_range_m} and {self.max_range_m}"
+                f"tolerance_m is {self.tolerance_m}, min_range_m {self.min_range_m} and "
+                f"max_range_m {self.max_range_m}, expected a tolerance > 0 and the "
+                "least range below the greatest: give lengths in metres"
             )

@@ -10,36 +10,19 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.frame import FARTHEST_M
+from hybridnav.mapping.checks import (
+    MOST_READINGS,
+    checked_array,
+    checked_count,
+    checked_number,
+    checked_pose,
+    checked_ranges,
+)
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
 
-_MOST_READINGS = 1_000_000
 _MOST_TURN_RAD = 100.0
-
-
-def _is_pose(pose: tuple[float, float, float]) -> bool:
-    """Return whether a pose is finite and no farther than a grid may be."""
-    return all(math.isfinite(value) and abs(value) <= FARTHEST_M for value in pose)
-
-
-def _checked_pose(pose: tuple[float, float, float]) -> tuple[float, float, float]:
-    x_m, y_m, heading_rad = (float(value) for value in pose)
-    if not _is_pose((x_m, y_m, heading_rad)):
-        raise InvalidValueError(
-            f"a pose must be finite (x, y, heading) within {FARTHEST_M:g} m and radians, got {pose}"
-        )
-    return x_m, y_m, heading_rad
-
-
-def _checked_ranges(ranges_m: FloatArray) -> FloatArray:
-    ranges = np.array(ranges_m, dtype=np.float64)
-    if ranges.ndim != 1 or not 0 < ranges.size <= _MOST_READINGS:
-        raise InvalidValueError(
-            f"ranges must be 1 to {_MOST_READINGS} numbers in one row, got shape {ranges.shape}"
-        )
-    ranges.flags.writeable = False
-    return ranges
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,18 +66,19 @@ class LaserScan:
     time_s: float = math.nan
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ranges_m", _checked_ranges(self.ranges_m))
-        object.__setattr__(self, "pose", _checked_pose(self.pose))
+        object.__setattr__(self, "ranges_m", checked_ranges(self.ranges_m))
+        object.__setattr__(self, "pose", checked_pose(self.pose))
         for name in ("start_rad", "step_rad", "max_range_m", "time_s"):
-            object.__setattr__(self, name, float(getattr(self, name)))
+            object.__setattr__(self, name, checked_number(name, getattr(self, name)))
         if not (abs(self.start_rad) <= _MOST_TURN_RAD and abs(self.step_rad) <= _MOST_TURN_RAD):
             raise InvalidValueError(
-                f"angles of beams must be finite and within a few turns, got {self.start_rad} and "
-                f"{self.step_rad} radians"
+                f"start_rad and step_rad are {self.start_rad} and {self.step_rad}, expected finite "
+                "angles within a few turns: give radians"
             )
         if not self.max_range_m > 0:
             raise InvalidValueError(
-                f"max_range_m must be a positive number of metres, got {self.max_range_m}"
+                f"max_range_m is {self.max_range_m}, expected a positive number: give metres, or "
+                "infinity if the laser states none"
             )
 
 
@@ -134,16 +118,15 @@ class SonarScan:
     time_s: float = math.nan
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ranges_m", _checked_ranges(self.ranges_m))
-        object.__setattr__(self, "pose", _checked_pose(self.pose))
-        object.__setattr__(self, "time_s", float(self.time_s))
-        mounts = np.array(self.mounts, dtype=np.float64)
+        object.__setattr__(self, "ranges_m", checked_ranges(self.ranges_m))
+        object.__setattr__(self, "pose", checked_pose(self.pose))
+        object.__setattr__(self, "time_s", checked_number("time_s", self.time_s))
+        mounts = checked_array("mounts", self.mounts)
         if mounts.shape != (len(self.ranges_m), 3) or not (np.abs(mounts) <= FARTHEST_M).all():
             raise InvalidValueError(
-                f"mounts must be finite (x, y, heading), one for each of {len(self.ranges_m)} "
-                f"ranges, got shape {mounts.shape}"
+                f"mounts have the shape {mounts.shape}, expected finite (x, y, heading), one for "
+                f"each of {len(self.ranges_m)} ranges: make them with sonar_ring"
             )
-        mounts.flags.writeable = False
         object.__setattr__(self, "mounts", mounts)
 
 
@@ -177,11 +160,11 @@ def sonar_ring(n_sonars: int = 16, *, radius_m: float = 0.23) -> FloatArray:
            [-1.  ,  0.  ,  3.14],
            [ 0.  , -1.  ,  4.71]])
     """
-    if not 0 < n_sonars <= _MOST_READINGS:
-        raise InvalidValueError(f"a ring needs 1 to {_MOST_READINGS} sonars, got {n_sonars}")
-    if not (math.isfinite(radius_m) and radius_m >= 0):
+    count = checked_count("n_sonars", n_sonars, MOST_READINGS)
+    radius = checked_number("radius_m", radius_m)
+    if not (math.isfinite(radius) and radius >= 0):
         raise InvalidValueError(
-            f"radius of the ring must be a finite length in metres >= 0, got {radius_m}"
+            f"radius_m is {radius_m}, expected a finite length >= 0: give metres"
         )
-    heading = np.arange(n_sonars) * (math.tau / n_sonars)
-    return np.stack([radius_m * np.cos(heading), radius_m * np.sin(heading), heading], axis=1)
+    heading = np.arange(count) * (math.tau / count)
+    return np.stack([radius * np.cos(heading), radius * np.sin(heading), heading], axis=1)

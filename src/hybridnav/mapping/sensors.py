@@ -9,25 +9,35 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
+from hybridnav.grid import CellClass, OccupancyGrid
+from hybridnav.grid.checks import checked_type
 from hybridnav.mapping._beam_kernels import ray_lengths
+from hybridnav.mapping.checks import MOST_READINGS, checked_array, checked_count, checked_number
 from hybridnav.mapping.models import MOST_RANGE_CELLS
 from hybridnav.mapping.scans import LaserScan, SonarScan, sonar_ring
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
-    from hybridnav.grid import OccupancyGrid
-
-_MOST_RAYS = 1000
 
 
 def _check(max_range_m: float, noise_m: float) -> None:
-    if not (math.isfinite(max_range_m) and max_range_m > 0):
+    far, noise = checked_number("max_range_m", max_range_m), checked_number("noise_m", noise_m)
+    if not (math.isfinite(far) and far > 0):
         raise InvalidValueError(
-            f"max_range_m must be a finite, positive number of metres, got {max_range_m}"
+            f"max_range_m is {max_range_m}, expected a finite number > 0: give metres"
         )
-    if not (math.isfinite(noise_m) and noise_m >= 0):
-        raise InvalidValueError(f"noise_m must be a finite length in metres >= 0, got {noise_m}")
+    if not (math.isfinite(noise) and noise >= 0):
+        raise InvalidValueError(
+            f"noise_m is {noise_m}, expected a finite length >= 0: give a deviation in metres"
+        )
+
+
+def _check_world(grid: OccupancyGrid, max_range_m: float) -> None:
+    if max_range_m / checked_type("grid", grid, OccupancyGrid).resolution_m > MOST_RANGE_CELLS:
+        raise InvalidValueError(
+            f"a range of {max_range_m:g} m is more than {MOST_RANGE_CELLS} cells of "
+            f"{grid.resolution_m:g} m: simulate a shorter one"
+        )
 
 
 def _ranges(
@@ -36,11 +46,6 @@ def _ranges(
     """Return the distance to the first occupied cell in each direction, infinite if there is none
     within the range."""
     side_m = grid.resolution_m
-    if max_range_m / side_m > MOST_RANGE_CELLS:
-        raise InvalidValueError(
-            f"a range of {max_range_m:g} m is more than {MOST_RANGE_CELLS} cells of {side_m:g} m: "
-            "simulate a shorter one"
-        )
     start = grid.frame.position_of(*place)
     # Directions in the grid, which may be turned in the map frame.
     turned = angles_rad - grid.frame.yaw_rad
@@ -52,7 +57,13 @@ def _ranges(
     return lengths * side_m
 
 
-def _noisy(ranges_m: FloatArray, noise_m: float, rng: np.random.Generator) -> FloatArray:
+def _noisy(ranges_m: FloatArray, noise_m: float, seed: int | np.random.Generator) -> FloatArray:
+    try:
+        rng = np.random.default_rng(seed)
+    except (TypeError, ValueError):
+        raise InvalidValueError(
+            f"seed is {seed!r:.80}, expected a whole number >= 0 or a generator: give one"
+        ) from None
     if noise_m == 0:
         return ranges_m
     noisy: FloatArray = np.maximum(ranges_m + rng.normal(0.0, noise_m, ranges_m.shape), 0.0)
@@ -99,8 +110,9 @@ class SimulatedLaser:
 
     def __post_init__(self) -> None:
         _check(self.max_range_m, self.noise_m)
-        if self.n_beams < 1:
-            raise InvalidValueError(f"a laser needs at least one beam, got {self.n_beams}")
+        checked_count("n_beams", self.n_beams, MOST_READINGS)
+        for name in ("start_rad", "step_rad"):
+            checked_number(name, getattr(self, name))
 
     def scan(
         self,
@@ -133,6 +145,7 @@ class SimulatedLaser:
         InvalidValueError
             When the pose is not finite, or the range more than 2^14 cells.
         """
+        _check_world(grid, self.max_range_m)
         shape = LaserScan(
             np.full(self.n_beams, math.inf), pose, self.start_rad, self.step_rad
         )  # checks the pose
@@ -141,7 +154,7 @@ class SimulatedLaser:
             heading_rad + self.start_rad + np.arange(self.n_beams, dtype=np.float64) * self.step_rad
         )
         ranges = _ranges(grid, (x_m, y_m), angles, self.max_range_m)
-        ranges = _noisy(ranges, self.noise_m, np.random.default_rng(seed))
+        ranges = _noisy(ranges, self.noise_m, seed)
         return LaserScan(
             ranges, shape.pose, self.start_rad, self.step_rad, self.max_range_m, time_s
         )
@@ -187,10 +200,10 @@ class SimulatedSonars:
 
     def __post_init__(self) -> None:
         _check(self.max_range_m, self.noise_m)
-        if not 0 <= self.half_angle_rad < math.pi / 2:
+        if not 0 <= checked_number("half_angle_rad", self.half_angle_rad) < math.pi / 2:
             raise InvalidValueError(
-                "half of a cone's opening must lie within 0 and pi / 2 radians, "
-                f"got {self.half_angle_rad}"
+                f"half_angle_rad is {self.half_angle_rad}, expected an angle from 0 to pi / 2: "
+                "give half of the cone's opening in radians"
             )
 
     def scan(
@@ -224,11 +237,13 @@ class SimulatedSonars:
         InvalidValueError
             When the pose or a mount is not finite, or the range more than 2^14 cells.
         """
-        shape = SonarScan(np.full(len(self.mounts), math.inf), pose, self.mounts)
+        _check_world(grid, self.max_range_m)
+        mounts = np.atleast_1d(checked_array("mounts", self.mounts))
+        shape = SonarScan(np.full(len(mounts), math.inf), pose, mounts)
         x_m, y_m, heading_rad = shape.pose
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
-        half_cells = self.half_angle_rad * self.max_range_m / grid.resolution_m
-        n_aside = min(math.ceil(half_cells), _MOST_RAYS // 2)  # beside the ray on the axis
+        # Beside the ray on the axis.
+        n_aside = math.ceil(self.half_angle_rad * self.max_range_m / grid.resolution_m)
         fan = np.linspace(-self.half_angle_rad, self.half_angle_rad, 2 * n_aside + 1)
         ranges = np.array(
             [
@@ -241,5 +256,5 @@ class SimulatedSonars:
                 for ahead, aside, turn in shape.mounts.tolist()
             ]
         )
-        ranges = _noisy(ranges, self.noise_m, np.random.default_rng(seed))
+        ranges = _noisy(ranges, self.noise_m, seed)
         return SonarScan(ranges, shape.pose, shape.mounts, time_s)

@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.topology import local
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -124,6 +125,77 @@ class TopologicalMap:
         """Return the dense index of the place that holds a cell of the grid, -1 for an occupied
         cell."""
         return int(self.level.field_of[cell])
+
+    def local_grid(self, place: int) -> OccupancyGrid:
+        """Return the metric map of one place, in the frame of that place.
+
+        The origin of that frame is the position of the place, the centre of its surviving cell; its
+        axes are those of the grid. The map holds the cells of the place, and the obstacles round it
+        as far as they decide on these; cells of other places are NaN. With the same thresholds and
+        radius, cells have the same class in it as in the whole map.
+
+        Parameters
+        ----------
+        place
+            Dense index of the place.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such place.
+
+        Examples
+        --------
+        >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+        >>> local = hn.TopologicalMap(pyramid).local_grid(0)
+        >>> local.shape, local.class_counts()["free"] + local.class_counts()["unexplored"] > 76
+        ((19, 27), True)
+        """
+        self._check_places([place])
+        return local.local_grid(self.level, place)
+
+    def local_pose(self, place: int) -> local.Pose:
+        """Return the pose of the frame of a place in the map frame, `(x, y, yaw)` in metres and
+        radians.
+
+        Parameters
+        ----------
+        place
+            Dense index of the place.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such place.
+        """
+        self._check_places([place])
+        return local.local_pose(self.level, place)
+
+    def transform(self, arc: int) -> local.Pose:
+        """Return the pose of the frame of an arc's second place in the frame of the first.
+
+        `(x, y, yaw)` in metres and radians: a point p of the second frame is R(yaw) p + (x, y) in
+        the first one. The axes of all frames are parallel, so that yaw is 0. Along every cycle of
+        arcs the transforms compose to the identity; that of a self-loop is the identity.
+
+        Parameters
+        ----------
+        arc
+            Dense index of the arc, which leads from `arcs[arc, 0]` to `arcs[arc, 1]`.
+
+        Raises
+        ------
+        InvalidValueError
+            When there is no such arc.
+
+        Examples
+        --------
+        >>> pyramid = hn.DualGraphPyramid.build(hn.example_map("figure1"), merge_distance_m=1.0)
+        >>> hn.TopologicalMap(pyramid).transform(0)
+        (0.8, -0.4, 0.0)
+        """
+        _check_index("arc", arc, self.n_arcs)
+        return local.transform_of(self.level, arc)
 
     @cached_property
     def inclusion(self) -> Inclusion:

@@ -36,6 +36,8 @@ _UNEXPLORED_RIM = 0.8
 _LEAST_INSIDE = 0.1
 """Area cut off inside free space that reaches all sides of the map, as a share of it, from which
 on that is the outside."""
+_SIDES = (np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1])
+"""Indices of the first and last row and column."""
 _LARGEST_LEAST_M2 = 1e9
 """Least areas beyond it are taken for a mistake."""
 _SPLINTER_M2 = 0.5
@@ -48,7 +50,7 @@ _SOLIDITY = 0.8
 _OPEN = 0.65
 _STRAIGHT = 0.35
 """Solidity of two parts of one corridor."""
-_WALL_REACH_M = 0.25
+WALL_REACH_M = 0.25
 """How far rooms reach into walls, and into the unexplored cells of their own side: outlines that
 people edit then run inside walls, not along the free cells' steps."""
 
@@ -108,7 +110,7 @@ def find_rooms(
             f"at most {MAX_ROOMS} are kept: raise the least area"
         )
     names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
-    return RoomLabels(names, _reaching(labels, grid))
+    return RoomLabels(names, reaching(labels, grid))
 
 
 def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
@@ -184,13 +186,13 @@ def _segments(grid: OccupancyGrid, method: Segmentation, least_m2: float) -> Int
     return watershed_segments(grid)
 
 
-def _reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
+def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     """Return labels spread into walls, and through unexplored cells, but never out behind a wall.
 
-    On some maps only a wall of one cell separates two rooms: labels do not spread through it into
-    unexplored cells, or into free cells without a room.
+    They reach 0.25 m. On some maps only a wall of one cell separates two rooms: labels do not
+    spread through it into unexplored cells, or into free cells without a room.
     """
-    reach = _WALL_REACH_M / grid.resolution_m
+    reach = WALL_REACH_M / grid.resolution_m
     wall = grid.measured == CellClass.OCCUPIED
     into_walls = grown(label_of, reach)
     inside = label_of.copy()
@@ -210,8 +212,10 @@ def outside_of(grid: OccupancyGrid) -> BoolArray:
     hall that the map's border cuts off.
     """
     free = grid.measured == CellClass.FREE
+    if 2 * sum(np.count_nonzero(free[side]) for side in _SIDES) < sum(2 * n for n in free.shape):
+        return np.zeros_like(free)  # most maps: their border is unexplored
     part_of, n_parts = ndimage.label(free)
-    borders = [part_of[0], part_of[-1], part_of[:, 0], part_of[:, -1]]
+    borders = [part_of[side] for side in _SIDES]
     on_border = [np.bincount(border, minlength=n_parts + 1) for border in borders]
     n_border = sum(len(border) for border in borders)
     around = np.all(np.stack(on_border) > 0, axis=0) & (2 * sum(on_border) >= n_border)

@@ -1,0 +1,185 @@
+"""Exploration of a floor plan by a simulated robot, until nothing in its reach is unknown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from hybridnav._progress import no_progress
+from hybridnav.errors import InvalidValueError
+from hybridnav.explore.robot import Robot, laser_all_round
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav._progress import Progress
+    from hybridnav._typing import FloatArray
+    from hybridnav.explore.goals import Goals
+    from hybridnav.explore.robot import Sensor
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.topology import TopologicalMap
+
+By = Literal["path", "frontier", "room"]
+"""How goals are ranked."""
+MOST_GOALS = 10_000
+"""Goals after which an exploration ends, whatever is left."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What the robot knew when it chose a goal.
+
+    Examples
+    --------
+    >>> from hybridnav.explore import Step, explore
+    >>> room = np.ones((20, 30), dtype=np.float32)
+    >>> room[2:-2, 2:-2] = 0.0
+    >>> steps: list[Step] = []
+    >>> plan = hn.OccupancyGrid(room, hn.Frame(0.1), robot_radius_m=0.1)
+    >>> done = explore(plan, watch=steps.append)
+    >>> steps[-1].chosen
+    -1
+    """
+
+    topology: TopologicalMap
+    pose: tuple[float, float, float]
+    goals: Goals
+    chosen: int
+    """Index of the goal, -1 where none is left: at the end, and before the robot looks again."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """What a robot made of a floor plan.
+
+    Examples
+    --------
+    >>> from hybridnav.explore import explore
+    >>> room = np.ones((20, 30), dtype=np.float32)
+    >>> room[2:-2, 2:-2] = 0.0
+    >>> done = explore(hn.OccupancyGrid(room, hn.Frame(0.1), robot_radius_m=0.1), (1.0, 1.0))
+    >>> done.n_given_up, done.share_known
+    (0, 1.0)
+    """
+
+    grid: OccupancyGrid
+    """The map that the robot made."""
+    topology: TopologicalMap
+    """Its places."""
+    points: FloatArray = field(repr=False)
+    """float64 (n, 2), where the robot took scans, in metres."""
+    driven_m: float
+    """Metres driven."""
+    n_goals: int
+    """Goals that the robot chose."""
+    n_given_up: int
+    """Unexplored cells that stayed so although the robot stood beside them."""
+    n_looks_again: int
+    """Spots from which the robot scanned doubtful cells again when no goal was left."""
+    share_known: float
+    """Share of the floor plan's free cells in the robot's reach that its map knows."""
+    is_complete: bool
+    """Whether no goal was left; False if the number of goals ended the exploration. A door that is
+    closed in the map may still hide what `share_known` leaves."""
+    seconds: dict[str, float] = field(repr=False)
+    """Seconds of computing: mapping, pyramid, goals, rooms, planning."""
+
+
+def explore(  # noqa: PLR0913 - all but the first have defaults
+    world: OccupancyGrid,
+    start: tuple[float, float] | None = None,
+    *,
+    sensor: Sensor | None = None,
+    seed: int = 0,
+    by: By = "path",
+    most_goals: int = MOST_GOALS,
+    watch: Callable[[Step], None] | None = None,
+    progress: Progress = no_progress,
+) -> Exploration:
+    """Explore a floor plan from a point until nothing in the robot's reach is unknown.
+
+    The robot scans, makes its map and follows it with its pyramid. The unexplored places that it
+    can drive to are its goals. It plans to the nearest one by the cost of the path (Yamauchi 1997),
+    on the places that it knows, by the preset `paper`; scans on the way; and chooses again when it
+    is there or the goal has become known from afar. An unexplored cell that stays unexplored
+    although the robot stood beside it is given up.
+
+    Noise can close a door in the map. So when no goal is left, the robot takes the occupied cells
+    away whose probability is below 0.9. Where it could then go on, it drives near, scans again and
+    starts anew, at most twice at a spot.
+
+    Parameters
+    ----------
+    world
+        The floor plan, with the robot's radius. Cells that are not free count as walls, and so does
+        everything outside.
+    start
+        `(x, y)` in metres, map frame, in a free cell of the plan; None for the one farthest from
+        walls.
+    sensor
+        By default a laser of 360 beams all round with a range of 8 m and a noise of 1 cm.
+    seed
+        Seed of the sensor's noise and of the pyramid.
+    by
+        How goals are ranked. `"path"`: by the cost of the path alone. `"frontier"`: by the same,
+        and the robot drives to each goal although it has become known, as Yamauchi's does.
+        `"room"`: as `"path"`, but goals in the room that the robot is in come first.
+    most_goals
+        Goals after which the exploration ends, from 1.
+    watch
+        Called with a `Step` at each choice, and at the end.
+    progress
+        Called with known and all cells in reach.
+
+    Returns
+    -------
+    Exploration
+        The map that the robot made, and what it drove.
+
+    Raises
+    ------
+    InvalidValueError
+        When the start is not in a free cell, the number of goals is out of range, or there is no
+        such ranking.
+
+    Examples
+    --------
+    >>> from hybridnav.explore import explore
+    >>> room = np.ones((20, 30), dtype=np.float32)
+    >>> room[2:-2, 2:-2] = 0.0
+    >>> plan = hn.OccupancyGrid(room, hn.Frame(0.1), robot_radius_m=0.1)
+    >>> explore(plan, most_goals=1).n_goals <= 1
+    True
+    """
+    if not 1 <= most_goals <= MOST_GOALS:
+        raise InvalidValueError(f"most_goals must be from 1 to {MOST_GOALS}, got {most_goals}")
+    if by not in get_args(By):
+        raise InvalidValueError(f"by must be one of {', '.join(get_args(By))}, got {by!r:.40}")
+    robot = Robot(world, start, laser_all_round() if sensor is None else sensor, seed)
+    is_complete = False
+    for _ in range(most_goals):
+        goals = robot.look()
+        progress(robot.known_cells(), robot.reach_cells)
+        first = robot.in_its_room(goals) if by == "room" else np.ones(len(goals), np.bool_)
+        chosen = int(np.lexsort((goals.costs_m, ~first))[0]) if len(goals) else -1
+        if watch is not None:
+            watch(Step(robot.topology, robot.pose, goals, chosen))
+        if chosen >= 0:
+            robot.visit(goals, chosen, arrives=by == "frontier")
+        elif not robot.look_again():
+            is_complete = True
+            break
+    return Exploration(
+        robot.topology.grid,
+        robot.topology,
+        np.array(robot.points),
+        robot.driven_m,
+        robot.n_goals,
+        robot.n_given_up,
+        robot.n_looks_again,
+        robot.known_cells() / robot.reach_cells,
+        is_complete,
+        dict(robot.seconds),
+    )

@@ -1,0 +1,333 @@
+"""A robot that is simulated in a floor plan: what it measures, knows, and where it drives."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.explore.doubts import doubtful_spots
+from hybridnav.explore.goals import Goals
+from hybridnav.grid import CellClass, Frame, OccupancyGrid
+from hybridnav.grid.clearance import clearance_cells
+from hybridnav.mapping import LaserModel, Mapper, SimulatedLaser, SimulatedSonars, SonarModel
+from hybridnav.online import OnlinePyramid, OnlineRooms
+from hybridnav.planner import HybridPlanner
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.search.moves import legal_moves
+from hybridnav.search.waypoints import costs_from
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.mapping.mapper import Area
+
+Sensor = SimulatedLaser | SimulatedSonars
+"""What a simulated robot measures with."""
+
+_SCAN_EVERY_M = 0.5
+_TURNS = 8
+"""Scans of a ring of sonars at a point, the robot turning from one sonar to the next."""
+_NEAR_M = 0.5
+"""Metres that a robot may stand beside the free cells it takes itself to be in."""
+_SCANS_AGAIN = 4
+"""Scans at a spot from which the robot looks again."""
+_TRIES = 2
+"""Visits of an unexplored cell that stays unexplored before it is given up, and looks at doubtful
+cells from about the same spot."""
+
+
+def laser_all_round(*, max_range_m: float = 8.0, noise_m: float = 0.01) -> SimulatedLaser:
+    """Return a laser of 360 beams, a degree apart.
+
+    Parameters
+    ----------
+    max_range_m
+        Longer beams have no return.
+    noise_m
+        Standard deviation of readings.
+
+    Returns
+    -------
+    SimulatedLaser
+        The laser.
+
+    Examples
+    --------
+    >>> from hybridnav.explore import laser_all_round
+    >>> laser_all_round(max_range_m=4.0).n_beams
+    360
+    """
+    return SimulatedLaser(
+        n_beams=360,
+        start_rad=-math.pi,
+        step_rad=math.pi / 180,
+        max_range_m=max_range_m,
+        noise_m=noise_m,
+    )
+
+
+class Robot:
+    """A robot in a floor plan, and what it knows."""
+
+    def __init__(
+        self, world: OccupancyGrid, start: tuple[float, float] | None, sensor: Sensor, seed: int
+    ) -> None:
+        self._world = _walled(world)
+        self._sensor, self._seed = sensor, seed
+        self._turns = [0.0]
+        if isinstance(sensor, SimulatedSonars):  # one echo says little of a cell
+            self._turns = (np.arange(_TURNS) * math.tau / len(sensor.mounts) / _TURNS).tolist()
+        self._noise = np.random.default_rng(seed)
+        far_m = sensor.max_range_m
+        self._mapper = Mapper(
+            resolution_m=world.resolution_m,
+            laser=LaserModel(max_range_m=far_m, clear_range_m=far_m),
+            sonar=SonarModel(max_range_m=far_m),
+            corner_m=world.frame.origin_m,
+        )
+        self._tries: Counter[tuple[int, int]] = Counter()
+        """Visits of unexplored cells, by their row and column on the lattice."""
+        self._given_up: set[tuple[int, int]] = set()
+        self._spots: list[tuple[float, float]] = []
+        self._version: OnlinePyramid | None = None
+        self._rooms: OnlineRooms | None = None
+        self._changed: list[Area] = []
+        """Areas of the scans since the last version."""
+        self.points: list[tuple[float, float]] = []
+        self.n_goals, self.driven_m = 0, 0.0
+        self.seconds = dict.fromkeys(("mapping", "pyramid", "goals", "rooms", "planning"), 0.0)
+        point = _widest(self._world) if start is None else start
+        self._reach_points = self._world.frame.points_of(np.argwhere(_reach(self._world, point)))
+        self.reach_cells = len(self._reach_points)
+        self.pose = (float(point[0]), float(point[1]), 0.0)
+        self._scan()
+
+    def _scan(self) -> None:
+        began = time.perf_counter()
+        x_m, y_m, heading_rad = self.pose
+        for turn_rad in self._turns:
+            pose = x_m, y_m, heading_rad + turn_rad
+            area = self._mapper.add(self._sensor.scan(self._world, pose, seed=self._noise))
+            if area is not None:
+                self._changed.append(area)
+        self.points.append(self.pose[:2])
+        self.seconds["mapping"] += time.perf_counter() - began
+
+    def _grid(self, area: Area | None = None) -> OccupancyGrid:
+        began = time.perf_counter()
+        grid = self._mapper.to_grid(
+            robot_radius_m=self._world.robot_radius_m,
+            free_threshold=self._world.free_threshold,
+            occupied_threshold=self._world.occupied_threshold,
+            name=f"{self._world.name}-explored",
+            area=area,
+        )
+        self.seconds["mapping"] += time.perf_counter() - began
+        return grid
+
+    def look(self) -> Goals:
+        """Bring map and pyramid up to date, and return the goals."""
+        grid = self._grid()
+        began = time.perf_counter()
+        if self._version is None:
+            self._version = OnlinePyramid.of(DualGraphPyramid.build(grid, seed=self._seed))
+        elif self._changed:
+            low, high = np.array(self._changed).reshape(-1, 2, 2).transpose(1, 0, 2)
+            changed = [*low.min(axis=0), *high.max(axis=0)]
+            self._version = self._version.update(grid, changed=changed).version
+        self._changed.clear()
+        self.topology = TopologicalMap(self._version.pyramid)
+        self.seconds["pyramid"] += time.perf_counter() - began
+        began = time.perf_counter()
+        left_out = np.zeros(grid.shape, dtype=np.bool_)
+        for cell in self._given_up:
+            left_out[self._in_grid(grid, cell)] = True
+        self._at = self._cell(grid)
+        goals = Goals.of(self.topology, self._at, left_out)
+        self.seconds["goals"] += time.perf_counter() - began
+        return goals
+
+    def _cell(self, grid: OccupancyGrid) -> tuple[int, int]:
+        """Return the robot's cell, or one near it where noise blocks it or cuts it off: the nearest
+        of the largest connected set of free cells that comes near."""
+        from scipy import ndimage  # noqa: PLC0415 - half a second
+
+        at = grid.frame.position_of(*self.pose[:2])
+        labels, _ = ndimage.label(grid.classes == CellClass.FREE)
+        free = np.argwhere(labels)
+        if not len(free):
+            raise InvalidValueError(
+                "no cell round the robot is free: start farther from walls, or with a smaller "
+                f"radius than {grid.robot_radius_m:g} m"
+            )
+        squared = ((free + 0.5 - at) ** 2).sum(axis=1)
+        reach = max(_NEAR_M / grid.resolution_m, math.sqrt(squared.min()) + 1)
+        near = squared <= reach**2
+        free, squared = free[near], squared[near]
+        sizes = np.bincount(labels.ravel())[labels[tuple(free.T)]]
+        row, col = free[np.lexsort((squared, -sizes))[0]].tolist()
+        return row, col
+
+    def in_its_room(self, goals: Goals) -> BoolArray:
+        """Return the goals that lie in the room that the robot is in, bool (n,)."""
+        began = time.perf_counter()
+        grid = self.topology.grid
+        self._rooms = (
+            OnlineRooms.of(grid) if self._rooms is None else self._rooms.update(grid).version
+        )
+        room_of = self._rooms.number_of
+        self.seconds["rooms"] += time.perf_counter() - began
+        inside: BoolArray = room_of[tuple(goals.cells.T)] == room_of[self._at]
+        return inside
+
+    def visit(self, goals: Goals, chosen: int, *, arrives: bool) -> None:
+        """Drive to a goal, or, unless the robot is to arrive there, until it is known."""
+        grid = self.topology.grid
+        beyond = self._on_lattice(grid, goals.beyond[chosen])
+        self.n_goals += 1
+        self._tries[beyond] += 1
+        if self._tries[beyond] >= _TRIES:
+            self._given_up.add(beyond)
+        points = self._path_to(goals.cells[chosen])
+        if points is None:
+            self._given_up.add(beyond)
+            return
+        self._drive(points, None if arrives else beyond)
+
+    def look_again(self) -> bool:
+        """Drive to the nearest spot from which doubtful cells can be seen, and scan there.
+
+        Return whether there is one that the robot has not looked from twice.
+        """
+        began = time.perf_counter()
+        grid = self.topology.grid
+        spots = doubtful_spots(grid, self._at)
+        points = grid.frame.points_of(spots)
+        looked = np.array(self._spots).reshape(-1, 1, 2)
+        near = np.hypot(*np.moveaxis(points - looked, -1, 0)) < _NEAR_M
+        spots = spots[near.sum(axis=0) < _TRIES]
+        flat = spots @ np.array([grid.shape[1], 1])
+        moves = legal_moves(grid.classes == CellClass.FREE, grid.corner_cutting)
+        costs = costs_from(moves, self._at, flat)[flat]
+        spots, costs = spots[costs >= 0], costs[costs >= 0]
+        self.seconds["goals"] += time.perf_counter() - began
+        if not len(spots):
+            return False
+        spot = spots[costs.argmin()]
+        x_m, y_m = grid.frame.points_of(spot).tolist()
+        self._spots.append((x_m, y_m))
+        path = self._path_to(spot)
+        if path is not None:
+            self._drive(path, None)
+            for _ in range(_SCANS_AGAIN):
+                self._scan()
+        return True
+
+    def _path_to(self, cell: LongArray) -> FloatArray | None:
+        """Return the points of a path to a cell, None if the planner finds none."""
+        began = time.perf_counter()
+        from_m, to_m = self.topology.grid.frame.points_of(np.array([self._at, cell]))
+        result = HybridPlanner(self.topology, preset="paper").plan(from_m, to_m)
+        self.seconds["planning"] += time.perf_counter() - began
+        return None if result.path is None else result.path.points
+
+    def _drive(self, points: FloatArray, beyond: tuple[int, int] | None) -> None:
+        """Drive along points, with scans on the way, until a cell is known."""
+        points = np.concatenate([[self.pose[:2]], points])
+        steps = np.hypot(*np.diff(points, axis=0).T)
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+        n_scans = max(1, math.ceil(along[-1] / _SCAN_EVERY_M))
+        x_m, y_m = self.pose[:2]
+        for at in np.linspace(0.0, along[-1], n_scans + 1)[1:].tolist():
+            last = x_m, y_m
+            x_m, y_m = (float(np.interp(at, along, column)) for column in points.T)
+            self.pose = x_m, y_m, math.atan2(y_m - last[1], x_m - last[0])
+            self._scan()
+            if beyond and self._is_known(beyond):
+                self.driven_m += at
+                return
+        self.driven_m += float(along[-1])
+
+    def _is_known(self, cell: tuple[int, int]) -> bool:
+        far_m = self._world.robot_radius_m + 2 * self._world.resolution_m
+        lattice = Frame(self._world.resolution_m, self._world.frame.origin_m)
+        x_m, y_m = lattice.points_of(np.array(cell)).tolist()
+        grid = self._grid((x_m - far_m, y_m - far_m, x_m + far_m, y_m + far_m))
+        row, col = self._in_grid(grid, cell)
+        inside = 0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]
+        return inside and bool(grid.classes[row, col] != CellClass.UNEXPLORED)
+
+    def _on_lattice(self, grid: OccupancyGrid, cell: object) -> tuple[int, int]:
+        """Return the row and column of a cell on the lattice, which never moves."""
+        rows, cols = self._offset(grid)
+        row, col = np.asarray(cell).tolist()
+        return row + rows, col + cols
+
+    def _in_grid(self, grid: OccupancyGrid, cell: tuple[int, int]) -> tuple[int, int]:
+        rows, cols = self._offset(grid)
+        return cell[0] - rows, cell[1] - cols
+
+    def _offset(self, grid: OccupancyGrid) -> tuple[int, int]:
+        lattice = Frame(grid.resolution_m, self._world.frame.origin_m)
+        row, col = lattice.position_of(*grid.frame.origin_m)
+        return round(row), round(col)
+
+    def known_cells(self) -> int:
+        """Return the free cells of the plan in the robot's reach that its map knows."""
+        grid = self.topology.grid
+        rows, cols = grid.frame.cells_of(self._reach_points).T
+        inside = (rows >= 0) & (cols >= 0) & (rows < grid.shape[0]) & (cols < grid.shape[1])
+        classes = grid.measured[rows[inside], cols[inside]]
+        return int(np.count_nonzero(classes != CellClass.UNEXPLORED))
+
+    @property
+    def n_looks_again(self) -> int:
+        """Spots from which the robot looked at doubtful cells again."""
+        return len(self._spots)
+
+    @property
+    def n_given_up(self) -> int:
+        """Unexplored cells that were given up."""
+        return len(self._given_up)
+
+
+def _walled(world: OccupancyGrid) -> OccupancyGrid:
+    """Return a plan in which all is wall that is not free, and so is a rim round it."""
+    walls = np.where(world.measured == CellClass.FREE, np.float32(0.0), np.float32(1.0))
+    rim = np.pad(walls, 1, constant_values=1.0)
+    x, y = world.frame.points_of_grid([-1, -1]).tolist()
+    frame = Frame(world.resolution_m, (x, y), world.frame.yaw_rad)
+    return replace(world, probability=rim, frame=frame, least_island_m2=0.0)
+
+
+def _widest(plan: OccupancyGrid) -> tuple[float, float]:
+    """Return the point of a walled plan that is farthest from walls."""
+    clearance = clearance_cells(plan.measured == CellClass.OCCUPIED)
+    cell = np.unravel_index(int(clearance.argmax()), plan.shape)
+    x, y = plan.frame.points_of(np.array(cell)).tolist()
+    return x, y
+
+
+def _reach(plan: OccupancyGrid, start: tuple[float, float]) -> BoolArray:
+    """Return the cells of a walled plan that a robot can reach, bool (rows, cols)."""
+    from scipy import ndimage  # noqa: PLC0415 - half a second
+
+    point = np.asarray(start, dtype=np.float64)
+    if point.shape != (2,) or not np.isfinite(point).all():
+        raise InvalidValueError(f"the start must be two finite metres (x, y), got {start!r:.60}")
+    row, col = plan.frame.cells_of(point).tolist()
+    inside = 0 <= row < plan.shape[0] and 0 <= col < plan.shape[1]
+    if not inside or plan.classes[row, col] != CellClass.FREE:
+        raise InvalidValueError(
+            f"the start ({point[0]:g}, {point[1]:g}) is not in a free cell of the plan: choose a "
+            f"point on the map that is more than {plan.robot_radius_m:g} m from walls"
+        )
+    labels, _ = ndimage.label(plan.classes == CellClass.FREE)
+    reached: BoolArray = labels == labels[row, col]
+    return reached

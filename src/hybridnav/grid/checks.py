@@ -1,0 +1,89 @@
+"""Checks of values that public functions are given."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+
+_T = TypeVar("_T")
+
+
+def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
+    """Return a value of a type.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    value
+        What was given.
+    kind
+        The type.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is of another type.
+    """
+    if isinstance(value, kind):
+        return value
+    text = " ".join(f"{value!r:.60}".split())
+    article = "an" if kind.__name__[0] in "AEIOU" else "a"
+    raise InvalidValueError(
+        f"{name} is {text} of type {type(value).__name__}, expected {article} {kind.__name__}: "
+        "make one"
+    )
+
+
+def checked_cell(name: str, cell: Any) -> tuple[int, int]:
+    """Return a cell as two integers.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    cell
+        What was given.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not two whole numbers.
+    """
+    try:
+        row, col = cell
+        return operator.index(row), operator.index(col)
+    except (TypeError, ValueError):
+        text = " ".join(f"{cell!r:.60}".split())
+        raise InvalidValueError(
+            f"{name} is {text}, expected a cell (row, col): give two whole numbers"
+        ) from None
+
+
+def checked_between(name: str, value: Any, low: float, high: float) -> float:
+    """Return a number in a range.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    value
+        What was given.
+    low, high
+        The least and the greatest number.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is no number, or lies outside the range.
+    """
+    if isinstance(value, int | float | np.number) and low <= value <= high:
+        return float(value)
+    text = " ".join(f"{value!r:.60}".split())
+    raise InvalidValueError(
+        f"{name} is {text}, expected a number from {low:,g} to {high:,g}: choose another one"
+    )

@@ -1,0 +1,224 @@
+"""Exploration: what the robot knows at the end, where it drove, and that it ends."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+
+import hybridnav as hn
+from hybridnav.explore import Exploration, Goals, Step, explore, laser_all_round
+from hybridnav.explore.doubts import doubtful_spots
+from hybridnav.mapping import SimulatedLaser, SimulatedSonars
+from tests.strategies import examples
+
+START = (1.0, 1.0)
+
+
+def flat(*, yaw_rad: float = 0.0, radius_m: float = 0.2) -> hn.OccupancyGrid:
+    """Four rooms along a corridor, a cupboard, a room without a door, and unknown ground."""
+    cells = np.zeros((66, 100), dtype=np.float32)
+    cells[[0, 1, -2, -1]] = cells[:, [0, 1, -2, -1]] = 1.0
+    cells[24:26, 2:80] = cells[40:42, 2:80] = 1.0
+    cells[42:64, 40:42] = cells[2:24, 30:32] = 1.0
+    cells[24:26, [*range(10, 20), *range(60, 70)]] = 0.0
+    cells[40:42, [*range(20, 30), *range(50, 60)]] = 0.0
+    cells[10:12, 50:60] = cells[50:64, 80:82] = cells[50:52, 80:98] = 1.0
+    cells[52:64, 82:98] = np.nan
+    return hn.OccupancyGrid(
+        cells, hn.Frame(0.1, (-1.0, 0.0), yaw_rad), robot_radius_m=radius_m, name="flat"
+    )
+
+
+@pytest.fixture(scope="module")
+def explored() -> Exploration:
+    """What a robot made of the flat."""
+    return explore(flat(), START)
+
+
+def test_everything_that_the_robot_can_reach_is_known(explored: Exploration) -> None:
+    assert explored.is_complete
+    assert (explored.share_known, explored.n_given_up) == (1.0, 0)
+    world, made = flat(), explored.grid
+    cells = np.argwhere(np.isfinite(world.probability))
+    at = made.frame.cells_of(world.frame.points_of(cells))
+    inside = ((at >= 0) & (at < made.shape)).all(axis=1)
+    there = made.measured[tuple(at[inside].T)]
+    truth = world.measured[tuple(cells[inside].T)]
+    walls = world.measured != hn.CellClass.FREE
+    beside = ndimage.binary_dilation(walls, np.ones((3, 3), np.bool_))[tuple(cells[inside].T)]
+    known = there != hn.CellClass.UNEXPLORED
+    assert (there == truth)[known & ~beside].all()
+    assert beside[known & (there != truth)].all()  # readings end on either side of a surface
+    assert known[~beside].mean() > 0.8  # the room without a door is not
+
+
+def test_the_robot_keeps_off_the_walls_and_drives_no_farther_than_it_says(
+    explored: Exploration,
+) -> None:
+    plan = flat(radius_m=0.1)  # half the robot's radius: it knows walls to a cell or so
+    assert (plan.classes[tuple(plan.frame.cells_of(explored.points).T)] == hn.CellClass.FREE).all()
+    steps = np.hypot(*np.diff(explored.points, axis=0).T)
+    assert steps.sum() <= explored.driven_m + 1e-6
+    assert steps.max() <= 0.5 + 1e-6
+    assert explored.points[0].tolist() == list(START)
+
+
+def test_equal_explorations_make_equal_maps(explored: Exploration) -> None:
+    again, other = explore(flat(), START), explore(flat(), START, seed=1)
+    assert np.array_equal(explored.grid.probability, again.grid.probability, equal_nan=True)
+    assert (again.driven_m, again.n_goals) == (explored.driven_m, explored.n_goals)
+    assert not np.array_equal(again.grid.probability, other.grid.probability, equal_nan=True)
+    assert other.share_known == 1.0
+
+
+def test_a_plan_may_be_turned() -> None:
+    turned = flat(yaw_rad=0.3)
+    x, y = turned.frame.points_of(np.array([10, 20])).tolist()
+    done = explore(turned, (x, y))
+    assert done.is_complete
+    assert done.share_known > 0.99
+
+
+def test_a_ring_of_sonars_explores_a_hall() -> None:
+    hall = np.zeros((60, 60), dtype=np.float32)
+    hall[[0, -1]] = hall[:, [0, -1]] = 1.0
+    grid = hn.OccupancyGrid(hall, hn.Frame(0.1), robot_radius_m=0.2)
+    heard = explore(grid, sensor=SimulatedSonars(max_range_m=3.0), most_goals=30)
+    assert heard.share_known > 0.8
+
+
+def test_what_no_scan_shows_is_given_up_and_exploration_ends() -> None:
+    # Few beams ahead show little of what lies beside the robot.
+    blinkered = SimulatedLaser(n_beams=20, start_rad=-0.3, step_rad=0.03, max_range_m=3.0)
+    world = np.zeros((24, 30), dtype=np.float32)
+    world[[0, -1]] = world[:, [0, -1]] = 1.0
+    done = explore(hn.OccupancyGrid(world, hn.Frame(0.2), robot_radius_m=0.2), sensor=blinkered)
+    assert done.is_complete
+    assert done.n_goals > 0
+
+
+def test_each_choice_can_be_watched_and_their_number_limited() -> None:
+    steps: list[Step] = []
+    known: list[int] = []
+    done = explore(
+        flat(),
+        START,
+        most_goals=3,
+        watch=steps.append,
+        progress=lambda share, _: known.append(share),
+    )
+    assert (done.n_goals, done.is_complete, len(steps)) == (3, False, 3)
+    assert known == sorted(known)
+    for step in steps:
+        beyond = step.goals.beyond[step.chosen]
+        assert step.topology.grid.classes[tuple(beyond)] == hn.CellClass.UNEXPLORED
+        assert step.goals.costs_m[step.chosen] == step.goals.costs_m.min()
+        assert step.topology.classes[step.goals.places[step.chosen]] == hn.CellClass.UNEXPLORED
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        ((-0.95, 0.05), "is not in a free cell of the plan"),
+        ((99.0, 1.0), "is not in a free cell of the plan"),
+        ((math.nan, 1.0), "must be two finite metres"),
+        ((8.0, 6.0), "is not in a free cell of the plan"),
+    ],
+)
+def test_a_start_that_is_none_is_refused(start: tuple[float, float], said: str) -> None:
+    with pytest.raises(hn.InvalidValueError, match=said):
+        explore(flat(), start)
+
+
+def test_wrong_settings_are_refused() -> None:
+    with pytest.raises(hn.InvalidValueError, match="most_goals must be from 1"):
+        explore(flat(), START, most_goals=0)
+    full = hn.OccupancyGrid(np.ones((4, 4), np.float32), robot_radius_m=0)
+    with pytest.raises(hn.InvalidValueError, match="is not in a free cell"):
+        explore(full)
+
+
+@settings(max_examples=examples(60))
+@given(st.integers(0, 2**32 - 1))
+def test_goals_are_the_unexplored_places_beside_cells_in_reach(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    cells = rng.choice([0.0, 0.5, 1.0], p=[0.6, 0.2, 0.2], size=(9, 9)).astype(np.float32)
+    cells[4, 4] = 0.0
+    grid = hn.OccupancyGrid(cells, hn.Frame(0.5), robot_radius_m=0)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.5))
+    goals = Goals.of(topology, (4, 4), np.zeros(grid.shape, dtype=np.bool_))
+    graph: nx.Graph[tuple[int, int]] = nx.Graph()
+    free = {(r, c) for r, c in np.argwhere(cells == 0).tolist()}
+    graph.add_nodes_from(free)
+    for r, c in free:
+        for dr, dc in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            if {(r + dr, c + dc), (r + dr, c), (r, c + dc)} <= free:
+                graph.add_edge((r, c), (r + dr, c + dc), weight=0.5 * math.hypot(dr, dc))
+    lengths = nx.single_source_dijkstra_path_length(graph, (4, 4))
+    expected: dict[int, float] = {}
+    sizes: dict[int, int] = {}
+    for r, c in np.argwhere(cells == 0.5).tolist():
+        place = topology.place_at((r, c))
+        for beside in ((r + 1, c), (r - 1, c), (r, c + 1), (r, c - 1)):
+            if beside in lengths:
+                expected[place] = min(expected.get(place, math.inf), lengths[beside])
+                sizes[place] = sizes.get(place, 0) + 1
+    assert goals.places.tolist() == sorted(expected)
+    assert goals.costs_m == pytest.approx([expected[place] for place in sorted(expected)])
+    assert goals.sizes.tolist() == [sizes[place] for place in sorted(expected)]
+    assert (np.abs(goals.cells - goals.beyond).sum(axis=1) == 1).all()
+
+
+def test_doubtful_cells_that_close_a_door_are_a_reason_to_look_again() -> None:
+    # A known room, a wall whose door in row 3 a wrong echo closes, and unexplored ground.
+    cells = np.zeros((7, 9), dtype=np.float32)
+    cells[:, 4], cells[:, 6:] = 1.0, np.nan
+    cells[3, 4] = 0.8
+    grid = hn.OccupancyGrid(cells, hn.Frame(0.5), robot_radius_m=0)
+    assert doubtful_spots(grid, (0, 0)).tolist() == [[3, 3]]
+    cells[3, 4] = 0.95
+    sure = hn.OccupancyGrid(cells, hn.Frame(0.5), robot_radius_m=0)
+    assert doubtful_spots(sure, (0, 0)).tolist() == []
+    cells[3, 4], cells[:, 6:] = 0.8, 1.0
+    nothing_beyond = hn.OccupancyGrid(cells, hn.Frame(0.5), robot_radius_m=0)
+    assert doubtful_spots(nothing_beyond, (0, 0)).tolist() == []
+
+
+def test_a_robot_with_a_noisy_laser_looks_again_before_it_ends() -> None:
+    noisy = laser_all_round(noise_m=0.05)
+    done = explore(flat(radius_m=0.35), START, sensor=noisy, seed=11)
+    assert done.is_complete
+    assert done.n_looks_again > 0
+    assert done.share_known == 1.0
+
+
+def test_a_robot_that_finishes_rooms_stays_while_goals_are_left() -> None:
+    steps: list[Step] = []
+    done = explore(flat(), START, by="room", watch=steps.append)
+    assert done.is_complete
+    assert done.share_known == 1.0
+    farther = [
+        step for step in steps if step.chosen >= 0 and step.goals.costs_m.argmin() != step.chosen
+    ]
+    assert farther
+    one_of = "by must be one of path, frontier, room, got 'luck'"
+    with pytest.raises(hn.InvalidValueError, match=one_of):
+        explore(flat(), START, by="luck")  # type: ignore[arg-type]
+
+
+def test_a_robot_that_drives_to_each_frontier_drives_farther(explored: Exploration) -> None:
+    steps: list[Step] = []
+    done = explore(flat(), START, by="frontier", watch=steps.append)
+    assert done.is_complete
+    assert done.share_known == 1.0
+    assert done.driven_m > explored.driven_m
+    for before, after in itertools.pairwise(steps[:-1]):
+        goal = before.topology.grid.frame.points_of(before.goals.cells[before.chosen])
+        assert after.pose[:2] == pytest.approx(tuple(goal), abs=1e-6)
