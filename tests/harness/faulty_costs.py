@@ -12,6 +12,9 @@ import numpy as np
 from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.baselines.grid import GridAstar
 from hybridnav.costs import cost_along
+from hybridnav.planner import HybridPlanner
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.topology import TopologicalMap
 from tests.harness.faulty_methods import length_of
 
 if TYPE_CHECKING:
@@ -105,6 +108,77 @@ class FalseBoundOfLine(Cheapest):
         cost_m = cost_along(self.grid, self.layer, points)
         line = AnyAngleResult(points, length_of(points))
         return MethodResult(None, any_angle=line, by_costs=CostClaim(cost_m, cost_m))
+
+
+class WithArcs(Cheapest):
+    """The cheapest path with rounded bends, and its true claims: no fault."""
+
+    def __init__(self, grid: hn.OccupancyGrid, *, costs: hn.CostLayer | None = None) -> None:
+        super().__init__(grid, costs=costs)
+        topology = TopologicalMap(DualGraphPyramid.build(grid))
+        self.planner = HybridPlanner(topology, preset="grid-astar", costs=costs)
+
+    def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:  # noqa: ARG002
+        assert answer.cells is not None
+        ends = self.grid.frame.points_of(answer.cells[[0, -1]])
+        found = self.planner.plan(*ends, smooth="arcs")
+        assert found.path is not None
+        line = AnyAngleResult(
+            found.path.points, found.path.length_m, headings_rad=found.path.headings_rad
+        )
+        own = CostClaim(found.cost, found.lower_bound, found.grid_bound)
+        return self.with_fault(MethodResult(None, any_angle=line, by_costs=own), line, own)
+
+    def with_fault(
+        self,
+        answer: MethodResult,
+        line: AnyAngleResult,  # noqa: ARG002
+        claim: CostClaim,  # noqa: ARG002
+    ) -> MethodResult:
+        """Return the answer with the planted fault."""
+        return answer
+
+
+class ArcsSaidCheap(WithArcs):
+    """Arcs that claim 3 % less than their cost."""
+
+    def with_fault(
+        self, answer: MethodResult, line: AnyAngleResult, claim: CostClaim
+    ) -> MethodResult:
+        lower_m = min(claim.lower_bound_m, 0.97 * claim.cost_m)
+        dear = replace(claim, cost_m=0.97 * claim.cost_m, lower_bound_m=lower_m)
+        return replace(answer, any_angle=line, by_costs=dear)
+
+
+class ArcsAskew(WithArcs):
+    """Arcs whose headings are not those of the path."""
+
+    def with_fault(
+        self, answer: MethodResult, line: AnyAngleResult, claim: CostClaim
+    ) -> MethodResult:
+        assert line.headings_rad is not None
+        askew = replace(line, headings_rad=line.headings_rad + 0.1)
+        return replace(answer, any_angle=askew, by_costs=claim)
+
+
+class ArcsSaidBelowTheGrid(WithArcs):
+    """Arcs with a false bound on paths of cells."""
+
+    def with_fault(
+        self, answer: MethodResult, line: AnyAngleResult, claim: CostClaim
+    ) -> MethodResult:
+        assert claim.grid_bound_m is not None
+        false = replace(claim, grid_bound_m=1.001 * claim.grid_bound_m + 0.001)
+        return replace(answer, any_angle=line, by_costs=false)
+
+
+class ArcsBoundedByNothing(WithArcs):
+    """Arcs with a bound on paths of cells that is no number."""
+
+    def with_fault(
+        self, answer: MethodResult, line: AnyAngleResult, claim: CostClaim
+    ) -> MethodResult:
+        return replace(answer, any_angle=line, by_costs=replace(claim, grid_bound_m=math.nan))
 
 
 class ByLength(GridAstar):

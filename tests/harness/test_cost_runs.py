@@ -22,6 +22,7 @@ from hybridnav.harness import (
 from hybridnav.harness.paths import decode_path
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.tables import rows_of_study
+from hybridnav.poses import Motion
 from tests.harness import faulty_costs as faulty
 from tests.harness.small_runs import ROOMS, name_of, run_here, write_map
 from tests.layers import layer_of
@@ -34,8 +35,12 @@ FAULTS = {
     faulty.BoundAboveItsCost: "is above the cost",
     faulty.ClaimsNothing: "not nan m as reported",
     faulty.FalseBoundOfLine: "is above the weighted optimum",
+    faulty.ArcsSaidCheap: "as reported",
+    faulty.ArcsAskew: "neither a line nor an arc tangent",
+    faulty.ArcsSaidBelowTheGrid: "bound on paths of cells",
+    faulty.ArcsBoundedByNothing: "nan m is no lower bound on paths of cells",
 }
-SOUND = (faulty.Cheapest, faulty.HonestlyDear, faulty.ByLength)
+SOUND = (faulty.Cheapest, faulty.HonestlyDear, faulty.WithArcs, faulty.ByLength)
 PRESETS = ("shortest", "octile", "portals", "paper")
 COSTS = ("clearance:inflation_radius_m=3,scaling=0.5,multiplier=6",)
 N_PAIRS = 30
@@ -53,7 +58,7 @@ def settings(tmp_path_factory: Any) -> RunSettings:
     smoothed = hn.load_preset("grid-astar", overrides=["planner.smooth=line-of-sight"])
     return RunSettings(
         maps=(str(write_map(tmp_path_factory.mktemp("map"), ROOMS)),),
-        presets=(*PRESETS, smoothed),
+        presets=(*PRESETS, "robot", smoothed),
         baselines=("hpa-star", *map(name_of, (*FAULTS, *SOUND))),
         pairs=N_PAIRS,
         costs=COSTS,
@@ -94,7 +99,7 @@ def test_a_planted_fault_is_caught(study: Any, method: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "method", ["grid-astar", "grid-astar+line-of-sight", "hpa-star", *PRESETS, *SOUND]
+    "method", ["grid-astar", "grid-astar+line-of-sight", "hpa-star", "robot", *PRESETS, *SOUND]
 )
 def test_a_sound_method_has_no_fault(study: Any, method: Any) -> None:
     outcome = outcome_of(study, method)
@@ -125,7 +130,11 @@ def test_every_path_has_its_own_cost_beside_its_length(folder: Any, scene: Any) 
             points = record.get("points")
             if points is None:
                 points = grid.frame.points_of(decode_path(tuple(record["start"]), record["path"]))
-            assert record["cost_m"] == pytest.approx(cost_along(grid, layer, points), rel=1e-9)
+            rel = 1e-9
+            if "headings_rad" in record:
+                motion = Motion(np.array(points), np.array(record["headings_rad"]), curved=True)
+                points, rel = motion.spread(1e-3)[0][:, :2], 1e-4
+            assert record["cost_m"] == pytest.approx(cost_along(grid, layer, points), rel=rel)
             assert record["cost_m"] >= record["length_m"] * (1 - 1e-9)
             assert (record["cost_lower_bound_m"] or 0) <= record["cost_m"] * (1 + 1e-9)
             judged += 1
@@ -150,6 +159,26 @@ def test_losses_gaps_and_metrics_are_about_costs(study: Any) -> None:
     assert (taut.losses <= 1e-9).all()
     assert taut.losses.min() < 0
     assert outcome_of(study, "shortest").losses.max() > 0.1
+
+
+def test_arcs_are_judged_as_they_are_driven(folder: Any, study: Any) -> None:
+    robot, best = outcome_of(study, "robot"), outcome_of(study, "grid-astar")
+    assert robot.metric == "any-angle-weighted"
+    curved = [record for record in robot.records if record.get("headings_rad")]
+    turned = [len(set(np.round(record["headings_rad"], 6).tolist())) > 1 for record in curved]
+    assert len(curved) == sum(record["status"] == "solved" for record in robot.records)
+    assert sum(turned) > N_PAIRS / 3
+    assert np.isfinite(robot.grid_gaps).sum() == len(curved)
+    assert np.nanmax(robot.grid_gaps) <= 0.0101
+    assert (robot.grid_gaps >= robot.losses - 1e-9)[np.isfinite(robot.grid_gaps)].all()
+    assert np.isnan(best.grid_gaps).all()
+    rows: dict[str, Any] = {str(row["method"]): row for row in rows_of_study(study)}
+    assert rows["robot"]["gap to cells mean %"] == pytest.approx(100 * robot.grid_gaps.mean())
+    assert rows["robot"]["gap to cells p99 %"] <= 1.01
+    frame = to_frame(load_study(folder))
+    own = frame[frame["method"] == "robot"]
+    within = own["cost_grid_bound_m"] <= own["weighted_optimum_m"] * (1 + 1e-9)
+    assert within[own["cost_m"].notna()].all()
 
 
 def test_tables_and_report_name_the_costs(folder: Any, study: Any) -> None:
@@ -200,7 +229,7 @@ def test_a_run_resumes_and_refuses_other_costs(
     runs = (tmp_path / "runs.jsonl").read_text()
     for other, words in (((), "without costs"), (("clearance",), "with costs clearance")):
         with pytest.raises(hn.InvalidValueError, match=words) as refused:
-            evaluate(replace(settings, costs=other), tmp_path)
+            evaluate(replace(settings, presets=PRESETS, costs=other), tmp_path)
         assert "\n" not in str(refused.value)
     assert (tmp_path / "runs.jsonl").read_text() == runs
     both = (folder / RECORDS_FILE).read_text()
@@ -234,7 +263,11 @@ def test_cells_that_costs_close_are_occupied_for_all(settings: RunSettings, tmp_
     evaluate(replace(only, costs=layer), tmp_path)
     study = write_outputs(tmp_path)
     assert study.faults == []
-    assert study.costs == "array"
+    assert study.costs == f"array {layer.digest[:12]}"
+    other = layer_of(np.full(grid.shape, 3.0), closed)
+    with pytest.raises(hn.InvalidValueError, match=r"with costs array [0-9a-f]{12}"):
+        evaluate(replace(only, costs=other), tmp_path)
+    evaluate(replace(only, costs=layer_of(np.full(grid.shape, 2.0), closed)), tmp_path)
     for outcome in study.outcomes:
         for record in outcome.records:
             west = record["start"][1] < 9, record["goal"][1] < 9

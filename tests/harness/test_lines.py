@@ -331,7 +331,7 @@ def test_a_preset_with_costs_in_a_run_by_lengths_is_refused_in_one_line(cli, tmp
 def test_lines_go_not_with_corner_cutting():
     smooth = load_preset("paper", overrides=["planner.smooth=line-of-sight"])
     settings = RunSettings(maps=("x.yaml",), presets=("paper", smooth), corner_cutting=True)
-    with pytest.raises(InvalidValueError, match=r"preset paper\+line-of-sight.*corner cutting"):
+    with pytest.raises(InvalidValueError, match=r"method paper\+line-of-sight.*corner cutting"):
         methods_of(settings, None)
     assert methods_of(replace(settings, presets=("paper",)), None)
 
@@ -358,7 +358,7 @@ def test_the_preset_of_shortest_paths_loses_nothing(folder, tmp_path):
     losses = outcome_of(study, "shortest").losses
     np.testing.assert_array_equal(losses, np.zeros(N_PAIRS))
     assert (outcome_of(study, "grid-astar").losses >= losses).all()
-    with pytest.raises(InvalidValueError, match=r"preset shortest.*corner cutting"):
+    with pytest.raises(InvalidValueError, match=r"method shortest.*corner cutting"):
         methods_of(replace(only, corner_cutting=True), None)
 
 
@@ -398,7 +398,9 @@ def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):
     assert len(solved) == 10
     for record in solved:
         assert 0 < record["lower_bound_m"] <= record["length_m"] * (1 + 1e-9)
-        assert record["stages"]["first path"] <= record["stages"]["refine"]
+        # On a machine that is busy the time may pass before there is any.
+        first_s = record["stages"].get("first path", 0.0 if record["by_grid"] else math.inf)
+        assert first_s <= record["stages"]["refine"]
     # Again: nothing to do, the same answer.
     assert cli(*arguments).out == done.out
     assert len(read_records(out)) == 3 * 6

@@ -18,6 +18,7 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.harness import workers
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.compare import compare_runs
+from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
@@ -125,6 +126,17 @@ def test_a_run_that_is_killed_twice_has_the_records_of_an_unbroken_one(
     before = there.count(b"\n")
     assert evaluate(settings, tmp_path) == total(4) - before
     assert path.read_bytes().startswith(there)
+    assert timeless(tmp_path) == timeless(unbroken)
+
+
+@pytest.mark.parametrize("count", [2, 3, 7])
+def test_a_run_checks_the_same_sample_wherever_it_was_broken_off(
+    count, settings, unbroken, tmp_path
+):
+    lines = (unbroken / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    of_reference = [line for line in lines if json.loads(line)["method"] == REFERENCE]
+    (tmp_path / RECORDS_FILE).write_bytes(b"".join(of_reference[:count]))
+    evaluate(settings, tmp_path)
     assert timeless(tmp_path) == timeless(unbroken)
 
 

@@ -14,6 +14,9 @@ ANY_ANGLE_SLACK = 1e-6
 """That of any-angle lengths: the judge of segments rounds points to 2^-24 of a cell, so a path may
 cut each corner by as much."""
 
+ARC_SLACK = 1e-5
+"""That of costs of arcs, which judges read by chords."""
+
 ANSWERED = ("solved", "no path")
 """Statuses of records that hold an answer."""
 
@@ -65,6 +68,12 @@ def _cost_contradiction(record: Record, optimum: float | None) -> str | None:
         return None
     if cost < optimum * (1 - SLACK) and not is_any_angle(record):
         return f"cost {cost:.6f} m is below the weighted optimum {optimum:.6f} m"
+    of_cells = record.get("cost_grid_bound_m")
+    if of_cells is not None and of_cells > optimum * (1 + SLACK):
+        return (
+            f"the lower bound on paths of cells {of_cells:.6f} m is above the weighted optimum "
+            f"{optimum:.6f} m"
+        )
     slack = ANY_ANGLE_SLACK if is_any_angle(record) else SLACK
     if bound is not None and bound > optimum * (1 + slack):
         return (

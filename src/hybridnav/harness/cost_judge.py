@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.costs import cost_along
-from hybridnav.harness.contradictions import ANY_ANGLE_SLACK, SLACK
-from hybridnav.metrics import CheapestCost
+from hybridnav.harness.contradictions import ANY_ANGLE_SLACK, ARC_SLACK, SLACK
+from hybridnav.metrics import CheapestCost, chords_of
 
 if TYPE_CHECKING:
     from hybridnav._typing import LongArray
-    from hybridnav.baselines import MethodResult
+    from hybridnav.baselines import AnyAngleResult, MethodResult
     from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
@@ -60,23 +60,39 @@ class CostJudge:
         """
         line, claim = answer.any_angle, answer.by_costs
         if line is not None:
-            cost_m, slack = cost_along(self._grid, self._layer, line.points), ANY_ANGLE_SLACK
+            cost_m, slack_m = self._cost_of_line(line)
             bound_m = line.lower_bound_m
         else:
             assert answer.cells is not None  # noqa: S101 - the answer is a path
-            cost_m, slack = self._cost_of_cells(answer.cells), SLACK
-            bound_m = length_m / answer.bound
+            cost_m = self._cost_of_cells(answer.cells)
+            bound_m, slack_m = length_m / answer.bound, SLACK * cost_m
         faults = []
+        of_cells: Record = {}
         if claim is not None:
             bound_m = claim.lower_bound_m
-            if not abs(claim.cost_m - cost_m) <= slack * cost_m:
+            if not abs(claim.cost_m - cost_m) <= slack_m:
                 faults.append(f"the cost is {cost_m:.6f} m, not {claim.cost_m:.6f} m as reported")
-            if not bound_m <= cost_m * (1 + slack):
+            if not bound_m <= cost_m + slack_m:
                 faults.append(
                     f"the lower bound on costs {bound_m:.6f} m is above the cost {cost_m:.6f} m"
                 )
-        known = {"cost_m": cost_m, "cost_lower_bound_m": bound_m if bound_m >= 0 else 0.0}
-        return known if math.isfinite(bound_m) else known | {"cost_lower_bound_m": None}, faults
+            if claim.grid_bound_m is not None:
+                of_cells = {"cost_grid_bound_m": claim.grid_bound_m}
+                if not 0 <= claim.grid_bound_m < math.inf:
+                    faults.append(f"{claim.grid_bound_m} m is no lower bound on paths of cells")
+        known: Record = {"cost_m": cost_m, "cost_lower_bound_m": bound_m if bound_m >= 0 else 0.0}
+        if not math.isfinite(bound_m):
+            known["cost_lower_bound_m"] = None
+        return known if faults else known | of_cells, faults
+
+    def _cost_of_line(self, line: AnyAngleResult) -> tuple[float, float]:
+        """Return the cost of an any-angle path, and by how much a claim may differ, in metres."""
+        if line.headings_rad is None:
+            cost_m = cost_along(self._grid, self._layer, line.points)
+            return cost_m, ANY_ANGLE_SLACK * cost_m
+        chords = chords_of(self._grid, line.points, line.headings_rad)
+        cost_m = cost_along(self._grid, self._layer, chords.points)
+        return cost_m, ARC_SLACK * cost_m + chords.cost_slack_m(self._grid, self._layer)
 
     def optima(self, pair: Pair, *, is_path: bool) -> tuple[Record, list[str]]:
         """Return the least cost and the least length of paths of cells, and the contradiction of

@@ -30,8 +30,9 @@ def to_frame(study: Study) -> pd.DataFrame:
         `octile_optimum_m` and `any_angle_optimum_m`; `loss` over the reference that the study
         uses, `octile_loss` and `any_angle_loss`, as shares; `seconds` of the query and
         `reference_seconds` of A* on the whole grid; `expanded` cells or nodes. In a run with costs
-        also `costs`, their text; `cost_m`, `weighted_optimum_m` and `cost_lower_bound_m`;
-        `weighted_loss` and `gap`, as shares.
+        also `costs`, their text; `cost_m`, `weighted_optimum_m`, `cost_lower_bound_m` and, for
+        any-angle paths with a bound on paths of cells, `cost_grid_bound_m`; `weighted_loss`, `gap`
+        and `grid_gap`, as shares.
 
     Raises
     ------
@@ -86,6 +87,8 @@ def _of_costs(outcome: Outcome) -> dict[str, object]:
         "cost_m": outcome.costs_m,
         "weighted_optimum_m": outcome.weighted_optima_m,
         "cost_lower_bound_m": outcome.figure("cost_lower_bound_m"),
+        "cost_grid_bound_m": outcome.figure("cost_grid_bound_m"),
         "weighted_loss": outcome.weighted_losses,
         "gap": outcome.gaps,
+        "grid_gap": outcome.grid_gaps,
     }

@@ -16,23 +16,29 @@ from hybridnav.harness.contradictions import SLACK
 from hybridnav.harness.cost_judge import CostJudge
 from hybridnav.harness.methods import HybridMethod, Prepared
 from hybridnav.harness.yardstick import AnyAngleOptimum
-from hybridnav.metrics import ScipyOptimum, VisibilityGraph, judge_line, judge_path, line_cells
+from hybridnav.metrics import (
+    ScipyOptimum,
+    VisibilityGraph,
+    chords_of,
+    judge_line,
+    judge_path,
+    line_cells,
+)
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from hybridnav._typing import LongArray
     from hybridnav.baselines import AnyAngleResult, MethodResult
     from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
+    from hybridnav.metrics import Chords
 
 Cell = tuple[int, int]
-
-SAMPLE = 3
-"""Pairs of a task whose octile optimum scipy computes too, and whose any-angle optimum a visibility
-graph."""
 
 VISIBILITY_CORNERS = 6000
 """Convex corners up to which there is a visibility graph: about a second to prepare."""
@@ -56,6 +62,9 @@ class Judge:
         optima too, and any-angle lengths are recorded. With costs its costs are the optimum.
     costs
         Costs of the cells, by which paths are judged too; None for lengths.
+    sample
+        Pairs whose octile optimum scipy computes too, and whose any-angle optimum a visibility
+        graph; None for all.
     """
 
     def __init__(
@@ -65,10 +74,11 @@ class Judge:
         *,
         reference: bool,
         costs: CostLayer | None = None,
+        sample: Container[Pair] | None = None,
     ) -> None:
         self._grid, self._layer = grid, costs
         self._costs = None if costs is None else CostJudge(grid, costs)
-        self._oracles = Oracles(grid) if reference else None
+        self._oracles = Oracles(grid, sample) if reference else None
         self._region_of = prepared.method.region_of
         self._consistency: Consistency | None = None
         self._search: GridSearch | None = None
@@ -103,17 +113,28 @@ class Judge:
 
     def _judged_path(self, pair: Pair, answer: MethodResult) -> tuple[float | None, list[str]]:
         if answer.any_angle is not None:
-            line = answer.any_angle
-            verdict = judge_line(self._grid, line.points, start=pair.start, goal=pair.goal)
-            return verdict.length_m, [*verdict.faults, *_false_claims(line, verdict.length_m)]
+            line, chords = answer.any_angle, self._chords_of(answer.any_angle)
+            points = line.points if chords is None else chords.points
+            verdict = judge_line(self._grid, points, start=pair.start, goal=pair.goal)
+            length_m = verdict.length_m if chords is None else chords.length_m
+            wrong = () if chords is None else chords.faults[:1]
+            return length_m, [*wrong, *verdict.faults, *_false_claims(line, length_m)]
         if answer.cells is None:
             return None, []
         verdict = judge_path(self._grid, answer.cells, start=pair.start, goal=pair.goal)
         return verdict.length_m, [*verdict.faults]
 
+    def _chords_of(self, line: AnyAngleResult) -> Chords | None:
+        """Return a path with arcs as a polyline, None for one of lines."""
+        if line.headings_rad is None:
+            return None
+        return chords_of(self._grid, line.points, line.headings_rad)
+
     def _cells_of(self, answer: MethodResult) -> LongArray:
         if answer.any_angle is not None:
-            return line_cells(self._grid, answer.any_angle.points)
+            chords = self._chords_of(answer.any_angle)
+            points = answer.any_angle.points if chords is None else chords.points
+            return line_cells(self._grid, points)
         assert answer.cells is not None  # noqa: S101 - the caller has looked
         return answer.cells
 
@@ -175,9 +196,9 @@ class Oracles:
     """Other optima of pairs: the any-angle optimum, the octile optimum of a scenario, and on a
     sample both optima by independent code."""
 
-    def __init__(self, grid: OccupancyGrid) -> None:
+    def __init__(self, grid: OccupancyGrid, sample: Container[Pair] | None) -> None:
         self._grid = grid
-        self._left = 0 if grid.corner_cutting else SAMPLE
+        self._sample = () if grid.corner_cutting else sample
         self._any_angle = None if grid.corner_cutting else AnyAngleOptimum(grid)
 
     @cached_property
@@ -198,9 +219,8 @@ class Oracles:
         known: Record = {}
         faults = []
         length = math.inf if length_m is None else length_m
-        sampled = self._left > 0
+        sampled = self._sample is None or pair in self._sample
         if sampled:
-            self._left -= 1
             optimum = float(self._scipy.lengths_from(pair.start)[pair.goal])
             known["scipy_optimum_m"] = optimum if math.isfinite(optimum) else None
             if not (length == optimum or abs(length - optimum) <= SLACK * optimum):

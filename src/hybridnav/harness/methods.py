@@ -17,6 +17,7 @@ from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.harness.graph_method import GraphMethod
 from hybridnav.planner import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.result import PlanStatus
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import IntArray
     from hybridnav.baselines import Method
     from hybridnav.costs import CostLayer
+    from hybridnav.graphs import WaypointGraph
     from hybridnav.grid import OccupancyGrid
     from hybridnav.result import Metric, PlanResult
 
@@ -66,20 +68,34 @@ class MethodSpec:
     """The preset's sections; None for a baseline."""
     pyramid: dict[str, Any] = field(default_factory=dict)
     """merge_distance_m, linkage, seed: of the places that it plans on."""
+    graph: WaypointGraph | None = None
+    """The graph whose routes it follows, if that is all that it does."""
+    clear_edges_only: bool = False
+    """Whether edges of the graph that the robot cannot follow are left out."""
 
     @property
     def metric(self) -> Metric:
         """Metric of its paths; octile for baselines, even for those whose answers have an
         `any_angle` path."""
+        if self.graph is not None:
+            return "any-angle"
         planner = (self.preset or {}).get("planner", {})
-        settings = ("refine", "ompl"), ("smooth", LINE_OF_SIGHT), ("coarse", "mesh")
+        settings = (
+            ("refine", "ompl"),
+            ("smooth", LINE_OF_SIGHT),
+            ("smooth", "arcs"),
+            ("coarse", "mesh"),
+        )
         is_any_angle = any(planner.get(key) == value for key, value in settings)
         return "any-angle" if is_any_angle else "octile"
 
     @cached_property
     def digest(self) -> str:
         """Short hash of all settings, part of every record's id."""
-        text = json.dumps([self.name, self.preset, self.pyramid], sort_keys=True)
+        parts: list[Any] = [self.name, self.preset, self.pyramid]
+        if self.graph is not None:
+            parts += [self.graph.digest, self.clear_edges_only]
+        text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -92,8 +108,7 @@ def preset_spec(
 ) -> MethodSpec:
     """Return the method of a preset, with its merge distance and seed where they are given.
 
-    In a run with costs those take the place of the preset's own. Arcs are left out: judges read
-    lines, so such a preset finishes its paths by line of sight.
+    In a run with costs those take the place of the preset's own.
 
     Raises
     ------
@@ -104,9 +119,6 @@ def preset_spec(
     """
     preset = load_preset(source)
     _check_metric(preset, by_costs=by_costs)
-    if preset.planner.smooth == "arcs":
-        planner = preset.planner.model_copy(update={"smooth": LINE_OF_SIGHT})
-        preset = preset.model_copy(update={"planner": planner})
     pyramid = preset.pyramid.model_dump(exclude={"robot_radius_m"})
     smoothed = preset.planner.smooth == LINE_OF_SIGHT
     return MethodSpec(
@@ -118,7 +130,8 @@ def preset_spec(
 
 def _check_metric(preset: Preset, *, by_costs: bool) -> None:
     ompl, costs = preset.planner.ompl, preset.planner.costs
-    if costs is not None and costs.clearance is not None and not by_costs:
+    needs_costs = preset.planner.smooth == "arcs" or (costs and costs.clearance)
+    if needs_costs and not by_costs:
         raise InvalidValueError(
             f"preset {preset.name} plans by costs, and this run measures lengths: state costs for "
             "all methods, as in --costs clearance"
@@ -161,6 +174,12 @@ def baseline_spec(
     return MethodSpec(name, None, pyramid | _given(merge_distance_m, seed))
 
 
+def graph_spec(graph: WaypointGraph, *, clear_edges_only: bool = False) -> MethodSpec:
+    """Return the method that follows a graph; see `GraphMethod`."""
+    name = f"graph {graph.name}" + (" (clear edges)" if clear_edges_only else "")
+    return MethodSpec(name, None, graph=graph, clear_edges_only=clear_edges_only)
+
+
 def _given(merge_distance_m: float | None, seed: int | None) -> dict[str, Any]:
     settings = {"merge_distance_m": merge_distance_m, "seed": seed}
     return {key: value for key, value in settings.items() if value is not None}
@@ -197,7 +216,9 @@ class HybridMethod:
         line = _line(result)
         arc_ids = self.topology.arc_ids
         by_costs = self._planner.costs is not None
-        claim = CostClaim(result.cost, result.lower_bound) if by_costs and result.solved else None
+        claim = None
+        if by_costs and result.solved:
+            claim = CostClaim(result.cost, result.lower_bound, result.grid_bound)
         is_factor = result.solved and line is None and not by_costs
         return MethodResult(
             None if path is None or line is not None else path.cells,
@@ -231,6 +252,7 @@ def _line(result: PlanResult) -> AnyAngleResult | None:
         result.path.points,
         result.path.length_m,
         lower_bound_m=result.lower_bound if result.metric == "any-angle" else 0.0,
+        headings_rad=result.path.headings_rad if result.path.is_curved else None,
         by_grid=None if how is None else how.by_grid,
     )
 
@@ -303,6 +325,9 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
         if preset.planner.refusal_of_costs():
             costs = None
         method = HybridMethod(topology, preset, costs)
+    elif spec.graph is not None:
+        costs = None
+        method = GraphMethod(grid, spec.graph, clear_edges_only=spec.clear_edges_only)
     else:
         made_of, options = _class_of(spec.name)
         if not _takes_costs(made_of):

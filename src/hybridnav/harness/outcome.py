@@ -155,6 +155,12 @@ class Outcome:
         return np.where(gaps <= SLACK, 0.0, gaps)
 
     @cached_property
+    def grid_gaps(self) -> FloatArray:
+        """Costs over the proved lower bounds on paths of cells, minus one; below 0 for any-angle
+        paths that cost less; NaN without such a bound."""
+        return loss_of(self.costs_m, self.figure("cost_grid_bound_m"))
+
+    @cached_property
     def octile_losses(self) -> FloatArray:
         """Length over the octile optimum, minus one; NaN for any-angle paths."""
         return loss_of(self.lengths_m, self._octile_optima_m)

@@ -27,6 +27,7 @@ from hybridnav.harness.tables import (
     to_csv,
     to_markdown,
 )
+from hybridnav.metrics import chords_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -256,6 +257,8 @@ def _path(record: Record, grid: OccupancyGrid) -> FloatArray:
     start, goal = record["start"], record["goal"]
     if record.get("points"):
         points = np.array(record["points"], dtype=np.float64)
+        if record.get("headings_rad") and np.isfinite(points).all():
+            points = chords_of(grid, points, record["headings_rad"]).points
         return points[np.isfinite(points).all(axis=1)]
     if record.get("path"):
         return grid.frame.points_of(decode_path((start[0], start[1]), record["path"]))

@@ -109,6 +109,12 @@ def render_report(report: ReportData) -> str:
 
 @cache
 def _template() -> Template:
+    source = resources.files("hybridnav.harness").joinpath("report.html.j2")
+    return page_template(source.read_text(encoding="utf-8"))
+
+
+def page_template(source: str) -> Template:
+    """Return the template of a page, in which texts may hold any characters."""
     environment = Environment(
         autoescape=True,
         finalize=_printable,
@@ -117,8 +123,7 @@ def _template() -> Template:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    source = resources.files("hybridnav.harness").joinpath("report.html.j2")
-    return environment.from_string(source.read_text(encoding="utf-8"))
+    return environment.from_string(source)
 
 
 def _printable(value: Any) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +12,10 @@ from hybridnav._files import MODEL_SUFFIX
 from hybridnav._progress import no_progress
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
+from hybridnav.graphs import WaypointGraph
 from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.harness.methods import REFERENCE, MethodSpec, baseline_spec, preset_spec
+from hybridnav.grid.checks import checked_type
+from hybridnav.harness.methods import REFERENCE, MethodSpec, baseline_spec, graph_spec, preset_spec
 from hybridnav.harness.pairs import (
     SAMPLER_VERSION,
     Pair,
@@ -32,6 +34,7 @@ from hybridnav.harness.scenes import (
 )
 from hybridnav.harness.task import Task
 from hybridnav.harness.workers import run_local, run_on_cluster
+from hybridnav.io import load_graph
 from hybridnav.io.movingai import read_scenarios
 
 if TYPE_CHECKING:
@@ -51,6 +54,9 @@ MOVINGAI_MERGE_DISTANCE_M = 40.0
 _PAIRS = 100
 _PAIRS_PER_TASK = 2000
 
+_SAMPLE = 3
+"""Pairs of a task whose optima independent code computes too."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
@@ -66,6 +72,12 @@ class RunSettings:
     maps: tuple[str, ...]
     presets: tuple[str | Preset, ...] = ("shortest",)
     baselines: tuple[str, ...] = ()
+    graphs: tuple[str | WaypointGraph, ...] = ()
+    """Graphs that others have made, or files of them; there must be one map. Routes go straight to
+    the nearest node in sight of the start, over the edges that are shortest in metres, and straight
+    from the nearest node in sight of the goal."""
+    clear_edges_only: bool = False
+    """Whether edges of these graphs that the robot cannot follow are left out."""
     pairs: int | None = None
     """Sampled pairs a map, 100 unless given; of a scenario file as many, evenly spread over it, or
     all."""
@@ -121,7 +133,7 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
         When a setting is out of range, the folder cannot be written, or it holds a run with other
         costs.
     MapError, PresetError
-        When a map, a scenario file or a preset cannot be read.
+        When a map, a graph, a scenario file or a preset cannot be read.
 
     Examples
     --------
@@ -134,6 +146,10 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     """
     path = Path(folder)
     clear_scenes()  # a file may have changed since the last run of this process
+    if settings.graphs and len(settings.maps) != 1:
+        raise InvalidValueError(
+            f"a graph goes with one map, got {len(settings.maps)} maps: evaluate each by itself"
+        )
     tasks = [task for name in settings.maps for task in _tasks_of(settings, name)]
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -185,7 +201,7 @@ def _missing(task: Task, there: set[str]) -> Task | None:
     )
     if not pairs and task.ids[0] in there:
         return None
-    return Task(task.map, task.map_sha, task.method, pairs)
+    return replace(task, pairs=pairs)
 
 
 def _new_ids(task: Task, there: set[str]) -> set[str]:
@@ -209,10 +225,14 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
     scene = read_scene(spec)
     digest = scene.digest
     pairs = _pairs_of(settings, scene.grid)
-    return [
-        Task(spec, digest, method, tuple(pairs[at : at + _PAIRS_PER_TASK]))
-        for method in methods_of(settings, merge_distance_m)
+    parts = [
+        tuple(pairs[at : at + _PAIRS_PER_TASK])
         for at in range(0, max(len(pairs), 1), _PAIRS_PER_TASK)
+    ]
+    return [
+        Task(spec, digest, method, part, frozenset(part[:_SAMPLE]))
+        for method in methods_of(settings, merge_distance_m)
+        for part in parts
     ]
 
 
@@ -227,10 +247,14 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
         # The preset of the same name as the reference is that very search: measured once.
         if spec.name != REFERENCE:
             specs.append(spec)
+    for graph in settings.graphs:
+        read = load_graph(graph) if isinstance(graph, str) else graph
+        checked_type("graph", read, WaypointGraph)
+        specs.append(graph_spec(read, clear_edges_only=settings.clear_edges_only))
     lines = [spec.name for spec in specs if spec.metric != "octile"]
     if lines and settings.corner_cutting:
         raise InvalidValueError(
-            f"preset {lines[0]}: an any-angle path never passes between two blocked cells that "
+            f"method {lines[0]}: an any-angle path never passes between two blocked cells that "
             "meet at a corner: leave corner cutting out, or take presets with octile paths, such "
             "as portals"
         )
@@ -254,7 +278,8 @@ def _pairs_of(settings: RunSettings, grid: OccupancyGrid) -> list[Pair]:
 
 def _write_settings(settings: RunSettings, folder: Path) -> None:
     """Note the settings of this run, one line for each run into the folder."""
-    plain = asdict(settings)
+    plain = asdict(replace(settings, graphs=()))
+    plain["graphs"] = [graph if isinstance(graph, str) else graph.name for graph in settings.graphs]
     plain["presets"] = [
         preset if isinstance(preset, str) else preset.name for preset in settings.presets
     ]

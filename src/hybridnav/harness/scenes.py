@@ -24,6 +24,10 @@ GivenCosts = tuple[str, ...] | CostLayer
 """Texts as in `hybridnav plan --costs`, or a layer; an empty tuple for lengths."""
 
 
+_DIGITS = 12
+"""Digits of the hash of a layer in texts."""
+
+
 @dataclass(frozen=True)
 class MapSpec:
     """A map file and its reading."""
@@ -94,8 +98,13 @@ def clear_scenes() -> None:
 
 
 def text_of_costs(given: GivenCosts) -> str:
-    """Return costs as one text, empty for lengths."""
-    return _text_of_source(given.source) if isinstance(given, CostLayer) else " ".join(given)
+    """Return costs as one text, empty for lengths.
+
+    That of a layer ends in a hash of its factors and closed cells: two arrays have one source.
+    """
+    if not isinstance(given, CostLayer):
+        return " ".join(given)
+    return f"{_text_of_source(given.source)} {given.digest[:_DIGITS]}"
 
 
 def _text_of_source(source: dict[str, Any]) -> str:

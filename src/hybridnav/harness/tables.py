@@ -52,6 +52,8 @@ _COST_COLUMNS = (
     "weighted loss %",
     "gap mean %",
     "gap max %",
+    "gap to cells mean %",
+    "gap to cells p99 %",
 )
 EFFICIENCY_COLUMNS = (
     "nodes",
@@ -138,6 +140,7 @@ def figures(
 def _of_costs(outcomes: Sequence[Outcome], shared: BoolArray) -> Row:
     """Return lengths and costs over the pairs in common, beside each other, and proved gaps."""
     gaps = _pooled([outcome.gaps for outcome in outcomes])
+    to_cells = _pooled([outcome.grid_gaps for outcome in outcomes])
     return {
         "length mean m": nanmean(_pooled([outcome.lengths_m for outcome in outcomes])[shared]),
         "cost mean m": nanmean(_pooled([outcome.costs_m for outcome in outcomes])[shared]),
@@ -145,6 +148,8 @@ def _of_costs(outcomes: Sequence[Outcome], shared: BoolArray) -> Row:
         * nanmean(_pooled([outcome.weighted_losses for outcome in outcomes])[shared]),
         "gap mean %": 100 * nanmean(gaps),
         "gap max %": 100 * nanquantile(gaps, 1.0),
+        "gap to cells mean %": 100 * nanmean(to_cells),
+        "gap to cells p99 %": 100 * nanquantile(to_cells, 0.99),
     }
 
 

@@ -38,6 +38,10 @@ class Task:
     method: MethodSpec
     pairs: tuple[Pair, ...]
 
+    sample: frozenset[Pair] = frozenset()
+    """Those of the pairs whose optima independent code computes too. They are chosen when a run is
+    planned: a run that is resumed samples the same ones."""
+
     attempt: int = 0
     """Number of times that the task was lost before it began."""
 
@@ -103,13 +107,17 @@ def _ready(scene: Scene, task: Task) -> tuple[Prepared, Judge]:
     _warm_up(task.method, by_costs=scene.costs is not None)
     prepared = prepare(task.method, scene.grid, scene.costs)
     is_reference = task.method.name == REFERENCE
-    return prepared, Judge(scene.grid, prepared, reference=is_reference, costs=scene.costs)
+    judge = Judge(
+        scene.grid, prepared, reference=is_reference, costs=scene.costs, sample=task.sample
+    )
+    return prepared, judge
 
 
 def _about(scene: Scene, task: Task) -> Record:
     grid = scene.grid
     return {
         **_of_costs(scene, task.map),
+        **_of_graph(task.method),
         "file": task.map.path,
         "shape": list(grid.shape),
         "resolution_m": grid.resolution_m,
@@ -132,6 +140,15 @@ def _of_costs(scene: Scene, spec: MapSpec) -> Record:
         "cost_source": scene.costs.source,
         "grid_sha": map_digest(read_map(replace(spec, costs=()))),
     }
+
+
+def _of_graph(spec: MethodSpec) -> Record:
+    """Return the fields that the record of a preparation has for a method that follows a graph."""
+    graph = spec.graph
+    if graph is None:
+        return {}
+    about = {"name": graph.name, "format": graph.format, "sha256": graph.digest}
+    return {"graph": about | {"clear_edges_only": spec.clear_edges_only}}
 
 
 def _plain(settings: Record) -> Record:
@@ -225,6 +242,7 @@ def _of_line(line: AnyAngleResult) -> Record:
         "lower_bound_m": float(line.lower_bound_m) if math.isfinite(line.lower_bound_m) else None,
         "by_grid": line.by_grid,
         "points": line.points.tolist(),
+        **({} if line.headings_rad is None else {"headings_rad": line.headings_rad.tolist()}),
     }
 
 

@@ -171,7 +171,7 @@ def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
         if name in worker.missing and name != task.ids[index]
     )
     if left or task.ids[0] in worker.missing:
-        waiting.append(Task(task.map, task.map_sha, task.method, left))
+        waiting.append(replace(task, pairs=left, attempt=0))
     return [failed_record(task, index, status)]
 
 
