@@ -23,18 +23,37 @@ from .grid import (
     RoomLabels as RoomLabels,
     drop_islands as drop_islands,
 )
+from .graphs import (
+    GraphCheck as GraphCheck,
+    RouteGraph as RouteGraph,
+    WaypointGraph as WaypointGraph,
+    build_route_graph as build_route_graph,
+    check_graph as check_graph,
+    judge_route_graph as judge_route_graph,
+    keep_right as keep_right,
+    merge_bends as merge_bends,
+)
 from .io import (
+    BagLog as BagLog,
     CarmenLog as CarmenLog,
     Model as Model,
     example_map as example_map,
+    export_nav2 as export_nav2,
+    export_path as export_path,
+    export_places as export_places,
+    export_rooms as export_rooms,
     load as load,
+    load_bag_map as load_bag_map,
     load_blocked as load_blocked,
+    load_graph as load_graph,
     load_keepout_mask as load_keepout_mask,
     load_map as load_map,
     load_rooms as load_rooms,
     load_speed_mask as load_speed_mask,
     save as save,
+    save_bag as save_bag,
     save_rooms as save_rooms,
+    write_movingai_map as write_movingai_map,
     write_ros_map as write_ros_map,
 )
 from .planner import (

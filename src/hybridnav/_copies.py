@@ -13,8 +13,9 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 _Array = TypeVar("_Array", bound=np.ndarray[Any, Any])
-_State = tuple[dict[str, Any], tuple[bool, ...], tuple[str, ...], tuple[str, ...]]
-_LOCK = type(threading.Lock())
+_State = tuple[dict[str, Any], tuple[bool, ...], tuple[str, ...], dict[str, Any]]
+_LOCKS = {type(threading.Lock()): threading.Lock, type(threading.RLock()): threading.RLock}
+"""What makes a lock of each type."""
 
 
 def frozen(array: _Array) -> _Array:
@@ -47,10 +48,11 @@ def copies_alike(cls: type[_T]) -> type[_T]:
 
 
 def _state_of(thing: object) -> _State:
-    """Return attributes, whether each array in them is writeable, names of views, and of locks."""
+    """Return attributes, whether each array in them is writeable, names of views, and what makes
+    locks."""
     held = vars(thing)
     views = tuple(name for name, value in held.items() if isinstance(value, MappingProxyType))
-    locks = tuple(name for name, value in held.items() if isinstance(value, _LOCK))
+    locks = {name: _LOCKS[type(value)] for name, value in held.items() if type(value) in _LOCKS}
     kept = {name: value for name, value in held.items() if name not in locks}
     kept |= {name: dict(held[name]) for name in views}
     writeable = tuple(bool(array.flags.writeable) for array in _arrays(kept))
@@ -63,7 +65,7 @@ def _set_state(thing: object, state: _State) -> None:
         if not may_write:
             array.flags.writeable = False
     kept = kept | {name: MappingProxyType(kept[name]) for name in views}
-    vars(thing).update(kept | {name: threading.Lock() for name in locks})
+    vars(thing).update(kept | {name: make() for name, make in locks.items()})
 
 
 def _arrays(value: Any) -> Iterator[np.ndarray[Any, Any]]:

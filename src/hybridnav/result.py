@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.errors import PlanError
+from hybridnav.messages import path_message
 from hybridnav.poses import Motion
 from hybridnav.sentences import sentences
 
@@ -151,6 +152,35 @@ class Path:
             the last one is that of the step before.
         """
         return self._motion.spread(spacing_m)[1]
+
+    def to_message(
+        self, frame_id: str = "map", *, spacing_m: float = 0.05, stamp_ns: int = 0
+    ) -> dict[str, Any]:
+        """Return the `poses` as a `nav_msgs/Path` of ROS 2, in plain dictionaries and lists, which
+        `hybridnav.messages.fill_message` puts into a message.
+
+        Parameters
+        ----------
+        frame_id
+            Name of the map frame.
+        spacing_m
+            As in `poses`.
+        stamp_ns
+            Time in nanoseconds since 1970, of the path and of each pose.
+
+        Raises
+        ------
+        InvalidValueError
+            As for `poses`, or when the frame has no name or the time is out of range.
+
+        Examples
+        --------
+        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+        >>> path = hn.HybridPlanner(topology).plan((0.5, 0.5), (1.5, 0.5)).path
+        >>> path.to_message(spacing_m=1.0)["poses"][1]["pose"]["position"]
+        {'x': 1.5, 'y': 0.5, 'z': 0.0}
+        """
+        return path_message(self.poses(spacing_m), frame_id, stamp_ns)
 
     @property
     def spot_turns(self) -> LongArray:

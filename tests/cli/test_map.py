@@ -5,7 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import pytest
+
 import hybridnav as hn
+from tests.io.bag_writer import KINDS
+from tests.io.drive import driven
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,4 +83,47 @@ def test_what_cannot_be_mapped_is_refused(cli: Any, tmp_path: Path) -> None:
     assert cli("map", log, "-o", out, "--resolution", "0").refuses(2, "resolution")
     assert cli("map", log, "-o", out, "--hit", "0.4").refuses(2, "when_hit")
     assert cli("map", log, "-o", out, "--max-cells", "9").refuses(3, "12 beyond --max-cells")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bag_becomes_a_map_of_its_scans(cli, tmp_path, kind):
+    out = tmp_path / "room.yaml"
+    bag = driven(kind).write(tmp_path)
+    done = cli("map", bag, "-o", out, "--resolution", 0.1, "--json")
+    assert (done.code, done.err) == (0, "")
+    assert (done.answer["scans"], done.answer["left_out"]) == (40, {})
+    grid = hn.load_map(out, robot_radius_m=0)
+    walls = grid.frame.points_of(np.argwhere(grid.measured == hn.CellClass.OCCUPIED))
+    away = np.minimum(np.abs(np.abs(walls[:, 0]) - 4), np.abs(np.abs(walls[:, 1]) - 3))
+    assert len(walls) > 50
+    assert away.max() < 0.11
+    shown = cli("map", bag, "-o", out, "--resolution", 0.1).out
+    assert [line.split()[0] for line in shown.splitlines()] == [
+        "map", "extent", "cells", "scans", "log", "seconds",
+    ]  # fmt: skip
+    assert cli("replay", bag, "--every", 10, "--resolution", 0.2, "--json").code == 0
+
+
+def test_the_map_of_a_bag_is_written_as_it_is(cli, tmp_path):
+    grid = hn.example_map("figure1")
+    hn.save_bag(tmp_path / "kept.bag", grid=grid)
+    out = tmp_path / "kept.yaml"
+    done = cli("map", tmp_path / "kept.bag", "-o", out, "--topic", "/map", "--json")
+    assert done.answer["cells"]["free"] == (grid.measured == hn.CellClass.FREE).sum()
+    again = hn.load_map(out, robot_radius_m=grid.robot_radius_m)
+    assert (again.measured == grid.measured).all()
+    shown = cli("map", tmp_path / "kept.bag", "-o", out, "--topic", "/map").out
+    assert [line.split()[0] for line in shown.splitlines()] == ["map", "extent", "cells"]
+
+
+def test_wrong_topics_and_frames_end_in_one_line(cli, tmp_path):
+    bag, out = driven("mcap").write(tmp_path), tmp_path / "m.yaml"
+    assert cli("map", bag, "-o", out, "--topic", "/rear").refuses(3, "'/rear'", "/scan: name one")
+    moon = cli("map", bag, "-o", out, "--frame", "moon")
+    assert moon.refuses(3, "no scan of a laser", "40 no transforms from laser to moon")
+    log = tmp_path / "some.log"
+    log.write_text("")
+    assert cli("map", log, "-o", out, "--topic", "/scan").refuses(2, "--topic is for bags")
+    assert cli("map", log, "-o", out, "--frame", "odom").refuses(2, "--frame is for bags")
     assert not out.exists()

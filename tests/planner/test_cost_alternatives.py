@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from typing import Any
@@ -16,11 +17,10 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.costs import cost_along
-from hybridnav.metrics import judge_path
 from hybridnav.route import DoorGraph, door_graph
+from tests.door_alternatives import Planned, check_alternatives, two_points
 from tests.floors import random_floor
 from tests.layers import layer_of
-from tests.planner.test_door_alternatives import doors_by_cells, line_of, two_points
 from tests.strategies import examples
 
 
@@ -43,40 +43,18 @@ def random_layer(floor: Any, rng: np.random.Generator) -> hn.CostLayer:
 @settings(max_examples=examples(40), deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_each_is_the_cheapest_path_by_its_doors_and_within_the_limits(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    floor = random_floor(rng)
-    layer = random_layer(floor, rng)
-    grid = floor.topology.grid
-    planner = hn.HybridPlanner(floor.topology, preset="grid-astar", costs=layer)
-    first, last = two_points(floor, rng)
-    ends = grid.frame.points_of([first, last])
-    most, stretch = float(rng.choice([0.3, 0.5, 0.8])), float(rng.choice([1.2, 2.0, 4.0]))
-    plain = planner.plan(*ends)
-    found = hn.plan_alternatives(
-        planner, ends[0], ends[1], 4, max_overlap=most, max_stretch=stretch
-    )
-    assert bool(found) == plain.solved
-    if not found:
-        return
-    assert plain.path is not None
-    assert np.array_equal(found[0].path.points, plain.path.points)
-    costs = [other.result.cost for other in found]
-    assert costs == pytest.approx(sorted(costs))
-    for number, other in enumerate(found):
+    def by_costs(floor: Any, rng: np.random.Generator) -> Planned:
+        layer, grid = random_layer(floor, rng), floor.topology.grid
+
+        def measure(line: Any) -> float:
+            parts = (shapely.get_coordinates(part) for part in shapely.get_parts(line))
+            return sum(cost_along(grid, layer, part) for part in parts if len(part) > 1)
+
+        planner = hn.HybridPlanner(floor.topology, preset="grid-astar", costs=layer)
+        return Planned(planner, functools.partial(weighted_moves, floor, layer), measure)
+
+    for other in check_alternatives(seed, by_costs):
         assert other.result.metric == "weighted"
-        assert judge_path(grid, other.path.cells, start=first, goal=last).faults == ()
-        inside = weighted_moves(floor, layer, set(doors_by_cells(floor, other.path)))
-        assert other.result.cost == pytest.approx(nx.dijkstra_path_length(inside, first, last))
-        assert other.result.cost <= stretch * costs[0] * (1 + 1e-9)
-        assert other.result.lower_bound == plain.lower_bound
-        for before in found[:number]:
-            shared = line_of(other.path).intersection(
-                line_of(before.path).buffer(grid.resolution_m)
-            )
-            parts = (shapely.get_coordinates(part) for part in shapely.get_parts(shared))
-            shared_m = sum(cost_along(grid, layer, part) for part in parts if len(part) > 1)
-            assert shared_m / max(other.result.cost, 1e-9) <= other.overlap + 1e-6
-        assert other.overlap <= most
 
 
 @settings(max_examples=examples(30), deadline=None)

@@ -271,7 +271,7 @@ def test_presets_that_know_lengths_only_refuse_costs_in_one_line(preset: str) ->
     ("costs", "message"),
     [
         (layer_of(np.ones((3, 4))), "costs of 4 x 3 cells are not those of a map of"),
-        (np.ones((3, 4)), "costs must be a CostLayer, got a ndarray"),
+        (np.ones((3, 4)), "of type ndarray, expected a CostLayer"),
     ],
 )
 def test_costs_of_another_map_are_refused(costs: Any, message: str) -> None:

@@ -33,7 +33,7 @@ REFUSE = {"shortest", "octile"} | {
 }
 COMMANDS = {"plan", "build", "evaluate"}
 """Commands that make a planner."""
-NO_PLANNER = {"show", "rooms", "compare", "preset", "map"}
+NO_PLANNER = {"show", "rooms", "compare", "preset", "map", "replay", "explore", "export", "check"}
 RADIUS_M = 0.25
 CLEARANCE = "clearance:multiplier=4"
 

@@ -13,7 +13,13 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.homotopy.search import AlternativeSearch
-from hybridnav.metrics import judge_path
+from tests.door_alternatives import (
+    Planned,
+    check_alternatives,
+    doors_by_cells,
+    line_of,
+    two_points,
+)
 from tests.floors import random_floor
 from tests.strategies import examples, occupancy_grid
 
@@ -24,61 +30,14 @@ def planner_of(floor, preset="grid-astar"):
     return hn.HybridPlanner(floor.topology, preset=preset)
 
 
-def two_points(floor, rng):
-    free = np.argwhere(floor.classes == 1)
-    first, last = (tuple(cell) for cell in rng.choice(free, 2, replace=False).tolist())
-    return first, last
-
-
-def line_of(path):
-    return shapely.LineString(path.points if len(path.points) > 1 else path.points.repeat(2, 0))
-
-
-def doors_by_cells(floor, path):
-    """The doors that a path of cells steps through, in order."""
-    number_of = {}
-    for number, (one, other) in enumerate(floor.doors):
-        number_of[one, other] = number_of[other, one] = number
-    cells = list(map(tuple, path.cells.tolist()))
-    steps = itertools.pairwise(cells)
-    return [number_of[step] for step in steps if step in number_of]
-
-
 @settings(max_examples=examples(60), deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_each_is_the_shortest_path_by_its_doors_and_within_the_limits(seed):
-    rng = np.random.default_rng(seed)
-    floor = random_floor(rng)
-    planner = planner_of(floor)
-    grid = planner.topology.grid
-    first, last = two_points(floor, rng)
-    ends = grid.frame.points_of([first, last])
-    most, stretch = float(rng.choice([0.3, 0.5, 0.8])), float(rng.choice([1.2, 2.0, 4.0]))
-    plain = planner.plan(*ends)
-    found = hn.plan_alternatives(
-        planner, ends[0], ends[1], 4, max_overlap=most, max_stretch=stretch
-    )
-    assert bool(found) == plain.solved
-    if not found:
-        return
-    assert np.array_equal(found[0].path.points, plain.path.points)
-    sequences = [tuple(doors_by_cells(floor, other.path)) for other in found]
-    assert len(set(sequences)) == len(found)
-    lengths = [other.path.length_m for other in found]
-    assert lengths == pytest.approx(sorted(lengths))
-    for number, (other, doors) in enumerate(zip(found, sequences, strict=True)):
-        assert judge_path(grid, other.path.cells, start=first, goal=last).faults == ()
-        assert len(other.doors) == len(doors)
-        inside = floor.moves(doors=set(doors))
-        shortest = nx.dijkstra_path_length(inside, first, last)
-        assert other.path.length_m == pytest.approx(shortest)
-        assert other.path.length_m <= stretch * lengths[0] + 1e-9
-        assert other.result.lower_bound == plain.lower_bound
-        line = line_of(other.path)
-        for before in found[:number]:
-            shared_m = line.intersection(line_of(before.path).buffer(grid.resolution_m)).length
-            assert shared_m / line.length <= other.overlap + 1e-6
-        assert other.overlap <= most
+    def by_lengths(floor, _rng):
+        return Planned(planner_of(floor), floor.moves, lambda line: line.length)
+
+    for other in check_alternatives(seed, by_lengths):
+        assert other.path.length_m == pytest.approx(other.result.cost)
 
 
 def test_no_sequence_of_doors_within_the_limits_is_shorter_than_the_second():
@@ -232,11 +191,30 @@ def test_all_searches_inside_rooms_share_one_time_limit(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "limits", [{"most_states": 0}, {"time_limit_s": math.nan}, {"least_hole_m2": -1.0}]
+    ("options", "message"),
+    [
+        ({"by": "homotopy", "max_overlap": 0.5}, "by='doors': leave it out"),
+        ({"by": "homotopy", "max_stretch": 3}, "max_stretch=3 was given with by='homotopy'"),
+        ({"by": "homotopy", "inside_rooms": True}, "inside_rooms=True was given"),
+        ({"least_hole_m2": 1.0}, "by='homotopy' or inside_rooms=True: leave it out"),
+        ({"most_states": 10}, "most_states=10 was given with by='doors'"),
+        ({"time_limit_s": 0.0}, "time_limit_s=0.0 was given with by='doors'"),
+    ],
 )
-def test_options_are_checked_where_they_change_nothing(ring, limits):
-    with pytest.raises(hn.InvalidValueError):
-        hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **limits)
+def test_options_that_change_nothing_are_refused_in_one_line(ring, options, message):
+    with pytest.raises(hn.InvalidValueError) as told:
+        hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **options)
+    assert message in str(told.value)
+    assert str(told.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    "options", [{"most_states": 0}, {"time_limit_s": math.nan}, {"least_hole_m2": -1.0}]
+)
+@pytest.mark.parametrize("where", [{"by": "homotopy"}, {"inside_rooms": True}])
+def test_limits_of_searches_for_classes_out_of_range_are_refused(ring, options, where):
+    with pytest.raises(hn.InvalidValueError, match=r"most_states|time_limit_s|hole"):
+        hn.plan_alternatives(ring, (1.5, 4.5), (19.5, 4.5), 2, **where, **options)
 
 
 @pytest.mark.parametrize("preset", ["shortest", "octile"])

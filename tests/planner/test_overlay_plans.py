@@ -4,12 +4,14 @@ of costs between and beside queries."""
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely import Polygon
 from shapely import box as area
 
 import hybridnav as hn
@@ -133,6 +135,42 @@ def test_answers_follow_updates_exactly(
             planner.prepare()
 
 
+@ON_OVERLAY
+@given(class_grids(max_side=20), seeds, st.booleans())
+@settings(max_examples=examples(20), deadline=None)
+def test_a_changed_map_is_taken_into_the_overlay_that_was_built(
+    preset: str,
+    classes: Any,
+    seed: int,
+    has_own: bool,  # noqa: FBT001 - drawn
+) -> None:
+    rng = np.random.default_rng(seed)
+    grid = occupancy_grid(classes, resolution_m=0.5)
+    chosen = preset_of(preset)
+    layer = None if has_own else hn.CostLayer((1 + 3 * rng.random(grid.shape)).astype(np.float32))
+    if has_own:
+        named = chosen.planner.model_copy(update={"costs": hn.load_preset("robot").planner.costs})
+        chosen = chosen.model_copy(update={"planner": named})
+    planner = hn.HybridPlanner(topology_of(grid), preset=chosen, costs=layer)
+    was_built = bool(grid.enterable().any())
+    planner.prepare()
+    for _ in range(3):
+        probability = grid.probability.copy()
+        row, col = (int(rng.integers(side)) for side in grid.shape)
+        box = np.s_[row : row + rng.integers(1, 6), col : col + rng.integers(1, 6)]
+        probability[box] = rng.choice([0.0, 1.0], probability[box].shape)
+        grid = replace(grid, probability=probability)
+        planner.update(topology=topology_of(grid))
+        costs = hn.CostLayer.clearance(grid) if layer is None else layer
+        is_open = grid.enterable()
+        cells = np.argwhere(is_open)
+        for start, goal in cells[rng.integers(len(cells), size=(3 if len(cells) else 0, 2))]:
+            result = planner.plan(*grid.frame.points_of([start, goal]))
+            check(result, optimum_m(grid, costs, is_open, tuple(start))[tuple(goal)], is_open)
+            assert not was_built or set(result.stats.seconds) >= {"search"}
+            assert "overlay" not in result.stats.seconds
+
+
 def halls(n: int = 40) -> hn.OccupancyGrid:
     """Two halls with two doors between them."""
     probability = np.zeros((n, n))
@@ -204,40 +242,105 @@ def test_factors_too_large_for_the_overlay_are_planned_by_on_the_grid() -> None:
 
 
 def test_threads_finish_by_the_costs_before_or_after_an_update() -> None:
+    """Each answer is the optimum of one of two states, and each batch that of one alone."""
     grid = halls(60)
     topology = topology_of(grid)
-    layers = [layer_of(np.full(grid.shape, factor)) for factor in (1.0, 3.0)]
+    layers = [
+        layer_of(np.random.default_rng(seed).uniform(1, 4, grid.shape).round()) for seed in (1, 2)
+    ]
+    free = np.argwhere(grid.enterable())
+    pairs = grid.frame.points_of(free[np.random.default_rng(3).integers(len(free), size=(12, 2))])
+    starts, goals = pairs[:, 0], pairs[:, 1]
+    optima = [
+        hn.HybridPlanner(topology, preset="grid-astar", costs=layer).plan_many(starts, goals).cost
+        for layer in layers
+    ]
+    assert (np.abs(optima[0] / optima[1] - 1) > 10 * ROUNDING).all()
     planner = hn.HybridPlanner(topology, preset=preset_of("overlay"), costs=layers[0])
     planner.prepare()
-    ends = (2.0, 2.0), (28.0, 28.0)
-    allowed = set()
-    for layer in layers:
-        planner.update(costs=layer)
-        found = planner.plan(*ends)
-        allowed.add((found.cost, found.lower_bound))
-    wrong, done = [], threading.Event()
+    wrong, seen, done = [], set(), threading.Event()
 
-    def ask() -> None:
+    def is_of(state: int, cost: Any, bound: Any, pair: Any) -> Any:
+        least = optima[state][pair]
+        return (np.abs(cost / least - 1) <= ROUNDING) & (bound <= least * (1 + 1e-9))
+
+    def ask(seed: int) -> None:
+        rng = np.random.default_rng(seed)
         while not done.is_set():
-            found = planner.plan(*ends)
-            if (found.cost, found.lower_bound) not in allowed:
-                wrong.append((found.cost, found.lower_bound))
+            pair = int(rng.integers(len(pairs)))
+            one = planner.plan(*pairs[pair])
+            many = planner.plan_many(starts, goals)
+            states = [
+                [state for state in range(2) if is_of(state, one.cost, one.lower_bound, pair)],
+                [
+                    state
+                    for state in range(2)
+                    if is_of(state, many.cost, many.lower_bound, slice(None)).all()
+                ],
+            ]
+            if [] in states:
+                wrong.append((pair, one.cost, many.cost))
+            seen.update(states[1])
 
-    threads = [threading.Thread(target=ask, daemon=True) for _ in range(3)]
+    threads = [threading.Thread(target=ask, args=(seed,), daemon=True) for seed in range(3)]
     for thread in threads:
         thread.start()
     for turn in range(40):
-        planner.update(costs=layers[turn % 2])
+        planner.update(costs=layers[(turn + 1) % 2])
     done.set()
     for thread in threads:
         thread.join(60)
     assert not any(thread.is_alive() for thread in threads)
     assert not wrong
+    assert seen == {0, 1}
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile", "portals", "robot", "grid-astar"])
+def test_a_progress_callback_may_plan(preset: str) -> None:
+    grid = halls()
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    costs: list[float] = []
+    planner.prepare(progress=lambda *_: costs.append(planner.plan((5.0, 2.0), (15.0, 2.0)).cost))
+    assert costs
+    assert costs == pytest.approx([planner.plan((5.0, 2.0), (15.0, 2.0)).cost] * len(costs))
+
+
+@pytest.mark.parametrize("is_built", [False, True])
+def test_a_progress_callback_may_change_costs(is_built: bool) -> None:  # noqa: FBT001 - drawn
+    grid = halls(60)
+    layers = [
+        layer_of(np.random.default_rng(seed).uniform(1, 4, grid.shape).round()) for seed in (1, 2)
+    ]
+    topology, ends = topology_of(grid), ((2.0, 2.0), (28.0, 28.0))
+    planner = hn.HybridPlanner(topology, preset=preset_of("overlay"), costs=layers[0])
+    if is_built:
+        planner.prepare()
+        planner.update(costs=layers[1])
+        planner.update(costs=layers[0])
+    left = [layers[1], layers[0], layers[1]]
+    planner.prepare(progress=lambda *_: planner.update(costs=left.pop()) if left else None)
+    for _ in range(2):
+        exact = hn.HybridPlanner(topology, preset="grid-astar", costs=planner.costs).plan(*ends)
+        found = planner.plan(*ends)
+        assert planner.costs is not None
+        assert found.cost == pytest.approx(exact.cost, rel=ROUNDING)
+        assert found.lower_bound <= exact.cost * (1 + 1e-9)
+        planner.prepare()
 
 
 @pytest.mark.parametrize(
     "changed",
-    [(0, 0, 1), (0, 0, np.nan, 1), (2, 0, 1, 1), "here", (0, 0, np.inf, 1), {"cells": [[0, 0]]}],
+    [
+        (0, 0, 1),
+        (0, 0, np.nan, 1),
+        (2, 0, 1, 1),
+        "here",
+        (0, 0, np.inf, 1),
+        {"cells": [[0, 0]]},
+        Polygon(),
+        np.ones((2, 2), np.bool_),
+        [np.ones((2, 2))] * 4,
+    ],
 )
 def test_an_area_of_a_change_that_is_none_is_refused_in_one_line(changed: Any) -> None:
     grid = halls()

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.costs import cost_along
 from hybridnav.metrics import segment_faults
-from tests.layers import grid_of
+from tests.layers import grid_of, layer_of
 from tests.planner.test_costs import optimum_m, scene, seeds, topology_of
 from tests.strategies import class_grids, examples, occupancy_grid
 
@@ -155,6 +155,21 @@ def test_robot_is_within_its_epsilon_of_the_cheapest_path_of_cells_on_the_office
         spots += len(result.path.spot_turns)
         bends += int(arc_steps(result.path)[0].sum())
     assert spots < 0.02 * bends
+
+
+def test_no_share_of_the_path_of_cells_bounds_paths_between_posts() -> None:
+    """The counterexample of the page on costs: a straight line between posts in two rows."""
+    probability = np.zeros((2, 42))
+    probability[1, 2::4] = probability[0, 4::4] = 1.0
+    grid = grid_of(probability, hn.Frame(1.0), robot_radius_m=0)
+    costs = layer_of(np.ones(grid.shape))
+    topology, ends = topology_of(grid), ((0.5, 0.5), (41.5, 0.5))
+    line = hn.HybridPlanner(topology, preset="shortest").plan(*ends)
+    planner = hn.HybridPlanner(topology, preset="grid-astar", costs=costs)
+    cells = planner.plan(*ends, smooth="none")
+    assert (round(line.cost, 1), cells.cost, cells.lower_bound) == (41.2, 61.0, 61.0)
+    smooth = planner.plan(*ends, smooth="line-of-sight")
+    assert smooth.lower_bound <= line.cost <= smooth.cost < cells.cost
 
 
 def test_lengths_know_no_arcs() -> None:

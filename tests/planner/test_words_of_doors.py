@@ -54,6 +54,50 @@ def test_a_goal_has_a_door_beside_it():
         assert house().plan((0.9, 3.0), goal).words()[-1].endswith(last)
 
 
+def test_a_goal_beside_a_wide_opening_has_it_at_its_hand_and_not_among_those_passed():
+    """Its middle lies behind, its edge beside."""
+    words = house().plan((0.9, 3.0), (10.4, 2.75)).words()
+    assert words[-1] == (
+        "after 10 m, past two doors on the left, you are at (10.4, 2.75) in the corridor, "
+        "with opening 1 to the hall on the right"
+    )
+
+
+# Three rooms on one line aslant: two doors whose walls stand at right angles.
+CORNER = (
+    "####################",
+    "#bbbbbaaaaaa########",
+    "#bbbbbaaaaaa########",
+    "#bbbbb#aaaaa########",
+    "#bbbbb#aaaaa########",
+    "#########aa#########",
+    *("#kkkkkkkkkkkkkkkkkk#",) * 7,
+    "####################",
+)
+
+
+def test_a_door_in_the_wall_beside_the_door_before_has_its_side():
+    """Nothing bends: but a person who stands in the first door looks past the second."""
+    words = hn.HybridPlanner(topology_of(CORNER)).plan((8.4, 1.2), (2.2, 6.3)).words()
+    assert words[1] == "after 4 m leave the kitchen by door 1 into the archive"
+    assert words[2] == "after 3 m go through door 2 on the left into the bath"
+
+
+def test_a_path_inside_one_room_has_a_direction():
+    """A door if there is one, though behind; else the points of the compass."""
+    words = house().plan((19.75, 6.25), (18.75, 6.25)).words()
+    assert words[0] == "start in the lab with door 6 to the corridor on the left"
+    assert house().plan((2.5, 5.25), (2.5, 6.25)).words()[0] == (
+        "start in the kitchen with door 2 to the corridor behind you"
+    )
+    hall = hn.HybridPlanner(topology_of(["ooooooooo"] * 9))
+    ends = {"east": (4, 2.25), "north-east": (4, 4), "west": (0.25, 2.25), "south": (2.25, 0.25)}
+    for compass, goal in ends.items():
+        result = hall.plan((2.25, 2.25), goal)
+        assert result.words()[0] == f"start in the hall heading {compass}"
+        assert result.instructions[0].to_dict()["heading_rad"] is not None
+
+
 # A pillar hides the middle of the opening; the doors of the kitchen and the archive touch.
 HIDDEN = (
     "##############################",

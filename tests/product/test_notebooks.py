@@ -27,6 +27,7 @@ ELSEWHERE: dict[str, dict[str, Any]] = {
     "05_ompl_in_the_corridor": {"START": (12.0, 2.0), "GOAL": (24.0, 23.0), "LENGTH_M": 1.2},
     "06_certificates": {"NEAR": ((12.0, 2.0), (12.0, 7.5)), "FAR": ((12.0, 2.0), (24.0, 23.0))}
     | {"DOORS": ((15.5, 6.2), (9.9, 6.2))},
+    "07_a_robot_wakes_up": {"STARTS": [(12.0, 2.0)]},
 }
 """Settings with which each notebook runs on another map."""
 SHARED_PORTALS = f"""
@@ -126,7 +127,7 @@ def test_without_ompl_one_sentence_says_so_and_the_rest_runs(tmp_path: Path) -> 
 
 
 def test_there_are_notebooks() -> None:
-    assert [path.name[:3] for path in NOTEBOOKS] == ["01_", "02_", "03_", "04_", "05_", "06_"]
+    assert [path.name[:3] for path in NOTEBOOKS] == [f"0{number}_" for number in range(1, 8)]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

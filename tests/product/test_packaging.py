@@ -289,8 +289,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     stubs = {path.relative_to(source).as_posix() for path in source.rglob("*.pyi")}
     presets = {f"hybridnav/presets/{name}" for name in PLANNERS}
     content = {name for name in names if ".dist-info/" not in name}
-    table = "hybridnav/topology/room_judge.npz"
-    others = {"hybridnav/py.typed", "hybridnav/harness/report.html.j2", table}
+    pages = {f"hybridnav/harness/{page}.html.j2" for page in ("check", "report")}
+    others = {"hybridnav/py.typed", "hybridnav/topology/room_judge.npz", *pages}
     assert "hybridnav/__init__.pyi" in stubs
     assert content == modules | stubs | presets | others
     assert len(names) == len(set(names))

@@ -6,7 +6,7 @@ import itertools
 import math
 import re
 from dataclasses import fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import pytest
 
@@ -22,9 +22,10 @@ from hybridnav.sentences import (
     languages,
     sentences,
 )
+from hybridnav.sentences.instruction import Side
 
 if TYPE_CHECKING:
-    from hybridnav.sentences.instruction import Hand, Side
+    from hybridnav.sentences.instruction import Hand
 
 KITCHEN, CORRIDOR, LAB = Space("kitchen"), Space(None, "corridor"), Space("l3_404")
 AT = (1.0, 2.0)
@@ -103,6 +104,28 @@ CASES = {
         instruction("cross", doorway=Doorway(LAB, 78, 1.2, is_opening=True, beside="left")),
         "after 8 m go through opening 78 on the left into l3_404",
         "nach 8 m durch Öffnung 78 (links) in „l3_404“ gehen",
+    ),
+    "opening between furniture": (
+        instruction("cross", doorway=Doorway(LAB, 78, 7.46, 1.1, is_opening=True)),
+        "after 8 m go through opening 78 into l3_404",
+        "nach 8 m durch Öffnung 78 in „l3_404“ gehen",
+    ),
+    "start with a door aside": (
+        instruction("start", 0.0, KITCHEN, landmark=Landmark(3, LAB, "ahead-left")),
+        "start in the kitchen with door 3 to l3_404 ahead on the left",
+        "Start in „kitchen“, Tür 3 in „l3_404“ links voraus",
+    ),
+    "start by the compass": (
+        instruction("start", 0.0, KITCHEN, heading_rad=-2.2),
+        "start in the kitchen heading south-west",
+        "Start in „kitchen“ in Richtung Südwesten",
+    ),
+    "goal with a door behind": (
+        instruction(
+            "arrive", 3.0, KITCHEN, waypoint="sink", landmark=Landmark(3, LAB, "behind-right")
+        ),
+        "after 3 m you are at sink in the kitchen, with door 3 to l3_404 behind you on the right",
+        "nach 3 m am Ziel: sink in „kitchen“, Tür 3 in „l3_404“ rechts hinten",
     ),
     "no door": (
         instruction("cross", doorway=Doorway(Space(None, "room"))),
@@ -185,6 +208,7 @@ def test_every_template_is_used_and_filled(code):
             written += sentences(
                 [
                     instruction("start", 0.0, space, turn=turn),
+                    instruction("start", 0.0, space, heading_rad=1.5),
                     instruction("cross", 9.0, space, turn=turn, doorway=doorway, passed=passed),
                     instruction("arrive", 0.0, space, waypoint=space.name),
                     instruction("arrive", 5.0, space, waypoint="sink"),
@@ -192,8 +216,7 @@ def test_every_template_is_used_and_filled(code):
                 ],
                 code,
             )
-            sides: tuple[Side, ...] = ("left", "right", "ahead", "behind")
-            for side in sides:
+            for side in get_args(Side):
                 seen = Landmark(4, space, side, is_opening=is_opening)
                 written += sentences([instruction("start", 0.0, space, landmark=seen)], code)
                 there = instruction("arrive", 5.0, space, waypoint="sink", landmark=seen)

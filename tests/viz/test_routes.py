@@ -5,13 +5,14 @@ import re
 
 import numpy as np
 import pytest
+import shapely
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 import hybridnav as hn
 from hybridnav.grid import RoomLabels
 from hybridnav.planner.alternatives import Alternatives
-from hybridnav.viz import plot_alternatives, plot_rooms, plot_tour
+from hybridnav.viz import plot_alternatives, plot_plan, plot_rooms, plot_tour
 from tests.strategies import drawn, occupancy_grid
 
 # A ring of corridor round a block, and a closet that nothing leads to.
@@ -132,6 +133,22 @@ def test_names_lie_beside_the_way_where_there_is_room(width_in, size_m):
         box = text.get_window_extent(renderer)
         inside = (path >= [box.x0, box.y0]) & (path <= [box.x1, box.y1])
         assert not inside.all(axis=1).any(), text.get_text()
+
+
+def test_labels_of_start_and_goal_keep_off_a_straight_path():
+    """It has two points, both at its ends."""
+    grid = occupancy_grid(np.ones((24, 60), dtype=np.uint8), resolution_m=0.25)
+    planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
+    for start, goal in (((3.0, 3.0), (12.0, 3.0)), ((12.0, 2.0), (3.0, 2.5)), ((7, 1), (7, 5))):
+        result = planner.plan(start, goal)
+        assert result.path is not None
+        assert len(result.path.points) == 2
+        ax = plot_plan(planner.topology, result)
+        renderer = FigureCanvasAgg(ax.get_figure(root=True)).get_renderer()
+        line = shapely.LineString(ax.transData.transform(result.path.points))
+        for text in texts(ax, "(start|goal)-label").values():
+            box = text.get_window_extent(renderer)
+            assert not line.intersects(shapely.box(*box.extents)), text.get_text()
 
 
 def test_rooms_number_all_their_doors_where_there_is_room(ring):

@@ -1,4 +1,4 @@
-"""The option `--blocked`: closed doors, rooms, and areas in files."""
+"""The option `--blocked`: closed doors, rooms, areas in files, and keepout masks."""
 
 from __future__ import annotations
 
@@ -10,19 +10,24 @@ import typer
 
 from hybridnav._files import printable
 from hybridnav.cli.errors import UsageError
+from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     import hybridnav as hn
+    from hybridnav.io.cost_specs import CostSpec
 
 BlockedOption = Annotated[
     list[str] | None,
     typer.Option(
         "--blocked",
         metavar="WHAT",
-        help="Close door:N, room:NAME, or the areas of a GeoJSON file or mask image; may be "
-        "repeated.",
+        help="Close door:N, room:NAME, keepout:FILE[,x=X,y=Y,yaw=A] (a mask of Nav2), or the areas "
+        "of a GeoJSON file or mask image; may be repeated.",
     ),
 ]
+
+
+_KINDS = frozenset({"door", "room", "keepout"})
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class Closing:
     doors: tuple[int, ...] = ()
     rooms: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
+    masks: tuple[CostSpec, ...] = ()
+    """Keepout masks of Nav2."""
 
     @property
     def needs_rooms(self) -> bool:
@@ -55,6 +62,8 @@ class Closing:
         closed = Blocked(doors=self.doors, rooms=self.rooms)
         for path in self.files:
             closed |= load_blocked(path, grid)
+        for mask in self.masks:
+            closed |= load_blocked(mask.file, grid, pose=mask.pose)
         return closed
 
 
@@ -70,21 +79,39 @@ def parsed_closing(texts: list[str] | None) -> Closing:
     Raises
     ------
     UsageError
-        When a door has no number, or a room or a file no name.
+        When a door has no number, a room or a file no name, or a mask other settings.
     """
-    doors, rooms, files = [], [], []
+    doors, rooms, files, masks = [], [], [], []
     for text in texts or ():
         kind, colon, name = text.partition(":")
-        if not text or (colon and kind in {"door", "room"} and not name.strip()):
-            raise UsageError(f"--blocked must be door:N, room:NAME or a file, got {text!r:.90}")
+        if not text or (colon and kind in _KINDS and not name.strip()):
+            kinds = "door:N, room:NAME, keepout:FILE"
+            raise UsageError(f"--blocked must be {kinds} or a file, got {text!r:.90}")
         if colon and kind == "door":
             doors.append(_number(name))
         elif colon and kind == "room":
             rooms.append(name)
+        elif colon and kind == "keepout":
+            masks.append(_mask(text))
         else:
             files.append(Path(text))
     given = tuple(map(printable, texts or ()))
-    return Closing(given, tuple(doors), tuple(rooms), tuple(files))
+    return Closing(given, tuple(doors), tuple(rooms), tuple(files), tuple(masks))
+
+
+def _mask(text: str) -> CostSpec:
+    from hybridnav.io.cost_specs import parse_costs  # noqa: PLC0415 - loads numpy
+
+    try:
+        (mask,) = parse_costs([text])
+    except InvalidValueError as error:
+        raise UsageError(f"--blocked: {str(error).removeprefix('costs ')}") from None
+    if "multiplier" in mask.settings:
+        raise UsageError(
+            "--blocked keepout takes x, y and yaw, as closed cells have no cost, got multiplier: "
+            "leave it out, or plan by --costs"
+        )
+    return mask
 
 
 def _number(text: str) -> int:

@@ -176,6 +176,18 @@ def check_output(path: Path | None, option: str, endings: Sequence[str]) -> None
     check_writable(path, option)
 
 
+def check_new(path: Path, option: str) -> None:
+    """Refuse a file or folder that exists, or whose folder does not."""
+    try:
+        is_taken, in_folder = path.exists(), path.parent.is_dir()
+    except OSError as error:  # a name that is too long
+        raise UsageError(f"{option} {str(path)!r}: {error.strerror}") from None
+    if is_taken:
+        raise UsageError(f"{option}: {str(path)!r} exists, expected a new name")
+    if not in_folder:
+        raise UsageError(f"{option}: there is no folder {str(path.parent)!r}")
+
+
 def check_writable(path: Path, option: str) -> None:
     """Refuse a file that could not be written, by trying; nothing is left, nothing changed."""
     try:

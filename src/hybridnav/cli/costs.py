@@ -22,7 +22,7 @@ CostsOption = Annotated[
         "--costs",
         metavar="WHAT",
         help="Plan the cheapest path, by clearance[:KEY=VALUE,...], speed:FILE[,KEY=VALUE,...] or "
-        "keepout:FILE[,multiplier=M] (masks of Nav2); may be repeated.",
+        "keepout:FILE[,KEY=VALUE,...] (masks of Nav2); may be repeated.",
     ),
 ]
 

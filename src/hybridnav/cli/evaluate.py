@@ -35,6 +35,21 @@ BaselinesOption = Annotated[
         help="A baseline, or module:class; may be given several times.",
     ),
 ]
+GraphsOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--graph",
+        metavar="FILE",
+        help="A route graph of Nav2, STRANDS or LCAS, GraphML or node-link JSON, to follow on one "
+        "map; may be given several times.",
+    ),
+]
+ClearEdgesOption = Annotated[
+    bool,
+    typer.Option(
+        "--clear-edges", help="Leave out edges of the graph that the robot cannot follow."
+    ),
+]
 PairsOption = Annotated[
     int | None,
     typer.Option("--pairs", metavar="N", min=1, help="Pairs a map: 100 sampled, or all of --scen."),
@@ -104,6 +119,8 @@ def evaluate(
     out: OutOption,
     preset: PresetsOption = None,
     baseline: BaselinesOption = None,
+    graph: GraphsOption = None,
+    clear_edges: ClearEdgesOption = False,
     pairs: PairsOption = None,
     all_pairs: LatticeOption = None,
     scen: ScenariosOption = None,
@@ -139,11 +156,15 @@ def evaluate(
             "--metric any-angle does not go with --corner-cutting: no any-angle path passes "
             "between two blocked cells that meet at a corner; take --metric octile"
         )
-    names = preset if preset is not None else ([] if baseline else ["shortest"])
+    if clear_edges and not graph:
+        raise UsageError("--clear-edges goes with --graph: name the graph, or leave it out")
+    names = preset if preset is not None else ([] if baseline or graph else ["shortest"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
         presets=tuple(read_settings(name, overrides, None, None) for name in names),
         baselines=tuple(baseline or ()),
+        graphs=tuple(map(str, graph or ())),
+        clear_edges_only=clear_edges,
         pairs=pairs,
         lattice_step_m=all_pairs,
         scenarios=None if scen is None else str(scen),

@@ -19,18 +19,41 @@ from hybridnav.cli.common import (
     progress_bar,
 )
 from hybridnav.cli.errors import UsageError
+from hybridnav.cli.logs import is_bag, open_log
 from hybridnav.cli.options import JsonOption
 from hybridnav.errors import MapError
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
+    from hybridnav.io.scan_log import ScanLog
     from hybridnav.mapping import Mapper
 
 _LESS_OFTEN = 16
 """Scans between two moves of the bar."""
 
 LogArgument = Annotated[
-    Path, typer.Argument(metavar="LOG", help="CARMEN log: .log, or the same packed by gzip.")
+    Path,
+    typer.Argument(
+        metavar="LOG",
+        help="CARMEN log (.log, or packed by gzip), or bag of ROS (.bag, .mcap, .db3, folder).",
+    ),
+]
+TopicOption = Annotated[
+    str | None,
+    typer.Option(
+        "--topic",
+        metavar="NAME",
+        help="Topic of a bag: of scans, or of a map, whose last message is written.",
+    ),
+]
+FrameOption = Annotated[
+    str | None,
+    typer.Option(
+        "--frame",
+        metavar="NAME",
+        help="Frame of a bag in which the robot moves.",
+        show_default="map, odom or the root",
+    ),
 ]
 OutOption = Annotated[
     Path, typer.Option("-o", "--out", metavar="MAP", help="ROS map (.yaml); beside it the image.")
@@ -84,27 +107,29 @@ def map(  # noqa: A001 - the command's name
     when_hit: HitOption = 0.95,
     when_passed: PassOption = 0.19,
     max_cells: CellsOption = DEFAULT_MAX_CELLS,
+    topic: TopicOption = None,
+    frame: FrameOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a map of the laser scans in LOG, whose poses are taken as given."""
+    """Make a map of the laser scans in LOG, whose poses are taken as given, or of its own map."""
     if out.suffix.lower() not in {".yaml", ".yml"}:
         raise UsageError(f"--out must end in .yaml or .yml, got {str(out)!r}")
     for file in (out, out.with_suffix(".pgm")):
         check_writable(file, "--out")
+    if topic is not None and is_bag(log_file) and _write_kept(log_file, topic, out, as_json):
+        return
     load_numba()
     from hybridnav.mapping import LaserModel, Mapper  # noqa: PLC0415 - loads numba
 
     model = LaserModel(when_hit, when_passed, max_range_m, min_range_m, clear_range_m, tolerance_m)
     mapper = Mapper(resolution_m=resolution_m, laser=model, max_cells=max_cells)
-    log = hn.CarmenLog(log_file)
+    log = open_log(log_file, topic, frame)
     began = time.perf_counter()
     _add_all(log, mapper)
     seconds = time.perf_counter() - began
     where = f"log {printable(log_file)}"
     if not log.n_scans:
-        raise MapError(
-            f"{where}: no scan of a laser, expected lines FLASER or ROBOTLASER1; {log.summary()}"
-        )
+        raise MapError(f"{where}: no scan of a laser, expected {log.expected}; {log.summary()}")
     if not mapper.has_cells:
         raise MapError(
             f"{where}: no reading below the greatest range of {max_range_m:g} m; {log.summary()}"
@@ -115,18 +140,48 @@ def map(  # noqa: A001 - the command's name
     answer(describe(grid, log, seconds, out))
 
 
-def _add_all(log: hn.CarmenLog, mapper: Mapper) -> None:
+def _write_kept(bag: Path, topic: str, out: Path, as_json: bool) -> bool:  # noqa: FBT001 - private
+    """Write the last map of a topic, and return whether the topic holds maps."""
+    from hybridnav.io.bag_files import GRID, Bag  # noqa: PLC0415 - on demand
+
+    if topic not in Bag(bag).topics_of({GRID}):
+        return False
+    grid = hn.load_bag_map(bag, topic=topic, robot_radius_m=0.0)
+    hn.write_ros_map(grid, out)
+    rows, cols = grid.shape
+    if as_json:
+        figures = {"map": str(out), "rows": rows, "cols": cols, "resolution_m": grid.resolution_m}
+        answer(json.dumps(figures | {"cells": grid.class_counts()}) + "\n")
+    else:
+        answer("\n".join(_map_lines(grid, out)) + "\n")
+    return True
+
+
+def _map_lines(grid: hn.OccupancyGrid, out: Path) -> list[str]:
+    rows, cols = grid.shape
+    counts = grid.class_counts()
+    kinds = (f"{counts[kind]:,} {kind}" for kind in ("free", "occupied", "unexplored"))
+    return [
+        f"map        {printable(out)}, {cols} x {rows} cells of {grid.resolution_m:g} m",
+        extent_line(grid),
+        f"cells      {', '.join(kinds)}",
+    ]
+
+
+def _add_all(log: ScanLog, mapper: Mapper) -> None:
     """Add the scans of a log to a map, with a bar over the bytes of the file."""
     with progress_bar("reading scans") as advance:
         for count, scan in enumerate(log):
-            if not mapper.add(scan):
+            n_before = mapper.n_scans
+            mapper.add(scan)
+            if mapper.n_scans == n_before:  # also where a wrong first scan has gone
                 log.leave_out("beyond --max-cells")
             if count % _LESS_OFTEN == 0:
                 advance(log.bytes_read, log.size_bytes)
         advance(log.size_bytes, log.size_bytes)
 
 
-def _figures(grid: hn.OccupancyGrid, log: hn.CarmenLog, seconds: float, out: Path) -> str:
+def _figures(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) -> str:
     rows, cols = grid.shape
     figures = {
         "map": str(out),
@@ -143,15 +198,10 @@ def _figures(grid: hn.OccupancyGrid, log: hn.CarmenLog, seconds: float, out: Pat
     return json.dumps(figures) + "\n"
 
 
-def _summary(grid: hn.OccupancyGrid, log: hn.CarmenLog, seconds: float, out: Path) -> str:
-    rows, cols = grid.shape
-    counts = grid.class_counts()
-    kinds = (f"{counts[kind]:,} {kind}" for kind in ("free", "occupied", "unexplored"))
+def _summary(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) -> str:
     recorded = f", recorded in {log.duration_s:.0f} s" if log.duration_s > 0 else ""
     lines = [
-        f"map        {printable(out)}, {cols} x {rows} cells of {grid.resolution_m:g} m",
-        extent_line(grid),
-        f"cells      {', '.join(kinds)}",
+        *_map_lines(grid, out),
         f"scans      {log.n_scans:,}{recorded}",
         f"log        {log.summary()}",
         f"seconds    {seconds:.3f}",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hybridnav.cli.blocked import BlockedOption, parsed_closing
-from hybridnav.cli.common import Reading, check_output, check_picture, read_settings
+from hybridnav.cli.common import Reading, check_new, check_output, check_picture, read_settings
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.keep import KeepInOption, KeepOption, Source
@@ -28,7 +28,6 @@ from hybridnav.cli.options import (
     SetOption,
     SmoothOption,
 )
-from hybridnav.cli.poses import ENDINGS
 from hybridnav.cli.request import Request, Wanted
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
@@ -36,7 +35,7 @@ from hybridnav.sentences import check_language, languages
 
 if TYPE_CHECKING:
     from hybridnav.cli.rendering import Waypoint
-    from hybridnav.planner.alternatives import By
+    from hybridnav.planner.alternative_options import By
     from hybridnav.planner.named import At
 
 Point = tuple[float, ...]
@@ -135,6 +134,8 @@ LeastHoleOption = Annotated[
         show_default="1.0",
     ),
 ]
+_POSES = (".csv", ".json", ".geojson")
+"""Endings of files of poses."""
 _BY_DOORS = {"--max-overlap", "--max-stretch", "--inside-rooms"}
 """Options that change nothing by homotopy."""
 LanguageOption = Annotated[
@@ -150,7 +151,16 @@ PosesOption = Annotated[
     typer.Option(
         "--poses",
         metavar="FILE",
-        help="Write poses every 5 cm: x, y in metres, yaw in radians; .csv or .json.",
+        help="Write poses every 5 cm: x, y in metres, yaw in radians; .csv or .json. Or the line: "
+        ".geojson.",
+    ),
+]
+BagOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--bag",
+        metavar="NAME",
+        help="Write path and map as a new bag of ROS: NAME.bag of ROS 1, else a folder of ROS 2.",
     ),
 ]
 CompareOption = Annotated[
@@ -190,6 +200,7 @@ def plan(
     compare: CompareOption = False,
     plot: PlotOption = None,
     poses: PosesOption = None,
+    bag: BagOption = None,
     language: LanguageOption = "en",
     as_json: JsonOption = False,
 ) -> None:
@@ -198,7 +209,12 @@ def plan(
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
     check_picture(plot)
-    check_output(poses, "--poses", ENDINGS)
+    check_output(poses, "--poses", _POSES)
+    if bag is not None:
+        check_new(bag, "--bag")
+        from hybridnav.io.bag_files import check_rosbags  # noqa: PLC0415 - on demand
+
+        check_rosbags("--bag")
     where = _checked_at(at)
     given = parsed_costs(costs)
     check_language(language)
@@ -215,7 +231,7 @@ def plan(
     first, last = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
-    hole_m2 = _checked_least_hole(1.0 if least_hole_m2 is None else least_hole_m2)
+    hole_m2 = None if least_hole_m2 is None else _checked_least_hole(least_hole_m2)
     given_by = "doors" if by is None else _checked_by(by)
     options = {
         "--by": by,
@@ -230,8 +246,8 @@ def plan(
     wanted = Wanted(
         alternatives,
         given_by,
-        0.8 if max_overlap is None else max_overlap,
-        2.0 if max_stretch is None else max_stretch,
+        max_overlap,
+        max_stretch,
         inside_rooms,
         hole_m2,
     )
@@ -249,11 +265,15 @@ def plan(
         compare=compare,
         plot=plot,
         poses=poses,
+        bag=bag,
         language=language,
         as_json=as_json,
     )
-    if poses is not None and alternatives > 1:
-        raise UsageError("--poses writes one path, and --alternatives asks for more: leave one out")
+    for option, file in (("--poses", poses), ("--bag", bag)):
+        if file is not None and alternatives > 1:
+            raise UsageError(
+                f"{option} writes one path, and --alternatives asks for more: leave one out"
+            )
     if request.is_tour and compare:
         raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
     if not request.run():

@@ -16,7 +16,6 @@ from hybridnav.cli.common import (
     stage,
 )
 from hybridnav.cli.compiling import compiling_beside
-from hybridnav.cli.poses import write_poses
 from hybridnav.cli.rendering import draw, query_of, respond
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.cli.costs import Costs
     from hybridnav.cli.keep import Source
     from hybridnav.cli.rendering import Waypoint
-    from hybridnav.planner.alternatives import By
+    from hybridnav.planner.alternative_options import By
     from hybridnav.planner.named import At
 
 _GRID_SEARCH = {
@@ -45,10 +44,10 @@ class Wanted:
 
     count: int
     by: By
-    max_overlap: float
-    max_stretch: float
+    max_overlap: float | None
+    max_stretch: float | None
     inside_rooms: bool
-    least_hole_m2: float
+    least_hole_m2: float | None
 
     @property
     def needs_grid(self) -> bool:
@@ -71,6 +70,7 @@ class Request:
     compare: bool
     plot: Path | None
     poses: Path | None
+    bag: Path | None
     language: str
     as_json: bool
 
@@ -111,7 +111,9 @@ class Request:
             beside = _compared(self._on_whole_grid(topology, closed, costs), outcome)
         self._respond(grid, outcome, beside, seconds)
         if self.poses is not None:
-            write_poses(self.poses, outcome)
+            hn.export_path(outcome, self.poses)
+        if self.bag is not None:
+            hn.save_bag(self.bag, [outcome], grid=grid)
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
             draw(self.plot, topology, found or outcome, self.waypoints, optimum_m)

@@ -51,12 +51,24 @@ RegionsOption = Annotated[
         help="Go on above the places: to regions of at most N cells, then to the apex.",
     ),
 ]
+GuessOption = Annotated[
+    float | None,
+    typer.Option(
+        "--guess-below",
+        metavar="M",
+        min=0,
+        max=1,
+        help="Count the arcs that end to exist if a threshold moves by less than M, and draw the "
+        "graph, these arcs dashed.",
+    ),
+]
 
 
 def show(
     map_file: MapArgument,
     level: LevelOption = None,
     regions: RegionsOption = None,
+    guess_below: GuessOption = None,
     preset: PresetOption = None,
     overrides: SetOption = None,
     robot_radius_m: RadiusOption = None,
@@ -83,12 +95,17 @@ def show(
     if not model.is_filed:
         seconds = {"load": seconds["load"], **pyramid.stats.seconds}
     shown = pyramid[level]
-    parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), _describe_level(shown)]
+    about = _describe_level(shown) + _describe_guesses(shown, guess_below)
+    parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), about]
     answer("\n\n".join(parts) + f"\nseconds    {timings(seconds)}\n")
     if plot is not None:
-        from hybridnav.viz import plot_level, save_figure  # noqa: PLC0415 - matplotlib on demand
+        from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
 
-        save_figure(plot_level(shown), plot)
+        if guess_below is None:
+            axes = viz.plot_level(shown)
+        else:
+            axes = viz.plot_topology(shown, guess_below=guess_below)
+        viz.save_figure(axes, plot)
 
 
 def _describe_map(pyramid: hn.DualGraphPyramid) -> str:
@@ -148,4 +165,15 @@ def _describe_level(level: hn.Level) -> str:
     return (
         f"level {level.index:<4} {vertices}, "
         f"the largest of {largest_m2:.2f} m²; {parallel:,} parallel arcs"
+    )
+
+
+def _describe_guesses(level: hn.Level, guess_below: float | None) -> str:
+    """Return a line on the arcs that a small move of a threshold ends, where asked for."""
+    if guess_below is None:
+        return ""
+    guesses = int((level.certainty.margin < guess_below).sum())
+    return (
+        f"\ncertainty  {guesses:,} of {level.n_arcs:,} arcs are guesses: "
+        f"a threshold moved by less than {guess_below:g} ends them"
     )

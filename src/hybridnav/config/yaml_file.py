@@ -28,6 +28,9 @@ class Limits:
     max_bytes: int = 2**20
     max_values: int = 10_000
     """PyYAML reads about 30,000 values a second, so that a hostile file costs a third of one."""
+    aliases: bool = False
+    """Whether anchors and aliases are allowed. An alias counts as all the values that it stands
+    for, and as deep; none may stand for what contains it."""
 
 
 _SETTINGS = Limits()
@@ -125,19 +128,10 @@ def read_marked(
         Of the type `error` or `missing`, as by `read_yaml`.
     """
     where = f"{what} {printable(path)}"
-    with open_file(path, what=what, error=error, missing=missing or error) as stream:
-        content = stream.read(limits.max_bytes + 1)
-    if len(content) > limits.max_bytes:
-        raise error(f"{where}: YAML of more than {limits.max_bytes} bytes is not read")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as failure:
-        line = content.count(b"\n", 0, failure.start) + 1
-        raise error(f"{where}, line {line}: not UTF-8 text") from None
-    try:
-        data, root = _construct(text, limits.max_values)
-    except yaml.YAMLError as failure:
-        raise error(f"{where}{_explain(failure, text)}") from None
+    text = read_text(
+        path, what=what, error=error, missing=missing, max_bytes=limits.max_bytes, kind="YAML"
+    )
+    data, root = _constructed(text, where, error, limits)
     if not isinstance(data, dict):
         given = "nothing" if data is None else reprlib.repr(data)
         raise error(f"{where}: expected a mapping of keys to values, got {given}")
@@ -145,6 +139,65 @@ def read_marked(
         if not isinstance(key, str):
             raise error(f"{where}: every key must be text, got {reprlib.repr(key)}")
     return Marked(data, text, root)
+
+
+def parse_document(text: str, where: str, error: type[HybridNavError], limits: Limits) -> Any:
+    """Return the value of a YAML document of any form, which may be damaged or hostile.
+
+    Parameters
+    ----------
+    text
+        The document.
+    where
+        What messages begin with.
+    error
+        Class of the error for an unreadable text.
+    limits
+        How much is read.
+
+    Raises
+    ------
+    HybridNavError
+        Of the type `error`, one line.
+    """
+    return _constructed(text, where, error, limits)[0]
+
+
+def read_text(  # noqa: PLR0913 - keywords, most of them passed on
+    path: PathLike,
+    *,
+    what: str,
+    error: type[HybridNavError],
+    missing: type[HybridNavError] | None = None,
+    max_bytes: int,
+    kind: str,
+) -> str:
+    """Read a file of UTF-8 text.
+
+    Parameters
+    ----------
+    path, what, error, missing
+        As of `read_yaml`.
+    max_bytes
+        Most bytes that are read.
+    kind
+        Name of the format in messages.
+
+    Raises
+    ------
+    HybridNavError
+        Of the type `error` or `missing`, one line.
+    """
+    where = f"{what} {printable(path)}"
+    with open_file(path, what=what, error=error, missing=missing or error) as stream:
+        content = stream.read(max_bytes + 1)
+    if len(content) > max_bytes:
+        raise error(f"{where}: {kind} of more than {max_bytes} bytes is not read")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as failure:
+        line = content.count(b"\n", 0, failure.start) + 1
+        raise error(f"{where}, line {line}: not UTF-8 text") from None
 
 
 def open_file(
@@ -233,29 +286,56 @@ class _LimitedLoader(_PlainLoader):
     """
 
     _depth = 0
+    _deepest = 0
     _values = 0
-    max_values = _SETTINGS.max_values
+
+    def __init__(self, text: str, limits: Limits) -> None:
+        super().__init__(text)
+        self._limits = limits
+        self._open: set[str] = set()
+        self._size_of: dict[str, tuple[int, int]] = {}
 
     def compose_node(self, parent: Node | None, index: int) -> Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        values, height = 1, 0
+        if isinstance(event, yaml.AliasEvent):
+            values, height = self._size_of.get(str(event.anchor), (1, 0))
+        self._values += values
+        problem = self._problem(event, height)
+        if problem is not None:
+            raise ComposerError(None, None, problem, event.start_mark)
+        before, deepest = self._values, self._deepest
+        self._deepest = self._depth + height
+        is_anchor = event.anchor is not None and not isinstance(event, yaml.AliasEvent)
+        if is_anchor:
+            self._open.add(event.anchor)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        if is_anchor:
+            self._open.discard(event.anchor)
+            size = self._values - before + 1, self._deepest - self._depth
+            self._size_of[event.anchor] = size
+        self._deepest = max(self._deepest, deepest)
+        return node
+
+    def _problem(self, event: Any, height: int) -> str | None:
+        name = reprlib.repr(event.anchor)
+        if event.anchor is not None and not self._limits.aliases:
+            return f"anchors and aliases are not supported, got {name}"
         problem = None
-        self._values += 1
-        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
-            problem = f"anchors and aliases are not supported, got {reprlib.repr(event.anchor)}"
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor in self._open:
+                problem = f"alias {name} stands for what contains it"
         elif event.tag is not None:
             problem = f"tags are not supported, got {reprlib.repr(event.tag)}"
         elif isinstance(event, yaml.ScalarEvent) and len(event.value) > _MAX_CHARACTERS:
             problem = f"a value has more than {_MAX_CHARACTERS} characters"
-        elif self._depth >= _MAX_DEPTH:
+        if self._depth + height >= _MAX_DEPTH:
             problem = f"nested more than {_MAX_DEPTH} deep"
-        elif self._values > self.max_values:
-            problem = f"more than {self.max_values} values"
-        if problem is not None:
-            raise ComposerError(None, None, problem, event.start_mark)
-        self._depth += 1
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        return node
+        elif self._values > self._limits.max_values:
+            problem = f"more than {self._limits.max_values} values"
+        return problem
 
     def compose_mapping_node(self, anchor: Any) -> MappingNode:
         node = super().compose_mapping_node(anchor)
@@ -276,15 +356,19 @@ class _LimitedLoader(_PlainLoader):
             raise ConstructorError(None, None, str(failure), node.start_mark) from None
 
 
-def _construct(text: str, max_values: int) -> tuple[Any, Any]:
+def _constructed(
+    text: str, where: str, error: type[HybridNavError], limits: Limits
+) -> tuple[Any, Any]:
     """Return the value of a document and its node; nothing and None for an empty one."""
-    loader: Any = _LimitedLoader(text)
-    loader.max_values = max_values
     try:
-        root = loader.get_single_node()
-        return None if root is None else loader.construct_document(root), root
-    finally:
-        loader.dispose()
+        loader: Any = _LimitedLoader(text, limits)
+        try:
+            root = loader.get_single_node()
+            return None if root is None else loader.construct_document(root), root
+        finally:
+            loader.dispose()
+    except yaml.YAMLError as failure:
+        raise error(f"{where}{_explain(failure, text)}") from None
 
 
 def _explain(failure: yaml.YAMLError, content: str) -> str:

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-import math
-import operator
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from numbers import Real
-from typing import TYPE_CHECKING, Any, Literal, get_args, overload
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, overload
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.homotopy.search import MOST_STATES, TIME_LIMIT_S, check_limits
-from hybridnav.planner.by_classes import ClassEffort, ClassTours
-from hybridnav.planner.by_doors import Chosen, DoorTours, RouteLimits
+from hybridnav.planner.alternative_options import check_used, effort_of, limits_of
+from hybridnav.planner.by_classes import ClassTours
+from hybridnav.planner.by_doors import Chosen, DoorTours
 from hybridnav.planner.tour import Tour, plan_tour
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav.homotopy.classes import Word
+    from hybridnav.planner.alternative_options import By
     from hybridnav.planner.blocked import Closable
+    from hybridnav.planner.by_doors import RouteLimits
     from hybridnav.planner.named import At
     from hybridnav.planner.planner import HybridPlanner
     from hybridnav.result import Path, PlanResult
-
-By = Literal["doors", "homotopy"]
-"""Difference between two paths: the doors that they pass, or the sides of obstacles."""
-MOST = 20
-"""Most alternatives of one query."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +124,14 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     count: int,
     *,
     by: By = "doors",
-    max_overlap: float = 0.8,
-    max_stretch: float = 2.0,
+    max_overlap: float | None = None,
+    max_stretch: float | None = None,
     inside_rooms: bool = False,
     at: At = "anywhere",
     blocked: Closable | None = None,
-    least_hole_m2: float = 1.0,
-    most_states: int = MOST_STATES,
-    time_limit_s: float = TIME_LIMIT_S,
+    least_hole_m2: float | None = None,
+    most_states: int | None = None,
+    time_limit_s: float | None = None,
 ) -> Alternatives:
     """Plan paths between the same two points that differ for people.
 
@@ -145,8 +139,9 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     Then sequences are tried in the order of their length on the graph of doors, which measures the
     paths inside rooms: for each pair of doors of a room, the shortest sequence that passes both in
     turn, unless it passes a room twice. Each that keeps to the limits is planned by the preset of
-    the planner while the doors that lead off it are closed, and the path has to keep to the limits
-    too. At most four sequences for each requested alternative are planned.
+    the planner while the doors that lead off it are closed, by the cells along one side of each,
+    and the path has to keep to the limits too. At most four sequences for each requested
+    alternative are planned.
 
     With a planner by costs the cheapest paths take the place of the shortest: sequences are tried
     in the order of their cost, and overlap and stretch are measured in cost.
@@ -172,9 +167,10 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     max_overlap
         Greatest share of its length, or of its cost, from 0 to 1, that an alternative by doors has
         in common with a shorter one: what lies within a robot's diameter (at least a cell) of the
-        other path, and all between the same two doors of one room.
+        other path, and all between the same two doors of one room. None is 0.8.
     max_stretch
         Greatest length, or cost, of an alternative by doors over that of the first, at least 1.
+        None is 2.
     inside_rooms
         Whether paths by the same doors count as alternatives too if they pass an obstacle inside a
         room on two sides. Then only what lies near the other path is in common. Not with OMPL.
@@ -186,12 +182,13 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     least_hole_m2
         By homotopy and inside rooms, holes of a smaller area do not count: obstacles and, unless
         they may be entered, unexplored islands, with all that they surround, in square metres.
+        None is 1.
     most_states
         By homotopy and inside rooms, pairs of a cell and a class that are looked at before the
-        search stops, from 1 to 2^26; more take more time and memory.
+        search stops, from 1 to 2^26; more take more time and memory. None is a million.
     time_limit_s
         By homotopy and inside rooms, seconds before the search stops; inside rooms, for all
-        sequences of doors together.
+        sequences of doors together. None is 10.
 
     Returns
     -------
@@ -202,9 +199,9 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     Raises
     ------
     InvalidValueError
-        When an option is out of range, an end is not valid, a closed item is not on the map,
-        or, by homotopy and inside rooms, the planner plans by costs, it refines with OMPL, or its
-        grid allows corner cutting.
+        When an option is out of range or changes nothing by doors, or by homotopy, an end is not
+        valid, a closed item is not on the map, or, by homotopy and inside rooms, the planner plans
+        by costs, it refines with OMPL, or its grid allows corner cutting.
 
     Examples
     --------
@@ -216,75 +213,79 @@ def plan_alternatives(  # noqa: PLR0913 - all but four have defaults
     >>> [other.path.length_m for other in found]
     [8.0, 8.0]
     """
-    limits = _checked(RouteLimits(count, max_overlap, max_stretch))
-    if by not in get_args(By):
-        raise InvalidValueError(f"by must be 'doors' or 'homotopy', got {by!r:.80}")
-    if planner.costs is not None and (by == "homotopy" or inside_rooms):
+    options = {
+        "max_overlap": max_overlap,
+        "max_stretch": max_stretch,
+        "inside_rooms": inside_rooms or None,
+        "least_hole_m2": least_hole_m2,
+        "most_states": most_states,
+        "time_limit_s": time_limit_s,
+    }
+    check_used(by, {name: value for name, value in options.items() if value is not None})
+    needs_classes = by == "homotopy" or inside_rooms
+    if planner.costs is not None and needs_classes:
         raise InvalidValueError(
             "homotopy classes are searched for their shortest paths, and this planner plans by "
             'costs: take by="doors" without inside_rooms, or a planner without costs'
         )
-    effort = _checked_effort(ClassEffort(least_hole_m2, most_states, time_limit_s))
+    limits = limits_of(count, max_overlap, max_stretch)
+    effort = effort_of(least_hole_m2, most_states, time_limit_s)
     closed = planner.closed(blocked)
     waypoints = [start, goal]
-    classes = None
-    if by == "homotopy" or inside_rooms:
-        classes = ClassTours(planner, waypoints, closed, effort)
+    classes = ClassTours(planner, waypoints, closed, effort) if needs_classes else None
     first = plan_tour(planner, waypoints, at=at, blocked=closed)
     if not first.solved:
         return unplanned(first.status)
-    if by == "homotopy" and classes is not None:
-        found = tuple(
-            Alternative(tour, word=word) for tour, word in classes.find(first, limits.count)
-        )
-        note = classes.stopped or _fewer(
-            len(found), limits, "no other path passes an obstacle on another side"
-        )
-        return Alternatives(found, complete=not classes.stopped, note=note)
+    if classes is not None and by == "homotopy":
+        return _by_homotopy(classes, first, limits)
     search = None
-    chosen = [Chosen(first)]
     if planner.topology.pyramid.rooms is not None:
         search = DoorTours(planner, first, waypoints, planner.closed_for_all(closed))
+    return _by_doors(search, classes, first, limits, by_costs=planner.costs is not None)
+
+
+def _by_homotopy(classes: ClassTours, first: Tour, limits: RouteLimits) -> Alternatives:
+    """Return the alternatives by sides of obstacles."""
+    tours = classes.find(first, limits.count)
+    found = tuple(Alternative(tour, word=word) for tour, word in tours)
+    note = classes.stopped or _fewer(
+        len(found), limits, "no other path passes an obstacle on another side"
+    )
+    return Alternatives(found, complete=not classes.stopped, note=note)
+
+
+def _by_doors(
+    search: DoorTours | None,
+    classes: ClassTours | None,
+    first: Tour,
+    limits: RouteLimits,
+    *,
+    by_costs: bool,
+) -> Alternatives:
+    """Return the alternatives by sequences of doors.
+
+    Parameters
+    ----------
+    search
+        The search for sequences of doors; None on a map without rooms.
+    classes
+        The search inside rooms; None for none.
+    first
+        The plain plan, solved.
+    limits
+        What they must keep to.
+    by_costs
+        Whether the planner plans by costs.
+    """
+    chosen = [Chosen(first)]
+    if search is not None:
         chosen = search.find(limits)
         if classes is not None and len(chosen) < limits.count:
             chosen = classes.inside(search, chosen, limits)
     stopped = _stopped(search, classes) if len(chosen) < limits.count else ""
     found = tuple(Alternative(one.tour, one.overlap) for one in chosen)
-    note = stopped or _fewer(
-        len(found), limits, _reason(search, limits, by_costs=planner.costs is not None)
-    )
+    note = stopped or _fewer(len(found), limits, _reason(search, limits, by_costs=by_costs))
     return Alternatives(found, complete=not stopped, note=note)
-
-
-def _checked(limits: RouteLimits) -> RouteLimits:
-    """Return the limits if they are in range."""
-    try:
-        count = operator.index(limits.count)
-    except TypeError:
-        count = 0
-    if not 1 <= count <= MOST:
-        raise InvalidValueError(
-            f"alternatives must be a whole number from 1 to {MOST}, got {limits.count!r:.80}"
-        )
-    for name, low, high in (("max_overlap", 0.0, 1.0), ("max_stretch", 1.0, math.inf)):
-        value = getattr(limits, name)
-        if not (isinstance(value, Real) and low <= float(value) <= high):
-            most = "or more" if math.isinf(high) else f"to {high:g}"
-            raise InvalidValueError(
-                f"{name} must be a number from {low:g} {most}, got {value!r:.80}"
-            )
-    return replace(limits, count=count)
-
-
-def _checked_effort(effort: ClassEffort) -> ClassEffort:
-    """Return what a search for classes takes if it is in range, also where none is needed."""
-    check_limits(effort.most_states, effort.time_limit_s)
-    if not (isinstance(effort.least_hole_m2, Real) and 0 <= effort.least_hole_m2 < math.inf):
-        raise InvalidValueError(
-            "least hole must be a finite number of square metres >= 0, "
-            f"got {effort.least_hole_m2!r:.80}"
-        )
-    return effort
 
 
 def _stopped(search: DoorTours | None, classes: ClassTours | None) -> str:

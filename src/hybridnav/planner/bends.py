@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.result import Path
 
-_LEAST_SLIGHT_RAD = math.radians(40.0)
+_LEAST_SLIGHT_RAD = math.radians(35.0)
 """Turn from which a slight bend counts: several that nobody tells lead elsewhere."""
 _TOLERANCE_M = 0.75
 """Deviation below which a path counts as straight: a step round a chair is no bend."""
@@ -30,7 +30,7 @@ _ROUNDING_M = 1e-9
 
 @dataclass(frozen=True)
 class Bend:
-    """A turn of a line: by 55 degrees or more, or a slight one from 40 degrees on."""
+    """A turn of a line: by 55 degrees or more, or a slight one from 35 degrees on."""
 
     at_m: float
     """Metres from the begin of the line."""
@@ -96,7 +96,7 @@ class Line:
         return float(along[int(np.argmin(away))])
 
     def bends(self) -> list[Bend]:
-        """Return its bends of 40 degrees or more, in order.
+        """Return its bends of 35 degrees or more, in order.
 
         They are turns of the line simplified by 0.75 m (Douglas and Peucker 1973), path by path.
         Slighter turns to one hand, each within 1.5 m of the one before, make one bend.

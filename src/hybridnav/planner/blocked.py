@@ -147,6 +147,8 @@ class Blocked:
         return _cells_in_runs(np.concatenate(runs))
 
     def _in_places(self, topology: TopologicalMap) -> list[LongArray]:
+        if not len(self.places):
+            return []
         places = _found("place", self.places, topology.place_ids)
         across = np.array([topology.grid.shape[1], 1])
         return [topology.level.receptive_field(place) @ across for place in places.tolist()]
@@ -160,7 +162,9 @@ class Blocked:
 
     def _on_boundaries(self, topology: TopologicalMap) -> list[LongArray]:
         """Return the cells of arcs and doors, level by level, so that no closed arc is spared."""
-        places = topology.pyramid.place_level if self.arcs or self.doors else 0
+        if not self.arcs and not self.doors:
+            return []
+        places = topology.pyramid.place_level
         ids = [arc for arc in self.arcs if not isinstance(arc, LevelArc)]
         closed = [LevelArc(places, arc) for arc in _found("arc", ids, topology.arc_ids).tolist()]
         for arc in self.arcs:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
 from hybridnav._progress import no_progress
+from hybridnav.grid import CellClass
 from hybridnav.result import PlanStats
 
 if TYPE_CHECKING:
@@ -16,13 +17,14 @@ if TYPE_CHECKING:
     from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.costs import CostLayer
-    from hybridnav.grid import Frame
+    from hybridnav.grid import Frame, OccupancyGrid
     from hybridnav.jumps import JumpSearch
     from hybridnav.mesh import MeshSearch
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.portals import BuiltPortals
     from hybridnav.pyramid import Level
     from hybridnav.result import Metric, Route
+    from hybridnav.topology import TopologicalMap
 
     Prepared = MeshSearch | JumpSearch | BuiltPortals
     """What planners of cell paths build of a map."""
@@ -155,3 +157,48 @@ class Updatable(Protocol):
             First row, last row + 1, first column, last column + 1 of the cells that differ.
         """
         ...
+
+
+@runtime_checkable
+class Carried(Protocol):
+    """A planner of cell paths whose structures are taken over to the places of a changed map."""
+
+    def carried(self, topology: TopologicalMap, costs: CostLayer | None) -> Carried:
+        """Return the planner of a changed map; this one stays as it is until `catch_up`.
+
+        Parameters
+        ----------
+        topology
+            The places of the map now.
+        costs
+            The costs on it, None for lengths.
+        """
+        ...
+
+    def catch_up(self) -> None:
+        """Bring structures up to date that another planner has built; no query runs meanwhile."""
+        ...
+
+
+@runtime_checkable
+class Following(Protocol):
+    """A planner of cell paths that plans on the grid alone, and follows its changes."""
+
+    def followed(self, grid: OccupancyGrid, cells: LongArray) -> CellPlanner:
+        """Return the planner of a changed map; this one stays as it is.
+
+        Parameters
+        ----------
+        grid
+            The map now.
+        cells
+            int64 (m, 2), (row, col) of the cells whose class is another one than before.
+        """
+        ...
+
+
+def enterable_of(grid: OccupancyGrid, cells: LongArray, *, allow_unexplored: bool) -> BoolArray:
+    """Return which of some cells (row, col) may be entered."""
+    classes = grid.classes[tuple(cells.T)]
+    is_open: BoolArray = classes == CellClass.FREE
+    return is_open | (classes == CellClass.UNEXPLORED) if allow_unexplored else is_open

@@ -131,7 +131,7 @@ class MaxDistance:
         self._own = own
         self._settings = settings
         self._search: MaxDistanceSearch | None = None
-        self._building = threading.Lock()
+        self._building = threading.RLock()  # a progress callback may plan
 
     @property
     def prepared(self) -> None:
@@ -217,7 +217,7 @@ class OverPortals:
         self._settings = settings
         self._built = built
         self._search: PortalSearch | None = None
-        self._building = threading.Lock()
+        self._building = threading.RLock()  # a progress callback may plan
 
     @property
     def prepared(self) -> BuiltPortals | None:

@@ -10,6 +10,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.costs import CostLayer, cost_along
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import checked_type
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.closed import ClosedCells
 from hybridnav.refine import CostLine
@@ -17,16 +18,10 @@ from hybridnav.result import Path
 from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
-
     from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import PlannerSettings, Preset
-    from hybridnav.grid import Frame, OccupancyGrid
-
-    Box = tuple[int, int, int, int]
-
-_ROUNDING_CELLS = 1e-6
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid.areas import Box
 
 
 @copies_alike
@@ -61,6 +56,23 @@ class PlannerCosts:
             self.check(given)
             self.layer = given if self._named is None else self._named | given
 
+    def on(self, grid: OccupancyGrid) -> PlannerCosts:
+        """Return the costs on the same map after its cells changed.
+
+        Raises
+        ------
+        InvalidValueError
+            When costs computed from the map are joined with given ones.
+        """
+        if self._named is None:
+            return PlannerCosts(grid, self._preset, self.layer)
+        if self.layer is not self._named:
+            raise InvalidValueError(
+                f"costs were given that are joined with those that preset {self._preset.name} "
+                "computes from the map, which changed: make a new planner of the map now"
+            )
+        return PlannerCosts(grid, self._preset, None)
+
     def changed(self, given: CostLayer, box: Box) -> CostLayer:
         """Return the layer with the cells in a box as another given layer has them.
 
@@ -89,54 +101,12 @@ class PlannerCosts:
 
     def check(self, given: CostLayer) -> None:
         """Raise `InvalidValueError` if a planner cannot plan by a layer."""
-        if not isinstance(given, CostLayer):
-            raise InvalidValueError(f"costs must be a CostLayer, got a {type(given).__name__}")
-        given.check_fits(self._grid)
+        checked_type("costs", given, CostLayer).check_fits(self._grid)
         if why := self._preset.planner.refusal_of_costs():
-            raise InvalidValueError(f"preset {self._preset.name} cannot plan by costs: {why}")
-
-
-def box_of_cells(
-    changed: BaseGeometry | ArrayLike | None, frame: Frame, shape: tuple[int, int]
-) -> Box:
-    """Return the box of all cells that an area overlaps.
-
-    Parameters
-    ----------
-    changed
-        A shapely geometry in metres, whose bounds are taken, or `(x_min, y_min, x_max, y_max)` in
-        metres, map frame; None for the whole map.
-    frame
-        Place of the map.
-    shape
-        Its rows and columns.
-
-    Returns
-    -------
-    tuple
-        First row, last row + 1, first column, last column + 1.
-
-    Raises
-    ------
-    InvalidValueError
-        When the area is not described by four finite numbers, the least first.
-    """
-    if changed is None:
-        return 0, shape[0], 0, shape[1]
-    try:
-        x_min, y_min, x_max, y_max = np.asarray(getattr(changed, "bounds", changed), np.float64)
-    except (TypeError, ValueError, OverflowError):
-        x_min = y_min = x_max = y_max = np.float64(np.nan)
-    if not (x_min <= x_max < np.inf and y_min <= y_max < np.inf and min(x_min, y_min) > -np.inf):
-        raise InvalidValueError(
-            f"changed is {changed!r:.80}, expected an area in metres: give a shapely geometry, or "
-            "(x_min, y_min, x_max, y_max)"
-        )
-    corners = np.array([[x_min, y_min], [x_min, y_max], [x_max, y_min], [x_max, y_max]])
-    positions = frame.positions_of(corners)
-    low = np.clip(np.floor(positions.min(axis=0) + _ROUNDING_CELLS), 0, shape).astype(int)
-    high = np.clip(np.ceil(positions.max(axis=0) - _ROUNDING_CELLS), 0, shape).astype(int)
-    return int(low[0]), int(high[0]), int(low[1]), int(high[1])
+            closes = "" if given.closed is None else "; closed cells alone go as `blocked`"
+            raise InvalidValueError(
+                f"preset {self._preset.name} cannot plan by costs: {why}{closes}"
+            )
 
 
 @copies_alike

@@ -84,6 +84,13 @@ def read_pose(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray
     return pose
 
 
+def read_end(name: str, given: ArrayLike, *, needs_heading: bool | None) -> FloatArray:
+    """Return a position, float64 (2,), or with OMPL a pose, (3,); None stands for no OMPL."""
+    if needs_heading is None:
+        return read_point(name, given)
+    return read_pose(name, given, needs_heading=needs_heading)
+
+
 def read_points(name: str, points: ArrayLike, *, needs_heading: bool = False) -> FloatArray:
     """Return positions, float64 (n, 2), or with headings (n, 3); n may be 0."""
     rows, width = _numbers(points), 3 if needs_heading else 2

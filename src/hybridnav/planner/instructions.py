@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import bisect
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from hybridnav.planner.bends import Line
+from hybridnav.planner.events import events_of, stretches_of, turned, without_slivers
 from hybridnav.sentences import Doorway, Instruction, Turn
 from hybridnav.sentences.instruction import LEAST_BEND_RAD
 
@@ -17,26 +15,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from hybridnav.planner.bends import Bend
+    from hybridnav.planner.events import Event, Stretch
     from hybridnav.planner.landmarks import Landmarks
     from hybridnav.planner.legs import Leg
     from hybridnav.result import Path
-    from hybridnav.sentences import Passed, Space
-    from hybridnav.sentences.instruction import Hand, Kind
-    from hybridnav.topology import Door
+    from hybridnav.sentences import Landmark, Passed
+    from hybridnav.sentences.instruction import Hand
 
-_SLIVER_M = 1.0
-"""Length of a leg outside rooms that is not mentioned, as across a gap between two outlines."""
-_GRAZE_M = 3.0
-"""Length of a visit in a room, in and out by one door, that is not mentioned."""
-_IN_DOORWAY_M = 1.5
-"""Distance from a door within which a bend is described with it."""
-_AT_WAYPOINT_M = 0.5
-"""Distance from a waypoint at which a bend lies at it, and not at a door farther on."""
 _NEAR_EXIT_M = 4.0
 """Distance of the first door up to which a start needs no landmark."""
-_BEYOND_M = 0.75
-"""Distance from a door from which a bend lies clearly before or behind it."""
-_NEARER_RAD = math.radians(10.0)
 _SLIGHT_RAD = math.radians(25.0)
 """Turn below which one passes an opening straight on, however it lies."""
 _ASTRAY_RAD = math.radians(30.0)
@@ -45,58 +32,28 @@ _ALONG_M = 6.0
 """Length from which a path that passes an opening aslant leads along its wall before."""
 _LONG_M = 8.0
 """Length above which a stretch needs landmarks at both hands."""
+_KEPT_M = 5.0
+"""Length up to which a person goes on in the direction of the door that was passed."""
+_LAST_M = 1.0
+"""End of a path that has a direction."""
+_ASIDE_RAD = math.radians(60.0)
+"""Angle between two doors from which the second lies at one hand for a person in the first."""
 _LOOK_M, _CLEAR_M = 3.0, 0.5
 """Stretch of a path beside a door that has a direction: from 0.5 to 3 m off the door."""
 
 
 @dataclass(frozen=True)
-class _Stretch:
-    """The part of the line inside one space."""
+class _Since:
+    """What a person knows since the instruction before."""
 
-    space: Space
-    begin_m: float
-    end_m: float
-    doors: tuple[Door, ...] = ()
-    """Doors at its end: two or more across a gap between two outlines."""
-    waypoint: str | None = None
-    is_last: bool = False
-    """Whether its path ends with it."""
-
-
-@dataclass(frozen=True)
-class _Event:
-    """What happens at a length of the line."""
-
-    kind: Kind
-    at_m: float
-    stretch: _Stretch
-    """Where one is before it."""
-    following: _Stretch | None = None
-    """The stretch that a crossing leads to."""
-    turn: Bend | None = None
-    """The bend here, or into a door."""
-    behind: Bend | None = None
-    """The bend behind a door."""
-    is_oriented: bool = True
-    """Whether a person knows the direction of the path before it."""
-
-    @property
-    def door(self) -> Door | None:
-        """The door crossed: the narrowest of those on both sides of a gap."""
-        return min(self.stretch.doors, key=lambda door: door.width_m, default=None)
-
-    @property
-    def leads_forward(self) -> bool:
-        """Whether it leads from the first room of its door to the other."""
-        doors = self.stretch.doors
-        forward = True
-        name = self.stretch.space.name
-        for door in doors:
-            forward = door.rooms[0] == name
-            name = door.rooms[1] if forward else door.rooms[0]
-            if door is self.door:
-                break
-        return forward
+    at_m: float = 0.0
+    """Where it is followed, by the length of the line."""
+    is_first: bool = True
+    """Whether the next door is the first one after the start or a waypoint."""
+    entered: frozenset[int] = frozenset()
+    """Numbers of the doors by which one has entered the room."""
+    facing_rad: float = math.nan
+    """Direction in which one has passed the last door, and goes on; NaN where another was told."""
 
 
 def instructions_of(
@@ -119,51 +76,92 @@ def instructions_of(
         Heading at the start, None if there is none.
     """
     line = Line(paths)
-    stretches = _without_slivers(list(_stretches(line, legs)))
-    before_m, is_first, entered = 0.0, True, set[int]()
-    events = _events(line, stretches, landmarks)
-    start = _start(line, stretches[0].space, heading_rad)
-    first = events[0]
-    if heading_rad is None and not (first.kind == "cross" and first.at_m <= _NEAR_EXIT_M):
-        left = {door.number for door in stretches[0].doors}
-        start = replace(start, landmark=landmarks.at_start(line, start.space.name, left))
+    stretches = without_slivers(list(stretches_of(line, legs)))
+    events = events_of(line, stretches, landmarks)
+    start = _start(line, events[0], landmarks, heading_rad)
     yield start
-    if heading_rad is None and start.landmark is None:
+    if heading_rad is None and start.landmark is None and start.heading_rad is None:
         events[0] = replace(events[0], is_oriented=False)
+    since = _Since(entered=_left_behind(start.landmark))
     for event, following in zip(events, [*events[1:], None], strict=True):
-        stretch = event.stretch
-        left = {door.number for door in stretch.doors}
-        doorway = None
-        if event.following is not None:
-            until_m = line.length_m if following is None else following.at_m
-            doorway = _doorway(line, event, event.following, landmarks, (before_m, until_m))
-            doorway = replace(doorway, is_first=is_first)
-        between_m = (before_m, event.at_m)
-        passed = landmarks.passed(line, between_m, stretch.space.name, entered | left)
-        instruction = Instruction(
-            event.kind,
-            line.at(event.at_m),
-            event.at_m,
-            event.at_m - before_m,
-            stretch.space,
-            _needed(passed, event.at_m - before_m, _hand_of(event, doorway)),
-            None if event.turn is None else Turn(event.turn.angle_rad),
-            doorway,
-        )
-        if event.following is not None:
-            is_first, entered = False, left
-        elif event.kind == "arrive":
-            is_point = stretch.waypoint is not None and stretch.waypoint != stretch.space.name
-            seen = landmarks.at_goal(line, between_m, stretch.space.name, entered)
-            instruction = replace(
-                instruction, waypoint=stretch.waypoint, landmark=seen if is_point else None
-            )
-            is_first = True
+        until_m = line.length_m if following is None else following.at_m
+        instruction = _told(line, event, until_m, since, landmarks)
         yield instruction
-        before_m = event.at_m
+        since = _after(event, instruction.doorway, since, landmarks)
 
 
-def _hand_of(event: _Event, doorway: Doorway | None) -> Hand | None:
+def _start(
+    line: Line, first: Event, landmarks: Landmarks, heading_rad: float | None
+) -> Instruction:
+    """Return the start, with what shows the direction to a person who knows none."""
+    space, onward_rad = first.stretch.space, line.first_heading()
+    start = Instruction("start", line.at(0.0), 0.0, 0.0, space)
+    if heading_rad is not None:
+        angle = turned(heading_rad, onward_rad)
+        return replace(start, turn=Turn(angle)) if abs(angle) >= LEAST_BEND_RAD else start
+    if math.isnan(onward_rad) or (first.kind == "cross" and first.at_m <= _NEAR_EXIT_M):
+        return start
+    seen = landmarks.at_start(line, space.name, {door.number for door in first.stretch.doors})
+    return replace(start, landmark=seen, heading_rad=onward_rad if seen is None else None)
+
+
+def _left_behind(mark: Landmark | None) -> frozenset[int]:
+    """Return the door named at the start, if a person does not pass it afterwards."""
+    is_passed = mark is None or mark.side.startswith("ahead")
+    return frozenset() if is_passed or mark is None else frozenset({mark.door})
+
+
+def _told(
+    line: Line, event: Event, until_m: float, since: _Since, landmarks: Landmarks
+) -> Instruction:
+    """Return the instruction for an event, with what is passed before it."""
+    stretch, between_m = event.stretch, (since.at_m, event.at_m)
+    room, but = stretch.space.name, since.entered | {door.number for door in stretch.doors}
+    doorway = mark = waypoint = None
+    if event.following is not None:
+        doorway = _doorway(line, event, event.following, landmarks, (since, until_m))
+    elif event.kind == "arrive":
+        waypoint = stretch.waypoint
+        if waypoint is not None and waypoint != room:
+            mark = landmarks.at_goal(line.at(event.at_m), _facing(line, event, since), room, but)
+            but |= frozenset() if mark is None else {mark.door}
+    passed = landmarks.passed(line, between_m, room, but)
+    return Instruction(
+        event.kind,
+        line.at(event.at_m),
+        event.at_m,
+        event.at_m - since.at_m,
+        stretch.space,
+        _needed(passed, event.at_m - since.at_m, _hand_of(event, doorway)),
+        None if event.turn is None else Turn(event.turn.angle_rad),
+        doorway,
+        waypoint,
+        mark,
+    )
+
+
+def _facing(line: Line, event: Event, since: _Since) -> float:
+    """Return the direction in which a person looks who arrives, radians; NaN without motion."""
+    if event.at_m - since.at_m <= _KEPT_M and not math.isnan(since.facing_rad):
+        return since.facing_rad
+    return line.heading(max(since.at_m, event.at_m - _LAST_M), event.at_m)
+
+
+def _after(event: Event, doorway: Doorway | None, since: _Since, landmarks: Landmarks) -> _Since:
+    """Return what a person knows after an instruction."""
+    if event.kind == "arrive":
+        return _Since(event.at_m, entered=since.entered)
+    if doorway is None:
+        return replace(since, at_m=event.at_m, facing_rad=math.nan)
+    is_told = not doorway.is_opening or doorway.beside is not None or event.turn is not None
+    facing_rad = math.nan
+    if event.door is not None and is_told and doorway.behind is None and doorway.onward is None:
+        facing_rad = landmarks.way_out_rad(event.door, is_forward=event.leads_forward)
+    entered = frozenset(door.number for door in event.stretch.doors)
+    return _Since(event.at_m, False, entered, facing_rad)
+
+
+def _hand_of(event: Event, doorway: Doorway | None) -> Hand | None:
     """Return the hand at which a person looks for a door; None for no door, and for ahead."""
     if doorway is None:
         return None
@@ -177,135 +175,12 @@ def _needed(passed: tuple[Passed, ...], length_m: float, hand: Hand | None) -> t
     return tuple(one for one in passed if one.hand == hand)
 
 
-def _start(line: Line, space: Space, heading_rad: float | None) -> Instruction:
-    x, y = line.at(0.0)
-    turn = None
-    if heading_rad is not None:
-        angle = _turned(heading_rad, line.first_heading())
-        turn = Turn(angle) if abs(angle) >= LEAST_BEND_RAD else None
-    return Instruction("start", (x, y), 0.0, 0.0, space, turn=turn)
-
-
-def _stretches(line: Line, legs: Sequence[Sequence[Leg]]) -> Iterator[_Stretch]:
-    """Yield the stretches of the line inside the space of each leg."""
-    begin_m = 0.0
-    for own, ends_m in zip(legs, line.ends_m, strict=True):
-        shares = np.cumsum([begin_m, *(leg.length_m for leg in own)])[1:].tolist()
-        for leg, guess_m in zip(own[:-1], shares, strict=False):
-            end_m = line.nearest(leg.endpoint, begin_m, guess_m)
-            doors = () if leg.door is None else (leg.door,)
-            yield _Stretch(leg.space, begin_m, end_m, doors)
-            begin_m = end_m
-        yield _Stretch(own[-1].space, begin_m, ends_m, (), own[-1].waypoint, is_last=True)
-        begin_m = ends_m
-
-
-def _without_slivers(stretches: Sequence[_Stretch]) -> list[_Stretch]:
-    """Join the stretches on both sides of a gap between two outlines, and of a graze.
-
-    The doors on both sides of the gap are one, which lies where the narrower of them does.
-    """
-    kept: list[_Stretch] = []
-    for stretch in stretches:
-        before = kept[-1] if kept and not kept[-1].is_last else None
-        if before is not None and _is_graze(kept[-2:], stretch):
-            kept.pop()
-            before = kept[-1]
-        is_gap = stretch.space.name is None and stretch.end_m - stretch.begin_m < _SLIVER_M
-        if before is not None and is_gap and not stretch.is_last:
-            is_narrower = _narrowest_m(stretch.doors) < _narrowest_m(before.doors)
-            end_m = stretch.end_m if is_narrower else before.end_m
-            kept[-1] = replace(before, end_m=end_m, doors=before.doors + stretch.doors)
-        elif before is not None and before.space.name == stretch.space.name:
-            kept[-1] = replace(stretch, begin_m=before.begin_m)
-        else:
-            kept.append(stretch if before is None else replace(stretch, begin_m=before.end_m))
-    return kept
-
-
-def _is_graze(last: Sequence[_Stretch], stretch: _Stretch) -> bool:
-    """Return whether the last stretch is a short visit between the one before and another."""
-    if len(last) < 2 or last[0].is_last:  # noqa: PLR2004
-        return False
-    before, visit = last
-    is_short = visit.end_m - visit.begin_m < _GRAZE_M
-    return (
-        is_short and before.doors == visit.doors[::-1] and before.space.name == stretch.space.name
-    )
-
-
-def _narrowest_m(doors: Sequence[Door]) -> float:
-    return min((door.width_m for door in doors), default=math.inf)
-
-
-def _events(line: Line, stretches: Sequence[_Stretch], landmarks: Landmarks) -> list[_Event]:
-    """Return what happens along the line, in order: doors, waypoints, and bends."""
-    events = [
-        _Event("arrive" if one.is_last else "cross", one.end_m, one, None if one.is_last else other)
-        for one, other in zip(stretches, [*stretches[1:], None], strict=True)
-    ]
-    ends_m = [one.end_m for one in stretches]
-    near: dict[int, list[Bend]] = {}
-    turns: list[_Event] = []
-    for bend in line.bends():
-        crossing = _crossing_near(events, bend.at_m)
-        if crossing is not None and Turn(bend.angle_rad).is_slight:
-            continue  # where a door lies and leads is described with it
-        if crossing is None:
-            stretch = stretches[min(bisect.bisect_right(ends_m, bend.at_m), len(stretches) - 1)]
-            turns.append(_Event("turn", bend.at_m, stretch, turn=bend))
-        else:
-            near.setdefault(crossing, []).append(bend)
-    for crossing, bends in near.items():
-        events[crossing], others = _with_bends(events[crossing], bends, landmarks)
-        turns += others
-    return sorted([*events, *turns], key=lambda event: (event.at_m, event.kind == "turn"))
-
-
-def _crossing_near(events: Sequence[_Event], at_m: float) -> int | None:
-    """Return the index of the nearest crossing within reach of a bend, without a waypoint between;
-    None if there is none."""
-    waypoints = [number for number, event in enumerate(events) if event.kind == "arrive"]
-    beside = [other for other in waypoints if abs(events[other].at_m - at_m) <= _AT_WAYPOINT_M]
-    near = [
-        (abs(event.at_m - at_m), number)
-        for number, event in enumerate(events)
-        if event.kind == "cross"
-        and abs(event.at_m - at_m) <= _IN_DOORWAY_M
-        and not any((other > number) == (events[other].at_m <= at_m) for other in waypoints)
-        and all(abs(event.at_m - events[other].at_m) <= _AT_WAYPOINT_M for other in beside)
-    ]
-    return min(near)[1] if near else None
-
-
-def _with_bends(
-    event: _Event, bends: Sequence[Bend], landmarks: Landmarks
-) -> tuple[_Event, list[_Event]]:
-    """Return a crossing with the bends at it, and the turns that remain.
-
-    A single bend in a door leads into it if the path behind it is clearly nearer to the right angle
-    with the door than the path before it; else it lies behind the door.
-    """
-    before = [bend for bend in bends if bend.at_m < event.at_m]
-    behind = [bend for bend in bends if bend.at_m >= event.at_m]
-    if len(bends) == 1 and abs(bends[0].at_m - event.at_m) < _BEYOND_M and event.door is not None:
-        way = landmarks.way_out_rad(event.door, is_forward=event.leads_forward)
-        off = [abs(_turned(way, heading)) for heading in (bends[0].before_rad, bends[0].after_rad)]
-        leads_in = off[1] + _NEARER_RAD < off[0]
-        before, behind = (list(bends), []) if leads_in else ([], list(bends))
-    rest = [_Event("turn", bend.at_m, event.stretch, turn=bend) for bend in before[:-1]]
-    if event.following is not None:
-        rest += [_Event("turn", bend.at_m, event.following, turn=bend) for bend in behind[1:]]
-    turn, after = before[-1] if before else None, behind[0] if behind else None
-    return replace(event, turn=turn, behind=after), rest
-
-
 def _doorway(
     line: Line,
-    event: _Event,
-    following: _Stretch,
+    event: Event,
+    following: Stretch,
     landmarks: Landmarks,
-    between_m: tuple[float, float],
+    known: tuple[_Since, float],
 ) -> Doorway:
     """Return a crossing for sentences: its door, and how the path comes and goes.
 
@@ -313,25 +188,32 @@ def _doorway(
     hand at which the door lies is then told as one who stands in the door sees it.
     """
     door, at_m = event.door, event.at_m
+    since, until_m = known
+    between_m = since.at_m, until_m
     if door is None:
-        return Doorway(following.space, behind=_turn_of(event.behind))
+        return Doorway(following.space, is_first=since.is_first, behind=_turn_of(event.behind))
     doorway = Doorway(
         following.space,
         door.number,
         door.width_m,
+        door.passage_m,
         is_opening=door.is_opening,
+        is_first=since.is_first,
         behind=_turn_of(event.behind),
     )
     way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
     comes = line.heading(max(at_m - _LOOK_M, between_m[0]), max(at_m - _CLEAR_M, between_m[0]))
     goes = line.heading(min(at_m + _CLEAR_M, between_m[1]), min(at_m + _LOOK_M, between_m[1]))
-    into_rad, out_rad = _turned(comes, way), _turned(way, goes)
-    is_straight = doorway.is_opening and abs(_turned(comes, goes)) < _SLIGHT_RAD
+    into_rad, out_rad = turned(comes, way), turned(way, goes)
+    is_straight = doorway.is_opening and abs(turned(comes, goes)) < _SLIGHT_RAD
     is_beside = event.is_oriented and event.turn is None
     if is_straight:
         is_beside = is_beside and at_m - between_m[0] > _ALONG_M
         return replace(doorway, beside=_hand(into_rad) if is_beside else None)
     beside, onward = _hand(into_rad) if is_beside else None, _hand(out_rad)
+    aside_rad = turned(since.facing_rad, way)
+    if is_beside and abs(aside_rad) >= _ASIDE_RAD and at_m - since.at_m <= _KEPT_M:
+        beside = "left" if aside_rad > 0 else "right"
     behind = doorway.behind
     if behind is not None and not (beside and beside == onward == behind.hand):
         return replace(doorway, beside=beside)
@@ -380,8 +262,3 @@ def _hand(angle_rad: float) -> Hand | None:
     if not abs(angle_rad) >= LEAST_BEND_RAD:
         return None
     return "left" if angle_rad > 0 else "right"
-
-
-def _turned(heading_rad: float, to_rad: float) -> float:
-    """Return the turn from one heading to another, radians in [-pi, pi]."""
-    return math.remainder(to_rad - heading_rad, math.tau)

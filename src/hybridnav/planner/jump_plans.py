@@ -12,14 +12,14 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.grid.centres import centres
-from hybridnav.jumps import JumpSearch, build_jump_graph, contract_graph
-from hybridnav.planner.cell_planner import CellPlan, CellPlans
+from hybridnav.jumps import JumpPatch, JumpSearch, build_jump_graph, contract_graph
+from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
 from hybridnav.planner.cell_plans import WholeMap, round_closed
 from hybridnav.result import PlanStats
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.grid import OccupancyGrid
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
@@ -61,31 +61,45 @@ class OverJumps:
         search: JumpSearch | None = None,
     ) -> None:
         self._grid = grid
+        self._settings = settings
         self._allow_unexplored = settings.allow_unexplored
         self._refiner = refiner
         self._whole_map = WholeMap(refiner)
         self._search = search
-        self._building = threading.Lock()
+        self._building = threading.RLock()  # a progress callback may plan
         self._frame = grid.frame.for_kernels
 
     @property
     def prepared(self) -> JumpSearch | None:
-        """The search of the graph, None until it is built."""
-        return self._search
+        """The search of the graph, None until it is built, and after a change of the map."""
+        search = self._search
+        return None if search is None or search.patch is not None else search
 
     def prepare(self, progress: Progress = no_progress) -> JumpSearch:
-        """Build the graph, once; see `CellPlanner`."""
-        if self._search is None:
+        """Build the graph, once, also anew after a change of the map; see `CellPlanner`."""
+        if self.prepared is None:
             with self._building:
-                if self._search is None:
+                if self.prepared is None:
                     free = self._grid.enterable(allow_unexplored=self._allow_unexplored)
                     graph = build_jump_graph(free)
+                    base = JumpPatch.of(graph)
                     progress(1, 2)
                     if graph.n_corners >= CONTRACTED_FROM:
                         graph = contract_graph(graph)
-                    self._search = JumpSearch(graph)
+                    self._search = JumpSearch(graph, base=base)
                     progress(2, 2)
+        assert self._search is not None  # noqa: S101 - built above
         return self._search
+
+    def followed(self, grid: OccupancyGrid, cells: LongArray) -> OverJumps:
+        """Return the planner of the changed map, whose corners look anew; see `Following`."""
+        allowed, search = self._allow_unexplored, self._search
+        if search is not None:
+            free = grid.enterable(allow_unexplored=allowed)
+            was = enterable_of(self._grid, cells, allow_unexplored=allowed)
+            changed = cells[was != free[tuple(cells.T)]]
+            search = search.renewed(free, changed) if len(changed) else search
+        return OverJumps(grid, self._refiner.on(grid), self._settings, search)
 
     def plan(self, query: CellQuery) -> CellPlan:
         """Find a shortest path between two cells; see `CellPlanner`."""
@@ -97,7 +111,7 @@ class OverJumps:
             self.prepare()
             seconds["graph"] = time.perf_counter() - began
         now = time.perf_counter()
-        found = self.prepare().path(*query.cells)
+        found = (self._search or self.prepare()).path(*query.cells)
         seconds["jumps"] = time.perf_counter() - now
         plan = CellPlan(
             found.cells,
@@ -115,7 +129,7 @@ class OverJumps:
         """
         if self._grid.corner_cutting:
             return None
-        found = self.prepare().many(*queries.cells)
+        found = (self._search or self.prepare()).many(*queries.cells)
         cost_m = found.length_cells * self._grid.resolution_m
         done, points = np.ones(len(cost_m), dtype=np.bool_), centres(found.cells, self._frame)
         return CellPlans(done, cost_m, cost_m, found.path_start, points)

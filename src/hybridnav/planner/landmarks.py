@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav.grid import CellClass
+from hybridnav.poses import wrapped
 from hybridnav.sentences import Landmark, Passed, Space
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
+    from hybridnav._typing import FloatArray
     from hybridnav.planner.bends import Line
     from hybridnav.sentences.instruction import Hand, Side
     from hybridnav.topology import Door, Rooms
@@ -33,8 +36,12 @@ _NEARBY_M = 5.0
 """Distance of a door that shows a person where a path ends, at most."""
 _NEAREST_M = 0.7
 """Distance from a door below which nobody can tell where it lies."""
-_AHEAD_RAD = math.radians(35.0)
+_AHEAD_RAD = math.radians(15.0)
 """Angle to the path up to which a landmark lies ahead, or behind."""
+_TOWARDS_RAD = math.radians(20.0)
+"""Angle to the first stretch up to which a path leads towards some part of its exit."""
+_BESIDE_RAD = math.radians(60.0)
+"""Angle to the path from which a landmark lies at one hand."""
 _LEAST_SIDEWAYS = 0.5
 """Sine of the least angle between a path and the way out by a door beside it."""
 
@@ -51,6 +58,7 @@ class Landmarks:
     def __init__(self, rooms: Rooms) -> None:
         self._rooms = rooms
         self._way_through_rad: dict[int, float] = {}
+        self._points_of: dict[int, FloatArray] = {}
 
     @cached_property
     def _doors_of(self) -> dict[str | None, list[Door]]:
@@ -164,40 +172,42 @@ class Landmarks:
         Returns
         -------
         Landmark or None
-            The exit if it lies ahead, over furniture too; else the nearest other door in sight,
-            within 20 m; else the exit in sight; else the nearest other door that lies ahead.
+            The exit straight ahead, over furniture too; else the exit in sight if it lies ahead at
+            one hand; else the nearest other door in sight, within 20 m; else the exit in sight;
+            else what lies ahead behind furniture, or, for a path that stays in the room, anywhere.
         """
-        (x, y), heading_rad = line.at(0.0), line.first_heading()
-        found: list[tuple[bool, bool, float, int, Landmark]] = []
-        for door in () if math.isnan(heading_rad) else self._doors_of.get(room, ()):
-            away_m, is_exit = math.dist((x, y), door.position), door.number in exits
-            if away_m < _NEAREST_M or (away_m > _FARTHEST_M and not is_exit):
+        point, heading_rad = line.at(0.0), line.first_heading()
+        found: list[tuple[bool, int, float, int, Landmark]] = []
+        for door in self._doors_of.get(room, ()):
+            away_m, is_exit = math.dist(point, door.position), door.number in exits
+            is_far = away_m > _FARTHEST_M and not is_exit
+            if away_m < _NEAREST_M or is_far or (door.is_opening and None in door.rooms):
                 continue
-            way = math.atan2(door.position[1] - y, door.position[0] - x)
-            side = _side(math.remainder(way - heading_rad, math.tau))
-            beyond = door.rooms[1] if door.rooms[0] == room else door.rooms[0]
-            if door.is_opening and beyond is None:
-                continue
-            seen = Landmark(door.number, Space(beyond), side, is_opening=door.is_opening)
-            if is_exit and side == "ahead":
-                return seen
-            is_hidden = not self._is_seen([x, y], door)
-            if is_hidden and side != "ahead":
-                continue
-            found.append((is_hidden, is_exit, away_m, door.number, seen))
+            seen = self._mark(door, room, point, heading_rad)
+            if is_exit and self._leads_to(door, point, heading_rad):
+                return replace(seen, side="ahead")
+            is_hidden = not self._is_seen(list(point), door)
+            is_ahead = seen.side.startswith("ahead")
+            if not is_hidden or not exits or is_ahead:
+                rank = (0 if is_ahead else 2) if is_exit else 1
+                found.append((is_hidden, rank, away_m, door.number, seen))
         return min(found, key=lambda one: one[:4])[4] if found else None
 
     def at_goal(
-        self, line: Line, between_m: tuple[float, float], room: str | None, but: Collection[int]
+        self,
+        point: tuple[float, float],
+        heading_rad: float,
+        room: str | None,
+        but: Collection[int],
     ) -> Landmark | None:
         """Return the door that shows a person where a path ends.
 
         Parameters
         ----------
-        line
-            The path.
-        between_m
-            Begin and end of its last stretch, by the length of the path.
+        point
+            Where it ends, `(x, y)` in metres, map frame.
+        heading_rad
+            Direction in which the person looks, radians; NaN without one.
         room
             The room in which it ends, None outside rooms.
         but
@@ -208,22 +218,54 @@ class Landmarks:
         Landmark or None
             The nearest other door in sight, within 5 m.
         """
-        begin_m, end_m = between_m
-        (x, y), heading_rad = line.at(end_m), line.heading(max(begin_m, end_m - _LOOK_M), end_m)
         near = [
             (away_m, door.number, door)
             for door in self._doors_of.get(room, ())
-            for away_m in [math.dist((x, y), door.position)]
+            for away_m in [math.dist(point, door.position)]
             if _NEAREST_M <= away_m <= _NEARBY_M and door.number not in but
-            if not (door.is_opening and None in door.rooms) and self._is_seen([x, y], door)
+            if not (door.is_opening and None in door.rooms) and self._is_seen(list(point), door)
         ]
         if not near or math.isnan(heading_rad):
             return None
-        door = min(near)[2]
-        way = math.atan2(door.position[1] - y, door.position[0] - x)
+        return self._mark(min(near)[2], room, point, heading_rad)
+
+    def _mark(
+        self, door: Door, room: str | None, point: tuple[float, float], heading_rad: float
+    ) -> Landmark:
+        """Return a door as a landmark for a person at a point of a room.
+
+        Where it lies is judged by its nearest point: the middle of a wide opening lies ahead of one
+        who stands beside it.
+        """
+        span = self._span(door)
+        away_m = np.hypot(*(span - point).T)
+        nearest = int(np.argmin(away_m))
+        middle = _turn_to(heading_rad, point, door.position)
+        if away_m[nearest] < _NEAREST_M:
+            way = self.way_out_rad(door, is_forward=door.rooms[0] == room)
+            angle = math.remainder(way - heading_rad, math.tau)
+        else:
+            angle = _turn_to(heading_rad, point, span[nearest].tolist())
+        if abs(middle) <= _AHEAD_RAD and abs(angle) <= _BESIDE_RAD:
+            angle = middle
         beyond = door.rooms[1] if door.rooms[0] == room else door.rooms[0]
-        side = _side(math.remainder(way - heading_rad, math.tau))
-        return Landmark(door.number, Space(beyond), side, is_opening=door.is_opening)
+        return Landmark(door.number, Space(beyond), _side(angle), is_opening=door.is_opening)
+
+    def _leads_to(self, door: Door, point: tuple[float, float], heading_rad: float) -> bool:
+        """Return whether some part of a door lies in the direction of a path."""
+        across, up = (self._span(door) - point).T
+        off = wrapped(np.arctan2(up, across) - heading_rad)
+        return bool((np.abs(off) <= _TOWARDS_RAD).any())
+
+    def _span(self, door: Door) -> FloatArray:
+        """Return the points of a door from end to end, float64 (n, 2), metres."""
+        span = self._points_of.get(door.number)
+        if span is None:
+            frame, cols = self._rooms.grid.frame, self._rooms.grid.shape[1]
+            flat = self._rooms.cells_beside(door.number)
+            span = frame.points_of(np.column_stack(np.divmod(flat, cols)))
+            self._points_of[door.number] = span
+        return span
 
     def _hand_of(self, door: Door, room: str | None, heading_rad: float) -> Hand | None:
         """Return the hand to which a door leads out of a room; None if it lies across the path."""
@@ -238,10 +280,7 @@ class Landmarks:
         part of one between two rooms."""
         if self._is_seen(point, door) or None in door.rooms:
             return self._is_seen(point, door)
-        frame, cols = self._rooms.grid.frame, self._rooms.grid.shape[1]
-        flat = self._rooms.cells_beside(door.number)
-        ends = frame.points_of(np.column_stack(np.divmod(flat, cols))).tolist()
-        return any(self._is_free(point, end) for end in ends)
+        return any(self._is_free(point, end) for end in self._span(door).tolist())
 
     def _is_seen(self, point: list[float], door: Door) -> bool:
         """Return whether no occupied cell lies between a point and the middle of a door."""
@@ -256,13 +295,24 @@ class Landmarks:
         return not (grid.measured[tuple(cells.T)] == CellClass.OCCUPIED).any()
 
 
+def _turn_to(heading_rad: float, point: tuple[float, float], end: Sequence[float]) -> float:
+    """Return the turn from a heading towards a point, radians in [-pi, pi]."""
+    way = math.atan2(end[1] - point[1], end[0] - point[0])
+    return math.remainder(way - heading_rad, math.tau)
+
+
 def _side(angle_rad: float) -> Side:
     """Return where something lies, by its angle to the direction of the path."""
-    if abs(angle_rad) <= _AHEAD_RAD:
+    is_left, off = angle_rad > 0, abs(angle_rad)
+    if off <= _AHEAD_RAD:
         return "ahead"
-    if abs(angle_rad) >= math.pi - _AHEAD_RAD:
+    if off >= math.pi - _AHEAD_RAD:
         return "behind"
-    return "left" if angle_rad > 0 else "right"
+    if off < _BESIDE_RAD:
+        return "ahead-left" if is_left else "ahead-right"
+    if off > math.pi - _BESIDE_RAD:
+        return "behind-left" if is_left else "behind-right"
+    return "left" if is_left else "right"
 
 
 def _is_known(door: Door, others: list[Door]) -> bool:

@@ -15,8 +15,16 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.lines import cells_of_line, polyline_length, polyline_lengths
-from hybridnav.mesh import DetourSearch, MeshPath, MeshSearch, build_mesh, shortest_paths
-from hybridnav.planner.cell_planner import CellPlan, CellPlans
+from hybridnav.mesh import (
+    DetourSearch,
+    MeshPath,
+    MeshSearch,
+    build_mesh,
+    locate_polygons,
+    renew_mesh,
+    shortest_paths,
+)
+from hybridnav.planner.cell_planner import CellPlan, CellPlans, enterable_of
 from hybridnav.refine import LineOfSight
 from hybridnav.result import PlanStats
 
@@ -34,6 +42,8 @@ if TYPE_CHECKING:
 Position = tuple[float, float]
 
 
+_MOST_REMOVED, _FEW = 0.5, 1000
+"""Share and number of removed polygons that a mesh keeps: with more of them it is built anew."""
 _KEPT = 8
 """Number of searches round closed cells that are kept for queries with equal closures."""
 
@@ -76,18 +86,36 @@ class OverMesh:
             )
         self._grid, self._frame = grid, grid.frame
         self._refiner = refiner
+        self._settings = settings
         self._allow_unexplored = settings.allow_unexplored
         self._epsilon, self._budget_s = settings.epsilon or 0.0, settings.budget_s
         self._free = np.ascontiguousarray(grid.enterable(allow_unexplored=self._allow_unexplored))
         self._search = search
+        self._is_renewed = self._is_located = False
         self._across = np.array([grid.shape[1], 1])
         self._detours: dict[ClosedCells, DetourSearch] = {}
-        self._building = threading.Lock()
+        self._building = threading.RLock()  # a progress callback may plan
 
     @property
     def prepared(self) -> MeshSearch | None:
-        """The search of the mesh, None until it is built."""
-        return self._search
+        """The search of the mesh, None until it is built, and after a change of the map."""
+        return None if self._is_renewed else self._search
+
+    def followed(self, grid: OccupancyGrid, cells: LongArray) -> OverMesh:
+        """Return the planner of the changed map; polygons beside changed cells are cut anew, and
+        the graph of corners is stale until it is prepared again. See `Following`."""
+        made = OverMesh(grid, self._refiner.on(grid), self._settings)
+        search = self._search
+        if search is not None:
+            was = enterable_of(self._grid, cells, allow_unexplored=self._allow_unexplored)
+            changed = cells[was != made._free[tuple(cells.T)]]
+            mesh = renew_mesh(search.mesh, made._free, changed @ self._across)
+            if mesh is search.mesh:
+                made._search, made._is_renewed = search, self._is_renewed
+                made._is_located = self._is_located
+            elif (mesh.component < 0).sum() <= _MOST_REMOVED * mesh.n_polygons + _FEW:
+                made._search, made._is_renewed = MeshSearch(mesh), True
+        return made
 
     def prepare(self, progress: Progress = no_progress) -> MeshSearch:
         """Build the mesh and the graph of its corners, once; see `CellPlanner`."""
@@ -254,11 +282,23 @@ class OverMesh:
         passed: LongArray = cells_of_line(free, positions - low) + low
         return passed
 
+    def _located(self, search: MeshSearch) -> MeshSearch:
+        """Return the search of a mesh whose cells are listed, as searches round closed cells need
+        it."""
+        if not self._is_renewed:
+            return search
+        with self._building:
+            if not self._is_located:
+                self._search = MeshSearch(locate_polygons(search.mesh, self._free))
+                self._is_located = True
+        return self._search or search
+
     def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
         """Return the search round closed cells, which is cached."""
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:
+            search = self._located(search)
             found = self._detours[closed] = DetourSearch(search, closed.flat)
             for old in list(self._detours)[:-_KEPT]:
                 self._detours.pop(old, None)

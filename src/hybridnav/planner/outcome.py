@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from hybridnav.planner.follow import built_of, is_stale
 from hybridnav.result import PlanResult, PlanStatus
 from hybridnav.route.route_finder import RouteFinder, RouteOfCells
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from hybridnav.config import Preset
     from hybridnav.costs import CostLayer
     from hybridnav.planner.cell_planner import CellPlan
+    from hybridnav.planner.ompl_plans import OmplPlan
     from hybridnav.result import Metric, Path
     from hybridnav.topology import TopologicalMap
 
@@ -25,7 +27,7 @@ class Outcomes:
     Parameters
     ----------
     topology
-        The map.
+        The map; with stale places results have no routes.
     preset
         The preset of the planner.
     costs
@@ -38,7 +40,8 @@ class Outcomes:
         self._topology = topology
         self._preset = preset
         self._costs = costs
-        self._route_finder = RouteFinder(topology)
+        self._built = built_of(topology)
+        self._route_finder = None if is_stale(topology) else RouteFinder(topology)
 
     def answer(self, status: PlanStatus, poses: Poses, **outcome: Any) -> PlanResult:
         """Return a result that records the endpoints, the preset and the settings of the
@@ -80,15 +83,32 @@ class Outcomes:
             stats=plan.stats,
         )
 
-    def route_of(self, path: Path | None) -> RouteOfCells | None:
-        """Return what the route of a path is found from, None for no path."""
-        return (
-            None if path is None else RouteOfCells(self._topology, self._route_finder, path.cells)
+    def by_ompl(self, found: OmplPlan, plan: CellPlan, poses: Poses, bound_m: float) -> PlanResult:
+        """Return the result of a coarse plan refined by OMPL, with the bound of the coarse one."""
+        bound = max(found.lower_bound, bound_m)
+        if found.path is not None and found.status is PlanStatus.SOLVED:
+            bound = min(bound, found.weighted_cost or found.path.length_m)
+        return self.answer(
+            found.status,
+            poses,
+            metric=found.metric,
+            path=found.path,
+            route_source=self.route_of(found.path),
+            lower_bound=bound,
+            weighted_cost=found.weighted_cost,
+            refinement=found.refinement,
+            stats=plan.stats,
         )
+
+    def route_of(self, path: Path | None) -> RouteOfCells | None:
+        """Return what the route of a path is found from, None for no path or stale places."""
+        if path is None or self._route_finder is None:
+            return None
+        return RouteOfCells(self._topology, self._route_finder, path.cells)
 
     @cached_property
     def _settings(self) -> dict[str, Any]:
-        pyramid = self._topology.pyramid
+        pyramid = self._built
         costs = {} if self._costs is None else {"costs": self._costs.source}
         return {
             "preset": self._preset.name,
@@ -97,7 +117,7 @@ class Outcomes:
                 "merge_distance_m": pyramid.merge_distance_m,
                 "linkage": pyramid.linkage,
                 "seed": pyramid.seed,
-                "robot_radius_m": pyramid.grid.robot_radius_m,
+                "robot_radius_m": self._topology.grid.robot_radius_m,
             },
             **costs,
         }

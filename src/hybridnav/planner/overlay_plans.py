@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
+from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
 from hybridnav.planner.cell_planner import CellPlan
 from hybridnav.planner.cell_plans import WholeMap, round_closed
@@ -20,16 +21,15 @@ from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
     from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings
     from hybridnav.costs import CostLayer
+    from hybridnav.grid.areas import Box
     from hybridnav.overlay import Overlay
     from hybridnav.planner.cell_planner import CellQueries, CellQuery
     from hybridnav.pyramid import Level
     from hybridnav.result import Metric
     from hybridnav.topology import TopologicalMap
-
-    Box = tuple[int, int, int, int]
 
 _WORTH = 20
 """Times that queries expand all cells before the overlay is built: building it takes 3 to 7 us a
@@ -57,11 +57,14 @@ class OverOverlay:
         self, topology: TopologicalMap, refiner: GridRefiner, settings: PlannerSettings
     ) -> None:
         self._topology = topology
+        self._settings = settings
         self._allow_unexplored = settings.allow_unexplored
         self._epsilon = settings.epsilon or 0.0
         self._take(refiner)
         self._built: tuple[Overlay, OverlaySearch] | None = None
         self._cannot_build = topology.grid.corner_cutting
+        self._overdue: Box | None = None
+        """Box of the cells that are other ones than in the overlay."""
         self._expanded = 0
         self._building = Turns()
 
@@ -104,8 +107,14 @@ class OverOverlay:
                 self._topology, factor, allow_unexplored=allowed, progress=progress
             )
             if costs is not None and len(costs.closed_flat):
-                overlay.update(factor, closed=costs.closed, changed=_box_of(costs))
+                overlay.update(
+                    factor, closed=costs.closed, changed=_box_of(costs.closed_flat, costs.shape)
+                )
                 overlay.renew()
+            now = self._refiner.costs
+            if now is not costs and now is not None:  # a progress callback has changed them
+                new: Any = now.factors
+                overlay.update(new, closed=now.closed)
         except PathsTooLongError:  # as with factors of hundreds in large fields
             self._cannot_build = True
             return
@@ -126,6 +135,43 @@ class OverOverlay:
             self._built[0].update(factor, closed=costs.closed, changed=box)
         except PathsTooLongError:
             self._built, self._cannot_build = None, True
+
+    def carried(self, topology: TopologicalMap, costs: CostLayer | None) -> OverOverlay:
+        """Return the planner of a changed map, which takes the overlay over; see `Carried`."""
+        allowed = self._allow_unexplored
+        refiner = GridRefiner(topology.grid, allow_unexplored=allowed, costs=costs)
+        other = OverOverlay(topology, refiner, self._settings)
+        other._built, other._expanded = self._built, self._expanded
+        if self._built is not None:
+            before, now = self._state(), other._state()
+            differs = np.logical_or.reduce([a != b for a, b in zip(before, now, strict=True)])
+            other._overdue = _box_of(np.flatnonzero(differs), differs.shape)
+        return other
+
+    def _state(self) -> tuple[AnyArray, BoolArray, BoolArray]:
+        """Return the factors of the cells, which may be entered, and which of these are closed."""
+        costs, grid = self._refiner.costs, self._topology.grid
+        enterable = grid.enterable(allow_unexplored=self._allow_unexplored)
+        closed = None if costs is None else costs.closed
+        factors = np.ones(grid.shape, np.float32) if costs is None else costs.factors
+        return factors, enterable, np.zeros(grid.shape, np.bool_) if closed is None else closed
+
+    def catch_up(self) -> None:
+        """Take the changed cells into the overlay; see `Carried`."""
+        self._building.alone(self._catch_up)
+
+    def _catch_up(self) -> None:
+        if self._built is None or self._overdue is None:
+            return
+        factors, enterable, closed = self._state()
+        factor: Any = factors
+        try:
+            self._built[0].update(factor, enterable=enterable, closed=closed, changed=self._overdue)
+        except PathsTooLongError:
+            self._built, self._cannot_build = None, True
+        except InvalidValueError:  # there was no free cell when it was built
+            self._built = None
+        self._overdue = None
 
     def plan(self, query: CellQuery) -> CellPlan:
         """Find a cheapest path, or one within epsilon of it; see `CellPlanner`."""
@@ -164,7 +210,9 @@ class OverOverlay:
         """None, because paths may use the whole map; see `CellPlanner`."""
 
 
-def _box_of(costs: CostLayer) -> Box:
-    """Return the box that holds all closed cells of a layer."""
-    rows, cols = np.divmod(costs.closed_flat, costs.shape[1])
+def _box_of(flat: LongArray, shape: tuple[int, ...]) -> Box:
+    """Return the box that holds some flat cells, an empty one for none."""
+    if not len(flat):
+        return 0, 0, 0, 0
+    rows, cols = np.divmod(flat, shape[1])
     return int(rows.min()), int(rows.max()) + 1, int(cols.min()), int(cols.max()) + 1

@@ -11,12 +11,14 @@ from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.areas import box_of_area
 from hybridnav.planner.batch import plan_many
-from hybridnav.planner.cell_planner import CellQuery, Updatable
+from hybridnav.planner.cell_planner import Carried, CellQuery, Updatable
 from hybridnav.planner.closed import ClosedCells, Closures
-from hybridnav.planner.costs import PlannerCosts, box_of_cells
-from hybridnav.planner.endpoints import cells_of_endpoints, read_point, read_points, read_pose
+from hybridnav.planner.costs import PlannerCosts
+from hybridnav.planner.endpoints import cells_of_endpoints, read_end, read_points
 from hybridnav.planner.finish import Finish, Smooth
+from hybridnav.planner.follow import MapChange, change_of, followed, is_stale
 from hybridnav.planner.outcome import Outcomes
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
@@ -25,6 +27,7 @@ from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from contextlib import AbstractContextManager
 
     from numpy.typing import ArrayLike
     from shapely.geometry.base import BaseGeometry
@@ -32,9 +35,10 @@ if TYPE_CHECKING:
     from hybridnav._progress import Progress
     from hybridnav._typing import FloatArray, PathLike
     from hybridnav.costs import CostLayer
+    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid.areas import Box
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_planner import CellPlan, Prepared
-    from hybridnav.planner.costs import Box
+    from hybridnav.planner.cell_planner import CellPlanner, Prepared
     from hybridnav.planner.itinerary import Guide
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
@@ -131,7 +135,7 @@ class HybridPlanner:
     @cached_property
     def guide(self) -> Guide | None:
         """The source of descriptions for a person; None on a map without rooms."""
-        if self.topology.pyramid.rooms is None:
+        if is_stale(self.topology) or self.topology.pyramid.rooms is None:
             return None
         # Loads modules that plans without rooms do not need.
         from hybridnav.planner.itinerary import Guide  # noqa: PLC0415
@@ -185,10 +189,14 @@ class HybridPlanner:
             When a point is not two finite numbers, a name is not known, or a closed item is not on
             the map.
         """
+        with self._query():
+            return self._plan(start, goal, smooth, blocked, at)
+
+    def _query(self) -> AbstractContextManager[bool]:
+        """Return the lock to hold while the costs must stay as they are."""
         if self._begun is not None:
             self._turns.alone(self._complete)
-        with self._turns.shared():
-            return self._plan(start, goal, smooth, blocked, at)
+        return self._turns.shared()
 
     def _plan(
         self,
@@ -214,7 +222,9 @@ class HybridPlanner:
                 closed=self.closed_for_all(blocked),
                 costs=self.costs,
             )
-        poses = self._pose("start", start), self._pose("goal", goal)
+        headings = None if self._ompl is None else self.needs_headings
+        read = partial(read_end, needs_heading=headings)
+        poses = read("start", start), read("goal", goal)
         finish = self._finish.checked(smooth, self.preset.planner.smooth)
         result = self._between(poses, finish, self.closed(blocked), began)
         if result.path is None or not result.solved or self.guide is None:
@@ -242,7 +252,11 @@ class HybridPlanner:
         if plan.cells is None:
             return self._outcomes.no_path(plan, poses, self._cells.metric)
         if self._ompl is not None:
-            return self._by_ompl(self._ompl, plan, poses, closed, began)
+            now, flat = time.perf_counter(), None if closed is None else closed.flat
+            found = self._ompl.plan(plan.cells, poses, flat, spent_s=now - began)
+            plan.stats.seconds["ompl"] = time.perf_counter() - now
+            bound = self._cells.bound(plan, endpoints)
+            return self._outcomes.by_ompl(found, plan, poses, bound)
         return self._finish.result(plan, poses, finish, closed)
 
     def plan_many(
@@ -254,6 +268,9 @@ class HybridPlanner:
         blocked: Closable | ClosedCells | None = None,
     ) -> PlanBatch:
         """Plan paths between many pairs of points, with the answers of `plan` in arrays.
+
+        All are planned by the costs that hold when the first one is: an `update` in another thread
+        waits for the last one.
 
         Parameters
         ----------
@@ -271,16 +288,20 @@ class HybridPlanner:
         first = read_points("starts", starts, needs_heading=self.needs_headings)
         last = read_points("goals", goals, needs_heading=self.needs_headings)
         if len(first) != len(last):
-            raise InvalidValueError(f"there are {len(first)} starts and {len(last)} goals")
-        finish = self._finish.checked(smooth, self.preset.planner.smooth)
-        closed = self.closed(blocked)
-        is_kept = finish == "none" or self._cells.metric == "any-angle"
-        at_once = self._cells if self._ompl is None and is_kept else None
+            raise InvalidValueError(
+                f"there are {len(first)} starts and {len(last)} goals, expected as many of both: "
+                "give each start its goal"
+            )
+        with self._query():
+            finish = self._finish.checked(smooth, self.preset.planner.smooth)
+            closed = self.closed(blocked)
+            is_kept = finish == "none" or self._cells.metric == "any-angle"
+            at_once = self._cells if self._ompl is None and is_kept else None
 
-        def alone(start: FloatArray, goal: FloatArray) -> PlanResult:
-            return self.plan(start, goal, smooth=finish, blocked=closed)
+            def alone(start: FloatArray, goal: FloatArray) -> PlanResult:
+                return self._plan(start, goal, finish, closed, "anywhere")
 
-        return plan_many(self.topology.grid, at_once, (first, last), closed, alone)
+            return plan_many(self.topology.grid, at_once, (first, last), closed, alone)
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures for queries now: mesh and graph of corners, jump-point graph,
@@ -297,28 +318,46 @@ class HybridPlanner:
         """
         self._preparing.alone(lambda: self._cells.prepare(progress))
 
-    def update(self, *, costs: CostLayer, changed: BaseGeometry | ArrayLike | None = None) -> None:
-        """Plan by other costs from now on; the next answer is exact for these, with its proof.
+    def update(
+        self,
+        *,
+        costs: CostLayer | None = None,
+        grid: OccupancyGrid | None = None,
+        topology: TopologicalMap | None = None,
+        changed: BaseGeometry | ArrayLike | None = None,
+    ) -> None:
+        """Plan by other costs, or on a changed map, from now on, exactly and with proofs.
 
-        Queries of other threads that run already finish by the costs before; the update waits for
-        them, and for `prepare`. With an overlay (`coarse: overlay`, or `portals` with costs) the
-        costs between the border cells of the changed fields are computed at once; searches leave
-        stale tables above these out until `prepare` renews them. Other presets search the cells.
+        Queries of other threads that run already finish by what was before; the update waits for
+        them, and for `prepare`. An interrupt leaves the planner as it was, or changed.
+
+        With an overlay (`coarse: overlay`, or `portals` with costs) the changed fields get their
+        costs at once; searches leave stale tables above these out until `prepare` renews them.
+        `shortest`, `octile` and `grid-astar` follow a changed grid alone. Their results have no
+        route, and names, places and doors are refused, until an update brings the places of the map
+        now. All other presets need these at once.
 
         Parameters
         ----------
         costs
             The new costs, in place of those given before; those of the preset stay joined with
             them. Closed cells are closed from now on, and open again if they were closed before.
+        grid
+            The map now, with the shape and the frame of the one before; its classes count.
+        topology
+            The places of the map now; its grid is taken if no `grid` is given.
         changed
-            The area outside of which nothing is read: a shapely geometry in metres, map frame,
-            whose bounds are taken, or `(x_min, y_min, x_max, y_max)`; None for the whole map.
+            The area outside of which nothing is read, and nothing has changed: a shapely geometry
+            in metres, map frame, whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a
+            mask, bool (rows, cols); None for the whole map. For a grid it holds the changed
+            measurements; the robot's radius is added.
 
         Raises
         ------
         InvalidValueError
-            When the preset cannot plan by costs, the costs are those of another map, or the area is
-            not described like that; then nothing has changed.
+            When nothing is given, the preset cannot plan by costs, costs or grid are those of
+            another map, the preset needs places, or the area is not described like that; then
+            nothing has changed.
 
         Examples
         --------
@@ -332,9 +371,27 @@ class HybridPlanner:
         >>> print(round(planner.plan((0.5, 0.5), (1.5, 0.5)).cost, 3))
         1.8
         """
-        grid = self.topology.grid
-        box = box_of_cells(changed, grid.frame, grid.shape)
-        self._preparing.alone(partial(self._update, costs, box))
+        before = self.topology.grid
+        box = box_of_area(changed, before.frame, before.shape)
+        change = change_of(costs, grid, topology, box)
+        if change is not None:
+            self._preparing.alone(partial(self._follow, change))
+        if costs is not None:
+            self._preparing.alone(partial(self._update, costs, box))
+
+    def _follow(self, change: MapChange) -> None:
+        self._turns.alone(self._complete)
+        made = followed(self.topology, self.preset, self._cells, self._costs, change)
+        self._begun = partial(self._take_map, *made)
+        self._turns.alone(self._complete)
+
+    def _take_map(self, topology: TopologicalMap, cells: CellPlanner, costs: PlannerCosts) -> None:
+        self.topology, self._cells, self._costs = topology, cells, costs
+        if isinstance(cells, Carried):
+            cells.catch_up()
+        self._closures = Closures(topology)
+        self.__dict__.pop("guide", None)
+        self._make_answers()
 
     def _update(self, costs: CostLayer, box: Box) -> None:
         self._turns.alone(self._complete)
@@ -359,42 +416,6 @@ class HybridPlanner:
         """End the OMPL process of a preset; the next query waits for another one."""
         if self._ompl is not None:
             self._ompl.close()
-
-    def _pose(self, name: str, given: ArrayLike) -> FloatArray:
-        """Return a position and, with OMPL, heading; float64 (2,) or (3,)."""
-        if self._ompl is None:
-            return read_point(name, given)
-        return read_pose(name, given, needs_heading=self.needs_headings)
-
-    def _by_ompl(
-        self,
-        planner: OmplPlanner,
-        plan: CellPlan,
-        poses: tuple[FloatArray, FloatArray],
-        closed: ClosedCells | None,
-        began: float,
-    ) -> PlanResult:
-        """Return the result of the coarse path refined by OMPL."""
-        assert plan.cells is not None  # noqa: S101 - the caller has looked
-        endpoints = poses[0][:2], poses[1][:2]
-        now = time.perf_counter()
-        flat = None if closed is None else closed.flat
-        found = planner.plan(plan.cells, poses, flat, spent_s=now - began)
-        seconds = {**plan.stats.seconds, "ompl": time.perf_counter() - now}
-        bound = max(found.lower_bound, self._cells.bound(plan, endpoints))
-        if found.path is not None and found.status is PlanStatus.SOLVED:
-            bound = min(bound, found.weighted_cost or found.path.length_m)
-        return self._outcomes.answer(
-            found.status,
-            poses,
-            metric=found.metric,
-            path=found.path,
-            route_source=self._outcomes.route_of(found.path),
-            lower_bound=bound,
-            weighted_cost=found.weighted_cost,
-            refinement=found.refinement,
-            stats=replace(plan.stats, seconds=seconds),
-        )
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
         """Return the cells of a closure, None for no closure."""

@@ -9,7 +9,16 @@ from typing import Any, Literal
 Kind = Literal["start", "turn", "cross", "arrive"]
 Shape = Literal["corridor", "hall", "room", "passage"]
 Hand = Literal["left", "right"]
-Side = Literal["left", "right", "ahead", "behind"]
+Side = Literal[
+    "left",
+    "right",
+    "ahead",
+    "behind",
+    "ahead-left",
+    "ahead-right",
+    "behind-left",
+    "behind-right",
+]
 LEAST_BEND_RAD = math.radians(55.0)
 """Turn from which a bend counts."""
 _SHARP_RAD = math.radians(135.0)
@@ -137,6 +146,8 @@ class Doorway:
     """Number of the door; None where the spaces meet without one, as at unexplored cells."""
     width_m: float = 0.0
     """Width of the door in metres."""
+    passage_m: float = math.inf
+    """Diameter of the largest disc that passes: what furniture leaves of the width."""
     is_opening: bool = False
     """Whether it is too wide to be a door."""
     is_first: bool = False
@@ -180,6 +191,9 @@ class Instruction:
     """Name or coordinates of the waypoint at which one arrives."""
     landmark: Landmark | None = None
     """What shows the direction at a start without a heading, or where a goal lies."""
+    heading_rad: float | None = None
+    """Direction of the first step at a start without a landmark, radians, map frame (x is east,
+    REP 103); else None."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the plain values for JSON."""
@@ -197,6 +211,7 @@ class Instruction:
             "doorway": None if self.doorway is None else _doorway(self.doorway),
             "waypoint": self.waypoint,
             "landmark": None if self.landmark is None else self.landmark.to_dict(),
+            "heading_rad": self.heading_rad,
         }
 
 
@@ -205,6 +220,7 @@ def _doorway(doorway: Doorway) -> dict[str, Any]:
         "into": doorway.into.to_dict(),
         "door": doorway.door,
         "width_m": doorway.width_m,
+        "passage_m": None if math.isinf(doorway.passage_m) else doorway.passage_m,
         "is_opening": doorway.is_opening,
         "is_first": doorway.is_first,
         "beside": doorway.beside,

@@ -31,6 +31,10 @@ class HandWords:
     """A turn on the spot before the first step."""
     beside: str
     """The place of a door: `on the left`."""
+    ahead: str
+    """The place of a door ahead, at this hand: `ahead on the left`."""
+    behind: str
+    """The place of a door behind, at this hand."""
     onward: str
     """Behind a door to this hand: ` to the left`."""
 
@@ -75,6 +79,10 @@ class Language:
     """First sentence of a robot with a heading; `{inside}`, `{turn}`."""
     start_beside: str
     """First sentence with a landmark at one hand; `{inside}`, `{landmark}`, `{beside}`."""
+    start_heading: str
+    """First sentence without a landmark; `{inside}`, `{compass}`."""
+    compass: tuple[str, ...]
+    """Words for east, north-east, north, ..., counter-clockwise."""
     start_towards: str
     """First sentence with a landmark ahead; `{inside}`, `{landmark}`."""
     start_away: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
         Instruction,
         Landmark,
         Passed,
+        Side,
         Space,
         Turn,
     )
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 _LANGUAGES = {"de": GERMAN, "en": ENGLISH}
 _WIDE_M = 2.0
 """Width from which an opening is recognised by it, in metres."""
+_FREE_M = 1.5
+"""Gap that furniture leaves of an opening, in metres, below which its width misleads."""
 _AT_ONCE_M = 0.5
 """Length below which a distance is not written, in metres."""
 
@@ -143,20 +147,28 @@ class _Writer:
         if instruction.kind == "turn":
             assert turn is not None  # noqa: S101 - a turn has one
             return words.turn.format(inside=inside, lead=lead, turn=self._turn(turn))
-        if instruction.landmark is not None:
-            return self._start(instruction.landmark, inside)
+        return self._start(instruction, inside)
+
+    def _start(self, instruction: Instruction, inside: str) -> str:
+        """Return the first sentence: what shows the direction, or how to turn."""
+        words, turn, landmark = self.words, instruction.turn, instruction.landmark
+        if landmark is not None:
+            return self._start_at(landmark, inside)
+        if instruction.heading_rad is not None:
+            eighth = round(instruction.heading_rad / (math.pi / 4)) % 8
+            return words.start_heading.format(inside=inside, compass=words.compass[eighth])
         if turn is None:
             return words.start.format(inside=inside)
         return words.start_facing.format(inside=inside, turn=self._face(turn))
 
-    def _start(self, landmark: Landmark, inside: str) -> str:
+    def _start_at(self, landmark: Landmark, inside: str) -> str:
         """Return the first sentence with a landmark that shows the direction."""
         words, named = self.words, self._landmark(landmark)
         if landmark.side == "ahead":
             return words.start_towards.format(inside=inside, landmark=named)
         if landmark.side == "behind":
             return words.start_away.format(inside=inside, landmark=named)
-        beside = self._hand(landmark.side).beside
+        beside = self._place(landmark.side)
         return words.start_beside.format(inside=inside, landmark=named, beside=beside)
 
     def _at(self, landmark: Landmark | None) -> str:
@@ -168,8 +180,14 @@ class _Writer:
             return words.at_ahead.format(landmark=self._landmark(landmark))
         if landmark.side == "behind":
             return words.at_behind.format(landmark=self._landmark(landmark))
-        beside = self._hand(landmark.side).beside
+        beside = self._place(landmark.side)
         return words.at_beside.format(landmark=self._landmark(landmark), beside=beside)
+
+    def _place(self, side: Side) -> str:
+        """Return the words for a place at one hand."""
+        where, _, hand = side.rpartition("-")
+        words = self.words.left if hand == "left" else self.words.right
+        return {"ahead": words.ahead, "behind": words.behind}.get(where, words.beside)
 
     def _landmark(self, landmark: Landmark) -> str:
         """Return the words for a door by what lies behind it."""
@@ -207,7 +225,7 @@ class _Writer:
         words, is_ahead = self.words, doorway.beside is None
         if not doorway.is_opening:
             template = words.door if is_ahead else words.door_beside
-        elif doorway.width_m < _WIDE_M:
+        elif doorway.width_m < _WIDE_M or doorway.passage_m < _FREE_M:
             template = words.narrow_opening if is_ahead else words.narrow_opening_beside
         else:
             template = words.opening if is_ahead else words.opening_beside

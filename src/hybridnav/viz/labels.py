@@ -25,6 +25,9 @@ _SHAPES = {"start": ("o", 6.5), "goal": ("D", 6.0)}
 _ANCHORS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
 _OUTSIDE, _OVERLAP = 1000.0, 100.0  # penalties; covering all of the path costs 10
 
+_MOST_ALONG = 10_000
+"""Points along one line beside which labels are laid: a wrong path may be longer than any map."""
+
 
 class LabelPlacer:
     """Places labels on a canvas so that none hides another.
@@ -111,11 +114,11 @@ class Marker:
 def draw_markers(
     canvas: Canvas,
     markers: Sequence[Marker],
-    path: FloatArray,
+    lines: Sequence[FloatArray],
     *,
     labels: LabelPlacer | None = None,
 ) -> None:
-    """Draw start and goal, with labels that hide as little as possible of other labels and a path.
+    """Draw start and goal, with labels that hide as little as possible of other labels and paths.
 
     A marker outside the view is drawn at its rim, with its coordinates.
     """
@@ -123,6 +126,7 @@ def draw_markers(
     labels = LabelPlacer(canvas) if labels is None else labels
     points = [np.clip(marker.point, view.low, view.high) for marker in markers]
     labels.keep_free(points, 4.5 * sizes.line)
+    along = _along(lines, 0.3 * sizes.font / sizes.points_per_metre)
     for marker, point in zip(markers, points, strict=True):
         shape, diameter = _SHAPES[marker.name]
         drawn = Line2D(
@@ -144,15 +148,29 @@ def draw_markers(
             words += " ({:g}, {:g})".format(*marker.point)
         half = np.array([text_width(words, sizes.font, "bold") / 2, 0.6 * sizes.font])
         boxes = labels.boxes_beside(point, half, [6.5 * sizes.line])
-        box = boxes[int(np.argmin([_cost(labels, box, path) for box in boxes]))]
+        box = boxes[int(np.argmin([_cost(labels, box, along) for box in boxes]))]
         font = {"fontsize": sizes.font, "fontweight": "bold", "color": style.INK}
         labels.write(words, box, f"{marker.name}-label", halo=0.3 * sizes.font, **font)
 
 
-def _cost(labels: LabelPlacer, box: FloatArray, path: FloatArray) -> float:
-    """Return how much a label in a box would leave the picture, or hide of labels and a path."""
-    covered = ((path >= box[0]) & (path <= box[1])).all(axis=1)
-    share = np.count_nonzero(covered) / max(len(path), 1)
+def _along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
+    """Return points along lines, a spacing apart, but not more than a line may have: a straight
+    path has points at its bends alone, and a label between two of them would hide it."""
+    found = [np.empty((0, 2))]
+    for line in lines:
+        where = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])[: len(line)]
+        if len(line):
+            count = 2 + int(min(where[-1] / spacing_m, _MOST_ALONG))
+            at = np.linspace(0.0, where[-1], count)
+            found.append(np.stack([np.interp(at, where, part) for part in line.T], axis=1))
+    return np.concatenate(found)
+
+
+def _cost(labels: LabelPlacer, box: FloatArray, along: FloatArray) -> float:
+    """Return how much a label in a box would leave the picture, or hide of labels and of points
+    along paths."""
+    covered = ((along >= box[0]) & (along <= box[1])).all(axis=1)
+    share = np.count_nonzero(covered) / max(len(along), 1)
     outside = not labels.is_in_view(box)
     return _OUTSIDE * outside + _OVERLAP * labels.n_hidden(box) + 10 * share
 

@@ -100,7 +100,7 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
         entries.append((line, "shortest path"))
     endpoints = next((line[[0, -1]] for line in lines if len(line)), np.empty((0, 2)))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
-    draw_markers(canvas, markers, points)
+    draw_markers(canvas, markers, lines)
     if (grid.classes == CellClass.UNEXPLORED).any():
         entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
     words = [grid.name if title is None else title]

@@ -102,7 +102,7 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     if result.path is not None:
         path = result.path.points
         draw_path(canvas, path)
-    draw_markers(canvas, markers, path)
+    draw_markers(canvas, markers, [path])
     words = _words(topology, result, optimum_m) if title is None else [title]
     entries = _entries(result, places, strong, canvas.sizes) + ground_entries(grid)
     return finish(canvas, entries, words)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib import patheffects
 from matplotlib.lines import Line2D
 
@@ -174,8 +173,7 @@ def plot_alternatives(
         length = f"{one.path.length_m:.2f} m{cost}"
         entries.append((sample, f"route {number + 1}, {length}{_by(one.doors)}"))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
-    along = np.concatenate(lines) if lines else np.empty((0, 2))
-    draw_markers(canvas, markers, along, labels=labels)
+    draw_markers(canvas, markers, lines, labels=labels)
     text = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
     words = [topology.grid.name, text] if title is None else [title]
     return finish(canvas, entries + ground, words)

@@ -1,0 +1,186 @@
+"""Changes of the map under a planner: which cells changed, and what stands for stale places."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+import numpy as np
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import OccupancyGrid
+from hybridnav.grid.areas import class_reach, class_rules
+from hybridnav.grid.checks import checked_type
+from hybridnav.planner.cell_planner import Carried, Following
+from hybridnav.planner.select import cell_planner
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from typing import NoReturn
+
+    from hybridnav._typing import LongArray
+    from hybridnav.config import Preset
+    from hybridnav.costs import CostLayer
+    from hybridnav.grid.areas import Box
+    from hybridnav.planner.cell_planner import CellPlanner
+    from hybridnav.planner.costs import PlannerCosts
+    from hybridnav.pyramid import DualGraphPyramid
+
+_ON_CELLS = "none", "mesh", "jumps"
+"""Values of `coarse` that need no places."""
+
+
+class StalePlaces:
+    """Stands for the topological map of a grid that changed after its places were built.
+
+    It has the grid. Whatever else is asked of it is refused, so that no place of the map before is
+    taken for one of the map now.
+    """
+
+    def __init__(self, grid: OccupancyGrid, built: DualGraphPyramid) -> None:
+        self.grid = grid
+        self.built = built
+        """The pyramid of the map before, for the record of how it was built."""
+
+    def __getattr__(self, name: str) -> NoReturn:
+        if name.startswith("_"):  # what copies and pickles look for
+            raise AttributeError(name)
+        raise InvalidValueError(
+            f"the map changed after its places were built, and {name} belongs to them: call "
+            "update with topology, the topological map of the grid now"
+        )
+
+
+def is_stale(topology: TopologicalMap) -> bool:
+    """Return whether this stands for a topological map whose grid changed."""
+    return isinstance(topology, StalePlaces)
+
+
+def built_of(topology: TopologicalMap) -> DualGraphPyramid:
+    """Return the pyramid of a topological map, or of the one that it was before its grid
+    changed."""
+    return topology.built if isinstance(topology, StalePlaces) else topology.pyramid
+
+
+class MapChange(NamedTuple):
+    """What an update of the map gives to a planner."""
+
+    grid: OccupancyGrid | None
+    """The map now, None to take that of `topology`."""
+    topology: TopologicalMap | None
+    """The places of the map now, None for a grid alone; one of both is given."""
+    box: Box
+    """First row, last row + 1, first column, last column + 1 of the cells that may have changed."""
+
+
+def change_of(
+    costs: CostLayer | None, grid: OccupancyGrid | None, topology: TopologicalMap | None, box: Box
+) -> MapChange | None:
+    """Return the change of the map that an update was given, None for costs alone.
+
+    Raises
+    ------
+    InvalidValueError
+        When nothing is given, or something of another type.
+    """
+    if topology is not None:
+        checked_type("topology", topology, TopologicalMap)
+    if grid is not None:
+        checked_type("grid", grid, OccupancyGrid)
+    if topology is None and grid is None:
+        if costs is None:
+            raise InvalidValueError(
+                "update was given no costs, grid or topology, expected one of them: pass what "
+                "changed"
+            )
+        return None
+    return MapChange(grid, topology, box)
+
+
+def followed(
+    topology: TopologicalMap,
+    preset: Preset,
+    cells: CellPlanner,
+    costs: PlannerCosts,
+    change: MapChange,
+) -> tuple[TopologicalMap, CellPlanner, PlannerCosts]:
+    """Return the places, the planner of cell paths, and the costs after a change of the map.
+
+    Parameters
+    ----------
+    topology, preset, cells, costs
+        Those of a planner; unchanged.
+    change
+        The map now.
+
+    Raises
+    ------
+    InvalidValueError
+        When the planner cannot follow, or the grid is one of another map.
+    """
+    settings, places, grid = preset.planner, change.topology, change.grid
+    if settings.refine == "ompl":
+        raise InvalidValueError(
+            f"preset {preset.name} cannot follow a change, because OMPL's process has the map: "
+            "make a new planner of the map now"
+        )
+    if places is None and settings.coarse not in _ON_CELLS:
+        raise InvalidValueError(
+            f"preset {preset.name} plans on the places of its map, and only a grid is given: call "
+            "update with topology too, or take preset shortest, octile or grid-astar"
+        )
+    if places is not None:
+        if grid is not None and not np.array_equal(grid.classes, places.grid.classes):
+            raise InvalidValueError(
+                "grid and topology are those of different maps, expected the places of the grid: "
+                "build them of it"
+            )
+        grid = places.grid
+    assert grid is not None  # noqa: S101 - one of both is given
+    changed = changed_cells(topology.grid, grid, change.box)
+    if places is None:
+        places = cast("TopologicalMap", StalePlaces(grid, built_of(topology)))
+    costs = costs.on(grid)
+    if isinstance(cells, Following):
+        return places, cells.followed(grid, changed), costs
+    if isinstance(cells, Carried):
+        return places, cast("CellPlanner", cells.carried(places, costs.layer)), costs
+    return places, cell_planner(places, settings, None, costs.layer), costs
+
+
+def changed_cells(before: OccupancyGrid, now: OccupancyGrid, box: Box) -> LongArray:
+    """Return the cells whose class changed, int64 (m, 2), (row, col), in the order of rows.
+
+    Parameters
+    ----------
+    before, now
+        The map before and after.
+    box
+        First row, last row + 1, first column, last column + 1 of the cells whose measurements may
+        have changed; the robot's radius is added here.
+
+    Raises
+    ------
+    InvalidValueError
+        When the grids differ in shape, frame, or in what is legal.
+    """
+    for what, old, new in (
+        ("a shape of cells", before.shape, now.shape),
+        ("a frame", before.frame, now.frame),
+        ("corner_cutting", before.corner_cutting, now.corner_cutting),
+    ):
+        if old != new:
+            raise InvalidValueError(
+                f"the grid has {what} {new}, expected {old}: make a new planner for another map"
+            )
+    is_same_reach = class_rules(before) == class_rules(now) and now.least_island_m2 == 0
+    part: tuple[slice, slice] = slice(None), slice(None)
+    low_row = low_col = 0
+    if is_same_reach:
+        reach = class_reach(now)
+        low_row, low_col = max(box[0] - reach, 0), max(box[2] - reach, 0)
+        part = slice(low_row, box[1] + reach), slice(low_col, box[3] + reach)
+        if box[0] >= box[1] or box[2] >= box[3]:
+            return np.empty((0, 2), np.int64)
+    found = np.argwhere(before.classes[part] != now.classes[part])
+    cells: LongArray = found + np.array([low_row, low_col])
+    return cells

@@ -1,0 +1,278 @@
+"""Planners that follow a changed map: optima by independent judges after each change, threads,
+interrupts, closures, and what is refused."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from hybridnav.metrics import VisibilityGraph, segment_faults
+from tests.interrupts import Struck, lines_of
+from tests.oracle.grid import assert_legal, distances, move_graph
+from tests.strategies import class_grids, examples, occupancy_grid
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SEEDS = st.integers(0, 2**32 - 1)
+FOLLOWING = "shortest", "octile", "grid-astar"
+REBUILT = "paper", "portals"
+
+
+def topology_of(grid: hn.OccupancyGrid) -> hn.TopologicalMap:
+    return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
+
+
+def with_box(
+    grid: hn.OccupancyGrid, rng: np.random.Generator
+) -> tuple[hn.OccupancyGrid, tuple[float, float, float, float]]:
+    """The map with a box of other probabilities, and the area of the box in metres."""
+    probability = grid.probability.copy()
+    row, col = (int(rng.integers(side)) for side in grid.shape)
+    box = np.s_[row : row + rng.integers(1, 6), col : col + rng.integers(1, 6)]
+    probability[box] = rng.choice([[0.0], [1.0], [0.0, 0.0, 0.5, 1.0]][rng.integers(3)], 1)
+    if rng.random() < 0.3:
+        probability[box] = rng.choice([0.0, 1.0], probability[box].shape)
+    high = row + probability[box].shape[0], col + probability[box].shape[1]
+    corners = grid.frame.points_of_grid([(row, col), high])
+    return replace(grid, probability=probability), (*corners[0], *corners[1])
+
+
+def check(planner: hn.HybridPlanner, grid: hn.OccupancyGrid, rng: np.random.Generator) -> None:
+    """Hold that answers on the map are legal and optimal, and that no bound lies above."""
+    free = grid.enterable()
+    cells = np.argwhere(free)
+    if not len(cells):
+        return
+    visible, moves = VisibilityGraph(grid), move_graph(free)
+    for start, goal in cells[rng.integers(len(cells), size=(4, 2))]:
+        result = planner.plan(*grid.frame.points_of([start, goal]))
+        cell, last = tuple(start.tolist()), tuple(goal.tolist())
+        least = distances(moves, free.shape, cell)[last] * grid.resolution_m
+        assert result.solved == np.isfinite(least)
+        if result.path is None:
+            assert result.lower_bound == np.inf
+            continue
+        if result.metric == "any-angle":
+            least = visible.shortest(cell, last).length_m
+            assert not segment_faults(grid, result.path.points)
+        else:
+            assert_legal(result.path.cells, free)
+        assert result.lower_bound <= least * (1 + 1e-9)
+        if planner.preset.name == "paper":
+            assert result.cost >= least * (1 - 1e-9)
+        else:
+            assert result.cost == pytest.approx(least, rel=1e-9)
+
+
+@pytest.mark.parametrize("preset", FOLLOWING)
+@settings(max_examples=examples(30), deadline=None)
+@given(class_grids(max_side=24), SEEDS)
+def test_answers_after_each_change_are_optimal(preset: str, classes: Any, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    grid = replace(occupancy_grid(classes, resolution_m=0.5), robot_radius_m=rng.choice([0, 0.6]))
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    check(planner, grid, rng)
+    for turn in range(5):
+        grid, area = with_box(grid, rng)
+        planner.update(grid=grid, changed=area if turn % 2 == 0 else None)
+        if rng.random() < 0.2:
+            planner.prepare()
+        check(planner, grid, rng)
+
+
+@pytest.mark.parametrize("preset", REBUILT)
+@settings(max_examples=examples(8), deadline=None)
+@given(class_grids(max_side=16), SEEDS)
+def test_presets_on_places_follow_with_the_places_of_now(
+    preset: str, classes: Any, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    grid = occupancy_grid(classes, resolution_m=0.5)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    for _ in range(2):
+        new, area = with_box(grid, rng)
+        with pytest.raises(hn.InvalidValueError, match="plans on the places of its map"):
+            planner.update(grid=new, changed=area)
+        check(planner, grid, rng)
+        grid = new
+        planner.update(topology=topology_of(grid), changed=area)
+        check(planner, grid, rng)
+
+
+@pytest.mark.parametrize("preset", FOLLOWING)
+def test_closed_cells_are_avoided_after_a_change(preset: str) -> None:
+    grid = hn.OccupancyGrid(np.zeros((12, 21), np.float32), robot_radius_m=0)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    ends = (0.5, 6.5), (20.5, 6.5)
+    assert planner.plan(*ends).cost == 20
+    probability = np.zeros((12, 21), np.float32)
+    probability[:, 10] = 1.0
+    probability[[1, 10], 10] = 0.0
+    grid = replace(grid, probability=probability)
+    planner.update(grid=grid, changed=(10.0, 0.0, 11.0, 12.0))
+    both = planner.plan(*ends)
+    closed = planner.plan(*ends, blocked={"cells": [(10, 10)]})
+    assert closed.cost > both.cost
+    expected = hn.HybridPlanner(topology_of(grid), preset=preset)
+    assert closed.cost == pytest.approx(expected.plan(*ends, blocked={"cells": [(10, 10)]}).cost)
+
+
+def test_results_have_no_route_until_the_places_of_now_are_given() -> None:
+    grid = hn.OccupancyGrid(np.zeros((6, 30), np.float32), robot_radius_m=0)
+    planner = hn.HybridPlanner(topology_of(grid), preset="shortest")
+    probability = np.zeros((6, 30), np.float32)
+    probability[:5, 15] = 1.0
+    now = replace(grid, probability=probability)
+    planner.update(grid=now, changed=(15.0, 0.0, 16.0, 5.0))
+    ends = (0.5, 0.5), (29.5, 0.5)
+    assert planner.plan(*ends).route is None
+    for blocked in ({"places": [0]}, {"arcs": [0]}, {"rooms": ["kitchen"]}):
+        with pytest.raises(hn.InvalidValueError, match="the map changed after its places"):
+            planner.plan(*ends, blocked=blocked)
+    with pytest.raises(hn.InvalidValueError, match="the map changed after its places"):
+        planner.plan("kitchen", ends[1])
+    copied = pickle.loads(pickle.dumps(planner))  # noqa: S301 - of this test
+    assert copied.plan(*ends).cost == planner.plan(*ends).cost
+    planner.update(topology=topology_of(now))
+    route = planner.plan(*ends).route
+    assert route is not None
+    assert len(route.places) > 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"probability": np.zeros((6, 7), np.float32)}, "a shape of cells"),
+        ({"frame": hn.Frame(0.5)}, "a frame"),
+        ({"corner_cutting": True}, "corner_cutting"),
+    ],
+)
+def test_another_map_is_refused_and_changes_nothing(change: dict[str, Any], message: str) -> None:
+    grid = hn.OccupancyGrid(np.zeros((6, 6), np.float32), robot_radius_m=0)
+    planner = hn.HybridPlanner(topology_of(grid), preset="octile")
+    with pytest.raises(hn.InvalidValueError, match=message):
+        planner.update(grid=replace(grid, **change))
+    assert planner.plan((0.5, 0.5), (5.5, 0.5)).cost == 5
+    other = replace(grid, probability=np.ones((6, 6), np.float32))
+    with pytest.raises(hn.InvalidValueError, match="different maps"):
+        planner.update(grid=other, topology=topology_of(grid))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "no costs, grid or topology, expected one of them"),
+        ({"grid": 3}, "grid is 3 of type int, expected an OccupancyGrid"),
+        ({"topology": "x"}, "topology is 'x' of type str, expected a TopologicalMap"),
+    ],
+)
+def test_updates_by_nothing_or_by_other_things_are_refused(
+    given: dict[str, Any], message: str
+) -> None:
+    grid = hn.OccupancyGrid(np.zeros((6, 6), np.float32), robot_radius_m=0)
+    planner = hn.HybridPlanner(topology_of(grid), preset="octile")
+    with pytest.raises(hn.InvalidValueError, match=message):
+        planner.update(**given)
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
+def test_an_interrupted_update_leaves_the_map_before_or_now(preset: str) -> None:
+    grid = hn.OccupancyGrid(np.zeros((10, 20), np.float32), robot_radius_m=0)
+    probability = np.zeros((10, 20), np.float32)
+    probability[:9, 10] = 1.0
+    now = replace(grid, probability=probability)
+    topology, ends = topology_of(grid), ((0.5, 0.5), (19.5, 0.5))
+    for _ in range(2):  # the first time loads more
+        planner = hn.HybridPlanner(topology, preset=preset)
+        planner.plan(*ends)
+        count = lines_of(partial(planner.update, grid=now))
+        costs = [19.0, planner.plan(*ends).cost]
+    for strike_at in np.linspace(1, count, 60).astype(int).tolist():
+        planner = hn.HybridPlanner(topology, preset=preset)
+        planner.plan(*ends)
+        with pytest.raises(Struck):
+            lines_of(partial(planner.update, grid=now), strike_at=strike_at)
+        assert planner.plan(*ends).cost in costs
+        planner.update(grid=now)
+        assert planner.plan(*ends).cost == costs[1]
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
+def test_plans_of_threads_are_those_of_one_version(preset: str) -> None:
+    grid = hn.OccupancyGrid(np.zeros((30, 60), np.float32), robot_radius_m=0)
+    maps = [grid]
+    for hole in (3, 15, 27):
+        probability = np.zeros((30, 60), np.float32)
+        probability[:, 30] = 1.0
+        probability[hole, 30] = 0.0
+        maps.append(replace(grid, probability=probability))
+    ends = (0.5, 10.5), (59.5, 20.5)
+    fresh = [hn.HybridPlanner(topology_of(each), preset=preset) for each in maps]
+    costs = [each.plan(*ends).cost for each in fresh]
+    planner, found, done = hn.HybridPlanner(topology_of(grid), preset=preset), [], threading.Event()
+
+    def ask() -> None:
+        while not done.is_set():
+            found.append(planner.plan(*ends).cost)
+
+    threads = [threading.Thread(target=ask) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for turn in range(40):
+        planner.update(grid=maps[turn % 4], changed=(30.0, 0.0, 31.0, 30.0))
+    done.set()
+    for thread in threads:
+        thread.join()
+    assert all(min(abs(cost - each) for each in costs) < 1e-9 for cost in found)
+
+
+@pytest.mark.full
+@pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
+@pytest.mark.parametrize("preset", FOLLOWING)
+def test_a_real_map_that_changes(preset: str, data: Path) -> None:
+    grid = hn.load_map(data / "nav2/maps/depot.yaml", robot_radius_m=0.25)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    rng = np.random.default_rng(0)
+    planner.plan((0.0, 0.0), (1.0, 1.0))
+    for _ in range(10):
+        grid, area = with_box(grid, rng)
+        planner.update(grid=grid, changed=area)
+        fresh = hn.HybridPlanner(topology_of(grid), preset=preset)
+        cells = np.argwhere(grid.enterable())
+        for start, goal in cells[rng.integers(len(cells), size=(30, 2))]:
+            ends = grid.frame.points_of([start, goal])
+            found, expected = planner.plan(*ends), fresh.plan(*ends)
+            assert found.status is expected.status
+            assert found.cost == pytest.approx(expected.cost, rel=1e-9)
+            assert found.lower_bound <= expected.cost * (1 + 1e-9)
+
+
+def test_costs_of_a_preset_are_those_of_the_map_now() -> None:
+    grid = hn.OccupancyGrid(np.zeros((20, 40), np.float32), hn.Frame(0.1), robot_radius_m=0)
+    topology = topology_of(grid)
+    planner = hn.HybridPlanner(topology, preset="robot")
+    ends = (0.05, 1.05), (3.95, 1.05)
+    planner.plan(*ends)
+    probability = np.zeros((20, 40), np.float32)
+    probability[8:12, 15:25] = 1.0
+    now = topology_of(replace(grid, probability=probability))
+    planner.update(topology=now, changed=(1.5, 0.8, 2.5, 1.2))
+    expected = hn.HybridPlanner(now, preset="robot").plan(*ends)
+    found = planner.plan(*ends)
+    assert found.cost == pytest.approx(expected.cost, rel=1e-9)
+    planner.prepare()
+    assert planner.plan(*ends).lower_bound <= expected.cost * (1 + 1e-9)
+    layer = hn.CostLayer(np.full(grid.shape, 2.0, np.float32))
+    given = hn.HybridPlanner(topology, preset="robot", costs=layer)
+    with pytest.raises(hn.InvalidValueError, match="make a new planner"):
+        given.update(topology=now)

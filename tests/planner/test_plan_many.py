@@ -1,0 +1,85 @@
+"""Many queries in one call, with every preset."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from tests.plans import (
+    points_in,
+    presets,
+)
+
+
+@presets
+@pytest.mark.parametrize("smooth", [None, "line-of-sight"])
+def test_many_answers_are_the_answers_one_by_one(
+    office_planners: dict[str, hn.HybridPlanner], preset: str, smooth: Any
+) -> None:
+    planner = office_planners[preset]
+    grid = planner.topology.grid
+    rng = np.random.default_rng(6)
+    pairs = points_in(grid, rng, 25)
+    low, high = grid.frame.points_of_grid([(-5, -5), (grid.shape[0] + 5, grid.shape[1] + 5)])
+    anywhere = rng.uniform(low, high, size=(15, 2, 2))
+    same = np.repeat(pairs[:1, :1], 2, axis=1)
+    starts, goals = np.concatenate([pairs, anywhere, same]).transpose(1, 0, 2)
+    batch = planner.plan_many(starts, goals, smooth=smooth)
+    singles = [
+        planner.plan(*endpoints, smooth=smooth) for endpoints in zip(starts, goals, strict=True)
+    ]
+    assert batch.status.tolist() == [str(single.status) for single in singles]
+    assert len(set(batch.status.tolist())) >= 3
+    assert batch.cost.tolist() == [single.cost for single in singles]
+    assert batch.lower_bound.tolist() == [single.lower_bound for single in singles]
+    np.testing.assert_array_equal(batch.gap, [single.gap for single in singles])
+    assert batch.path_start[0] == 0
+    assert batch.path_start[-1] == len(batch.points)
+    assert len(batch.path_start) == len(singles) + 1
+    for i, single in enumerate(singles):
+        points = np.empty((0, 2)) if single.path is None else single.path.points
+        np.testing.assert_array_equal(batch.path(i), points)
+
+
+@presets
+def test_many_takes_lists_and_nothing_at_all(
+    office_planners: dict[str, hn.HybridPlanner], preset: str
+) -> None:
+    planner = office_planners[preset]
+    (start, goal), *_ = points_in(planner.topology.grid, np.random.default_rng(7), 1)
+    one = planner.plan_many([start.tolist()], [tuple(goal)])
+    assert one.cost.tolist() == [planner.plan(start, goal).cost]
+    nothing: Any
+    for nothing in ([], np.empty((0, 2)), ()):
+        batch = planner.plan_many(nothing, nothing)
+        assert batch.status.shape == batch.cost.shape == batch.lower_bound.shape == (0,)
+        assert batch.gap.shape == (0,)
+        assert batch.points.shape == (0, 2)
+        assert batch.path_start.tolist() == [0]
+
+
+@pytest.mark.parametrize(
+    ("starts", "goals", "message"),
+    [
+        ([(0, 0)], [], "there are 1 starts and 0 goals"),
+        ([(0, 0), (1, 1)], [(0, 0)], "there are 2 starts and 1 goals"),
+        ((0, 0), (1, 1), "starts must be finite coordinates"),
+        ([(0, 0, 0)], [(0, 0, 0)], "starts must be finite coordinates"),
+        ([(0, 0)], [(0, math.nan)], "goals must be finite coordinates"),
+        ([(math.inf, 0)], [(0, 0)], "starts must be finite coordinates"),
+        ([[(0, 0)]], [[(0, 0)]], "starts must be finite coordinates"),
+        ([(0, 0), (1,)], [(0, 0), (1, 1)], "starts must be finite coordinates"),
+        ("here", "there", "starts must be finite coordinates"),
+        (None, None, "starts must be finite coordinates"),
+    ],
+)
+def test_many_refuses_what_are_no_points(
+    office_planners: dict[str, hn.HybridPlanner], starts: Any, goals: Any, message: str
+) -> None:
+    with pytest.raises(hn.InvalidValueError, match=message) as caught:
+        office_planners["portals"].plan_many(starts, goals)
+    assert str(caught.value).isprintable()
