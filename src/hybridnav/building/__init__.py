@@ -1,0 +1,5 @@
+"""Buildings of several floors, joined by lifts, stairs and ramps."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
