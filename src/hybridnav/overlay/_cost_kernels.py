@@ -27,7 +27,6 @@ def move_cost(units, direction):
     return units * ROOT >> 20 if direction & 1 else units
 
 
-@guarded
 @njit(cache=True, nogil=True)
 def sums_along(ground, cells):
     """Return the sums of the units of two cells over the straight moves of a path, and the others.

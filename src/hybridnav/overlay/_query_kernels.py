@@ -6,7 +6,7 @@ import numpy as np
 
 from hybridnav._jit import guarded, njit
 from hybridnav.overlay._cell_kernels import cells_of_path, reach_nodes
-from hybridnav.overlay._cost_kernels import slot_of
+from hybridnav.overlay._cost_kernels import slot_of, sums_along
 from hybridnav.overlay._exit_kernels import descend
 from hybridnav.overlay._field_kernels import forget, path_inside, spread
 from hybridnav.overlay._guide_kernels import aim
@@ -120,32 +120,9 @@ def _inside(ground, endpoints, distance):
     return least, cells, expanded
 
 
-@guarded
 @njit(cache=True, nogil=True)
-def find_path(ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work):
-    """Find a path of least cost between two cells.
-
-    Parameters
-    ----------
-    ground, levels, top
-        See `CellCosts`, `Levels` and `Top`.
-    endpoints
-        Two flat cells of fields.
-    epsilon
-        The search ends once no path can be cheaper by more than this part.
-    near_cells
-        Cells that the search among cells, which comes first, expands at most.
-    cell_work
-        int32 (rows * cols,), FAR before and after.
-    node_work
-        See `NodeWork`.
-
-    Returns
-    -------
-    tuple
-        The cost, NO_PATH for no path, and a lower bound on it; int64 (n,) flat cells of the path;
-        the numbers of cells and of nodes expanded.
-    """
+def _find_flat(ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work):
+    """Return what `find_path` does, with flat cells and without sums."""
     start, goal = endpoints
     inside, cells, is_proved, expanded = search_near(ground, start, goal, near_cells, cell_work)
     if is_proved:
@@ -184,3 +161,43 @@ def find_path(ground, levels, top, endpoints, epsilon, near_cells, cell_work, no
     nodes = to_finest(levels, ground, nodes)
     cells = cells_of_path(levels, ground, endpoints, nodes)
     return cost, bound, cells, expanded, n_expanded
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def find_path(ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work):
+    """Find a path of least cost between two cells.
+
+    Parameters
+    ----------
+    ground, levels, top
+        See `CellCosts`, `Levels` and `Top`.
+    endpoints
+        Two flat cells; there is no path from or to a closed one.
+    epsilon
+        The search ends once no path can be cheaper by more than this part.
+    near_cells
+        Cells that the search among cells, which comes first, expands at most.
+    cell_work
+        int32 (rows * cols,), FAR before and after.
+    node_work
+        See `NodeWork`.
+
+    Returns
+    -------
+    tuple
+        The cost, NO_PATH for no path, and a lower bound on it; int64 (n, 2), (row, col) of the
+        cells of the path, and the sums of `sums_along`; the numbers of cells and of nodes expanded.
+    """
+    for end in endpoints:
+        slot = slot_of(ground, end)
+        if ground.field_of[slot] < 0 or ground.units[slot] <= 0:
+            return np.int64(NO_PATH), np.int64(NO_PATH), np.empty((0, 2), np.int64), (0, 0), 0, 0
+    cost, bound, flat, expanded, n_expanded = _find_flat(
+        ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work
+    )
+    cells = np.empty((flat.size, 2), np.int64)
+    for i in range(flat.size):
+        row = np.int64(np.uint32(flat[i]) // np.uint32(ground.cols))
+        cells[i, 0], cells[i, 1] = row, flat[i] - row * ground.cols
+    return cost, bound, cells, sums_along(ground, cells), expanded, n_expanded

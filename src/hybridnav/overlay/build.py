@@ -118,16 +118,18 @@ class Overlay:
         slot = self.ground.block_at[flat >> kernels.BLOCK_BITS] + flat % (1 << kernels.BLOCK_BITS)
         return bool(self.ground.field_of[slot] >= 0 and self.ground.units[slot] > 0)
 
-    def cost_of(self, cells: LongArray) -> float:
+    def cost_of(self, cells: LongArray, sums: tuple[int, int]) -> float:
         """Return the cost of a path in cells, by the factors as given.
 
         Parameters
         ----------
         cells
             int64 (n, 2), (row, col) of the cells passed.
+        sums
+            Its sums of units; see `sums_along`.
         """
         if self._factor is None:
-            straight, diagonal = kernels.sums_along(self.ground, cells)
+            straight, diagonal = sums
             return float(straight + diagonal * math.sqrt(2.0)) * self.cost_unit
         is_straight = (np.diff(cells, axis=0) == 0).any(axis=1)
         length = np.where(is_straight, 1.0, math.sqrt(2.0))
