@@ -28,7 +28,7 @@ _MOST_NEAR = 1_000_000
 """Most cells of the first search; its open list takes 80 bytes for each."""
 _NEAR = 250
 """Cells of the first search where tables answer: a twentieth of the time of such a query."""
-_NEAR_WHERE_STALE = 64_000
+_NEAR_WHERE_STALE = 4_000
 _NEAR_IN_HALLS = 256_000
 _CELLS_A_NODE = 35
 """Half the cells that A* expands while a border cell is expanded."""
@@ -79,7 +79,7 @@ class OverlaySearch:
         Cells that A* expands at most, >= 0, before fields are looked at: it settles pairs of cells
         that are close together in less time. Every number finds paths of least cost. None measures
         it on 16 pairs of cells: 250 where tables lead over the map; in open halls, where searches
-        over border cells do, as many as take half their time, up to 256,000; and 64,000 at least
+        over border cells do, as many as take half their time, up to 256,000; and 4,000 at least
         while tables are stale.
 
     Raises
