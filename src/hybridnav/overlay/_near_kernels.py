@@ -97,8 +97,8 @@ def search_near(ground, start, goal, most, distance):
     Returns
     -------
     tuple
-        The cost, NO_PATH for no path; the flat cells of the path; whether no path costs less; the
-        number of cells expanded.
+        The cost, NO_PATH for no path or one that is not proved; the flat cells of the path; whether
+        no path costs less; the number of cells expanded.
     """
     least, shift = least_cost(start, goal, ground.cols, ground.least_units), 0
     while 2 << shift <= ground.least_units:
@@ -126,7 +126,10 @@ def search_near(ground, start, goal, most, distance):
         is_beyond |= is_left
     is_proved = least + (at << shift) >= bound or (at == _BUCKETS and not is_beyond)
     cells = np.empty(0, np.int64)
-    if bound < NO_PATH:
+    if not is_proved:
+        # The distance of a cell on the way may have fallen since the goal was reached.
+        bound = np.int64(NO_PATH)
+    elif bound < NO_PATH:
         cells = path_inside(ground, distance, goal)
     for i in range(n):
         distance[entries[i, 0]] = FAR
