@@ -1,3 +1,10 @@
+from .building import (
+    Building as Building,
+    BuildingPlan as BuildingPlan,
+    Floor as Floor,
+    Link as Link,
+    LinkEnd as LinkEnd,
+)
 from .config import Preset as Preset, load_preset as load_preset, preset_names as preset_names
 from .costs import CostLayer as CostLayer
 from .errors import (

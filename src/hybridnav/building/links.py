@@ -19,10 +19,18 @@ class LinkEnd:
     """Name of the floor."""
     position_m: tuple[float, float]
     """`(x, y)` in metres, in the frame of the floor."""
+    yaw_rad: float | None = None
+    """Direction in which one leaves the link here, radians counter-clockwise from the x axis of
+    the floor's frame: words then name the first turn. None if it is not known."""
 
     def __post_init__(self) -> None:
-        """Refuse positions that are not numbers."""
+        """Refuse positions and directions that are not numbers."""
         x, y = self.position_m
+        if self.yaw_rad is not None and not math.isfinite(self.yaw_rad):
+            raise InvalidValueError(
+                f"an end of a link on floor {self.floor} has the direction {self.yaw_rad!r:.40}, "
+                "expected a finite number of radians, or None"
+            )
         if not (math.isfinite(x) and math.isfinite(y)):
             raise InvalidValueError(
                 f"an end of a link on floor {self.floor} lies at {self.position_m!r:.60}, expected "
@@ -84,6 +92,18 @@ class Link:
             raise InvalidValueError(
                 f"link {self.name}: max_radius_m is {self.max_radius_m}, expected more than 0"
             )
+
+    def admits(self, robot_radius_m: float, *, stairs: bool = True) -> bool:
+        """Return whether a robot may use it.
+
+        Parameters
+        ----------
+        robot_radius_m
+            Radius of the robot in metres.
+        stairs
+            Whether the robot takes stairs.
+        """
+        return robot_radius_m <= self.max_radius_m and (stairs or self.kind != "stairs")
 
     def end_on(self, floor: str) -> LinkEnd | None:
         """Return the end on a floor, None if it does not stop there.

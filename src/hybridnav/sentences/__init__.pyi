@@ -1,4 +1,5 @@
 from .instruction import (
+    FloorChange as FloorChange,
     Instruction as Instruction,
     Landmark as Landmark,
     Passed as Passed,

@@ -1,6 +1,6 @@
 """The sentences in English."""
 
-from hybridnav.sentences.language import HandWords, Language, SpaceWords
+from hybridnav.sentences.language import HandWords, Language, NameWords, SpaceWords
 
 ENGLISH = Language(
     name="English",
@@ -15,6 +15,7 @@ ENGLISH = Language(
     hall=SpaceWords(inside="in the hall", into="into the hall", itself="the hall"),
     room=SpaceWords(inside="in the room", into="into the room", itself="the room"),
     passage=SpaceWords(inside="in the passage", into="into the passage", itself="the passage"),
+    storey=SpaceWords(inside="on this floor", into="onto this floor", itself="this floor"),
     left=HandWords(
         turn="turn left",
         sharp="turn sharply left",
@@ -72,6 +73,15 @@ ENGLISH = Language(
     opening="opening {number} ({width} m wide)",
     opening_beside="opening {number} {beside} ({width} m wide)",
     out_turning=" and {turn}",
+    lift=NameWords(common="the {name}", titled="{name}", plain="lift {name}"),
+    stairs=NameWords(common="the {name}", titled="{name}", plain="stairs {name}"),
+    ramp=NameWords(common="the {name}", titled="{name}", plain="ramp {name}"),
+    floor=NameWords(common="the {name}", titled="{name}", plain="floor {name}"),
+    take_lift="{lead}take {link} to {floor}{out}",
+    take_stairs="{lead}take {link} to {floor}{out}",
+    out_of_lift=", {turn} out of it",
+    out_of_stairs=", then {turn}",
+    straight_out=", go straight on",
     arrive="{lead}you are at {waypoint} {inside}",
     at_beside=", with {landmark} {beside}",
     at_ahead=", with {landmark} ahead",

@@ -1,9 +1,14 @@
 """The sentences in German."""
 
-from hybridnav.sentences.language import HandWords, Language, SpaceWords
+from hybridnav.sentences.language import HandWords, Language, NameWords, SpaceWords
 
 _NAMED = SpaceWords(inside="in „{name}“", into="in „{name}“", itself="„{name}“")
 """A name keeps no article: its gender is not known."""
+
+
+def _always(words: str) -> NameWords:
+    return NameWords(common=words, titled=words, plain=words)
+
 
 GERMAN = Language(
     name="Deutsch",
@@ -18,6 +23,7 @@ GERMAN = Language(
     hall=SpaceWords(inside="in der Halle", into="in die Halle", itself="die Halle"),
     room=SpaceWords(inside="im Raum", into="in den Raum", itself="den Raum"),
     passage=SpaceWords(inside="im Durchgang", into="in den Durchgang", itself="den Durchgang"),
+    storey=SpaceWords(inside="auf dieser Etage", into="auf diese Etage", itself="diese Etage"),
     left=HandWords(
         turn="links abbiegen",
         sharp="scharf links abbiegen",
@@ -75,6 +81,15 @@ GERMAN = Language(
     opening="Öffnung {number} ({width} m breit)",
     opening_beside="Öffnung {number} ({beside}, {width} m breit)",
     out_turning=", dann {turn}",
+    lift=_always("dem Aufzug „{name}“"),
+    stairs=_always("die Treppe „{name}“"),
+    ramp=_always("die Rampe „{name}“"),
+    floor=NameWords(common="Etage „{name}“", titled="Etage „{name}“", plain="Etage {name}"),
+    take_lift="{lead}mit {link} auf {floor} fahren{out}",
+    take_stairs="{lead}über {link} auf {floor} gehen{out}",
+    out_of_lift=", beim Aussteigen {turn}",
+    out_of_stairs=", dann {turn}",
+    straight_out=", dann geradeaus",
     arrive="{lead}am Ziel: {waypoint} {inside}",
     at_beside=", {landmark} {beside}",
     at_ahead=", {landmark} voraus",

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
-Kind = Literal["start", "turn", "cross", "arrive"]
-Shape = Literal["corridor", "hall", "room", "passage"]
+Kind = Literal["start", "turn", "cross", "ride", "arrive"]
+Vehicle = Literal["lift", "stairs", "ramp"]
+Shape = Literal["corridor", "hall", "room", "passage", "storey"]
 Hand = Literal["left", "right"]
 Side = Literal[
     "left",
@@ -162,8 +163,39 @@ class Doorway:
 
 
 @dataclass(frozen=True)
+class FloorChange:
+    """A ride by a lift, stairs or a ramp from one floor to another.
+
+    Examples
+    --------
+    >>> from hybridnav.sentences import FloorChange
+    >>> FloorChange("west lift", "lift", "3").has_exit
+    False
+    """
+
+    link: str
+    """Name of the link."""
+    kind: Vehicle
+    """What it is."""
+    floor: str
+    """Name of the floor to which it leads."""
+    has_exit: bool = False
+    """Whether the direction is known in which one leaves it: the instruction has the turn from
+    there, or none for straight on."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plain values for JSON."""
+        return {
+            "link": self.link,
+            "kind": self.kind,
+            "floor": self.floor,
+            "has_exit": self.has_exit,
+        }
+
+
+@dataclass(frozen=True)
 class Instruction:
-    """One step of a description: a start, a turn, a door, or an arrival.
+    """One step of a description: a start, a turn, a door, a ride to another floor, or an arrival.
 
     Examples
     --------
@@ -184,13 +216,16 @@ class Instruction:
     passed: tuple[Passed, ...] = ()
     """Landmarks since the instruction before."""
     turn: Turn | None = None
-    """The turn; of a start that from the robot's heading, of a door that just before it."""
+    """The turn; of a start that from the robot's heading, of a door that just before it, of a ride
+    that out of it."""
     doorway: Doorway | None = None
     """What a path crosses; None but for the kind `cross`."""
     waypoint: str | None = None
     """Name or coordinates of the waypoint at which one arrives."""
     landmark: Landmark | None = None
     """What shows the direction at a start without a heading, or where a goal lies."""
+    change: FloorChange | None = None
+    """The ride; None but for the kind `ride`."""
     heading_rad: float | None = None
     """Direction of the first step at a start without a landmark, radians, map frame (x is east,
     REP 103); else None."""
@@ -211,6 +246,7 @@ class Instruction:
             "doorway": None if self.doorway is None else _doorway(self.doorway),
             "waypoint": self.waypoint,
             "landmark": None if self.landmark is None else self.landmark.to_dict(),
+            "change": None if self.change is None else self.change.to_dict(),
             "heading_rad": self.heading_rad,
         }
 

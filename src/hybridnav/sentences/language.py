@@ -40,6 +40,18 @@ class HandWords:
 
 
 @dataclass(frozen=True, kw_only=True)
+class NameWords:
+    """A link or a floor by its name, `{name}`, which may have a noun for it or not."""
+
+    common: str
+    """A name in small letters with such a noun: `the west lift`, `the basement`."""
+    titled: str
+    """Another name with such a noun: `Lift A`, `Level 2`."""
+    plain: str
+    """A name without: `lift A`, `floor 2`."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Language:
     """Templates of all sentences in one language.
 
@@ -67,6 +79,8 @@ class Language:
     hall: SpaceWords
     room: SpaceWords
     passage: SpaceWords
+    storey: SpaceWords
+    """A floor whose map has no rooms."""
     left: HandWords
     right: HandWords
     turn_round: str
@@ -135,6 +149,20 @@ class Language:
     """A narrow one at one hand; `{number}`, `{beside}`."""
     out_turning: str
     """End of a sentence with a turn behind a door; `{turn}`."""
+    lift: NameWords
+    stairs: NameWords
+    ramp: NameWords
+    floor: NameWords
+    take_lift: str
+    """By a lift to another floor; `{lead}`, `{link}`, `{floor}`, `{out}`."""
+    take_stairs: str
+    """By stairs or a ramp; likewise."""
+    out_of_lift: str
+    """The turn out of a lift; `{turn}`."""
+    out_of_stairs: str
+    """The turn behind stairs or a ramp; `{turn}`."""
+    straight_out: str
+    """Straight on behind any of them."""
     arrive: str
     """At a waypoint; `{lead}`, `{waypoint}`, `{inside}`."""
     at_beside: str

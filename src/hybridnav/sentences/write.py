@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from hybridnav.sentences.instruction import (
         Doorway,
+        FloorChange,
         Hand,
         Instruction,
         Landmark,
@@ -22,9 +23,16 @@ if TYPE_CHECKING:
         Space,
         Turn,
     )
-    from hybridnav.sentences.language import HandWords, Language, SpaceWords
+    from hybridnav.sentences.language import HandWords, Language, NameWords, SpaceWords
 
 _LANGUAGES = {"de": GERMAN, "en": ENGLISH}
+_NOUNS = {
+    "lift": ("lift", "elevator"),
+    "stairs": ("stair", "steps"),
+    "ramp": ("ramp",),
+    "floor": ("floor", "level", "storey", "basement", "cellar", "attic", "roof"),
+}
+"""Nouns by which a name says what it is the name of."""
 _WIDE_M = 2.0
 """Width from which an opening is recognised by it, in metres."""
 _FREE_M = 1.5
@@ -139,6 +147,8 @@ class _Writer:
         inside, lead = self._space(instruction.space).inside, self._lead(instruction)
         if doorway is not None:
             return self._cross(instruction, doorway, lead)
+        if instruction.change is not None:
+            return self._ride(instruction.change, turn, lead)
         if instruction.kind == "arrive":
             arrival = self._arrival(instruction).format(
                 lead=lead, inside=inside, waypoint=instruction.waypoint
@@ -221,6 +231,18 @@ class _Writer:
             out=self._out(doorway),
         )
 
+    def _ride(self, change: FloorChange, turn: Turn | None, lead: str) -> str:
+        words, is_lift = self.words, change.kind == "lift"
+        template = words.take_lift if is_lift else words.take_stairs
+        out = words.straight_out if change.has_exit else ""
+        if turn is not None:
+            out = words.out_of_lift if is_lift else words.out_of_stairs
+            out = out.format(turn=self._turn(turn))
+        of_link: NameWords = getattr(words, change.kind)
+        link = _named(change.link, of_link, _NOUNS[change.kind])
+        floor = _named(change.floor, words.floor, _NOUNS["floor"])
+        return template.format(lead=lead, link=link, floor=floor, out=out)
+
     def _door(self, doorway: Doorway) -> str:
         words, is_ahead = self.words, doorway.beside is None
         if not doorway.is_opening:
@@ -300,6 +322,14 @@ class _Writer:
             into=named.into.format(name=space.name),
             itself=named.itself.format(name=space.name),
         )
+
+
+def _named(name: str, words: NameWords, nouns: Sequence[str]) -> str:
+    """Return the words for a link or a floor."""
+    template = words.plain
+    if any(noun in name.casefold() for noun in nouns):
+        template = words.common if _is_common(name) else words.titled
+    return template.format(name=name)
 
 
 def _is_common(name: str) -> bool:

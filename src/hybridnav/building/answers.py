@@ -1,0 +1,122 @@
+"""From the routes that a search has chosen to plans."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from hybridnav.building.floors import ROUNDED
+from hybridnav.building.plan import BuildingPlan, Ride, stats_of
+from hybridnav.building.search import START
+from hybridnav.building.words import GuidedRoute
+from hybridnav.planner.itinerary import waypoint_text
+from hybridnav.result import PlanStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav.building.floors import Floor
+    from hybridnav.building.search import Chosen, Ends, Network, Part, Search
+
+
+class Answers:
+    """Makes the plans of a building.
+
+    Parameters
+    ----------
+    floors
+        Its floors.
+    network
+        The links that may be used.
+    speed_m_s
+        Metres per second that the robot drives.
+    """
+
+    def __init__(self, floors: Sequence[Floor], network: Network, speed_m_s: float) -> None:
+        self._floors, self._network, self._speed_m_s = floors, network, speed_m_s
+
+    def refused(self, status: PlanStatus, ends: tuple[Ends, Ends]) -> BuildingPlan:
+        """Return the plan of a query without a route."""
+        start, goal = (self._named(end) for end in ends)
+        return BuildingPlan(status, "octile", start, goal, speed_m_s=self._speed_m_s)
+
+    def found(
+        self, search: Search, ends: tuple[Ends, Ends], limits: tuple[int, float], began: float
+    ) -> tuple[BuildingPlan, ...]:
+        """Search routes, and return them as plans.
+
+        Parameters
+        ----------
+        search
+            The search of a query.
+        ends
+            Its start and goal.
+        limits
+            Most routes, and cost of one over that of the first, at most.
+        began
+            When the query began, by `time.perf_counter`.
+        """
+        count, stretch = limits
+        if count == 1:
+            best = search.best()
+            chosen = [] if best is None else [best]
+        else:
+            ranked = search.ranked(lambda cost: stretch * cost / ROUNDED)
+            chosen = list(itertools.islice(ranked, count))
+        bound = search.bound()
+        plans = [self._plan(search, ends, one, bound) for one in chosen]
+        if not plans:
+            metrics = [result.metric for result in search.planned]
+            refused = self.refused(search.reason(), ends)
+            metric = metrics[0] if metrics else refused.metric
+            plans = [replace(refused, metric=metric, lower_bound=bound)]
+        stats = stats_of(search.planned, time.perf_counter() - began)
+        return tuple(replace(plan, stats=stats) for plan in plans)
+
+    def _plan(
+        self, search: Search, ends: tuple[Ends, Ends], chosen: Chosen, bound: float
+    ) -> BuildingPlan:
+        """Return the plan of one route."""
+        results = tuple(search.results[part] for part in chosen.parts)
+        rides = tuple(itertools.starmap(self._ride, itertools.pairwise(chosen.parts)))
+        floors = [self._floors[self._floor_of(part, ends)] for part in chosen.parts]
+        start, goal = (self._named(end) for end in ends)
+        guided = GuidedRoute(
+            tuple(floor.planner.guide for floor in floors),
+            results,
+            rides,
+            waypoint_text(ends[1].waypoint),
+        )
+        plan = BuildingPlan(
+            PlanStatus.SOLVED,
+            results[0].metric,
+            start,
+            goal,
+            results,
+            tuple(floor.name for floor in floors),
+            rides,
+            speed_m_s=self._speed_m_s,
+            instruction_source=guided,
+        )
+        cost = plan.cost
+        # Sums are rounded: a bound that differs from the cost by that alone is the cost.
+        return replace(plan, lower_bound=cost if bound >= cost * ROUNDED else bound)
+
+    def _floor_of(self, part: Part, ends: tuple[Ends, Ends]) -> int:
+        return ends[0].floor if part[0] == START else self._network.ends[part[0]].floor
+
+    def _ride(self, before: Part, after: Part) -> Ride:
+        """Return the ride between two parts of a route."""
+        entered, left = self._network.ends[before[1]], self._network.ends[after[0]]
+        charges = dict(self._network.rides[before[1]])
+        from_floor, to_floor = self._floors[entered.floor].name, self._floors[left.floor].name
+        return Ride(self._network.links[entered.link], from_floor, to_floor, charges[after[0]])
+
+    def _named(self, end: Ends) -> tuple[str, tuple[float, ...] | str]:
+        name, waypoint = self._floors[end.floor].name, end.waypoint
+        if isinstance(waypoint, str):
+            return name, waypoint
+        x, y = (float(number) for number in waypoint)  # type: ignore[union-attr, arg-type]
+        return name, (x, y)

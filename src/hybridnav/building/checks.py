@@ -1,0 +1,121 @@
+"""Checks of buildings: their floors fit together, and robots can stand at the ends of links."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from hybridnav.building.floors import Floor
+from hybridnav.building.links import Link
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid import CellClass
+from hybridnav.grid.checks import checked_type
+from hybridnav.grid.names import did_you_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav.building.links import LinkEnd
+
+
+def check_floors(floors: Sequence[Floor]) -> None:
+    """Refuse floors that do not make one building for one robot.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is none, a name occurs twice, or their planners plan by different presets, for
+        different robots, or with headings.
+    """
+    if not floors:
+        raise InvalidValueError("a building needs at least one floor, got none")
+    seen: set[str] = set()
+    for floor in floors:
+        checked_type("floors", floor, Floor)
+        if floor.name in seen:
+            raise InvalidValueError(f"floor {floor.name}: the name is given twice")
+        seen.add(floor.name)
+        if floor.planner.needs_headings:
+            raise InvalidValueError(
+                f"floor {floor.name}: preset {floor.planner.preset.name} plans with headings, "
+                "which ends of links do not have: take a preset without"
+            )
+    first = floors[0]
+    radius_m = first.planner.topology.grid.robot_radius_m
+    for floor in floors[1:]:
+        other_m = floor.planner.topology.grid.robot_radius_m
+        if other_m != radius_m:
+            raise InvalidValueError(
+                f"floor {floor.name} is for a robot radius of {other_m:g} m and floor "
+                f"{first.name} for {radius_m:g} m: load all maps with one robot_radius_m"
+            )
+        if floor.planner.preset.planner != first.planner.preset.planner:
+            raise InvalidValueError(
+                f"floor {floor.name} is planned by preset {floor.planner.preset.name} and floor "
+                f"{first.name} by {first.planner.preset.name}: their bounds do not add up, take "
+                "one preset"
+            )
+
+
+def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
+    """Refuse links whose names occur twice, and ends where this robot cannot stand.
+
+    Links that the robot does not fit in need no free ends.
+
+    Raises
+    ------
+    InvalidValueError
+        When a link is refused.
+    """
+    known = {floor.name: floor for floor in floors}
+    seen: set[str] = set()
+    for link in links:
+        checked_type("links", link, Link)
+        if not link.name.strip() or not link.name.isprintable():
+            raise InvalidValueError(
+                f"a link needs a name of one printable line, got {link.name!r:.90}"
+            )
+        if link.name in seen:
+            raise InvalidValueError(f"link {link.name}: the name is given twice")
+        seen.add(link.name)
+        for end in link.ends:
+            if end.floor not in known:
+                raise InvalidValueError(
+                    f"link {link.name}: no floor is called {end.floor!r:.90}"
+                    f"{did_you_mean(end.floor, tuple(known))}"
+                )
+            if link.admits(known[end.floor].planner.topology.grid.robot_radius_m):
+                _check_free(link, end, known[end.floor])
+
+
+def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
+    planner = floor.planner
+    grid, allowed = planner.topology.grid, planner.preset.planner.allow_unexplored
+    x, y = end.position_m
+    at = f"link {link.name}: its end ({x:g}, {y:g}) on floor {floor.name}"
+    row, col = grid.frame.cell_of(x, y)
+    if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
+        raise InvalidValueError(f"{at} lies outside the map: give a point on it")
+    cell = CellClass(grid.classes[row, col])
+    if cell == CellClass.FREE or (allowed and cell == CellClass.UNEXPLORED):
+        return
+    if grid.measured[row, col] == CellClass.FREE:
+        why = f"is too near to an obstacle for a robot radius of {grid.robot_radius_m:g} m"
+    else:
+        why = f"lies in an {cell.name.lower()} cell"
+    raise InvalidValueError(f"{at} {why}: give a point where the robot can stand")
+
+
+def check_speed(speed_m_s: float) -> float:
+    """Return a speed, refuse what is none.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not a finite number above 0.
+    """
+    if not (math.isfinite(speed_m_s) and speed_m_s > 0):
+        raise InvalidValueError(
+            f"speed_m_s is {speed_m_s!r:.40}, expected a finite number of metres per second above 0"
+        )
+    return float(speed_m_s)

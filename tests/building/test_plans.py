@@ -1,0 +1,118 @@
+"""Routes over floors: against Dijkstra on the joined floors, and every figure counted again."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hybridnav as hn
+from tests.building.scenes import (
+    Scene,
+    Where,
+    charge,
+    optimum_any_angle,
+    optimum_on_cells,
+    random_building,
+    usable,
+)
+from tests.plans import PLAIN
+
+SEEDS = st.integers(0, 10**6)
+
+
+def drawn_conditions(scene: Scene) -> tuple[set[str], bool]:
+    closed = {link.name for link in scene.building.links if scene.rng.random() < 0.2}
+    return closed, bool(scene.rng.random() < 0.8)
+
+
+def check_figures(
+    scene: Scene, plan: hn.BuildingPlan, start: Where, goal: Where, links: list[hn.Link]
+) -> None:
+    """Count every figure of a route again from its parts."""
+    building = scene.building
+    assert len(plan.results) == len(plan.floors) == len(plan.rides) + 1
+    at: tuple[str, Any]
+    at, cost, seconds = scene.named(start), 0.0, 0.0
+    for number, (floor, result) in enumerate(zip(plan.floors, plan.results, strict=True)):
+        assert floor == at[0]
+        assert result.path is not None
+        assert result.start is not None
+        assert result.goal is not None
+        assert math.dist(result.start, at[1]) < 1e-9
+        cost += result.cost
+        assert result.lower_bound <= result.cost
+        if number == len(plan.rides):
+            assert floor == scene.named(goal)[0]
+            assert math.dist(result.goal, goal[1]) < 1e-9
+            break
+        ride = plan.rides[number]
+        assert ride.link in links
+        assert ride.from_floor == floor
+        entered, left = ride.link.end_on(floor), ride.link.end_on(ride.to_floor)
+        assert entered is not None
+        assert left is not None
+        assert math.dist(result.goal, entered.position_m) < 1e-9
+        order = [end.floor for end in ride.link.ends]
+        ends = order.index(floor), order.index(ride.to_floor)
+        assert ride.charge_m == pytest.approx(charge(ride.link, *ends, building.speed_m_s))
+        cost += ride.charge_m
+        seconds += ride.seconds
+        at = ride.to_floor, left.position_m
+    length_m = sum(r.path.length_m for r in plan.results if r.path is not None)
+    assert plan.length_m == pytest.approx(length_m)
+    assert plan.cost == pytest.approx(cost)
+    assert plan.travel_s == pytest.approx(length_m / building.speed_m_s + seconds)
+    assert plan.lower_bound <= plan.cost
+    figures = plan.to_dict()
+    assert figures["cost"] == plan.cost
+    assert [ride["link"] for ride in figures["rides"]] == [ride.link.name for ride in plan.rides]
+
+
+@PLAIN
+@given(SEEDS)
+def test_shortest_is_exact(seed: int) -> None:
+    scene = random_building(seed)
+    for _ in range(4):
+        start, goal = scene.somewhere(), scene.somewhere()
+        closed, stairs = drawn_conditions(scene)
+        links = usable(scene, closed, stairs=stairs)
+        plan = scene.building.plan(
+            scene.named(start), scene.named(goal), closed_links=closed, stairs=stairs
+        )
+        optimum = optimum_any_angle(scene, start, goal, links)
+        if math.isinf(optimum):
+            assert plan.status is hn.PlanStatus.NO_PATH
+            assert math.isinf(plan.lower_bound)
+            continue
+        assert plan.cost == pytest.approx(optimum, abs=1e-9)
+        assert plan.gap == 0.0
+        check_figures(scene, plan, start, goal, links)
+
+
+@pytest.mark.parametrize("preset", ["octile", "grid-astar", "paper"])
+@PLAIN
+@given(SEEDS)
+def test_cells(preset: str, seed: int) -> None:
+    scene = random_building(seed, preset=preset)
+    is_exact = preset != "paper"
+    for _ in range(3):
+        start, goal = scene.somewhere(), scene.somewhere()
+        closed, stairs = drawn_conditions(scene)
+        links = usable(scene, closed, stairs=stairs)
+        plan = scene.building.plan(
+            scene.named(start), scene.named(goal), closed_links=closed, stairs=stairs
+        )
+        cells = [grid.enterable() for grid in scene.grids]
+        optimum = optimum_on_cells(scene, start, goal, links, cells)
+        assert plan.lower_bound <= optimum + 1e-9
+        assert plan.cost >= optimum - 1e-9
+        if plan.solved:
+            check_figures(scene, plan, start, goal, links)
+        if is_exact:
+            assert plan.solved == math.isfinite(optimum)
+            assert plan.cost == pytest.approx(optimum, abs=1e-9)
+            assert not plan.gap > 0
