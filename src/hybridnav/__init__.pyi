@@ -52,6 +52,7 @@ from .io import (
     load as load,
     load_bag_map as load_bag_map,
     load_blocked as load_blocked,
+    load_building as load_building,
     load_graph as load_graph,
     load_keepout_mask as load_keepout_mask,
     load_map as load_map,

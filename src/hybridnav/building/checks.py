@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+from scipy import ndimage
+
 from hybridnav.building.floors import Floor
 from hybridnav.building.links import Link
 from hybridnav.errors import InvalidValueError
@@ -16,6 +19,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav.building.links import LinkEnd
+
+
+_LEAST_PART = 0.05
+"""Share of the largest connected part of a floor that a part with the end of a link has."""
 
 
 def check_floors(floors: Sequence[Floor]) -> None:
@@ -104,6 +111,39 @@ def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
     else:
         why = f"lies in an {cell.name.lower()} cell"
     raise InvalidValueError(f"{at} {why}: give a point where the robot can stand")
+
+
+def check_reach(links: Sequence[Link], floors: Sequence[Floor]) -> None:
+    """Refuse ends of links from which the robot does not reach the rest of the floor.
+
+    A floor may consist of several parts, as two wings without a passage do, but an end lies in none
+    that is smaller than a twentieth of the largest.
+
+    Raises
+    ------
+    InvalidValueError
+        When an end lies in such a part.
+    """
+    for floor in floors:
+        planner = floor.planner
+        grid, allowed = planner.topology.grid, planner.preset.planner.allow_unexplored
+        part_of, _ = ndimage.label(grid.enterable(allow_unexplored=allowed))
+        cells_in = np.bincount(part_of.ravel())[1:]
+        for link in links:
+            end = link.end_on(floor.name)
+            if end is None or not link.admits(grid.robot_radius_m):
+                continue
+            part = int(part_of[grid.frame.cell_of(*end.position_m)])
+            if cells_in[part - 1] < _LEAST_PART * cells_in.max():
+                x, y = end.position_m
+                here, most = (
+                    n * grid.resolution_m**2 for n in (cells_in[part - 1], cells_in.max())
+                )
+                raise InvalidValueError(
+                    f"link {link.name}: its end ({x:g}, {y:g}) on floor {floor.name} lies in a "
+                    f"part of {here:.3g} m² that is cut off from the rest, {most:.3g} m²: give a "
+                    "point from which the robot can drive away"
+                )
 
 
 def check_speed(speed_m_s: float) -> float:

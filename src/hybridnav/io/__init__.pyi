@@ -1,6 +1,7 @@
 from .bags import BagLog as BagLog, load_bag_map as load_bag_map
 from .bags_out import save_bag as save_bag
 from .blocked import load_blocked as load_blocked
+from .buildings import is_building as is_building, load_building as load_building
 from .carmen import CarmenLog as CarmenLog
 from .examples import example_map as example_map
 from .features_out import (

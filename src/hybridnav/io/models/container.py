@@ -141,6 +141,19 @@ class FiledPart:
         part = self.part
         return Part(part.kind, part.version, dict(part.sizes), dict(part.values), arrays)
 
+    def stored(self, name: str) -> memoryview:
+        """Return the bytes of an array in the file, for contents with checksums of their own.
+
+        Raises
+        ------
+        ModelError
+            When it is missing, or deflated.
+        """
+        at = self.part.arrays.get(name)
+        if at is None or at.deflated:
+            raise ModelError(f"{self.where}: {self.kind} lacks {name}: build the model anew")
+        return memoryview(self._data)[at.offset : at.offset + at.size]
+
     def _array(self, name: str, at: _Stored) -> AnyArray:
         stored = memoryview(self._data)[at.offset : at.offset + at.size]
         if zlib.crc32(stored) != at.crc32:
@@ -189,6 +202,17 @@ def write_parts(path: Path, parts: Iterable[Part], *, compress: bool) -> None:
     OSError
         When it cannot be written.
     """
+    replace_file(path, buffers_of(parts, compress=compress))
+
+
+def buffers_of(parts: Iterable[Part], *, compress: bool) -> list[bytes | memoryview]:
+    """Return the content of the file of a model, in parts; see `write_parts`.
+
+    Raises
+    ------
+    ModelError
+        When rooms and doors have names that are too long together.
+    """
     described: list[dict[str, Any]] = []
     buffers: list[bytes | memoryview] = []
     offset = 0
@@ -226,7 +250,7 @@ def write_parts(path: Path, parts: Iterable[Part], *, compress: bool) -> None:
             f"{len(header)}: give rooms and doors shorter names"
         )
     head = _HEAD.pack(_MAGIC, FORMAT, zlib.crc32(header), len(header))
-    replace_file(path, [head, header, bytes(-(len(head) + len(header)) % _ALIGN), *buffers])
+    return [head, header, bytes(-(len(head) + len(header)) % _ALIGN), *buffers]
 
 
 def read_parts(path: PathLike) -> list[FiledPart]:
@@ -254,22 +278,39 @@ def read_parts(path: PathLike) -> list[FiledPart]:
         raise ModelError(f"{where}: no file: expected one that hybridnav build has written")
     try:
         with Path(path).open("rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            head = file.read(_HEAD.size)
-            length, checksum = _read_head(head, where)
-            content = file.read(min(length, _MAX_HEADER))
-            begin = _aligned(_HEAD.size + length)
-            if length > _MAX_HEADER or len(content) < length or begin > size:
-                raise ModelError(f"{where}: the header is cut off: build the model anew")
-            header = _read_header(content, checksum, where)
-            _check_places(header, size - begin, where)
-            # Private pages: numba gets ordinary arrays, and the file is never written to.
-            whole = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
+            whole: Any = b""
+            if os.fstat(file.fileno()).st_size:
+                # Private pages: numba gets ordinary arrays, and the file is never written to.
+                whole = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
     except FileNotFoundError:
         raise MapNotFoundError(f"{where}: no such file") from None
     except OSError as error:
         raise ModelError(f"{where}: cannot be read: {error.strerror}") from None
-    data = memoryview(whole)[begin:]
+    return parts_within(memoryview(whole), where)
+
+
+def parts_within(content: memoryview, where: str) -> list[FiledPart]:
+    """Return the parts of a model in memory; see `read_parts`.
+
+    Parameters
+    ----------
+    content
+        The bytes of its file, at a multiple of 64.
+    where
+        What messages begin with.
+
+    Raises
+    ------
+    ModelError
+        As by `read_parts`.
+    """
+    length, checksum = _read_head(bytes(content[: _HEAD.size]), where)
+    end, begin = _HEAD.size + length, _aligned(_HEAD.size + length)
+    if length > _MAX_HEADER or begin > len(content):
+        raise ModelError(f"{where}: the header is cut off: build the model anew")
+    header = _read_header(bytes(content[_HEAD.size : end]), checksum, where)
+    data = content[begin:]
+    _check_places(header, len(data), where)
     return [FiledPart(where, part, data) for part in header.parts]
 
 

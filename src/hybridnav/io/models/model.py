@@ -14,7 +14,7 @@ from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.io.models import parts
 from hybridnav.io.models.array_specs import refusal
 from hybridnav.io.models.container import read_parts
-from hybridnav.io.models.structures import GRID, KEY, KINDS, PRESET, PYRAMID, ROOMS
+from hybridnav.io.models.structures import BUILDING, GRID, KEY, KINDS, PRESET, PYRAMID, ROOMS
 from hybridnav.io.size import check_max_cells
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
@@ -288,6 +288,22 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
     """Open a model; see `hybridnav.io.load`."""
     check_max_cells(max_cells)
     filed = read_parts(path)
+    if filed and filed[0].kind == BUILDING.kind:
+        raise ModelError(
+            f"model {printable(path)}: it is that of a building, expected one of a map: load it "
+            "with load_building"
+        )
+    return model_of(filed, f"model {printable(path)}", max_cells)
+
+
+def model_of(filed: Sequence[FiledPart], where: str, max_cells: int) -> Model:
+    """Return the model of the parts of a file.
+
+    Raises
+    ------
+    ModelError
+        When they are not those of one map.
+    """
     for part in filed:
         if part.kind not in KINDS:
             raise refusal(part, "no such part is known: a newer hybridnav has made it")
@@ -296,7 +312,7 @@ def open_model(path: PathLike, *, max_cells: int = DEFAULT_MAX_CELLS) -> Model:
     for kind, key in [*made, (GRID.kind, None)]:
         if made.count((kind, key)) != 1:
             raise ModelError(
-                f"model {printable(path)}: {made.count((kind, key))} parts {kind}, expected one: "
+                f"{where}: {made.count((kind, key))} parts {kind}, expected one: "
                 "build the model anew"
             )
     return Model(None, filed, max_cells)

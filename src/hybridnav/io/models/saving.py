@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav._files import MODEL_SUFFIX, printable
+from hybridnav.building import Building
 from hybridnav.errors import InvalidValueError, ModelError
 from hybridnav.grid import OccupancyGrid
 from hybridnav.io.models import parts
+from hybridnav.io.models.buildings import building_parts
 from hybridnav.io.models.container import write_parts
 from hybridnav.io.models.model import Model, is_model
 from hybridnav.topology import TopologicalMap
@@ -20,21 +22,26 @@ if TYPE_CHECKING:
     from hybridnav.io.models.container import Part
     from hybridnav.planner import HybridPlanner
 
+    Saved = (
+        OccupancyGrid | TopologicalMap | HybridPlanner | Model | Building | Iterable[HybridPlanner]
+    )
+
 
 def save(
-    thing: OccupancyGrid | TopologicalMap | HybridPlanner | Model | Iterable[HybridPlanner],
+    thing: Saved,
     path: PathLike,
     *,
     compress: bool = False,
 ) -> None:
-    """Write a model: a map with everything that was prepared on it.
+    """Write a model: a map, or the maps of a building, with everything that was prepared on it.
 
     Parameters
     ----------
     thing
         A planner, with its grid, its topological map, and everything that it has prepared so far:
         call `HybridPlanner.prepare` first to include all. Or several planners on one topological
-        map, such as those of several presets. Or only such a map, a grid or a `Model`.
+        map, such as those of several presets. Or only such a map, a grid or a `Model`. Or a
+        `Building`, which `load_building` loads.
     path
         The file, which must end in `.hnm`. It is written whole or not at all; processes that have
         loaded the file it replaces keep the old one.
@@ -60,6 +67,12 @@ def save(
             f"the name of a model must end in {MODEL_SUFFIX}, got {printable(path)}"
         )
     try:
+        if isinstance(thing, Building):
+            # The maps are deflated, and what is known between links is little.
+            write_parts(
+                Path(path), building_parts(thing, parts_of, compress=compress), compress=False
+            )
+            return
         write_parts(Path(path), parts_of(thing), compress=compress)
     except OSError as error:
         raise ModelError(f"model {printable(path)}: cannot be written: {error.strerror}") from None

@@ -168,6 +168,17 @@ PRESET = Structure("preset", 2, (), {})
 KEY = Structure("key", 1, (), {})
 """Key by which a kept model is found."""
 
+BUILDING = Structure(
+    "building",
+    1,
+    (ArraySpec("lower", "float64", ("pairs",), least=0), ArraySpec("cost", "float64", ("pairs",))),
+    {"pairs": 10_000_000},
+)
+"""A building, first in its file; what is known between the ends of links, floor after floor."""
+
+FLOOR = Structure("floor", 1, (ArraySpec("model", "uint8", ("bytes",)),), {"bytes": 1 << 48})
+"""The model of a map of a building, a file in itself."""
+
 KINDS = frozenset(
     structure.kind
     for structure in (

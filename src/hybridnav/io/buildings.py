@@ -1,0 +1,245 @@
+"""Buildings from files: floors with their maps, and links by points, rooms and doors."""
+
+from __future__ import annotations
+
+import math
+import re
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._files import MODEL_SUFFIX
+from hybridnav.building import Building, Floor, Link, LinkEnd
+from hybridnav.building.checks import check_reach
+from hybridnav.config import load_preset
+from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, PresetError
+from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.grid.names import did_you_mean
+from hybridnav.io.building_entries import read_building_entries
+from hybridnav.io.maps import load
+from hybridnav.io.models import is_model
+from hybridnav.io.models.buildings import is_building_model, open_building
+from hybridnav.io.rooms_in import load_rooms
+from hybridnav.planner.landmarks import Landmarks
+from hybridnav.topology import find_rooms
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from hybridnav._typing import PathLike
+    from hybridnav.config import Preset
+    from hybridnav.io.building_entries import EndEntry, Entries, FloorEntry, LinkEntry
+    from hybridnav.planner import HybridPlanner
+    from hybridnav.topology import Rooms
+
+_FLOORS = re.compile(r"^[\"']?floors[\"']?\s*:", re.MULTILINE)
+_LOOKED_AT = 2**16
+"""Bytes of a file that are searched for its floors."""
+
+
+def is_building(path: PathLike) -> bool:
+    """Return whether a file describes a building, by what it contains; False if there is none.
+
+    Parameters
+    ----------
+    path
+        A YAML file or a model.
+    """
+    file = Path(path)
+    suffix = file.suffix.lower()
+    if not file.is_file():
+        return False
+    if suffix == MODEL_SUFFIX:
+        return is_building_model(file)
+    if suffix not in {".yaml", ".yml"}:
+        return False
+    try:
+        with file.open("rb") as stream:
+            text = stream.read(_LOOKED_AT).decode("utf-8-sig", errors="replace")
+    except OSError:
+        return False
+    return _FLOORS.search(text) is not None
+
+
+def load_building(
+    path: PathLike,
+    *,
+    robot_radius_m: float | None = None,
+    preset: PathLike | Preset | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> Building:
+    r"""Load a building from its description, or from its model.
+
+    Parameters
+    ----------
+    path
+        A YAML file, or a model (.hnm) that `save` has written of a building. The file has a list
+        `floors`, from the lowest to the highest, each with its `name`, its `map` (a map or a model,
+        relative to the file), and optionally `elevation_m`, a file of `rooms`, or `find_rooms:
+        true`; a list `links`, each with its `name`, its `kind` (lift, stairs or ramp), two or more
+        `ends`, and optionally `wait_s`, `ride_s`, `cost_m` and `max_radius_m`; and optionally
+        `speed_m_s`. An end has its `floor` and a place: `at: [x, y]`, a `room`, or the number of a
+        `door`, with the `room` on whose side of it the robot stands; and optionally `yaw_rad`.
+    robot_radius_m
+        Radius of the robot in metres on all floors; None for that of the models, or of the preset.
+    preset
+        Preset of all planners; None for that of the models, or `shortest`.
+    max_cells
+        Most cells of the map of a floor.
+
+    Returns
+    -------
+    Building
+        The building, whose links have been checked: the robot can stand at each end, and drive from
+        it to the rest of the floor.
+
+    Raises
+    ------
+    MapNotFoundError
+        When a file does not exist.
+    MapError
+        When a file cannot be read, or a floor, a room, a door or the place of an end is not as it
+        is written; one line that names the file and the line.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> hn.save(hn.example_map("figure1"), "figure1.hnm")
+    >>> ends = "[{floor: 1, at: [0.5, 0.5]}, {floor: 2, at: [0.5, 2.5]}]"
+    >>> _ = Path("building.yaml").write_text(
+    ...     "floors: [{name: 1, map: figure1.hnm}, {name: 2, map: figure1.hnm}]\n"
+    ...     f"links: [{{name: lift, kind: lift, wait_s: 20, ends: {ends}}}]\n"
+    ... )
+    >>> building = hn.load_building("building.yaml")
+    >>> round(building.plan(("1", (1.5, 0.5)), ("2", (0.5, 0.5))).length_m, 3)
+    3.0
+    """
+    if is_model(path):
+        return open_building(
+            path, robot_radius_m=robot_radius_m, preset=preset, max_cells=max_cells
+        )
+    entries = read_building_entries(path)
+    folder = Path(path).parent
+    planners: dict[tuple[str, str | None, bool], HybridPlanner] = {}
+    floors = []
+    for entry in entries.floors:
+        # One map on several floors is read once.
+        key = entry.map_file, entry.rooms_file, entry.find_rooms
+        if key not in planners:
+            planners[key] = _planner(entry, folder, robot_radius_m, preset, max_cells)
+        with _at(entry.at):
+            floors.append(Floor(entry.name, planners[key], entry.elevation_m))
+    return _joined(entries, floors)
+
+
+def _planner(
+    entry: FloorEntry,
+    folder: Path,
+    robot_radius_m: float | None,
+    preset: PathLike | Preset | None,
+    max_cells: int,
+) -> HybridPlanner:
+    """Make the planner of a floor, with the rooms that the file names."""
+    map_file = folder / entry.map_file
+    if robot_radius_m is None and not is_model(map_file):
+        chosen = load_preset("shortest" if preset is None else preset)
+        robot_radius_m = chosen.pyramid.robot_radius_m
+    with _at(f"{entry.at}: floor {entry.name}"):
+        model = load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells)
+        rooms = model.rooms
+        if entry.rooms_file is not None:
+            rooms = load_rooms(folder / entry.rooms_file, model.grid)
+        elif entry.find_rooms and rooms is None:
+            rooms = find_rooms(model.grid)
+        fitted = model.fitted(None if preset is None else load_preset(preset))
+        return model.planner(preset, topology=model.grown(fitted.pyramid, rooms))
+
+
+@contextmanager
+def _at(where: str) -> Iterator[None]:
+    """Put a place in the file before the errors of what is built of it."""
+    try:
+        yield
+    except PresetError:
+        raise
+    except MapNotFoundError as error:
+        raise MapNotFoundError(f"{where}: {error}") from None
+    except HybridNavError as error:
+        raise MapError(f"{where}: {error}") from None
+
+
+def _joined(entries: Entries, floors: list[Floor]) -> Building:
+    """Return the building of floors and links."""
+    by_name = {floor.name: floor for floor in floors}
+    links = [_link(entry, by_name) for entry in entries.links]
+    speed = {} if entries.speed_m_s is None else {"speed_m_s": entries.speed_m_s}
+    with _at(entries.where):
+        building = Building(floors, links, **speed)
+        check_reach(building.links, building.floors)
+    return building
+
+
+def _link(entry: LinkEntry, floors: dict[str, Floor]) -> Link:
+    ends = tuple(_end(end, floors) for end in entry.ends)
+    with _at(entry.at):
+        return Link(name=entry.name, kind=entry.kind, ends=ends, **entry.numbers)
+
+
+def _end(entry: EndEntry, floors: dict[str, Floor]) -> LinkEnd:
+    """Return the end of a link at its point, in its room, or at its door."""
+    floor = floors.get(entry.floor)
+    if floor is None:
+        hint = did_you_mean(entry.floor, tuple(floors))
+        raise MapError(f"{entry.at}: no floor is called {entry.floor!r:.90}{hint}")
+    yaw_rad = entry.yaw_rad
+    with _at(entry.at):
+        if entry.point is not None:
+            if entry.room is not None:
+                _check_in_room(entry.point, entry.room, floor)
+            return LinkEnd(entry.floor, entry.point, yaw_rad)
+        rooms = floor.planner.topology.rooms
+        if entry.door is None:
+            assert entry.room is not None  # noqa: S101 - an end has a place
+            if entry.room not in rooms.labels.points:
+                rooms.labels.index(entry.room)
+            return LinkEnd(entry.floor, rooms.point_of(entry.room), yaw_rad)
+        point, out_rad = _at_door(rooms, entry.door, entry.room)
+        return LinkEnd(entry.floor, point, out_rad if yaw_rad is None else yaw_rad)
+
+
+def _check_in_room(point: tuple[float, float], room: str, floor: Floor) -> None:
+    rooms = floor.planner.topology.rooms
+    rooms.labels.index(room)
+    found = rooms.at(point)
+    if found != room:
+        where = "in no room" if found is None else f"in room {found}"
+        raise MapError(f"the point {list(point)} lies {where}, expected {room}")
+
+
+def _at_door(
+    rooms: Rooms, number: int, room: str | None
+) -> tuple[tuple[float, float], float | None]:
+    """Return the free point nearest to the middle of a door, on the side of a room if one is named,
+    and the direction in which one enters that room."""
+    door, grid = rooms.door(number), rooms.grid
+    rows, cols = np.divmod(rooms.cells_beside(number), grid.shape[1])
+    kept = grid.enterable()[rows, cols]
+    yaw_rad = None
+    if room is not None:
+        kept &= rooms.labels.label_of[rows, cols] == rooms.labels.index(room)
+        if room not in door.rooms:
+            joined = " and ".join(name or "a space without a name" for name in door.rooms)
+            raise MapError(f"door {number} joins {joined}, not {room}")
+        way_rad = Landmarks(rooms).way_out_rad(door, is_forward=door.rooms[1] == room)
+        yaw_rad = math.remainder(way_rad, math.tau) if math.isfinite(way_rad) else None
+    if not kept.any():
+        raise MapError(
+            f"door {number} has no free cell for a robot radius of {grid.robot_radius_m:g} m: give "
+            "the end a point"
+        )
+    points = grid.frame.points_of(np.stack([rows[kept], cols[kept]], axis=1))
+    away = points - np.array(door.position)
+    x, y = points[int(np.argmin(np.hypot(away[:, 0], away[:, 1])))].tolist()
+    return (x, y), yaw_rad
