@@ -68,18 +68,18 @@ class Answers:
         bound = search.bound()
         plans = [self._plan(search, ends, one, bound) for one in chosen]
         if not plans:
-            metrics = [result.metric for result in search.planned]
+            metrics = [draft.result().metric for draft in search.planned[:1]]
             refused = self.refused(search.reason(), ends)
             metric = metrics[0] if metrics else refused.metric
             plans = [replace(refused, metric=metric, lower_bound=bound)]
-        stats = stats_of(search.planned, time.perf_counter() - began)
+        stats = stats_of([draft.stats for draft in search.planned], time.perf_counter() - began)
         return tuple(replace(plan, stats=stats) for plan in plans)
 
     def _plan(
         self, search: Search, ends: tuple[Ends, Ends], chosen: Chosen, bound: float
     ) -> BuildingPlan:
         """Return the plan of one route."""
-        results = tuple(search.results[part] for part in chosen.parts)
+        results = tuple(search.drafts[part].result() for part in chosen.parts)
         rides = tuple(itertools.starmap(self._ride, itertools.pairwise(chosen.parts)))
         floors = [self._floors[self._floor_of(part, ends)] for part in chosen.parts]
         start, goal = (self._named(end) for end in ends)

@@ -289,11 +289,11 @@ class Building:
                 endpoint_of("goal", goal, self.floors),
             )
             closed = self._closed(blocked)
-            refused = refusal_of(ends, self.floors, closed)
-            if refused is not None:
-                return (answers.refused(refused, ends),)
             search = Search(network, tables, ends, closed, at)
             found = answers.found(search, ends, limits, began)
+            if not found[0].solved:
+                refused = refusal_of(ends, self.floors, closed)
+                found = found if refused is None else (answers.refused(refused, ends),)
             if all(table.is_current for table in tables):
                 return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,6 +29,7 @@ ROUNDED = 1.0 - 1e-12
 _KEPT = 256
 """Number of plans between ends of links that a floor keeps."""
 _MAX_NAME = 80
+_versions = itertools.count()
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,11 +114,18 @@ class FloorTable:
         self.lower: list[list[float]] = known.lower.tolist()
         """Lists of numbers, for queries read single ones: faster than an array."""
         self.cost: list[list[float]] = known.cost.tolist()
+        self.version = next(_versions)
+        """Number of what is known, unlike that of any table before."""
         self._results: dict[tuple[int, int], PlanResult] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without kept plans, which are made anew."""
         return vars(self) | {"_results": {}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over a state; its version is that of another process, and begins anew."""
+        vars(self).update(state)
+        self.version = next(_versions)
 
     @property
     def known(self) -> Known:
@@ -170,6 +179,7 @@ class FloorTable:
         lower[start][goal] = max(lower[start][goal], bound)
         lower[goal][start] = max(lower[goal][start], bound)
         self.cost[start][goal] = cost
+        self.version = next(_versions)
 
     def straight_m(self, waypoint: ArrayLike | str) -> list[float]:
         """Return lower bounds on the costs between a waypoint and each end, in metres.

@@ -212,20 +212,20 @@ def _plain(end: tuple[str, tuple[float, ...] | str]) -> list[Any]:
     return [floor, waypoint if isinstance(waypoint, str) else list(waypoint)]
 
 
-def stats_of(planned: list[PlanResult], seconds: float) -> PlanStats:
+def stats_of(planned: list[PlanStats], seconds: float) -> PlanStats:
     """Return the effort of a query.
 
     Parameters
     ----------
     planned
-        All plans that were made for it.
+        The effort of each plan that was made for it.
     seconds
         Wall-clock seconds of all; what the stages of the plans leave is called `links`.
     """
     stages: dict[str, float] = {}
-    for result in planned:
-        for stage, spent in result.stats.seconds.items():
+    for stats in planned:
+        for stage, spent in stats.seconds.items():
             stages[stage] = stages.get(stage, 0.0) + spent
     stages["links"] = max(seconds - sum(stages.values()), 0.0)
-    sums = {name: sum(getattr(result.stats, name) for result in planned) for name in COUNTS}
+    sums = {name: sum(getattr(stats, name) for stats in planned) for name in COUNTS}
     return PlanStats(**sums, seconds=stages)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from hybridnav.building.floors import ROUNDED
+from hybridnav.planner.drafts import Draft
 from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from hybridnav.building.links import Link
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.named import At
-    from hybridnav.result import PlanResult
 
 Part = tuple[int, int]
 """A path on one floor: from `START`, or the end of a link, to an end, or `GOAL`."""
@@ -35,6 +35,17 @@ class End(NamedTuple):
     floor: int
     at: int
     """Its row in the table of the floor."""
+
+
+class Chosen(NamedTuple):
+    """A route, or a part of one: its parts in order, between which rides lead."""
+
+    cost: float
+    parts: tuple[Part, ...]
+
+
+Crossings = list[tuple[int, int, Chosen]]
+"""The end where a first ride begins, that where a last one ends, and what lies between."""
 
 
 class Network:
@@ -80,6 +91,70 @@ class Network:
             for number, end in enumerate(self.ends)
             for link in (links[end.link],)
         ]
+        self._between: dict[tuple[int, int, bool], tuple[tuple[int, ...], Crossings]] = {}
+
+    def between(
+        self, floors: tuple[int, int], tables: Sequence[FloorTable], *, lower: bool
+    ) -> Crossings:
+        """Return the cheapest way from each end on a floor to each end on another one, by what the
+        tables know; it is kept until they know more.
+
+        Parameters
+        ----------
+        floors
+            Where the first ride begins, and where the last one ends.
+        tables
+            The table of each floor.
+        lower
+            Whether parts of routes cost their lower bounds, also where their costs are known.
+        """
+        versions = tuple(table.version for table in tables)
+        kept = self._between.get((*floors, lower))
+        if kept is None or kept[0] != versions:
+
+            def cost_of(part: Part) -> float:
+                one, other = self.ends[part[0]], self.ends[part[1]]
+                table = tables[one.floor]
+                cost = math.nan if lower else table.cost[one.at][other.at]
+                return table.lower[one.at][other.at] if math.isnan(cost) else cost
+
+            kept = versions, self.crossings(floors, cost_of)
+            self._between[*floors, lower] = kept
+        return kept[1]
+
+    def crossings(self, floors: tuple[int, int], cost_of: Callable[[Part], float]) -> Crossings:
+        """Return the cheapest way from each end on a floor, by which one leaves it, to each end on
+        another one, by which one arrives, by Dijkstra's algorithm."""
+        found = []
+        for first in self.on_floor[floors[0]]:
+            least = self._ways_from(first, cost_of)
+            reached = [end for end in self.on_floor[floors[1]] if end in least]
+            found += [(first, end, Chosen(*least[end])) for end in reached]
+        return found
+
+    def _ways_from(
+        self, first: int, cost_of: Callable[[Part], float]
+    ) -> dict[int, tuple[float, tuple[Part, ...]]]:
+        """Return the least cost from an end where a ride begins to the ends where rides end, and
+        the parts between."""
+        least: dict[int, tuple[float, tuple[Part, ...]]] = {}
+        heap: list[tuple[float, int, tuple[Part, ...]]]
+        heap = [(charge, other, ()) for other, charge in self.rides[first]]
+        heapq.heapify(heap)
+        while heap:
+            cost, node, parts = heapq.heappop(heap)
+            if node in least:
+                continue
+            least[node] = cost, parts
+            for end in self.on_floor[self.ends[node].floor]:
+                arrived = cost + cost_of((node, end)) if end != node else math.inf
+                if not arrived < math.inf:
+                    continue
+                for other, charge in self.rides[end]:
+                    if other not in least:
+                        passed = (*parts, (node, end))
+                        heapq.heappush(heap, (arrived + charge, other, passed))
+        return least
 
 
 @dataclass(frozen=True)
@@ -88,13 +163,6 @@ class Ends:
 
     floor: int
     waypoint: ArrayLike | str
-
-
-class Chosen(NamedTuple):
-    """A route: its parts in order, between which rides lead."""
-
-    cost: float
-    parts: tuple[Part, ...]
 
 
 class Search:
@@ -133,9 +201,9 @@ class Search:
     ) -> None:
         self._network, self._tables, self._closed, self._at = network, tables, closed, at
         self._start, self._goal = ends
-        self.results: dict[Part, PlanResult] = {}
+        self.drafts: dict[Part, Draft] = {}
         """The plans of parts that were asked for."""
-        self.planned: list[PlanResult] = []
+        self.planned: list[Draft] = []
         """Those made for this query."""
         self._lower: dict[Part, float] = {}
         self._cost: dict[Part, float] = {}
@@ -153,20 +221,20 @@ class Search:
     def best(self) -> Chosen | None:
         """Return the cheapest route, all of whose parts are planned; None if there is none."""
         while True:
-            found = self._least(self._expected)
+            found = self._least(lower=False)
             if found is None or self._has_planned(found.parts):
                 return found
 
     def bound(self) -> float:
         """Return the least sum of lower bounds and charges over all routes, infinite for none."""
-        found = self._least(self._bound_of)
+        found = self._least(lower=True)
         return math.inf if found is None else found.cost
 
     def reason(self) -> PlanStatus:
         """Return why there is no route, after one was searched."""
         statuses = []
-        for (start, goal), result in self.results.items():
-            status = result.status
+        for (start, goal), draft in self.drafts.items():
+            status = draft.status
             if status.name.startswith("START") and start == START:
                 return status
             if status.name.startswith("GOAL") and goal == GOAL:
@@ -199,7 +267,7 @@ class Search:
         """Plan the parts that were not, until one costs more than expected; return whether none
         does. Those come first whose cost is not known, as they may rule the route out."""
         for part in sorted(parts, key=self._is_known):
-            if part not in self.results:
+            if part not in self.drafts:
                 before = self._expected(part)
                 self._plan(part)
                 if not self._expected(part) <= before / ROUNDED:
@@ -217,25 +285,26 @@ class Search:
         table, closed = self._tables[floor], self._closed.get(floor)
         if start != START and goal != GOAL and closed is None:
             rows = self._network.ends[start].at, self._network.ends[goal].at
-            found, was_kept = table.between(*rows)
+            result, was_kept = table.between(*rows)
+            found = Draft.of(result)
         else:
             found, was_kept = self._between(table, part, closed), False
             self._cost[part] = found.cost
             self._lower[part] = max(self._bound_of(part), found.lower_bound)
             if closed is None and (start == START) != (goal == GOAL):
                 self._compare(table, part, found)
-        self.results[part] = found
+        self.drafts[part] = found
         if not was_kept:
             self.planned.append(found)
 
-    def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> PlanResult:
+    def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> Draft:
         start, goal = (
             end.waypoint if number == of else table.positions_m[self._network.ends[number].at]
             for number, of, end in zip(part, (START, GOAL), (self._start, self._goal), strict=True)
         )
-        return table.floor.planner.plan(start, goal, blocked=closed, at=self._at)
+        return table.floor.planner.draft(start, goal, blocked=closed, at=self._at)
 
-    def _compare(self, table: FloorTable, part: Part, found: PlanResult) -> None:
+    def _compare(self, table: FloorTable, part: Part, found: Draft) -> None:
         """Raise the bounds of other parts from the start, or to the goal, by the triangle
         inequality; a name is not one point, and has none."""
         end = self._start if part[0] == START else self._goal
@@ -287,32 +356,30 @@ class Search:
             parts.append((start, GOAL))
         return parts
 
-    def _least(self, cost_of: Callable[[Part], float]) -> Chosen | None:
-        """Return the cheapest route by some costs of its parts, by Dijkstra's algorithm.
-
-        A node is an end at which a ride has ended, or the start.
-        """
-        rides, done = self._network.rides, set[int]()
-        heap: list[tuple[float, int, tuple[Part, ...]]] = [(0.0, START, ())]
-        least: dict[int, float] = {START: 0.0}
-        while heap:
-            cost, node, parts = heapq.heappop(heap)
-            if node == GOAL:
-                return Chosen(cost, parts)
-            if node in done:
-                continue
-            done.add(node)
-            for part in self._parts_from(node):
-                arrived = cost + cost_of(part)
-                if not arrived < math.inf:
-                    continue
-                steps = [(GOAL, 0.0)] if part[1] == GOAL else rides[part[1]]
-                for other, charge in steps:
-                    total = arrived + charge
-                    if total < least.get(other, math.inf):
-                        least[other] = total
-                        heapq.heappush(heap, (total, other, (*parts, part)))
-        return None
+    def _least(self, *, lower: bool) -> Chosen | None:
+        """Return the cheapest route, by the costs of parts where they are known and not `lower`,
+        else by lower bounds."""
+        cost_of = self._bound_of if lower else self._expected
+        floors = self._start.floor, self._goal.floor
+        if self._closed:
+            crossings = self._network.crossings(floors, cost_of)
+        else:
+            crossings = self._network.between(floors, self._tables, lower=lower)
+        on_floor = self._network.on_floor
+        first = {end: cost_of((START, end)) for end in on_floor[floors[0]]}
+        last = {end: cost_of((end, GOAL)) for end in on_floor[floors[1]]}
+        best, least = None, math.inf
+        for one, other, between in crossings:
+            cost = first[one] + between.cost + last[other]
+            if cost < least:
+                least, best = cost, (one, between.parts, other)
+        if floors[0] == floors[1] and cost_of((START, GOAL)) <= least:
+            least = cost_of((START, GOAL))
+            return Chosen(least, ((START, GOAL),)) if least < math.inf else None
+        if best is None:
+            return None
+        one, parts, other = best
+        return Chosen(least, ((START, one), *parts, (other, GOAL)))
 
     def _least_other(self, known: set[tuple[int, ...]], most: float) -> Chosen | None:
         """Return the cheapest route with a sequence of links that is not known."""

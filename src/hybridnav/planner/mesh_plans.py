@@ -7,7 +7,7 @@ import threading
 import time
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,21 @@ _MOST_REMOVED, _FEW = 0.5, 1000
 """Share and number of removed polygons that a mesh keeps: with more of them it is built anew."""
 _KEPT = 8
 """Number of searches round closed cells that are kept for queries with equal closures."""
+
+
+class FoundPath(NamedTuple):
+    """A path on the mesh, before the cells that it passes are known."""
+
+    query: CellQuery
+    path: MeshPath
+    points: FloatArray | None
+    """float64 (n, 2), `(x, y)` in metres; None where no path was found."""
+    stats: PlanStats
+
+    @property
+    def length_m(self) -> float:
+        """Length of the path in metres, infinite for none."""
+        return math.inf if self.points is None else polyline_length(self.points)
 
 
 @copies_alike
@@ -139,6 +154,11 @@ class OverMesh:
         When the preset's time is up, or if it has a time limit and the mesh is not built yet, the
         answer is a cell path shortened by line of sight, with the proved bound.
         """
+        return self.completed(self.found(query))
+
+    def found(self, query: CellQuery) -> FoundPath:
+        """Find the points of a shortest path between two points, not yet the cells that it
+        passes."""
         began = time.perf_counter()
         seconds = {}
         if self._search is None and self._budget_s is None:
@@ -148,37 +168,47 @@ class OverMesh:
         row, col = self._frame.position_of(float(start[0]), float(start[1]))
         positions = (row, col), self._frame.position_of(float(goal[0]), float(goal[1]))
         now = time.perf_counter()
-        found, passed, expanded = self._found(query, positions)
+        found, expanded = self._on_graph(query, positions)
         points = None
         if found.positions is not None:
             points = self._frame.points_of_grid(found.positions)
             points[0], points[-1] = query.points
         seconds["shortest"] = time.perf_counter() - now
+        return FoundPath(
+            query, found, points, PlanStats(expanded_intervals=expanded, seconds=seconds)
+        )
+
+    def completed(self, path: FoundPath) -> CellPlan:
+        """Return the plan of a path that was found, with the cells that it passes."""
+        query, found, points, stats = path
+        now = time.perf_counter()
+        passed = self._passed(query, found)
+        stats.seconds["shortest"] += time.perf_counter() - now
         plan = CellPlan(
             passed,
             points=points,
             length_cells=found.length_cells,
             bound_cells=found.lower_bound_cells,
-            stats=PlanStats(expanded_intervals=expanded, seconds=seconds),
+            stats=stats,
         )
         if points is not None or math.isinf(found.lower_bound_cells):
             return plan  # a path, or the proof of none
         return self._in_sight(query, plan)
 
-    def _found(
+    def _on_graph(
         self, query: CellQuery, positions: tuple[Position, Position]
-    ) -> tuple[MeshPath, LongArray | None, int]:
-        """Return the path of the search of the mesh, its cells, and the nodes expanded."""
+    ) -> tuple[MeshPath, int]:
+        """Return the path of the search of the mesh, and the nodes expanded."""
         search = self._search
         if search is None:
             bound = math.dist(*positions)
-            return MeshPath(None, math.inf, bound, 0), None, 0
+            return MeshPath(None, math.inf, bound, 0), 0
         began = time.perf_counter()
         found = search.path(query.cells, positions, epsilon=self._epsilon, budget_s=self._budget_s)
         closed, expanded = query.closed, found.expanded
         is_cut_off = found.positions is None and math.isinf(found.lower_bound_cells)
         if closed is None or is_cut_off:
-            return found, self._passed(query, found), expanded
+            return found, expanded
         detours = self._round(search, closed)
         if found.positions is None or detours.is_met_by(found):
             bound = found.lower_bound_cells
@@ -190,7 +220,7 @@ class OverMesh:
             # Closed cells make no path shorter.
             bound = max(min(bound, found.length_cells), found.lower_bound_cells)
             found = replace(found, lower_bound_cells=bound)
-        return found, self._passed(query, found), expanded
+        return found, expanded
 
     def _in_sight(self, query: CellQuery, plan: CellPlan) -> CellPlan:
         """Return the shortest path of cells, shortened by line of sight, with a plan's bound."""

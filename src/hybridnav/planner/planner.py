@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
@@ -16,7 +16,7 @@ from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import Carried, CellQuery, Updatable
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.costs import PlannerCosts
-from hybridnav.planner.endpoints import cells_of_endpoints, read_end, read_points
+from hybridnav.planner.endpoints import cells_of_endpoints, read_end, read_point, read_points
 from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.follow import MapChange, change_of, followed, is_stale
 from hybridnav.planner.outcome import Outcomes
@@ -38,8 +38,10 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.grid.areas import Box
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_planner import CellPlanner, Prepared
+    from hybridnav.planner.cell_planner import CellPlan, CellPlanner, Prepared
+    from hybridnav.planner.drafts import Draft
     from hybridnav.planner.itinerary import Guide
+    from hybridnav.planner.mesh_plans import OverMesh
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import PlanBatch, PlanResult
@@ -227,6 +229,12 @@ class HybridPlanner:
         poses = read("start", start), read("goal", goal)
         finish = self._finish.checked(smooth, self.preset.planner.smooth)
         result = self._between(poses, finish, self.closed(blocked), began)
+        return self._described(result, poses, waypoint)
+
+    def _described(
+        self, result: PlanResult, poses: tuple[FloatArray, FloatArray], waypoint: ArrayLike | str
+    ) -> PlanResult:
+        """Return a result with what its instructions are found from."""
         if result.path is None or not result.solved or self.guide is None:
             return result
         source = self.guide.of(result.path, waypoint, poses[0].tolist())
@@ -240,15 +248,10 @@ class HybridPlanner:
         began: float,
     ) -> PlanResult:
         """Plan between two points, or poses."""
-        endpoints = poses[0][:2], poses[1][:2]
-        grid, allowed = self.topology.grid, self.preset.planner.allow_unexplored
-        cells = cells_of_endpoints(grid, endpoints, allow_unexplored=allowed)
-        if isinstance(cells, PlanStatus):
-            return self._outcomes.answer(cells, poses)
-        shut = self.closed_for_all(closed)
-        if shut is not None and (refused := shut.refusal(cells, grid.shape)):
-            return self._outcomes.answer(refused, poses)
-        plan = self._cells.plan(CellQuery(cells, endpoints, closed))
+        query = self._query_of(poses, closed)
+        if isinstance(query, PlanStatus):
+            return self._outcomes.answer(query, poses)
+        endpoints, plan = query.points, self._cells.plan(query)
         if plan.cells is None:
             return self._outcomes.no_path(plan, poses, self._cells.metric)
         if self._ompl is not None:
@@ -258,6 +261,57 @@ class HybridPlanner:
             bound = self._cells.bound(plan, endpoints)
             return self._outcomes.by_ompl(found, plan, poses, bound)
         return self._finish.result(plan, poses, finish, closed)
+
+    def _query_of(
+        self, poses: tuple[FloatArray, FloatArray], closed: ClosedCells | None
+    ) -> CellQuery | PlanStatus:
+        """Return the query between two points, or the status that refuses one of them."""
+        endpoints = poses[0][:2], poses[1][:2]
+        grid, allowed = self.topology.grid, self.preset.planner.allow_unexplored
+        cells = cells_of_endpoints(grid, endpoints, allow_unexplored=allowed)
+        if isinstance(cells, PlanStatus):
+            return cells
+        shut = self.closed_for_all(closed)
+        if shut is not None and (refused := shut.refusal(cells, grid.shape)):
+            return refused
+        return CellQuery(cells, endpoints, closed)
+
+    def draft(
+        self,
+        start: ArrayLike | str,
+        goal: ArrayLike | str,
+        *,
+        blocked: Closable | ClosedCells | None = None,
+        at: At = "anywhere",
+    ) -> Draft:
+        """Plan a path as `plan` does, and make its result only if it is wanted.
+
+        With `shortest` that saves half of the time, for a caller who compares many plans.
+
+        Parameters
+        ----------
+        start, goal, blocked, at
+            As in `plan`.
+        """
+        from hybridnav.planner.drafts import Draft, draft_on_mesh  # noqa: PLC0415 - on demand
+
+        named = isinstance(start, str) or isinstance(goal, str)
+        with self._query():
+            if named or self._ompl is not None or self.preset.planner.coarse != "mesh":
+                return Draft.of(self._plan(start, goal, None, blocked, at))
+            poses = read_point("start", start), read_point("goal", goal)
+            closed = self.closed(blocked)
+            query = self._query_of(poses, closed)
+            if isinstance(query, PlanStatus):
+                return Draft.of(self._outcomes.answer(query, poses))
+            finish, outcomes, metric = self._finish, self._outcomes, self._cells.metric
+
+            def result_of(plan: CellPlan) -> PlanResult:
+                if plan.cells is None:
+                    return outcomes.no_path(plan, poses, metric)
+                return self._described(finish.result(plan, poses, "none", closed), poses, goal)
+
+            return draft_on_mesh(cast("OverMesh", self._cells), query, result_of)
 
     def plan_many(
         self,
