@@ -39,9 +39,8 @@ class GuidedRoute:
             before = self.rides[number - 1] if number else None
             here = self._on_floor(guide, path, before, heading_of(result.start))
             here = [replace(one, at_m=one.at_m + driven_m) for one in here]
-            if before is not None and found[-1].change is not None and found[-1].change.has_exit:
-                # The turn of the first step belongs to the sentence of the ride.
-                found[-1] = replace(found[-1], turn=here.pop(0).turn)
+            if before is not None and here[0].kind == "start" and len(here) > 1:
+                here = self._joined(found, here)
             if ride is not None:
                 change = self._change(ride, self.guides[number + 1])
                 last = replace(here[-1], waypoint=None, landmark=None)
@@ -49,6 +48,17 @@ class GuidedRoute:
             found += here
             driven_m += path.length_m
         return tuple(found)
+
+    def _joined(self, found: list[Instruction], here: list[Instruction]) -> list[Instruction]:
+        """Return the instructions on a floor behind a ride, the last one of `found`: the turn of
+        the first step belongs to the sentence of the ride, and a start that shows no direction
+        needs none."""
+        change, start = found[-1].change, here[0]
+        if change is not None and change.has_exit:
+            found[-1] = replace(found[-1], turn=start.turn)
+            return here[1:]
+        is_needed = start.landmark is not None or start.heading_rad is not None
+        return here if is_needed else here[1:]
 
     def _change(self, ride: Ride, guide: Guide | None) -> FloorChange:
         """Return what words say of a ride; `guide` is that of the floor where it ends."""

@@ -10,6 +10,14 @@ import typer
 
 import hybridnav as hn
 from hybridnav._files import MODEL_SUFFIX, printable
+from hybridnav.cli.building import (
+    BUILD_OPTIONS,
+    BuildingSource,
+    build_building,
+    check_options,
+    is_building_file,
+    refused_options,
+)
 from hybridnav.cli.common import (
     Reading,
     answer,
@@ -61,6 +69,7 @@ CompressOption = Annotated[
 
 
 def build(
+    ctx: typer.Context,
     map_file: MapArgument,
     out: OutOption,
     preset: PresetsOption = None,
@@ -75,12 +84,19 @@ def build(
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     compress: CompressOption = False,
 ) -> None:
-    """Prepare MAP for planning, and write it to a model, which other commands take as MAP."""
+    """Prepare MAP for planning, and write it to a model, which other commands take as MAP.
+
+    MAP may be a building; `hybridnav plan` takes its model.
+    """
     if not is_model_file(out):
         raise UsageError(f"--out must end in {MODEL_SUFFIX}, got {str(out)!r}")
     if rooms_file is not None and find_rooms:
         raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")
     check_writable(out, "--out")
+    if is_building_file(map_file):
+        check_options(refused_options(ctx, BUILD_OPTIONS))
+        build_building(BuildingSource.of(ctx.params), out, compress=compress)
+        return
     settings = [
         read_settings(name, overrides, robot_radius_m, seed, map_file=map_file)
         for name in preset or (None,)

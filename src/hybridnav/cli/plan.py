@@ -9,6 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hybridnav.cli.blocked import BlockedOption, parsed_closing
+from hybridnav.cli.building import (
+    PLAN_OPTIONS,
+    is_building_file,
+    plan_in_building,
+    refused_options,
+)
 from hybridnav.cli.common import Reading, check_new, check_output, check_picture, read_settings
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
@@ -41,8 +47,10 @@ if TYPE_CHECKING:
 Point = tuple[float, ...]
 
 
-def _point(text: str) -> Point:
+def _point(text: str) -> Point | str:
     point = read_point(text)
+    if point is None and ":" in text:
+        return text  # of a building: FLOOR:X,Y
     if point is None:
         raise typer.BadParameter(f"expected X,Y in metres, or X,Y,YAW, got {text!r}")
     if not all(map(math.isfinite, point)):
@@ -52,11 +60,19 @@ def _point(text: str) -> Point:
 
 StartOption = Annotated[
     Any,
-    typer.Option(metavar="X,Y", parser=_point, help="Start in metres; ,YAW in radians for OMPL."),
+    typer.Option(
+        metavar="X,Y",
+        parser=_point,
+        help="Start in metres; ,YAW in radians for OMPL; FLOOR:X,Y in a building.",
+    ),
 ]
 GoalOption = Annotated[
     Any,
-    typer.Option(metavar="X,Y", parser=_point, help="Goal in metres; ,YAW in radians for OMPL."),
+    typer.Option(
+        metavar="X,Y",
+        parser=_point,
+        help="Goal in metres; ,YAW in radians for OMPL; FLOOR:X,Y in a building.",
+    ),
 ]
 FromOption = Annotated[
     str | None, typer.Option("--from", metavar="ROOM|X,Y", help="Start in a room, or at a point.")
@@ -163,6 +179,9 @@ BagOption = Annotated[
         help="Write path and map as a new bag of ROS: NAME.bag of ROS 1, else a folder of ROS 2.",
     ),
 ]
+NoStairsOption = Annotated[
+    bool, typer.Option("--no-stairs", help="In a building: the robot takes no stairs.")
+]
 CompareOption = Annotated[
     bool,
     typer.Option("--compare", help="Also plan on the whole grid; for octile paths print the loss."),
@@ -170,6 +189,7 @@ CompareOption = Annotated[
 
 
 def plan(
+    ctx: typer.Context,
     map_file: MapArgument,
     start: StartOption = None,
     goal: GoalOption = None,
@@ -185,6 +205,7 @@ def plan(
     inside_rooms: InsideOption = False,
     least_hole_m2: LeastHoleOption = None,
     blocked: BlockedOption = None,
+    no_stairs: NoStairsOption = False,
     costs: CostsOption = None,
     preset: PresetOption = None,
     overrides: SetOption = None,
@@ -204,7 +225,7 @@ def plan(
     language: LanguageOption = "en",
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a route on MAP, from a point or room to another.
+    """Plan a route on MAP, or over the floors of a building, from a point or room to another.
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
@@ -216,6 +237,8 @@ def plan(
 
         check_rosbags("--bag")
     where = _checked_at(at)
+    if _planned_in_building(ctx, where, no_stairs=no_stairs):
+        return
     given = parsed_costs(costs)
     check_language(language)
     settings = read_settings(
@@ -280,11 +303,24 @@ def plan(
         raise typer.Exit(EXIT_NOT_SOLVED)
 
 
+def _planned_in_building(ctx: typer.Context, at: At, *, no_stairs: bool) -> bool:
+    """Plan over floors if the map is a building, and return whether it is one."""
+    if not is_building_file(ctx.params["map_file"]):
+        if no_stairs:
+            raise UsageError("--no-stairs is for a building, and this is one map: leave it out")
+        return False
+    if not plan_in_building(ctx.params, at, refused_options(ctx, PLAN_OPTIONS)):
+        raise typer.Exit(EXIT_NOT_SOLVED)
+    return True
+
+
 def _one_of(option: str, point: Any, other: str, text: str | None) -> Waypoint:
     """Return the start or the goal, from the one of its two options that was used."""
     if (point is None) == (text is None):
         what = "missing option" if point is None else "only one is taken, of"
         raise UsageError(f"{what} '--{option}' or '--{other}'; see hybridnav plan --help")
+    if isinstance(point, str):
+        raise UsageError(f"--{option}: expected X,Y in metres, or X,Y,YAW, got {point!r:.90}")
     return _parsed_waypoint(text) if text is not None else point
 
 

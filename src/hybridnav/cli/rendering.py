@@ -96,11 +96,11 @@ def _plan_lines(figures: dict[str, Any]) -> list[str]:
     elif figures["length_m"] is not None:
         by_costs = figures["metric"] in _BY_COSTS
         lines.append(
-            f"length     {figures['length_m']:.2f} m{'' if by_costs else _in_metric(figures)}"
+            f"length     {figures['length_m']:.2f} m{'' if by_costs else in_metric(figures)}"
         )
         if by_costs:
-            lines.append(f"cost       {figures['cost']:.2f} m{_in_metric(figures)}")
-        bound, stated = _rounded_bound(figures["lower_bound"], figures["gap"])
+            lines.append(f"cost       {figures['cost']:.2f} m{in_metric(figures)}")
+        bound, stated = rounded_bound(figures["lower_bound"], figures["gap"])
         stated = stated.replace("long", "dear") if by_costs else stated
         lines.append(f"bound      {bound} m, the path is {stated}")
         if figures["grid_bound"] is not None:
@@ -129,7 +129,8 @@ def _beside_cells(bound_m: float, gap: float) -> str:
     return f"cells      no path of cells costs less than {low:.2f} m, this one is {compared}"
 
 
-def _in_metric(figures: dict[str, Any]) -> str:
+def in_metric(figures: dict[str, Any]) -> str:
+    """Return the metric of a plan, for the end of a line."""
     return f" ({figures['metric']})"
 
 
@@ -186,7 +187,7 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     bound, gap = figures["lower_bound"], 0.0
     if bound > 0:
         gap = figures["cost"] / bound - 1
-    least, stated = _rounded_bound(bound, gap)
+    least, stated = rounded_bound(bound, gap)
     stated = stated.replace("long", "dear") if by_costs else stated
     unit = "m " if by_costs or figures["cost"] == length_m else ""
     return [
@@ -195,7 +196,7 @@ def _measured(figures: dict[str, Any]) -> list[str]:
     ]
 
 
-def _rounded_bound(bound: float, gap: float) -> tuple[str, str]:
+def rounded_bound(bound: float, gap: float) -> tuple[str, str]:
     """Return a bound and how far from the optimum a path is at most, rounded to the safe side."""
     if gap <= _OPTIMAL:
         return f"{bound:.2f}", "optimal"

@@ -3,6 +3,7 @@
 Drawn on matplotlib figures without pyplot or display.
 """
 
+from hybridnav.viz.building import plot_building
 from hybridnav.viz.charts import method_styles, plot_losses, plot_speed
 from hybridnav.viz.costs import plot_costs
 from hybridnav.viz.dual import plot_dual
@@ -26,6 +27,7 @@ __all__ = [
     "ReplayAnimation",
     "method_styles",
     "plot_alternatives",
+    "plot_building",
     "plot_costs",
     "plot_dual",
     "plot_figure1",
