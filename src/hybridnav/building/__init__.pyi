@@ -1,5 +1,13 @@
 from .building import Building as Building
 from .floors import Floor as Floor
+from .align import align_floors as align_floors, moved_floor as moved_floor
+from .floor_graphs import (
+    BuildingGraph as BuildingGraph,
+    DoorLine as DoorLine,
+    FloorArea as FloorArea,
+    FloorGraph as FloorGraph,
+)
+from .link_nodes import join_links as join_links, to_networkx as to_networkx
 from .links import Link as Link, LinkEnd as LinkEnd, LinkKind as LinkKind
 from .plan import BuildingPlan as BuildingPlan, Ride as Ride
 

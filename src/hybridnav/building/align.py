@@ -1,0 +1,164 @@
+"""Floors brought into one frame, so that lifts lie above each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav._copies import frozen
+from hybridnav.building.floor_graphs import BuildingGraph, DoorLine, FloorArea, FloorGraph
+from hybridnav.building.links import LinkEnd
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import checked_type
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import FloatArray
+    from hybridnav.building.links import Link
+
+Pose = tuple[float, float, float]
+"""`(x, y, yaw)` of one frame in another, in metres and radians."""
+
+
+def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
+    """Return a floor in another frame.
+
+    Parameters
+    ----------
+    floor
+        The floor.
+    pose
+        `(x, y, yaw)` of its frame in the new one, in metres and radians.
+
+    Raises
+    ------
+    InvalidValueError
+        When the pose is not three finite numbers.
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from hybridnav.building import FloorGraph, moved_floor
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node("dock", x=1.0, y=0.0)
+    >>> floor = FloorGraph(name="1", graph=hn.WaypointGraph.from_networkx(plain))
+    >>> moved_floor(floor, (10.0, 0.0, np.pi / 2)).graph.points.round(6).tolist()
+    [[10.0, 1.0]]
+    """
+    checked_type("floor", floor, FloorGraph)
+    if len(pose) != 3 or not all(map(math.isfinite, pose)):  # noqa: PLR2004
+        raise InvalidValueError(f"pose is {pose!r:.80}, expected (x, y, yaw), finite numbers")
+    graph = floor.graph
+    doors = [
+        DoorLine(door.name, (_point(door.ends[0], pose), _point(door.ends[1], pose)), door.rooms)
+        for door in floor.doors
+    ]
+    return replace(
+        floor,
+        graph=replace(
+            graph,
+            points=_moved(graph.points, pose),
+            lines={edge: _moved(line, pose) for edge, line in graph.lines.items()},
+        ),
+        doors=tuple(doors),
+        areas=tuple(FloorArea(a.name, a.kind, _moved(a.outline, pose)) for a in floor.areas),
+    )
+
+
+def align_floors(building: BuildingGraph) -> BuildingGraph:
+    """Move floors so that the ends of links lie above each other as well as possible.
+
+    Maps of two floors seldom have one frame. The first floor stays; floors that links join to it,
+    and so on, are moved, and turned where two or more links determine that: a rigid motion with the
+    least sum of squared distances between the ends of links (Kabsch 1976). Floors that no link
+    joins to the first stay as they are.
+
+    Parameters
+    ----------
+    building
+        The building.
+
+    Returns
+    -------
+    BuildingGraph
+        With the ends of links moved too. Lengths do not change.
+
+    Examples
+    --------
+    >>> import networkx as nx
+    >>> from hybridnav.building import BuildingGraph, FloorGraph, Link, LinkEnd, align_floors
+    >>> plain = nx.DiGraph()
+    >>> plain.add_node("dock", x=0.0, y=0.0)
+    >>> graph = hn.WaypointGraph.from_networkx(plain)
+    >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
+    >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (5, 0)), LinkEnd("2", (2, 1))))
+    >>> aligned = align_floors(BuildingGraph(name="house", floors=floors, links=(lift,)))
+    >>> aligned.links[0].ends[1].position_m, aligned.floors[1].graph.points.tolist()
+    ((5.0, 0.0), [[3.0, -1.0]])
+    """
+    checked_type("building", building, BuildingGraph)
+    poses: dict[str, Pose] = {building.floors[0].name: (0.0, 0.0, 0.0)}
+    while True:
+        # The floor with the most links to those that are placed is next.
+        pairs = {
+            floor.name: _pairs(building.links, floor.name, poses)
+            for floor in building.floors
+            if floor.name not in poses
+        }
+        best = max(pairs, key=lambda name: len(pairs[name]), default=None)
+        if best is None or not pairs[best]:
+            break
+        poses[best] = _fitted(*(np.array(points) for points in zip(*pairs[best], strict=True)))
+    floors = [
+        moved_floor(floor, poses[floor.name]) if floor.name in poses else floor
+        for floor in building.floors
+    ]
+    links = [
+        replace(link, ends=tuple(_end(end, poses) for end in link.ends)) for link in building.links
+    ]
+    return replace(building, floors=tuple(floors), links=tuple(links))
+
+
+def _pairs(
+    links: Sequence[Link], floor: str, poses: dict[str, Pose]
+) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Return each end on a floor, and the mean of the placed ends of its link."""
+    found = []
+    for link in links:
+        end = link.end_on(floor)
+        placed = [_point(e.position_m, poses[e.floor]) for e in link.ends if e.floor in poses]
+        if end is not None and placed:
+            x, y = np.mean(placed, axis=0).tolist()
+            found.append((end.position_m, (x, y)))
+    return found
+
+
+def _fitted(own: FloatArray, wanted: FloatArray) -> Pose:
+    """Return the pose that brings points nearest to others."""
+    middle, there = own.mean(axis=0), wanted.mean(axis=0)
+    (x, y), (u, v) = (own - middle).T, (wanted - there).T
+    yaw = math.atan2(float(x @ v - y @ u), float(x @ u + y @ v))
+    turned_x, turned_y = _point((float(middle[0]), float(middle[1])), (0.0, 0.0, yaw))
+    return float(there[0]) - turned_x, float(there[1]) - turned_y, yaw
+
+
+def _end(end: LinkEnd, poses: dict[str, Pose]) -> LinkEnd:
+    known = poses.get(end.floor)
+    return end if known is None else LinkEnd(end.floor, _point(end.position_m, known))
+
+
+def _point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
+    x, y, yaw = pose
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return x + cosine * point[0] - sine * point[1], y + sine * point[0] + cosine * point[1]
+
+
+def _moved(points: FloatArray, pose: Pose) -> FloatArray:
+    x, y, yaw = pose
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    turned: FloatArray = points @ np.array([[cosine, sine], [-sine, cosine]])
+    return frozen(turned + np.array([x, y]))

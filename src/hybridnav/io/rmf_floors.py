@@ -1,0 +1,192 @@
+"""Floors of Open-RMF's files while they are read: vertices by number, lanes, doors, lifts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.building import BuildingGraph, DoorLine, FloorGraph, Link, LinkEnd
+from hybridnav.errors import MapError
+from hybridnav.graphs import WaypointGraph
+from hybridnav.graphs.gather import Gathered, pair_of, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+Point = tuple[float, float]
+Name = int | str
+
+
+@dataclass
+class RmfFloor:
+    """One level."""
+
+    name: str
+    where: str
+    elevation_m: float | None = None
+    doors: list[DoorLine] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Begin without vertices."""
+        self.gathered = Gathered(f"{self.where}, level {shown(self.name)}")
+        self.points: list[Point | None] = []
+        self._ids: list[Name] = []
+
+    def add_vertex(
+        self, name: str, point: Point | None, facts: Mapping[str, Any], taken: set[Name]
+    ) -> None:
+        """Add the next vertex, by its name, or by its number if it has none or one that is taken,
+        which Open-RMF refuses.
+
+        Parameters
+        ----------
+        name
+            Its name; empty for none.
+        point
+            `(x, y)` in metres; None if there is none.
+        facts
+            All else.
+        taken
+            Names of all floors so far.
+        """
+        is_new = bool(name) and name not in taken
+        if name and not is_new:
+            where = f"vertex {shown(name)} of level {shown(self.name)}"
+            self.gathered.findings.add("repeated-id", where, *([point] if point else []))
+        number: Name = name if is_new else len(self._ids)
+        taken.add(number if is_new else "")
+        self._ids.append(number)
+        self.points.append(point)
+        self.gathered.add_node(number, point, dict(facts) | ({"name": name} if name else {}))
+
+    def add_lane(self, ends: tuple[int, int], facts: Mapping[str, Any]) -> None:
+        """Add an edge between two vertices by their numbers."""
+        tail, head = (self._ids[end] if 0 <= end < len(self._ids) else end for end in ends)
+        self.gathered.add_edge((tail, head), facts)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no vertex has a point."""
+        return not any(self.points)
+
+    def graph(self, name: str) -> FloorGraph:
+        """Return the floor."""
+        graph = WaypointGraph(**self.gathered.fields("rmf", name))
+        return FloorGraph(
+            name=self.name,
+            graph=graph,
+            elevation_m=self.elevation_m,
+            doors=tuple(self.doors),
+        )
+
+
+@dataclass
+class RmfLift:
+    """One lift: its first vertex on each floor."""
+
+    dims_m: tuple[float, float] | None = None
+    ends: dict[str, Point] = field(default_factory=dict)
+
+
+def building_of(
+    floors: Iterable[RmfFloor], lifts: Mapping[str, RmfLift], name: str, where: str
+) -> BuildingGraph:
+    """Return what was read; floors without vertices, and lifts that stop at fewer than two others,
+    are left out.
+
+    Parameters
+    ----------
+    floors
+        Floors, from the lowest to the highest where that is known.
+    lifts
+        Lifts by name.
+    name
+        Name of the building.
+    where
+        What messages begin with.
+
+    Raises
+    ------
+    MapError
+        When no floor has a vertex.
+    """
+    kept = [floor for floor in floors if not floor.is_empty]
+    if not kept:
+        raise MapError(f"{where}: no level has a vertex, expected vertices [x, y, ...]")
+    links = []
+    for lift, known in lifts.items():
+        ends = [
+            LinkEnd(floor.name, known.ends[floor.name])
+            for floor in kept
+            if floor.name in known.ends
+        ]
+        if len(ends) > 1:
+            fits = {} if known.dims_m is None else {"max_radius_m": min(known.dims_m) / 2}
+            links.append(Link(name=lift, kind="lift", ends=tuple(ends), **fits))
+    graphs = tuple(floor.graph(f"{name} {floor.name}") for floor in kept)
+    return BuildingGraph(name=name, floors=graphs, links=tuple(links))
+
+
+def mapping_of(value: Any, where: str, what: str) -> dict[str, Any]:
+    """Return a mapping with keys as texts; an empty one for none.
+
+    Raises
+    ------
+    MapError
+        When it is no mapping.
+    """
+    if value is None:
+        return {}
+    if not isinstance(value, dict):
+        raise MapError(f"{where}: expected {what} as a mapping, got {value!r:.60}")
+    return {str(key): item for key, item in value.items()}
+
+
+def list_of(value: Any, where: str, what: str) -> list[Any]:
+    """Return a list; an empty one for none.
+
+    Raises
+    ------
+    MapError
+        When it is no list.
+    """
+    if value is None:
+        return []
+    if not isinstance(value, list):
+        raise MapError(f"{where}: expected {what} as a list, got {value!r:.60}")
+    return value
+
+
+def lane_ends(entry: Any, where: str) -> tuple[int, int]:
+    """Return the numbers of two vertices with which an entry begins.
+
+    Raises
+    ------
+    MapError
+        When it does not.
+    """
+    if isinstance(entry, list) and len(entry) >= 2:  # noqa: PLR2004
+        tail, head = entry[:2]
+        if type(tail) is int and type(head) is int:
+            return tail, head
+    raise MapError(f"{where}: expected [vertex, vertex, ...] with two numbers, got {entry!r:.60}")
+
+
+def options_of(entry: list[Any], at: int, where: str) -> dict[str, Any]:
+    """Return the options of an entry, the item at an index; an empty mapping if it has none."""
+    return mapping_of(entry[at] if len(entry) > at else None, where, "options")
+
+
+def points_of(value: Any, where: str) -> tuple[Point, Point]:
+    """Return the two ends of a door.
+
+    Raises
+    ------
+    MapError
+        When these are not two points.
+    """
+    ends = [pair_of(end) for end in value] if isinstance(value, list) else []
+    if len(ends) != 2 or None in ends:  # noqa: PLR2004
+        raise MapError(f"{where}: expected endpoints [[x, y], [x, y]], got {value!r:.60}")
+    first, second = (end for end in ends if end is not None)
+    return first, second
