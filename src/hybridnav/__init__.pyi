@@ -50,6 +50,7 @@ from .io import (
     export_places as export_places,
     export_rmf as export_rmf,
     export_rooms as export_rooms,
+    floor_graph as floor_graph,
     load as load,
     load_bag_map as load_bag_map,
     load_blocked as load_blocked,

@@ -10,6 +10,7 @@ from .features_out import (
     export_places as export_places,
     export_rooms as export_rooms,
 )
+from .floor_graphs import floor_graph as floor_graph
 from .graph_files import load_graph as load_graph
 from .maps import load as load, load_map as load_map
 from .models import Model as Model, save as save

@@ -228,6 +228,38 @@ def _extents(edges: LongArray, cols: int, boundary_of: LongArray) -> FloatArray:
     return extents
 
 
+def farthest_ends(edges: LongArray, cols: int) -> FloatArray:
+    """Return the two corners of sides that lie farthest apart, of those that are outermost in any
+    of 36 directions.
+
+    Parameters
+    ----------
+    edges
+        int64 (n,), base edges that cross the sides, one or more.
+    cols
+        Columns of the map.
+
+    Returns
+    -------
+    FloatArray
+        float64 (2, 2), (row, col) in grid units.
+    """
+    corners = _corners(edges, cols).astype(np.float64)
+    angles = np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS)
+    along = corners @ np.stack([np.cos(angles), np.sin(angles)])
+    pairs = corners[np.stack([along.argmin(axis=0), along.argmax(axis=0)], axis=1)]
+    lengths = np.hypot(*(pairs[:, 1] - pairs[:, 0]).T)
+    found: FloatArray = pairs[int(lengths.argmax())]
+    return found
+
+
+def _corners(edges: LongArray, cols: int) -> LongArray:
+    """Return both corners of each side, int64 (2 n, 2), (row, col) of the lattice."""
+    row, col = np.divmod(edges >> 1, cols)
+    upward = (edges & 1).astype(np.int64)
+    return np.stack([row + upward, col + 1 - upward, row + 1, col + 1], axis=1).reshape(-1, 2)
+
+
 def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> LongArray:
     """Return the row that each boundary is part of, int64 (n_boundaries,), dense."""
     from scipy.sparse import coo_array  # noqa: PLC0415 - most imports of the package need no rooms
@@ -256,9 +288,7 @@ def _jambs(
     the end of the last crack, or an occupied cell near that crack."""
     around = np.pad(free, 1)
     blocks = around[:-1, :-1] & around[:-1, 1:] & around[1:, :-1] & around[1:, 1:]
-    row, col = np.divmod(edges >> 1, free.shape[1])
-    upward = (edges & 1).astype(np.int64)
-    corners = np.stack([row + upward, col + 1 - upward, row + 1, col + 1], axis=1).reshape(-1, 2)
+    corners = _corners(edges, free.shape[1])
     of = boundary_of.repeat(2)
     # Corners inside a boundary belong to two of its cracks.
     _, first, count = np.unique(

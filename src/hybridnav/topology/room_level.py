@@ -17,6 +17,7 @@ from hybridnav.topology.doors import (
     LEAST_DOOR_M,
     MOST_DOOR_M,
     RoomBoundaries,
+    farthest_ends,
     measured_clearance_m,
 )
 
@@ -261,6 +262,26 @@ class Rooms:
         of_door = self._numbers == self.door(number).number
         edges = found.edges[of_door[found.boundary_of]]
         return np.unique(endpoints_of(edges, self.grid.shape[1]))
+
+    def door_ends(self, number: int) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the two points of a door's boundary that lie farthest apart, `(x, y)` in metres,
+        map frame.
+
+        Parameters
+        ----------
+        number
+            The number of a door.
+
+        Raises
+        ------
+        InvalidValueError
+            When no door has the number.
+        """
+        found = self._boundaries
+        of_door = self._numbers == self.door(number).number
+        ends = farthest_ends(found.edges[of_door[found.boundary_of]], self.grid.shape[1])
+        (x, y), (u, v) = self.grid.frame.points_of_grid(ends).tolist()
+        return (x, y), (u, v)
 
     def counted(self) -> tuple[str, str, str]:
         """Describe how many rooms, doors and openings there are, and how many of them this robot

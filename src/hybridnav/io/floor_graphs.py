@@ -1,0 +1,197 @@
+"""The graph of a floor as its map has it: nodes, doors, rooms, and the ends of links."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridnav._copies import frozen
+from hybridnav.building import DoorLine, FloorArea, FloorGraph
+from hybridnav.building.link_nodes import Stub, node_at, with_stubs
+from hybridnav.errors import InvalidValueError
+from hybridnav.graphs import RouteGraph, WaypointGraph
+from hybridnav.graphs.attach import Network
+from hybridnav.graphs.metadata import edge_metadata, node_metadata
+from hybridnav.graphs.space import free_cells_at
+from hybridnav.grid.checks import checked_type
+from hybridnav.refine import Sight
+from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav.building import Link
+    from hybridnav.topology import Door, Rooms
+
+_FRACTION = 2.0**24
+"""Parts of a cell to which positions are rounded, as exact tests of segments need it."""
+
+
+def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
+    topology: TopologicalMap,
+    graph: RouteGraph,
+    *,
+    name: str,
+    elevation_m: float | None = None,
+    links: Sequence[Link] = (),
+    tolerance_m: float = 0.05,
+) -> FloorGraph:
+    """Return the graph of a floor with all that its map knows, for `BuildingGraph`.
+
+    Parameters
+    ----------
+    topology
+        The map; with rooms, nodes in rooms have the room's name as `name`, edges that pass a door
+        have it as `door_name`, and the floor has doors and areas. A door is called
+        "FLOOR_doorNUMBER"; openings and gaps are none.
+    graph
+        Its route graph, as `build_route_graph` and `keep_right` make it.
+    name
+        Name of the floor.
+    elevation_m
+        Its height in metres; None if it is not known.
+    links
+        Links of the building. Their ends on this floor become nodes, joined to the nearest node in
+        sight.
+    tolerance_m
+        How far outlines of rooms may lie from the steps of the cells, in metres, as in
+        `save_rooms`.
+
+    Returns
+    -------
+    FloorGraph
+        The outline of a room is that of its largest part, without holes.
+
+    Raises
+    ------
+    InvalidValueError
+        When the graph is of another map, the tolerance is not positive and finite, or an end of a
+        link is not free or sees no node.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.zeros((10, 40)), robot_radius_m=0)
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=12.0))
+    >>> floor = hn.floor_graph(topology, hn.build_route_graph(topology), name="1")
+    >>> floor.graph.n_nodes > 2, floor.doors
+    (True, ())
+    """
+    checked_type("topology", topology, TopologicalMap)
+    checked_type("graph", graph, RouteGraph)
+    if graph.grid is not topology.grid:
+        raise InvalidValueError(
+            f"the graph is of map {graph.grid.name!r:.60}, expected one of the topological map's"
+        )
+    if not 0 < tolerance_m < math.inf:
+        raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
+    rooms = topology.rooms if topology.pyramid.rooms is not None else None
+    doors = {} if rooms is None else {door.number: door for door in rooms.doors if _is_door(door)}
+    plain = _plain(graph, {number: f"{name}_door{number}" for number in doors})
+    stubs = _stubs(graph, plain, name, links)
+    return FloorGraph(
+        name=name,
+        graph=with_stubs(plain, stubs) if stubs else plain,
+        elevation_m=elevation_m,
+        doors=() if rooms is None else tuple(_lines(rooms, list(doors.values()), name)),
+        areas=() if rooms is None else tuple(_areas(rooms, tolerance_m)),
+    )
+
+
+def _is_door(door: Door) -> bool:
+    return not door.is_gap and not door.is_opening
+
+
+def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
+    """Return a route graph with its facts; a room has its name at its first node."""
+    nodes: dict[int, dict[str, Any]] = {}
+    named: set[str] = set()
+    for node in range(graph.n_nodes):
+        nodes[node] = {"metadata": node_metadata(graph, node)}
+        room = graph.rooms[node]
+        if graph.kinds[node] == "room" and room is not None and room not in named:
+            named.add(room)
+            nodes[node]["name"] = room
+    edges: dict[int, dict[str, Any]] = {}
+    for edge, passed in enumerate(graph.edge_doors):
+        edges[edge] = {"metadata": edge_metadata(graph, [edge])}
+        known = [door_names[number] for number in passed if number in door_names]
+        if known:
+            edges[edge]["door_name"] = known[0]
+    return WaypointGraph(
+        name=graph.grid.name,
+        format="hybridnav",
+        frame="",
+        names=tuple(range(graph.n_nodes)),
+        points=graph.points,
+        edge_names=(None,) * graph.n_edges,
+        edges=graph.edges,
+        costs=graph.lengths_m,
+        node_facts=nodes,
+        edge_facts=edges,
+    )
+
+
+def _stubs(
+    graph: RouteGraph, plain: WaypointGraph, floor: str, links: Sequence[Link]
+) -> list[Stub]:
+    """Return the ends of links that are no nodes, with the nearest nodes that they see."""
+    ends = [(link.name, end.position_m) for link in links if (end := link.end_on(floor))]
+    ends = [(name, end) for name, end in ends if node_at(plain, end) is None]
+    if not ends:
+        return []
+    grid = graph.grid
+    free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
+    exact = grid.frame.positions_of(np.array([end for _, end in ends], dtype=np.float64))
+    positions = np.round(exact * _FRACTION) / _FRACTION
+    for (name, (x, y)), position in zip(ends, positions, strict=True):
+        if not _is_free(free, position):
+            raise InvalidValueError(
+                f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} is not free for "
+                f"a robot radius of {grid.robot_radius_m:g} m: move it"
+            )
+    network = Network.of(Sight(free), graph.positions, graph.edges)
+    offsets, nodes, _ = network.in_sight(positions)
+    stubs = []
+    for at, (name, (x, y)) in enumerate(ends):
+        if offsets[at] == offsets[at + 1]:
+            raise InvalidValueError(
+                f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} sees no node of "
+                "the graph: move it, or build the graph with more nodes"
+            )
+        stubs.append((name, (x, y), int(nodes[offsets[at]])))
+    return stubs
+
+
+def _is_free(free: BoolArray, position: FloatArray) -> bool:
+    row, col = free_cells_at(free, position[None])[0].tolist()
+    rows, cols = free.shape
+    return 0 <= row < rows and 0 <= col < cols and bool(free[row, col])
+
+
+def _lines(rooms: Rooms, doors: list[Door], floor: str) -> list[DoorLine]:
+    return [
+        DoorLine(f"{floor}_door{door.number}", rooms.door_ends(door.number), door.rooms)
+        for door in doors
+    ]
+
+
+def _areas(rooms: Rooms, tolerance_m: float) -> list[FloorArea]:
+    """Return the outline of the largest part of each room."""
+    import shapely  # noqa: PLC0415 - rooms alone need it
+
+    from hybridnav.io.outlines import Outlines  # noqa: PLC0415 - loads scipy
+    from hybridnav.io.rooms_entries import Read  # noqa: PLC0415
+    from hybridnav.io.rooms_in import check_rooms  # noqa: PLC0415
+
+    check_rooms(
+        Read(f"map {rooms.grid.name}", list(rooms.names)), rooms.labels.label_of, rooms.grid
+    )
+    outlines = Outlines(rooms.labels.label_of, len(rooms.names), rooms.grid).within(tolerance_m)
+    areas = []
+    for name, rings in zip(rooms.names, outlines, strict=True):
+        largest = max(rings, key=lambda ring: shapely.Polygon(ring).area)
+        areas.append(FloorArea(name, "room", frozen(np.ascontiguousarray(largest))))
+    return areas
