@@ -9,6 +9,7 @@ from hybridnav._files import printable
 from hybridnav.config.yaml_file import parse_document, read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.io import graph_yaml
+from hybridnav.io.rmf_editor import is_drawn, read_drawn
 from hybridnav.io.rmf_in import is_rmf, read_rmf
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from hybridnav.building import BuildingGraph
 
 
-def load_building_graph(path: PathLike) -> BuildingGraph:
+def load_building_graph(path: PathLike, *, graph_index: int | None = None) -> BuildingGraph:
     """Read a graph of one or several floors, with the links between them.
 
     Parameters
@@ -24,7 +25,9 @@ def load_building_graph(path: PathLike) -> BuildingGraph:
     path
         A file of one of these formats:
 
-        * `.yaml`, `.yml`: a navigation graph of Open-RMF.
+        * `.yaml`, `.yml`: a navigation graph of Open-RMF, or a building map of its traffic editor.
+    graph_index
+        Which of the graphs of a building map, from 0 to 9; None for the first that has lanes.
 
     Returns
     -------
@@ -62,6 +65,8 @@ def load_building_graph(path: PathLike) -> BuildingGraph:
         data = parse_document(text, where, MapError, graph_yaml.LIMITS)
         if not is_rmf(data):
             raise MapError(f"{where}: expected a navigation graph of Open-RMF, with 'levels'")
+        if is_drawn(data):
+            return read_drawn(data, where, name, graph_index=graph_index)
         return read_rmf(data, where, name)
     except InvalidValueError as error:
         raise MapError(str(error)) from None

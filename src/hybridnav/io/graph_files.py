@@ -25,7 +25,7 @@ _MOST_TEXT = 2**26
 """Most bytes of GraphML and of the older text."""
 
 
-def load_graph(path: PathLike) -> WaypointGraph:
+def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
     r"""Read a graph of nodes at points and edges between them.
 
     Parameters
@@ -36,10 +36,13 @@ def load_graph(path: PathLike) -> WaypointGraph:
         * `.geojson`, `.json`: a route graph of Nav2, or the node-link form of networkx;
         * `.graphml`, `.xml`: GraphML;
         * any other name (`.tmap2`, `.tmap`, `.tplg`, `.yaml`, ...): a topological map of LCAS or
-          STRANDS, in YAML or the older text.
+          STRANDS, in YAML or the older text, or one of the files of Open-RMF that
+          `load_building_graph` reads.
 
         Coordinates are metres in the map frame. Nodes in node-link form and GraphML have theirs in
         attributes, as `WaypointGraph.from_networkx` describes them.
+    floor
+        Which floor to read of a file with several. `load_building_graph` reads them all.
 
     Returns
     -------
@@ -53,8 +56,8 @@ def load_graph(path: PathLike) -> WaypointGraph:
     MapNotFoundError
         When there is no such file.
     MapError
-        When it cannot be read: it is in none of these formats, too large, or has no node with a
-        point.
+        When it cannot be read: it is in none of these formats, too large, has no node with a point,
+        has several floors and none is chosen, or not the floor that is.
 
     Examples
     --------
