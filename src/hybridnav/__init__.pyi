@@ -41,11 +41,13 @@ from .graphs import (
     merge_bends as merge_bends,
 )
 from .io import (
+    Anchor as Anchor,
     BagLog as BagLog,
     CarmenLog as CarmenLog,
     Model as Model,
     example_map as example_map,
     export_nav2 as export_nav2,
+    export_osm as export_osm,
     export_path as export_path,
     export_places as export_places,
     export_rmf as export_rmf,

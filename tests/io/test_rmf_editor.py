@@ -195,7 +195,7 @@ def test_a_cabin_is_a_turned_rectangle_with_its_gap(tmp_path, yaw):
     rng = np.random.default_rng(3)
     for x, y in rng.uniform(150, 270, (12, 2)):
         facts = {"x": float(x), "y": float(y) + 80, "yaw": float(yaw), "width": 3.0, "depth": 1.4}
-        facts |= {"level_doors": {"up": [], "down": []}}
+        facts["level_doors"] = {"up": [], "down": []}
         building = hn.load_building_graph(write(tmp_path / "a.yaml", lifts={"hoist": facts}))
         box = shapely.affinity.rotate(shapely.box(-1.55, -0.75, 1.55, 0.75), yaw, use_radians=True)
         cabin = shapely.affinity.translate(box, x * 0.05, -(y + 80) * 0.05)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import frozen
-from hybridnav.building.floor_graphs import BuildingGraph, DoorLine, FloorArea, FloorGraph
+from hybridnav.building.floor_graphs import BuildingGraph, FloorArea, FloorGraph
 from hybridnav.building.links import LinkEnd
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
@@ -54,7 +54,7 @@ def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
         raise InvalidValueError(f"pose is {pose!r:.80}, expected (x, y, yaw), finite numbers")
     graph = floor.graph
     doors = [
-        DoorLine(door.name, (_point(door.ends[0], pose), _point(door.ends[1], pose)), door.rooms)
+        replace(door, ends=(_point(door.ends[0], pose), _point(door.ends[1], pose)))
         for door in floor.doors
     ]
     return replace(

@@ -22,7 +22,7 @@ SAME_POINT_M = 0.01
 
 @dataclass(frozen=True)
 class DoorLine:
-    """A door of a floor: the line that a robot crosses.
+    """A door or opening of a floor: the line that a robot crosses.
 
     Examples
     --------
@@ -37,6 +37,8 @@ class DoorLine:
     """Two points `(x, y)` in metres, in the frame of the floor."""
     rooms: tuple[str | None, str | None] = (None, None)
     """The rooms on both sides; None for what lies in no room, or where the file does not say."""
+    is_opening: bool = False
+    """Whether it is no door that could be shut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ class FloorGraph:
     elevation_m: float | None = None
     """Height of the floor in metres over any common zero; None if it is not known."""
     doors: tuple[DoorLine, ...] = ()
-    """Doors."""
+    """Doors and openings."""
     areas: tuple[FloorArea, ...] = ()
     """Rooms and corridors."""
 

@@ -120,6 +120,11 @@ class Gathered:
         self._lines: dict[int, FloatArray] = {}
         self.edge_ids: set[Name] = set()
 
+    @property
+    def has_nodes(self) -> bool:
+        """Whether any node has a point."""
+        return bool(self._names)
+
     def add_node(self, name: Any, point: Point | None, facts: Mapping[str, Any]) -> None:
         """Add a node; edges go to the last one of an id, as in Nav2.
 

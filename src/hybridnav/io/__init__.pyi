@@ -1,3 +1,4 @@
+from .anchors import Anchor as Anchor
 from .bags import BagLog as BagLog, load_bag_map as load_bag_map
 from .bags_out import save_bag as save_bag
 from .building_files import load_building_graph as load_building_graph
@@ -24,6 +25,7 @@ from .movingai_out import write_movingai_map as write_movingai_map
 from .nav2 import export_nav2 as export_nav2
 from .rooms_in import load_rooms as load_rooms
 from .rooms_out import save_rooms as save_rooms
+from .osm_out import export_osm as export_osm
 from .rmf_out import export_rmf as export_rmf
 from .ros import load_ros_map as load_ros_map
 from .ros_out import write_ros_map as write_ros_map

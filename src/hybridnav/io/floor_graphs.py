@@ -45,8 +45,8 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     ----------
     topology
         The map; with rooms, nodes in rooms have the room's name as `name`, edges that pass a door
-        have it as `door_name`, and the floor has doors and areas. A door is called
-        "FLOOR_doorNUMBER"; openings and gaps are none.
+        have it as `door_name`, and the floor has areas, and the doors and openings that the map's
+        robot passes. A door is called "FLOOR_doorNUMBER".
     graph
         Its route graph, as `build_route_graph` and `keep_right` make it.
     name
@@ -88,20 +88,20 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     if not 0 < tolerance_m < math.inf:
         raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
     rooms = topology.rooms if topology.pyramid.rooms is not None else None
-    doors = {} if rooms is None else {door.number: door for door in rooms.doors if _is_door(door)}
-    plain = _plain(graph, {number: f"{name}_door{number}" for number in doors})
+    doors = [] if rooms is None else [door for door in rooms.doors if door.passable]
+    plain = _plain(graph, {d.number: _named(d, name) for d in doors if not d.is_opening})
     stubs = _stubs(graph, plain, name, links)
     return FloorGraph(
         name=name,
         graph=with_stubs(plain, stubs) if stubs else plain,
         elevation_m=elevation_m,
-        doors=() if rooms is None else tuple(_lines(rooms, list(doors.values()), name)),
+        doors=() if rooms is None else tuple(_lines(rooms, doors, name)),
         areas=() if rooms is None else tuple(_areas(rooms, tolerance_m)),
     )
 
 
-def _is_door(door: Door) -> bool:
-    return not door.is_gap and not door.is_opening
+def _named(door: Door, floor: str) -> str:
+    return f"{floor}_{door.kind}{door.number}"
 
 
 def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
@@ -173,7 +173,7 @@ def _is_free(free: BoolArray, position: FloatArray) -> bool:
 
 def _lines(rooms: Rooms, doors: list[Door], floor: str) -> list[DoorLine]:
     return [
-        DoorLine(f"{floor}_door{door.number}", rooms.door_ends(door.number), door.rooms)
+        DoorLine(_named(door, floor), rooms.door_ends(door.number), door.rooms, door.is_opening)
         for door in doors
     ]
 

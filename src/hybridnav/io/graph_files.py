@@ -6,23 +6,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav._files import printable
-from hybridnav.config.yaml_file import read_text
-from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
-from hybridnav.io import graph_yaml, json_stream
+from hybridnav.config.yaml_file import parse_document
+from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.io import graph_yaml
+from hybridnav.io.building_files import (
+    JSON,
+    XML,
+    floor_in,
+    floors_of_text,
+    read_graph_text,
+    read_open_rmf,
+)
 from hybridnav.io.graph_json import read_json_graph
 from hybridnav.io.graph_text import is_text_graph, read_text_graph
 from hybridnav.io.graph_xml import read_graphml
 from hybridnav.io.graph_yaml import read_yaml_graph
+from hybridnav.io.rmf_in import is_rmf
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav._typing import PathLike
     from hybridnav.graphs import WaypointGraph
-
-_JSON, _XML = (".geojson", ".json"), (".graphml", ".xml")
-_MOST_TEXT = 2**26
-"""Most bytes of GraphML and of the older text."""
 
 
 def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
@@ -36,8 +39,8 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
         * `.geojson`, `.json`: a route graph of Nav2, or the node-link form of networkx;
         * `.graphml`, `.xml`: GraphML;
         * any other name (`.tmap2`, `.tmap`, `.tplg`, `.yaml`, ...): a topological map of LCAS or
-          STRANDS, in YAML or the older text, or one of the files of Open-RMF that
-          `load_building_graph` reads.
+          STRANDS, in YAML or the older text;
+        * one floor of a file that `load_building_graph` reads.
 
         Coordinates are metres in the map frame. Nodes in node-link form and GraphML have theirs in
         attributes, as `WaypointGraph.from_networkx` describes them.
@@ -71,19 +74,24 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
     ('node-link', 2)
     """
     suffix, name = Path(path).suffix.lower(), Path(path).stem
-    where = f"graph {printable(path)}"
-    kind, most = "topological map", graph_yaml.LIMITS.max_bytes
-    read: Callable[[str, str, str], WaypointGraph] = read_yaml_graph
-    if suffix in _JSON:
-        kind, most, read = "JSON", json_stream.MOST_BYTES, read_json_graph
-    elif suffix in _XML:
-        kind, most, read = "GraphML", _MOST_TEXT, read_graphml
-    text = read_text(
-        path, what="graph", error=MapError, missing=MapNotFoundError, max_bytes=most, kind=kind
-    )
-    if read is read_yaml_graph and is_text_graph(text):
-        read = read_text_graph
+    where, text = f"graph {printable(path)}", read_graph_text(path)
     try:
-        return read(text, where, name)
+        building = floors_of_text(text, suffix, where, name)
+        if building is not None:
+            return floor_in(building, floor, where)
+        if suffix in JSON:
+            graph = read_json_graph(text, where, name)
+        elif suffix in XML:
+            graph = read_graphml(text, where, name)
+        elif is_text_graph(text):
+            graph = read_text_graph(text, where, name)
+        else:
+            data = parse_document(text, where, MapError, graph_yaml.LIMITS)
+            if is_rmf(data):
+                return floor_in(read_open_rmf(data, where, name), floor, where)
+            graph = read_yaml_graph(data, where, name)
     except InvalidValueError as error:
         raise MapError(str(error)) from None
+    if floor is not None:
+        raise MapError(f"{where}: a {graph.format} graph has no floors: leave out {floor!r:.60}")
+    return graph

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.config.yaml_file import Limits, parse_document
+from hybridnav.config.yaml_file import Limits
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import Gathered, edge_text, name_of, number_of, pair_of
 from hybridnav.graphs.waypoint_graph import WaypointGraph
@@ -18,13 +18,13 @@ LIMITS = Limits(max_bytes=2**25, max_values=300_000, aliases=True)
 _TEXT = "topological map"
 
 
-def read_yaml_graph(text: str, where: str, name: str) -> WaypointGraph:
+def read_yaml_graph(data: Any, where: str, name: str) -> WaypointGraph:
     """Read a topological map: a list of nodes (STRANDS) or a mapping with `nodes` (tmap2).
 
     Parameters
     ----------
-    text
-        The file.
+    data
+        The file as parsed.
     where
         What messages begin with.
     name
@@ -35,7 +35,6 @@ def read_yaml_graph(text: str, where: str, name: str) -> WaypointGraph:
     MapError
         When it is in neither form.
     """
-    data = parse_document(text, where, MapError, LIMITS)
     gathered = Gathered(where)
     if isinstance(data, list):
         pose_of = _Poses({})

@@ -6,14 +6,19 @@ Coordinates and the choice of lanes follow open-rmf/rmf_traffic_editor,
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
 
 from hybridnav.building import DoorLine
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import number_of, pair_of, shown
 from hybridnav.io.rmf_drawing import Drawing, drawings_of
 from hybridnav.io.rmf_floors import (
+    MOST_FLOORS,
     Name,
     Point,
     RmfFloor,
@@ -79,7 +84,7 @@ def read_drawn(
         When it is not of this form, its coordinates are degrees, the scale of a level is not known,
         or no lane belongs to the graph.
     """
-    levels = mapping_of(data["levels"], where, "levels")
+    levels = mapping_of(data["levels"], where, "levels", MOST_FLOORS)
     contents = {
         level: mapping_of(content, f"{where}, level {shown(level)}", "the level")
         for level, content in levels.items()
@@ -88,7 +93,7 @@ def read_drawn(
     drawings = drawings_of(data, contents, where)
     lifts = {
         lift: _Cabin(mapping_of(facts, at, "the lift"), data, drawings, at)
-        for lift, facts in mapping_of(data.get("lifts"), where, "lifts").items()
+        for lift, facts in mapping_of(data.get("lifts"), where, "lifts", MOST_FLOORS).items()
         for at in [f"{where}, lift {shown(lift)}"]
     }
     found = {lift: RmfLift(cabin.dims_m) for lift, cabin in lifts.items()}
@@ -155,17 +160,22 @@ def _fill(
         if _index_of(lane) == index:
             chosen.append((ends, _parameters(lane, 2, f"{at}, lane {number}")))
     numbers: dict[int, int] = {}
-    for end in (end for ends, _ in chosen for end in ends):
+    for end in itertools.chain.from_iterable(ends for ends, _ in chosen):
         if end in numbers or not 0 <= end < len(vertices):
             continue
         numbers[end] = len(numbers)
         _add_vertex(floor, vertices[end], drawing, taken, f"{at}, vertex {end}")
     for number, entry in enumerate(list_of(content.get("doors"), at, "doors")):
         floor.doors.append(_door(entry, vertices, drawing, f"{at}, door {number}"))
-    for (tail, head), facts in chosen:
+    ends_of = [[numbers.get(end, -1 - end) for end in ends] for ends, _ in chosen]
+    passed = _doors_passed([[_point_at(floor, end) for end in ends] for ends in ends_of], floor)
+    for (tail, head), door, (_, facts) in zip(ends_of, passed, chosen, strict=True):
         known = {key: value for key, value in facts.items() if key not in _IN_FILE_ONLY and value}
-        ends = numbers.get(tail, -1 - tail), numbers.get(head, -1 - head)
-        _add_lanes(floor, ends, known, facts)
+        _add_lanes(floor, (tail, head), known | ({"door_name": door} if door else {}), facts)
+
+
+def _point_at(floor: RmfFloor, number: int) -> Point | None:
+    return floor.points[number] if 0 <= number < len(floor.points) else None
 
 
 def _add_vertex(
@@ -188,10 +198,6 @@ def _add_lanes(
 ) -> None:
     """Add a lane, and the one back if it leads in both directions."""
     tail, head = ends
-    points = [floor.points[end] if 0 <= end < len(floor.points) else None for end in (tail, head)]
-    if points[0] is not None and points[1] is not None:
-        crossed = [door.name for door in floor.doors if _cross((points[0], points[1]), door.ends)]
-        known |= {"door_name": crossed[-1]} if crossed else {}
     way = facts.get("orientation")
     ahead = {"orientation_constraint": way} if way in _OPPOSITE else {}
     floor.add_lane((tail, head), known | ahead)
@@ -243,11 +249,19 @@ class _Cabin:
         return across <= self.dims_m[0] / 2 + _GAP_M and along <= self.dims_m[1] / 2 + _GAP_M
 
 
-def _cross(one: tuple[Point, Point], other: tuple[Point, Point]) -> bool:
-    """Return whether two segments meet; those on one line do not."""
-    (a, b), (c, d) = one, other
-    return _side(a, b, c) * _side(a, b, d) <= 0 and _side(c, d, a) * _side(c, d, b) < 0
-
-
-def _side(a: Point, b: Point, c: Point) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+def _doors_passed(lanes: list[list[Point | None]], floor: RmfFloor) -> list[str]:
+    """Return the last door of the file that each lane crosses, empty for none."""
+    passed = [""] * len(lanes)
+    whole = [[end for end in ends if end is not None] for ends in lanes]
+    kept = [at for at, ends in enumerate(whole) if len(ends) == 2]  # noqa: PLR2004
+    if not floor.doors or not kept:
+        return passed
+    doors = shapely.linestrings([door.ends for door in floor.doors])
+    segments = shapely.linestrings([whole[at] for at in kept])
+    found = shapely.STRtree(doors).query(segments, predicate="intersects")
+    for lane, door in sorted(found.T.tolist()):
+        (a, b), (c, d) = whole[kept[lane]], floor.doors[door].ends
+        along, across = np.subtract(b, a), np.subtract(d, c)
+        if along[0] * across[1] != along[1] * across[0]:  # they are not parallel
+            passed[kept[lane]] = floor.doors[door].name
+    return passed

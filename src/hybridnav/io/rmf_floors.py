@@ -13,6 +13,9 @@ from hybridnav.graphs.gather import Gathered, pair_of, shown
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+MOST_FLOORS = 1000
+"""Most levels of a file, and most lifts of one that is drawn."""
+
 Point = tuple[float, float]
 Name = int | str
 
@@ -113,32 +116,32 @@ def building_of(
     kept = [floor for floor in floors if not floor.is_empty]
     if not kept:
         raise MapError(f"{where}: no level has a vertex, expected vertices [x, y, ...]")
+    place = {floor.name: at for at, floor in enumerate(kept)}
     links = []
     for lift, known in lifts.items():
-        ends = [
-            LinkEnd(floor.name, known.ends[floor.name])
-            for floor in kept
-            if floor.name in known.ends
-        ]
-        if len(ends) > 1:
+        stops = sorted((place[floor], floor) for floor in known.ends if floor in place)
+        if len(stops) > 1:
+            ends = tuple(LinkEnd(floor, known.ends[floor]) for _, floor in stops)
             fits = {} if known.dims_m is None else {"max_radius_m": min(known.dims_m) / 2}
-            links.append(Link(name=lift, kind="lift", ends=tuple(ends), **fits))
+            links.append(Link(name=lift, kind="lift", ends=ends, **fits))
     graphs = tuple(floor.graph(f"{name} {floor.name}") for floor in kept)
     return BuildingGraph(name=name, floors=graphs, links=tuple(links))
 
 
-def mapping_of(value: Any, where: str, what: str) -> dict[str, Any]:
+def mapping_of(value: Any, where: str, what: str, most: int | None = None) -> dict[str, Any]:
     """Return a mapping with keys as texts; an empty one for none.
 
     Raises
     ------
     MapError
-        When it is no mapping.
+        When it is no mapping, or has more than `most` members.
     """
     if value is None:
         return {}
     if not isinstance(value, dict):
         raise MapError(f"{where}: expected {what} as a mapping, got {value!r:.60}")
+    if most is not None and len(value) > most:
+        raise MapError(f"{where}: more than {most} {what} are not read")
     return {str(key): item for key, item in value.items()}
 
 

@@ -8,6 +8,7 @@ from hybridnav.building import DoorLine
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import pair_of, shown
 from hybridnav.io.rmf_floors import (
+    MOST_FLOORS,
     Name,
     Point,
     RmfFloor,
@@ -59,7 +60,7 @@ def read_rmf(data: dict[str, Any], where: str, name: str) -> BuildingGraph:
         lift: RmfLift(_dims(facts, f"{where}, lift {shown(lift)}"))
         for lift, facts in mapping_of(data.get("lifts"), where, "lifts").items()
     }
-    for level, content in mapping_of(data["levels"], where, "levels").items():
+    for level, content in mapping_of(data["levels"], where, "levels", MOST_FLOORS).items():
         floor = RmfFloor(level, where)
         at = f"{where}, level {shown(level)}"
         for lift, point in _filled(floor, mapping_of(content, at, "the level"), taken, at):

@@ -112,7 +112,12 @@ class _Writer:
         self._building = join_links(building)
         self._lifts = [link for link in building.links if link.kind == "lift"]
         self._cabin_m = cabin_m
-        self._doors = {d.name for floor in building.floors for d in floor.doors} if doors else set()
+        self._doors = {
+            door.name
+            for floor in building.floors
+            for door in floor.doors
+            if doors and not door.is_opening
+        }
         self._lift_at: dict[tuple[str, int], str] = {}
         for link in self._lifts:
             for floor, node in nodes_of_link(self._building, link):
@@ -274,7 +279,7 @@ def _left_out(building: BuildingGraph, *, doors: bool) -> Iterator[str]:
             yield f"{link.kind} {link.name}: Open-RMF knows lifts only"
         elif link.wait_s or link.ride_s or link.cost_m:
             yield f"lift {link.name}: its waiting time, ride time and cost"
-    if not doors and any(floor.doors for floor in building.floors):
+    if not doors and any(not door.is_opening for f in building.floors for door in f.doors):
         yield "doors: as asked"
     bent = sum(len(floor.graph.lines) for floor in building.floors)
     if bent:

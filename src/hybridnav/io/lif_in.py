@@ -1,0 +1,175 @@
+"""Reader of VDMA's Layout Interchange Format, version 1."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from hybridnav.building import BuildingGraph, FloorGraph, Link, LinkEnd
+from hybridnav.errors import MapError
+from hybridnav.graphs import WaypointGraph
+from hybridnav.graphs.gather import Gathered, pair_of, shown
+from hybridnav.io.json_stream import MOST_VALUES
+from hybridnav.io.rmf_floors import MOST_FLOORS, list_of, mapping_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from hybridnav.building import LinkKind
+
+Point = tuple[float, float]
+_KINDS: tuple[LinkKind, ...] = ("lift", "stairs", "ramp")
+
+
+def is_lif(text: str) -> bool:
+    """Return whether a text of JSON has the keys of a layout."""
+    return '"metaInformation"' in text and '"layouts"' in text
+
+
+def read_lif(text: str, where: str, name: str) -> BuildingGraph:
+    """Read layouts: one floor for each `layoutLevelId`, or for each layout that has none.
+
+    Parameters
+    ----------
+    text
+        The file.
+    where
+        What messages begin with.
+    name
+        Name of a building that has none.
+
+    Returns
+    -------
+    BuildingGraph
+        Floors in the order of the file, in its one frame. Edges between two floors become links
+        between their nodes: those of one `edgeName` one link, of the kind with which that begins,
+        or else a lift. Times are not stated.
+
+    Raises
+    ------
+    MapError
+        When it is not of this form.
+    """
+    data = _parsed(text, where)
+    floors: dict[str, Gathered] = {}
+    floor_of: dict[str, str] = {}
+    point_of: dict[str, Point] = {}
+    layouts = list_of(data.get("layouts"), where, "layouts")
+    for number, entry in enumerate(layouts):
+        at = f"{where}, layout {number}"
+        layout = mapping_of(entry, at, "the layout")
+        floor = str(layout.get("layoutLevelId", layout.get("layoutId", number)))
+        gathered = floors.setdefault(floor, Gathered(f"{where}, level {shown(floor)}"))
+        if len(floors) > MOST_FLOORS:
+            raise MapError(f"{where}: more than {MOST_FLOORS} levels are not read")
+        for node in _entries(layout, "nodes", at):
+            known = _text(node, "nodeId", at)
+            point = pair_of(node.get("nodePosition"))
+            facts = {key: value for key, value in node.items() if key != "nodePosition"}
+            if isinstance(node.get("nodeName"), str):
+                facts["name"] = node["nodeName"]
+            gathered.add_node(known, point, facts)
+            floor_of[known] = floor
+            if point is not None:
+                point_of[known] = point
+    crossing = _add_edges(data, floors, floor_of, where)
+    kept = {floor: gathered for floor, gathered in floors.items() if gathered.has_nodes}
+    if not kept:
+        raise MapError(f"{where}: no layout has a node with x and y in metres")
+    graphs = [
+        FloorGraph(name=floor, graph=WaypointGraph(**gathered.fields("lif", floor)))
+        for floor, gathered in kept.items()
+    ]
+    meta = mapping_of(data.get("metaInformation"), where, "metaInformation")
+    title = str(meta.get("projectIdentification") or name)
+    links = _links(crossing, floor_of, point_of, list(kept))
+    return BuildingGraph(name=title, floors=tuple(graphs), links=tuple(links))
+
+
+def _parsed(text: str, where: str) -> dict[str, Any]:
+    if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
+        raise MapError(f"{where}: JSON of more than {MOST_VALUES} values is not read")
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as failure:
+        at = f"line {failure.lineno}, column {failure.colno}"
+        raise MapError(f"{where}, {at}: no JSON: {failure.msg}") from None
+    except RecursionError:
+        raise MapError(f"{where}: JSON nested deeper than anything meant") from None
+    except ValueError:  # an integer of more than 4300 digits
+        raise MapError(f"{where}: no JSON: a number has too many digits") from None
+    if not isinstance(data, dict) or "layouts" not in data:
+        raise MapError(f"{where}: expected a layout in the Layout Interchange Format, 'layouts'")
+    return data
+
+
+def _entries(layout: dict[str, Any], key: str, where: str) -> Iterable[dict[str, Any]]:
+    for number, entry in enumerate(list_of(layout.get(key), where, key)):
+        yield mapping_of(entry, f"{where}, {key} {number}", f"an entry of {key}")
+
+
+def _text(entry: dict[str, Any], key: str, where: str) -> str:
+    value = entry.get(key)
+    if not isinstance(value, str):
+        raise MapError(f"{where}: expected {key} as a text, got {value!r:.60}")
+    return value
+
+
+def _add_edges(
+    data: dict[str, Any], floors: dict[str, Gathered], floor_of: dict[str, str], where: str
+) -> list[tuple[str, str, str]]:
+    """Add the edges inside floors; return name, start and end of the others."""
+    crossing = []
+    for number, layout in enumerate(data["layouts"]):
+        at = f"{where}, layout {number}"
+        own = str(layout.get("layoutLevelId", layout.get("layoutId", number)))
+        for edge in _entries(layout, "edges", at):
+            ends = _text(edge, "startNodeId", at), _text(edge, "endNodeId", at)
+            on = [floor_of.get(end) for end in ends]
+            if on[0] is not None and on[1] is not None and on[0] != on[1]:
+                crossing.append((str(edge.get("edgeName", edge.get("edgeId", ""))), *ends))
+                continue
+            facts = {key: value for key, value in edge.items() if not key.endswith("NodeId")}
+            floors[on[0] or own].add_edge(ends, facts | _speed(edge), name=edge.get("edgeId"))
+    return crossing
+
+
+def _speed(edge: dict[str, Any]) -> dict[str, Any]:
+    """Return the speed limit of an edge, the least of all vehicle types."""
+    kinds = edge.get("vehicleTypeEdgeProperties")
+    limits = [
+        limit
+        for kind in (kinds if isinstance(kinds, list) else [])
+        if isinstance(kind, dict)
+        for limit in [kind.get("maxSpeed")]
+        if isinstance(limit, int | float) and not isinstance(limit, bool) and limit > 0
+    ]
+    return {"speed_limit": min(limits)} if limits else {}
+
+
+def _links(
+    crossing: list[tuple[str, str, str]],
+    floor_of: dict[str, str],
+    point_of: dict[str, Point],
+    floors: list[str],
+) -> list[Link]:
+    """Return a link for the edges of each name."""
+    place = {floor: at for at, floor in enumerate(floors)}
+    stops: dict[str, dict[str, Point]] = {}
+    for name, *ends in crossing:
+        for end in ends:
+            if floor_of[end] in place and end in point_of:
+                stops.setdefault(name, {}).setdefault(floor_of[end], point_of[end])
+    links = []
+    taken: set[str] = set()
+    for name, found in stops.items():
+        if len(found) < 2:  # noqa: PLR2004
+            continue
+        word, _, rest = name.partition(" ")
+        kind = next((kind for kind in _KINDS if kind == word and rest), None)
+        own = rest if kind is not None and rest not in taken else name
+        taken.add(own)
+        ordered = sorted(found, key=place.__getitem__)
+        known = tuple(LinkEnd(floor, found[floor]) for floor in ordered)
+        links.append(Link(name=own, kind=kind or "lift", ends=known))
+    return links
