@@ -46,6 +46,7 @@ from .io import (
     CarmenLog as CarmenLog,
     Model as Model,
     example_map as example_map,
+    export_lif as export_lif,
     export_nav2 as export_nav2,
     export_osm as export_osm,
     export_path as export_path,

@@ -194,8 +194,8 @@ def test_a_lift_ends_at_the_vertices_in_its_cabin(tmp_path):
 def test_a_cabin_is_a_turned_rectangle_with_its_gap(tmp_path, yaw):
     rng = np.random.default_rng(3)
     for x, y in rng.uniform(150, 270, (12, 2)):
-        facts = {"x": float(x), "y": float(y) + 80, "yaw": float(yaw), "width": 3.0, "depth": 1.4}
-        facts["level_doors"] = {"up": [], "down": []}
+        sides = {"width": 3.0, "depth": 1.4, "yaw": float(yaw)}
+        facts = {"x": float(x), "y": float(y) + 80, "level_doors": {"up": [], "down": []}} | sides
         building = hn.load_building_graph(write(tmp_path / "a.yaml", lifts={"hoist": facts}))
         box = shapely.affinity.rotate(shapely.box(-1.55, -0.75, 1.55, 0.75), yaw, use_radians=True)
         cabin = shapely.affinity.translate(box, x * 0.05, -(y + 80) * 0.05)
@@ -216,7 +216,7 @@ def test_a_cabin_is_a_turned_rectangle_with_its_gap(tmp_path, yaw):
         ({"levels": {"a": {"vertices": [CORNER], "measurements": UNMEASURED,
                            "lanes": [[0, 0, LANE]]}}}, "expected two points and distance"),
         ({"levels": {"a": {"vertices": [CORNER], "lanes": [[0, "b", LANE]]}},
-          "coordinate_system": "cartesian_meters"}, "with two numbers"),
+          "coordinate_system": "cartesian_meters", "lifts": {}}, "with two numbers"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_line(tmp_path, change, words):

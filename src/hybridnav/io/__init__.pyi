@@ -13,6 +13,7 @@ from .features_out import (
 )
 from .floor_graphs import floor_graph as floor_graph
 from .graph_files import load_graph as load_graph
+from .lif_out import export_lif as export_lif
 from .maps import load as load, load_map as load_map
 from .models import Model as Model, save as save
 from .masks import load_keepout_mask as load_keepout_mask, load_speed_mask as load_speed_mask

@@ -54,11 +54,8 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
     floors: dict[str, Gathered] = {}
     floor_of: dict[str, str] = {}
     point_of: dict[str, Point] = {}
-    layouts = list_of(data.get("layouts"), where, "layouts")
-    for number, entry in enumerate(layouts):
-        at = f"{where}, layout {number}"
-        layout = mapping_of(entry, at, "the layout")
-        floor = str(layout.get("layoutLevelId", layout.get("layoutId", number)))
+    layouts = _layouts(data, where)
+    for at, floor, layout in layouts:
         gathered = floors.setdefault(floor, Gathered(f"{where}, level {shown(floor)}"))
         if len(floors) > MOST_FLOORS:
             raise MapError(f"{where}: more than {MOST_FLOORS} levels are not read")
@@ -72,7 +69,7 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
             floor_of[known] = floor
             if point is not None:
                 point_of[known] = point
-    crossing = _add_edges(data, floors, floor_of, where)
+    crossing = _add_edges(layouts, floors, floor_of)
     kept = {floor: gathered for floor, gathered in floors.items() if gathered.has_nodes}
     if not kept:
         raise MapError(f"{where}: no layout has a node with x and y in metres")
@@ -103,6 +100,17 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
     return data
 
 
+def _layouts(data: dict[str, Any], where: str) -> list[tuple[str, str, dict[str, Any]]]:
+    """Return each layout, after what messages about it begin with, and its floor."""
+    found = []
+    for number, entry in enumerate(list_of(data.get("layouts"), where, "layouts")):
+        at = f"{where}, layout {number}"
+        layout = mapping_of(entry, at, "the layout")
+        floor = str(layout.get("layoutLevelId", layout.get("layoutId", number)))
+        found.append((at, floor, layout))
+    return found
+
+
 def _entries(layout: dict[str, Any], key: str, where: str) -> Iterable[dict[str, Any]]:
     for number, entry in enumerate(list_of(layout.get(key), where, key)):
         yield mapping_of(entry, f"{where}, {key} {number}", f"an entry of {key}")
@@ -116,13 +124,13 @@ def _text(entry: dict[str, Any], key: str, where: str) -> str:
 
 
 def _add_edges(
-    data: dict[str, Any], floors: dict[str, Gathered], floor_of: dict[str, str], where: str
+    layouts: list[tuple[str, str, dict[str, Any]]],
+    floors: dict[str, Gathered],
+    floor_of: dict[str, str],
 ) -> list[tuple[str, str, str]]:
     """Add the edges inside floors; return name, start and end of the others."""
     crossing = []
-    for number, layout in enumerate(data["layouts"]):
-        at = f"{where}, layout {number}"
-        own = str(layout.get("layoutLevelId", layout.get("layoutId", number)))
+    for at, own, layout in layouts:
         for edge in _entries(layout, "edges", at):
             ends = _text(edge, "startNodeId", at), _text(edge, "endNodeId", at)
             on = [floor_of.get(end) for end in ends]
