@@ -13,6 +13,7 @@ import hybridnav as hn
 from tests.nav2_reader import read_nav2
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
+OFFICE = FIGURE.parents[1] / "office" / "office.yaml"
 SMALL = ("--robot-radius", "0", "--spacing", "1")
 
 
@@ -60,7 +61,7 @@ def test_edges_that_bend(cli, tmp_path):
 def test_wrong_usage_ends_in_one_line(cli, tmp_path):
     out = tmp_path / "graph.geojson"
     assert cli("export", FIGURE, "-o", tmp_path / "graph.txt").refuses(2, "--out", ".geojson")
-    assert cli("export", FIGURE, "-o", out, "--format", "rmf").refuses(2, "--format", "nav2")
+    assert cli("export", FIGURE, "-o", out, "--format", "shapefile").refuses(2, "--format", "nav2")
     assert cli("export", FIGURE, "-o", tmp_path / "no" / "g.json").refuses(2, "no folder")
     assert cli("export", FIGURE, "-o", out, *SMALL[:2], "--spacing", "nan").refuses(2, "spacing_m")
     assert cli("export", FIGURE, "-o", out, "--stretch", "0.9", *SMALL).refuses(2, "stretch")
@@ -133,3 +134,66 @@ def test_a_plan_is_written_into_a_bag(cli, tmp_path, monkeypatch):
     far = cli(*query[:-1], "99,99", "--bag", tmp_path / "far.bag")
     assert far.code == 1
     assert not (tmp_path / "far.bag").exists()
+
+
+def test_formats_of_fleets_are_read_back_as_the_same_graph(cli, tmp_path):
+    formats = {
+        "rmf": ("a.yaml", ()),
+        "osm": ("a.osm", ("--anchor", "48.15,11.57,20")),
+        "lif": ("a.json", ("--vehicle", "A.B", "--vehicle", "C.D")),
+    }
+    for kind, (name, more) in formats.items():
+        out = tmp_path / name
+        done = cli("export", FIGURE, "-o", out, "--format", kind, *SMALL, *more, "--json")
+        assert (done.code, done.err) == (0, "")
+        graph = hn.load_graph(out)
+        assert (graph.n_nodes, graph.n_edges) == (done.answer["nodes"], done.answer["edges"])
+        assert [floor.name for floor in hn.load_building_graph(out).floors] == ["0"]
+        done = cli("check", FIGURE, out, *SMALL[:2], "--floor", "0", "--json")
+        assert (done.code, done.answer["findings"]) == (0, {})
+
+
+def test_what_a_format_does_not_hold_is_printed(cli, tmp_path):
+    out = tmp_path / "a.yaml"
+    done = cli("export", OFFICE, "-o", out, "--format", "rmf", "--nodes", "50", "--no-doors")
+    assert done.code == 0
+    assert "left out   doors: as asked\n" in done.out
+    assert hn.load_building_graph(out).floors[0].doors == ()
+
+
+def test_options_of_fleets_are_refused_elsewhere(cli, tmp_path):
+    out = tmp_path / "a.geojson"
+    refused = {
+        ("--anchor", "1,2"): "--anchor is for --format osm, got nav2",
+        ("--vehicle", "A.B"): "--vehicle is for --format lif, got nav2",
+        ("--no-doors",): "--no-doors is for --format rmf, got nav2",
+        ("--floor", "1"): "--floor is for --format rmf, osm, lif, got nav2",
+        ("--format", "osm"): "--out",
+    }
+    for given, words in refused.items():
+        assert cli("export", FIGURE, "-o", out, *given).refuses(2, words)
+    out = tmp_path / "a.osm"
+    for anchor in ("here", "1", "1,2,3,4", "1,nan", "99,0"):
+        done = cli("export", FIGURE, "-o", out, "--format", "osm", "--anchor", anchor)
+        assert done.refuses(2, "--anchor")
+    assert cli("export", FIGURE, "-o", out, "--format", "osm").refuses(2, "needs --anchor")
+    out = tmp_path / "a.json"
+    assert cli("export", FIGURE, "-o", out, "--format", "lif").refuses(2, "needs --vehicle")
+    done = cli("export", FIGURE, "-o", out, "--format", "lif", "--vehicle", "A.B", "--polylines")
+    assert done.refuses(2, "--polylines is for --format nav2")
+
+
+def test_one_floor_of_several_is_judged(cli, tmp_path):
+    graph = tmp_path / "two.yaml"
+    level = "{vertices: [[1, 1, {name: a%d}], [1, 2, {}]], lanes: [[0, 1, {}], [1, 0, {}]]}"
+    graph.write_text(f"levels: {{L1: {level % 1}, L2: {level % 2}}}")
+    assert cli("check", FIGURE, graph).refuses(3, "it has the floors L1, L2: choose one")
+    done = cli("check", FIGURE, graph, *SMALL[:2], "--floor", "L2", "--json")
+    assert (done.answer["nodes"], done.answer["edges"]) == (2, 2)
+    assert cli("check", FIGURE, graph, "--floor", "L3").refuses(3, "no floor is named 'L3'")
+    done = cli(
+        "evaluate", FIGURE, "--graph", graph, "--floor", "L1", "--pairs", "3", "-o", tmp_path / "r"
+    )
+    assert "two L1" in done.out
+    refused = cli("evaluate", FIGURE, "--floor", "L1", "-o", tmp_path / "r")
+    assert refused.refuses(2, "--floor goes with --graph")

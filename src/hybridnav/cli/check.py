@@ -25,6 +25,7 @@ from hybridnav.cli.common import (
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.options import (
     FreeOption,
+    GraphFloorOption,
     JsonOption,
     LeastIslandOption,
     MapArgument,
@@ -47,8 +48,8 @@ GraphArgument = Annotated[
     Path,
     typer.Argument(
         metavar="GRAPH",
-        help="Route graph of Nav2 (.geojson), topological map of STRANDS or LCAS, GraphML, or "
-        "node-link JSON.",
+        help="Route graph of Nav2 (.geojson), topological map of STRANDS or LCAS, GraphML, "
+        "node-link JSON, or a file of Open-RMF, OpenStreetMap or VDMA's LIF.",
     ),
 ]
 PageOption = Annotated[
@@ -73,6 +74,7 @@ def check(
     map_file: MapArgument,
     graph_file: GraphArgument,
     out: PageOption = None,
+    floor: GraphFloorOption = None,
     ignore: IgnoreOption = None,
     along_lines: LinesOption = False,
     rooms_file: RoomsOption = None,
@@ -100,7 +102,7 @@ def check(
     settings = read_settings(preset, None, robot_radius_m, None, map_file=map_file)
     seconds: dict[str, float] = {}
     with stage(f"reading {graph_file}", seconds, "graph"):
-        graph = hn.load_graph(graph_file)
+        graph = hn.load_graph(graph_file, floor=floor)
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
     model = load_model(map_file, settings, seconds, reading)
     check_room_to_be(model.grid)

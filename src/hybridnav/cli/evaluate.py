@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
+import hybridnav as hn
 from hybridnav.cli.common import answer, complain, progress_bar, read_settings
 from hybridnav.cli.costs import parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
-from hybridnav.cli.options import MaxCellsOption
+from hybridnav.cli.options import GraphFloorOption, MaxCellsOption
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ GraphsOption = Annotated[
     typer.Option(
         "--graph",
         metavar="FILE",
-        help="A route graph of Nav2, STRANDS or LCAS, GraphML or node-link JSON, to follow on one "
+        help="A graph in any format that `hybridnav check` reads, to follow on one "
         "map; may be given several times.",
     ),
 ]
@@ -120,6 +121,7 @@ def evaluate(
     preset: PresetsOption = None,
     baseline: BaselinesOption = None,
     graph: GraphsOption = None,
+    floor: GraphFloorOption = None,
     clear_edges: ClearEdgesOption = False,
     pairs: PairsOption = None,
     all_pairs: LatticeOption = None,
@@ -158,12 +160,14 @@ def evaluate(
         )
     if clear_edges and not graph:
         raise UsageError("--clear-edges goes with --graph: name the graph, or leave it out")
+    if floor is not None and not graph:
+        raise UsageError("--floor goes with --graph: name the graph, or leave it out")
     names = preset if preset is not None else ([] if baseline or graph else ["shortest"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
         presets=tuple(read_settings(name, overrides, None, None) for name in names),
         baselines=tuple(baseline or ()),
-        graphs=tuple(map(str, graph or ())),
+        graphs=tuple(_graph(file, floor) for file in graph or ()),
         clear_edges_only=clear_edges,
         pairs=pairs,
         lattice_step_m=all_pairs,
@@ -194,6 +198,10 @@ def evaluate(
         complain("nothing was checked: the maps have no such pairs of free cells")
     if faults or unmade or not study.checks:
         raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _graph(file: Path, floor: str | None) -> str | hn.WaypointGraph:
+    return str(file) if floor is None else hn.load_graph(file, floor=floor)
 
 
 def _yardstick(metric: str) -> Yardstick:

@@ -26,6 +26,14 @@ from hybridnav.cli.common import (
     timings,
 )
 from hybridnav.cli.errors import UsageError
+from hybridnav.cli.fleets import (
+    ENDINGS,
+    AnchorOption,
+    Fleet,
+    FloorOption,
+    NoDoorsOption,
+    VehiclesOption,
+)
 from hybridnav.cli.options import (
     FreeOption,
     JsonOption,
@@ -46,17 +54,24 @@ if TYPE_CHECKING:
 
 _ENDINGS = {
     "nav2": (".geojson", ".json"),
+    **ENDINGS,
     "rooms": (".csv", ".geojson"),
     "places": (".csv", ".geojson"),
 }
 """Endings of the file of each format."""
+_PARTS = ("rooms", "places")
+"""Formats without a graph."""
 _SPACING_M, _STRETCH = 2.0, 1.02
 _MOST_PAIRS = 1_000_000
 
 OutOption = Annotated[
     Path,
     typer.Option(
-        "-o", "--out", metavar="FILE", help="The file: .geojson; of rooms and places also .csv."
+        "-o",
+        "--out",
+        metavar="FILE",
+        help="The file: .geojson; for rmf .yaml, for osm .osm, for lif .json; of rooms and places "
+        "also .csv.",
     ),
 ]
 FormatOption = Annotated[
@@ -123,6 +138,10 @@ def export(
     lanes_m: LanesOption = None,
     polylines: PolylinesOption = False,
     frame: FrameOption = "map",
+    floor: FloorOption = None,
+    anchor: AnchorOption = None,
+    vehicles: VehiclesOption = None,
+    no_doors: NoDoorsOption = False,
     report: ReportOption = None,
     rooms_file: RoomsOption = None,
     preset: PresetOption = None,
@@ -135,7 +154,8 @@ def export(
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
-    """Write a graph of MAP's free space for Nav2's route server, or its rooms or places."""
+    """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
+    5050, or its rooms or places."""
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     if polylines and (report is not None or plot is not None or lanes_m is not None):
@@ -145,7 +165,10 @@ def export(
         )
     check_output(out, "--out", _ENDINGS[kind])
     check_picture(plot)
-    if kind != "nav2":
+    fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
+    if fleet is not None and polylines:
+        raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
+    if kind in _PARTS:
         given = {
             "--nodes": nodes is not None,
             "--spacing": spacing_m != _SPACING_M,
@@ -163,7 +186,7 @@ def export(
     check_room_to_be(model.grid)
     find_rooms = kind != "places"
     topology = grow_topology(model, settings, seconds, rooms_file=rooms_file, find_rooms=find_rooms)
-    if kind != "nav2":
+    if kind in _PARTS:
         with stage(f"writing {out}", seconds, "write"):
             _write_parts(topology, kind, out, frame)
         answer(_parts_answer(topology, kind, (out, map_file), seconds, as_json=as_json))
@@ -183,14 +206,17 @@ def export(
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
         written = hn.merge_bends(graph) if polylines else graph
-        hn.export_nav2(written, out, frame=frame)
+        left_out = _write_graph(topology, (graph, written), fleet, out, frame)
     judged = None
     if report is not None:
         with stage("comparing routes", seconds, "report"):
             judged = hn.judge_route_graph(graph, pairs=report)
     figures = _figures(written, judged) | {"graph": str(out), "map": str(map_file)}
+    figures |= {} if fleet is None else {"left_out": list(left_out)}
     text = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
-    lines = [*_summary(out, written, graph.grid, judged), f"seconds    {timings(seconds)}"]
+    lines = _summary(out, written, graph.grid, judged)
+    lines += [f"left out   {printable(each)}" for each in left_out]
+    lines.append(f"seconds    {timings(seconds)}")
     answer((text if as_json else "\n".join(lines)) + "\n")
     if plot is not None:
         from hybridnav.viz import plot_route_graph, save_figure  # noqa: PLC0415 - on demand
@@ -202,7 +228,22 @@ def _check_plain(kind: str, given: dict[str, bool]) -> None:
     """Refuse options of graphs for a format that has none."""
     for option, is_given in given.items():
         if is_given:
-            raise UsageError(f"{option} is for --format nav2, got {kind}: leave it out")
+            known = ", ".join(each for each in _ENDINGS if each not in _PARTS)
+            raise UsageError(f"{option} is for --format {known}, got {kind}: leave it out")
+
+
+def _write_graph(
+    topology: hn.TopologicalMap,
+    graphs: tuple[RouteGraph, RouteGraph | WaypointGraph],
+    fleet: Fleet | None,
+    out: Path,
+    frame: str,
+) -> tuple[str, ...]:
+    """Write a graph, or for Nav2 what has been made of it; return what the file does not hold."""
+    if fleet is None:
+        hn.export_nav2(graphs[1], out, frame=frame)
+        return ()
+    return fleet.write(topology, graphs[0], out)
 
 
 def _write_parts(topology: hn.TopologicalMap, kind: str, out: Path, frame: str) -> None:

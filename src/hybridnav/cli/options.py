@@ -64,6 +64,10 @@ OccupiedOption = Annotated[
         help="Occupancy from which on a cell is occupied; else the map's.",
     ),
 ]
+GraphFloorOption = Annotated[
+    str | None,
+    typer.Option("--floor", metavar="NAME", help="The floor to read of a graph with several."),
+]
 LeastIslandOption = Annotated[
     float,
     typer.Option(

@@ -31,6 +31,8 @@ _VERTICAL: dict[str, LinkKind] = {"elevator": "lift", "stairs": "stairs"}
 _INDOOR = ("room", "corridor", "area")
 _FACTS = ("wait_s", "ride_s", "cost_m", "max_radius_m")
 _KM_H = 3.6
+_DECIMALS = 5
+"""Decimals of metres."""
 
 
 @dataclass
@@ -83,7 +85,7 @@ def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) 
     if not data.places:
         raise MapError(f"{where}: no node has a latitude and a longitude")
     title, anchor = _title(data, name), anchor or _anchor_of(data)
-    points = {node: pair_of(anchor.point_of(*place)) for node, place in data.places.items()}
+    points = {node: _point(anchor, place) for node, place in data.places.items()}
     floors = _sorted_floors(data, where)
     graphs = [
         _floor(floor, data, points, f"{where}, level {shown(floor.name)}") for floor in floors
@@ -103,6 +105,13 @@ def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) 
         floors=tuple(graph for _, graph in kept if graph is not None),
         links=tuple(links.found(floors)),
     )
+
+
+def _point(anchor: Anchor, place: tuple[float, float]) -> Point | None:
+    """Return a point in metres, rounded: else nodes at a wall would lie in it after a round trip,
+    by less than the last decimal of degrees."""
+    x, y = anchor.point_of(*place)
+    return pair_of((round(x, _DECIMALS), round(y, _DECIMALS)))
 
 
 def _title(data: OsmData, name: str) -> str:
