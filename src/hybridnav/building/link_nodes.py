@@ -34,7 +34,12 @@ def join_links(building: BuildingGraph) -> BuildingGraph:
     Parameters
     ----------
     building
-        The building; the same is returned if no node is missing.
+        The building.
+
+    Returns
+    -------
+    BuildingGraph
+        The same if no node is missing.
 
     Examples
     --------
@@ -75,6 +80,11 @@ def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
     ----------
     building
         The building; ends of links without a node are joined as `join_links` does it.
+
+    Returns
+    -------
+    networkx.MultiDiGraph
+        Edges of floors have `length_m`; those of links do not.
 
     Examples
     --------

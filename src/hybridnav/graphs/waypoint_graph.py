@@ -43,7 +43,8 @@ class WaypointGraph:
     name: str
     """Name of the graph."""
     format: str
-    """Where it is from: nav2, strands, strands-text, tmap2, graphml, node-link, networkx."""
+    """Where it is from: nav2, strands, strands-text, tmap2, graphml, node-link, networkx, rmf, osm,
+    lif, or hybridnav for the graph of a map."""
     frame: str
     """Name of the frame of the points; empty if the file has none."""
     names: tuple[Name, ...]

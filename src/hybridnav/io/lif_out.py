@@ -145,7 +145,7 @@ def _layouts(building: BuildingGraph, types: list[str]) -> list[dict[str, Any]]:
             ends = _node_id(*one), _node_id(*other)
             edge = {"edgeId": f"{link.kind}/{link.name}/{one[0].name}/{other[0].name}"}
             edge |= {"edgeName": f"{link.kind} {link.name}"}
-            layouts[at[one[0].name]]["edges"].append(edge | _ends(ends, types, None))
+            layouts[at[one[0].name]]["edges"].append(edge | _between(ends, types, None))
     return layouts
 
 
@@ -174,14 +174,14 @@ def _edges(floor: FloorGraph, types: list[str]) -> Iterator[dict[str, Any]]:
         yield (
             {"edgeId": f"{floor.name}/{edge}/edge"}
             | known
-            | _ends(ends, types, speed_limit_of(facts))
+            | _between(ends, types, speed_limit_of(facts))
         )
 
 
-def _ends(ends: tuple[str, str], types: list[str], speed: float | None) -> dict[str, Any]:
+def _between(nodes: tuple[str, str], types: list[str], speed: float | None) -> dict[str, Any]:
     limit = {} if speed is None else {"maxSpeed": speed}
     properties = [{"vehicleTypeId": name, "rotationAllowed": True} | limit for name in types]
-    start, end = ends
+    start, end = nodes
     return {"startNodeId": start, "endNodeId": end, "vehicleTypeEdgeProperties": properties}
 
 

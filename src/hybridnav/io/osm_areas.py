@@ -90,18 +90,18 @@ def _join(
                 gathered.add_link((one, other), {}, directed=False)
 
 
-def _shape(way: OsmWay, points: Mapping[int, Point | None]) -> BaseGeometry | None:
+def _shape(ring: OsmWay, points: Mapping[int, Point | None]) -> BaseGeometry | None:
     """Return the area inside a way; None for what contains others, and without points."""
-    corners = [point for node in way.refs[:-1] if (point := points.get(node)) is not None]
-    is_whole = len(corners) == len(way.refs) - 1
-    if not is_whole or way.tags.get("osmAG:areaType") == "structure":
+    corners = [point for node in ring.refs[:-1] if (point := points.get(node)) is not None]
+    is_whole = len(corners) == len(ring.refs) - 1
+    if not is_whole or ring.tags.get("osmAG:areaType") == "structure":
         return None
     return shapely.make_valid(shapely.Polygon(corners))
 
 
-def _middle(ends: list[Point | None]) -> Point | None:
+def _middle(found: list[Point | None]) -> Point | None:
     """Return the middle of the points that are there, None without any."""
-    known = [end for end in ends if end is not None]
+    known = [end for end in found if end is not None]
     if not known:
         return None
     return sum(x for x, _ in known) / len(known), sum(y for _, y in known) / len(known)

@@ -46,11 +46,11 @@ class OsmFloor:
     passages: list[OsmWay] = field(default_factory=list)
     elevation_m: float | None = None
 
-    def describe(self, way: OsmWay) -> None:
-        """Take the name of the level from a way, and its height from an area of osmAG."""
-        self.name = way.tags.get("level:ref") or self.name
-        height = number_of(way.tags.get("height"))
-        if way.tags.get("osmAG:type") == "area" and not math.isnan(height):
+    def describe(self, element: OsmWay) -> None:
+        """Take the name of the level from a element, and its height from an area of osmAG."""
+        self.name = element.tags.get("level:ref") or self.name
+        height = number_of(element.tags.get("height"))
+        if element.tags.get("osmAG:type") == "area" and not math.isnan(height):
             self.elevation_m = height
 
 
@@ -157,14 +157,16 @@ def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
     return found
 
 
-def _part(way: OsmWay) -> str:
-    """Return the list of a floor that a way belongs to, empty for none."""
-    kind = way.tags.get("osmAG:type")
+def _part(element: OsmWay) -> str:
+    """Return the list of a floor that a element belongs to, empty for none."""
+    kind = element.tags.get("osmAG:type")
     if kind == "passage":
         return "passages"
-    if way.is_closed and (kind == "area" or way.tags.get("indoor") in _INDOOR):
+    if element.is_closed and (kind == "area" or element.tags.get("indoor") in _INDOOR):
         return "areas"
-    is_route = "highway" in way.tags and not way.is_closed and "hybridnav:link" not in way.tags
+    is_route = (
+        "highway" in element.tags and not element.is_closed and "hybridnav:link" not in element.tags
+    )
     return "routes" if is_route else ""
 
 
@@ -192,9 +194,9 @@ def _floor(
     )
 
 
-def _leaves(way: OsmWay, own: set[int], elsewhere: frozenset[int]) -> bool:
+def _leaves(element: OsmWay, own: set[int], elsewhere: frozenset[int]) -> bool:
     """Return whether a passage leads to an area of another level."""
-    sides = [number_of(way.tags.get(key)) for key in ("osmAG:from", "osmAG:to")]
+    sides = [number_of(element.tags.get(key)) for key in ("osmAG:from", "osmAG:to")]
     return any(side in elsewhere and side not in own for side in sides)
 
 
@@ -221,9 +223,9 @@ def _add_routes(
                 gathered.add_edge(pair[::-1], facts)
 
 
-def _is_room(way: OsmWay) -> bool:
-    kind = way.tags.get("osmAG:areaType", "room")
-    return kind in {"room", "corridor"} and "hybridnav:link" not in way.tags
+def _is_room(element: OsmWay) -> bool:
+    kind = element.tags.get("osmAG:areaType", "room")
+    return kind in {"room", "corridor"} and "hybridnav:link" not in element.tags
 
 
 def _areas(
@@ -276,7 +278,7 @@ class _Links:
 
     def found(self, floors: list[OsmFloor]) -> list[Link]:
         """Return all links."""
-        links = [*self._ways(), *self._nodes()]
+        links = [*self._from_ways(), *self._from_nodes()]
         grouped: dict[tuple[str, LinkKind], list[tuple[float, Point]]] = {}
         for floor in floors:
             for way in floor.areas:
@@ -290,7 +292,7 @@ class _Links:
             links.append(self._link(name, kind, stops, {}))
         return [link for link in links if link is not None]
 
-    def _ways(self) -> list[Link | None]:
+    def _from_ways(self) -> list[Link | None]:
         links = []
         for way in self._data.ways:
             kind = self._kind(way.tags)
@@ -303,7 +305,7 @@ class _Links:
                 links.append(self._link(way.tags.get("name", ""), kind, stops, way.tags))
         return links
 
-    def _nodes(self) -> list[Link | None]:
+    def _from_nodes(self) -> list[Link | None]:
         links = []
         for node, tags in self._data.tags.items():
             kind, levels, point = self._kind(tags), levels_of(tags), self._points.get(node)
@@ -319,11 +321,11 @@ class _Links:
         return _HERE.get(tags.get("highway", ""))
 
     def _link(
-        self, name: str, kind: LinkKind, stops: list[tuple[float, Point]], tags: dict[str, str]
+        self, name: str, kind: LinkKind, points: list[tuple[float, Point]], tags: dict[str, str]
     ) -> Link | None:
         """Return a link, None if it stops at fewer than two levels."""
         ends: dict[float, LinkEnd] = {}
-        for level, point in sorted(stops, key=lambda stop: stop[0]):
+        for level, point in sorted(points, key=lambda each: each[0]):
             if level in self._names:
                 ends.setdefault(level, LinkEnd(self._names[level], point))
         if len(ends) < 2:  # noqa: PLR2004

@@ -147,7 +147,7 @@ class _Writer:
         self._nodes.append((point, tags))
         return len(self._nodes)
 
-    def _way(self, refs: list[int], tags: Tags) -> int:
+    def _add_way(self, refs: list[int], tags: Tags) -> int:
         self._ways.append((refs, tags))
         return len(self._ways)
 
@@ -173,25 +173,27 @@ class _Writer:
                     corners[point] = self._node(point, {})
             refs = [corners[point] for point in ring]
             tags = {"indoor": area.kind, "name": area.name, "osmAG:areaType": "room"}
-            way = self._way([*refs, refs[0]], tags | {"osmAG:type": "area"} | self._raised(floor))
+            way = self._add_way(
+                [*refs, refs[0]], tags | {"osmAG:type": "area"} | self._raised(floor)
+            )
             ways.setdefault(area.name, way)
         shapes.corners = corners
         return ways
 
-    def _doors(self, floor: FloorGraph, shapes: Shapes, ways: dict[str, int]) -> None:
+    def _doors(self, floor: FloorGraph, shapes: Shapes, way_of: dict[str, int]) -> None:
         for door in floor.doors:
             if not door.is_opening:
                 (x, y), (u, v) = door.ends
                 tags = {"door": "yes", "name": door.name} | self._on(floor)
                 self._node(((x + u) / 2, (y + v) / 2), tags)
-            known = [ways[room] for room in door.rooms if room in ways]
+            known = [way_of[room] for room in door.rooms if room in way_of]
             if len(known) == 2:  # noqa: PLR2004 - both sides
                 refs = [shapes.corners.get(end) or self._node(end, {}) for end in door.ends]
                 self._passage(refs, door.name, (known[0], known[1]), self._raised(floor))
 
-    def _passage(self, refs: list[int], name: str, ends: tuple[int, int], tags: Tags) -> None:
-        joined = {"osmAG:from": f"-{ends[0]}", "osmAG:to": f"-{ends[1]}"}
-        self._way(refs, {"name": name, "osmAG:type": "passage"} | joined | tags)
+    def _passage(self, refs: list[int], name: str, joined: tuple[int, int], tags: Tags) -> None:
+        sides = {"osmAG:from": f"-{joined[0]}", "osmAG:to": f"-{joined[1]}"}
+        self._add_way(refs, {"name": name, "osmAG:type": "passage"} | sides | tags)
 
     def _edges(self, floor: FloorGraph) -> None:
         """Write each edge, and one that leads back as the same way."""
@@ -206,10 +208,12 @@ class _Writer:
             tags = {"highway": "footway", "indoor": "yes", "oneway": "yes"} | self._on(floor)
             tags |= {"hybridnav:door": door} if door else {}
             tags |= {} if speed is None else {"maxspeed": f"{speed * _KM_H:.6g}"}
-            way = self._way([refs[tail], refs[head]], tags)
+            way = self._add_way([refs[tail], refs[head]], tags)
             waiting.setdefault((tail, head, door, speed), []).append(way)
 
-    def _link(self, link: Link, shapes: dict[str, Shapes], ways: dict[str, dict[str, int]]) -> None:
+    def _link(
+        self, link: Link, shapes: dict[str, Shapes], way_of: dict[str, dict[str, int]]
+    ) -> None:
         stops = nodes_of_link(self._building, link)
         levels = ";".join(self._levels[floor.name] for floor, _ in stops)
         tags = {"highway": _HIGHWAYS[link.kind], "indoor": "yes", "name": link.name}
@@ -218,7 +222,7 @@ class _Writer:
             value = float(getattr(link, key))
             if value and math.isfinite(value):
                 tags[f"hybridnav:{key}"] = repr(value)
-        self._way([self._graph_nodes[floor.name][node] for floor, node in stops], tags)
+        self._add_way([self._graph_nodes[floor.name][node] for floor, node in stops], tags)
         areas = []
         for floor, node in stops:
             middle = tuple(floor.graph.points[node].tolist())
@@ -226,11 +230,11 @@ class _Writer:
             own = {"indoor": "room", "name": link.name, "osmAG:areaType": AREA_TYPES[link.kind]}
             mark = {"hybridnav:link": link.kind}
             own |= {"osmAG:type": "area"} | mark | self._raised(floor)
-            area = self._way([*refs, refs[0]], own)
+            area = self._add_way([*refs, refs[0]], own)
             areas.append((floor, area, self._graph_nodes[floor.name][node]))
             room = shapes[floor.name].area_at(middle)
-            if room in ways[floor.name]:
-                to = ways[floor.name][room]
+            if room in way_of[floor.name]:
+                to = way_of[floor.name][room]
                 self._passage(
                     refs[:2], f"{link.name} {floor.name}", (area, to), self._raised(floor)
                 )

@@ -194,10 +194,10 @@ def _parameters(entry: list[Any], at: int, where: str) -> dict[str, Any]:
 
 
 def _add_lanes(
-    floor: RmfFloor, ends: tuple[int, int], known: dict[str, Any], facts: dict[str, Any]
+    floor: RmfFloor, vertices: tuple[int, int], known: dict[str, Any], facts: dict[str, Any]
 ) -> None:
     """Add a lane, and the one back if it leads in both directions."""
-    tail, head = ends
+    tail, head = vertices
     way = facts.get("orientation")
     ahead = {"orientation_constraint": way} if way in _OPPOSITE else {}
     floor.add_lane((tail, head), known | ahead)

@@ -62,9 +62,9 @@ class RmfFloor:
         self.points.append(point)
         self.gathered.add_node(number, point, dict(facts) | ({"name": name} if name else {}))
 
-    def add_lane(self, ends: tuple[int, int], facts: Mapping[str, Any]) -> None:
+    def add_lane(self, vertices: tuple[int, int], facts: Mapping[str, Any]) -> None:
         """Add an edge between two vertices by their numbers."""
-        tail, head = (self._ids[end] if 0 <= end < len(self._ids) else end for end in ends)
+        tail, head = (self._ids[end] if 0 <= end < len(self._ids) else end for end in vertices)
         self.gathered.add_edge((tail, head), facts)
 
     @property
