@@ -285,6 +285,17 @@ def test_a_place_that_loses_few_cells_keeps_its_number():
     assert cells == {(row, col) for row in range(6) for col in range(6)} - {(0, 0)}
 
 
+def test_a_place_no_cell_of_which_is_near_to_all_others_gives_away_those_far_from_the_nearest():
+    classes = np.ones((5, 5), np.uint8)
+    version = version_of(classes, merge_distance_m=3.2)
+    assert version.n_places == 1
+    classes[2, 2] = 0  # from its centre alone all cells are within 3.2
+    update = version.update(occupancy_grid(classes))
+    assert (update.died, update.changed, len(update.born)) == ((), (0,), 2)
+    assert len(update.version.receptive_field(0)) == 22
+    check_version(update.version)
+
+
 def test_unchanged_parts_of_a_map_are_shared_between_versions():
     classes = np.ones((300, 900), np.uint8)
     version = version_of(classes, merge_distance_m=20.0)

@@ -30,7 +30,8 @@ def beside_of(cell, side, rows, cols):
 def look_again(place, low, table, numbers, limit):
     """Bring areas, boxes and surviving cells of places up to date.
 
-    Their boxes hold them. Places that no cell suits are dissolved: their area becomes 0.
+    Their boxes hold them. A place from no cell of which all others are near enough loses those that
+    are too far from the one nearest to its surviving cell before.
 
     Parameters
     ----------
@@ -44,68 +45,114 @@ def look_again(place, low, table, numbers, limit):
     Returns
     -------
     int64 (m,)
-        The flat cells of those that were dissolved.
+        The flat cells that were lost.
     int64 (k,)
-        Those that have another surviving cell.
+        The places that have another surviving cell.
     """
-    all_numbers, area, survivor, box, is_stale = table
-    rows, cols = place.shape
+    all_numbers, area, survivor, _, is_stale = table
     moved, n_moved = np.empty(numbers.size, np.int64), 0
     cells, n_cells = np.empty(16, np.int64), 0
     around = np.empty(4, np.int64)
     for number in numbers:
         i = np.searchsorted(all_numbers, number)
         is_stale[i] = True
-        n_found = 0
-        low_row, low_col, high_row, high_col = rows, cols, 0, 0
-        for row in range(box[i, 0] - low[0], box[i, 2] - low[0]):
-            for col in range(box[i, 1] - low[1], box[i, 3] - low[1]):
-                if place[row, col] == number:
-                    n_found += 1
-                    low_row, low_col = min(low_row, row), min(low_col, col)
-                    high_row, high_col = max(high_row, row + 1), max(high_col, col + 1)
-        area[i] = n_found
-        if n_found == 0:
+        measure(place, low, (number, i), table, around)
+        if area[i] == 0:
             continue
-        around[0], around[1], around[2], around[3] = low_row, low_col, high_row, high_col
-        box[i, 0], box[i, 1] = low_row + low[0], low_col + low[1]
-        box[i, 2], box[i, 3] = high_row + low[0], high_col + low[1]
         at_row, at_col = np.int64(survivor[i, 0] - low[0]), np.int64(survivor[i, 1] - low[1])
-        is_in = low_row <= at_row < high_row and low_col <= at_col < high_col
+        is_in = around[0] <= at_row < around[2] and around[1] <= at_col < around[3]
         if is_in and place[at_row, at_col] == number:
             continue
-        at_row, at_col = survivor_in(place, number, around, (at_row, at_col), limit)
-        if at_row >= 0:
-            survivor[i, 0], survivor[i, 1] = at_row + low[0], at_col + low[1]
-            moved[n_moved] = number
-            n_moved += 1
-            continue
-        area[i] = 0
-        if n_cells + n_found > cells.size:
-            longer = np.empty(2 * (n_cells + n_found), np.int64)
-            longer[:n_cells] = cells[:n_cells]
-            cells = longer
-        for row in range(low_row, high_row):
-            for col in range(low_col, high_col):
-                if place[row, col] == number:
-                    place[row, col] = -1
-                    cells[n_cells] = row * cols + col
-                    n_cells += 1
+        found, is_near = survivor_in(place, number, around, (at_row, at_col), limit)
+        survivor[i, 0], survivor[i, 1] = found[0] + low[0], found[1] + low[1]
+        moved[n_moved] = number
+        n_moved += 1
+        if not is_near:
+            lost = leave_near(place, number, around, found, limit)
+            if n_cells + lost.size > cells.size:
+                longer = np.empty(2 * (n_cells + lost.size), np.int64)
+                longer[:n_cells] = cells[:n_cells]
+                cells = longer
+            cells[n_cells : n_cells + lost.size] = lost
+            n_cells += lost.size
+            measure(place, low, (number, i), table, around)
     return cells[:n_cells].copy(), moved[:n_moved].copy()
 
 
 @njit(cache=True, nogil=True)
-def survivor_in(place, number, box, before, limit):
-    """Return a cell of a place from which no other one is too far, (-1, -1) where none was found.
+def measure(place, low, of_place, table, around):
+    """Bring the area and the box of a place, given by number and row, up to date.
 
-    Tried are the cells that are nearest to the surviving one before and to the middle of the box.
+    `around` receives its box in the window, where it has cells; the box in the table holds it.
     """
+    number, i = of_place
+    area, box = table[1], table[3]
+    n_found = 0
+    low_row, low_col, high_row, high_col = place.shape[0], place.shape[1], 0, 0
+    for row in range(box[i, 0] - low[0], box[i, 2] - low[0]):
+        for col in range(box[i, 1] - low[1], box[i, 3] - low[1]):
+            if place[row, col] == number:
+                n_found += 1
+                low_row, low_col = min(low_row, row), min(low_col, col)
+                high_row, high_col = max(high_row, row + 1), max(high_col, col + 1)
+    area[i] = n_found
+    if n_found > 0:
+        around[0], around[1], around[2], around[3] = low_row, low_col, high_row, high_col
+        for k in range(4):
+            box[i, k] = around[k] + low[k & 1]
+
+
+@njit(cache=True, nogil=True)
+def leave_near(place, number, box, survivor, limit):
+    """Leave a place the cells near its surviving one that connect to it; return the others, flat.
+
+    `box` holds the place, in the window.
+    """
+    rows, cols = place.shape
+    flat = place.ravel()
+    lost, n_lost = np.empty((box[2] - box[0]) * (box[3] - box[1]), np.int64), 0
+    for row in range(box[0], box[2]):
+        for col in range(box[1], box[3]):
+            if place[row, col] == number:
+                place[row, col] = -1
+                lost[n_lost] = row * cols + col
+                n_lost += 1
+    waits = np.zeros(flat.size, np.bool_)
+    waits[lost[:n_lost]] = True
+    stack, size = np.empty(n_lost, np.int64), 1
+    stack[0] = survivor[0] * cols + survivor[1]
+    waits[stack[0]] = False
+    while size > 0:
+        size -= 1
+        cell = stack[size]
+        flat[cell] = number
+        for side in range(4):
+            beside = beside_of(cell, side, rows, cols)
+            if beside < 0 or not waits[beside]:
+                continue
+            squared = (beside // cols - survivor[0]) ** 2 + (beside % cols - survivor[1]) ** 2
+            if squared < limit:
+                waits[beside] = False
+                stack[size] = beside
+                size += 1
+    return lost[:n_lost][waits[lost[:n_lost]]]
+
+
+@njit(cache=True, nogil=True)
+def survivor_in(place, number, box, before, limit):
+    """Return a cell of a place, and whether no other one is too far from it.
+
+    Tried are the cells that are nearest to the surviving one before and to the middle of the box;
+    the first of them is returned where neither suits.
+    """
+    first_row, first_col = nearest_cell(place, number, box, float(before[0]), float(before[1]))
+    if is_within(place, number, box, (first_row, first_col), limit):
+        return (first_row, first_col), True
     middle = (box[0] + box[2] - 1) / 2, (box[1] + box[3] - 1) / 2
-    for row, col in ((float(before[0]), float(before[1])), middle):
-        found_row, found_col = nearest_cell(place, number, box, row, col)
-        if is_within(place, number, box, (found_row, found_col), limit):
-            return found_row, found_col
-    return np.int64(-1), np.int64(-1)
+    row, col = nearest_cell(place, number, box, middle[0], middle[1])
+    if is_within(place, number, box, (row, col), limit):
+        return (row, col), True
+    return (first_row, first_col), False
 
 
 @njit(cache=True, nogil=True)
