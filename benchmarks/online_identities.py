@@ -5,8 +5,10 @@
 The logs of Intel and Freiburg 079 are replayed in cells of 5 cm, with a robot of 0.25 m: a map
 after every so many scans. A cell flips if it stays free and changes the number of its place,
 although more than half of the cells of that place stay free; an untouched place, none of whose
-cells changes class, flips if its number is not on most of its cells any more. The last version is
-checked: at every level, arcs against boundaries read from the fields alone.
+cells changes class, flips if its number is not on most of its cells any more. The last two columns
+count only untouched places with no changed cell beside them, and with no touched place beside them
+either. The last version is checked: at every level, arcs against boundaries read from the fields
+alone.
 """
 
 from __future__ import annotations
@@ -59,14 +61,20 @@ def followed(log: Path, every: int, rooms_every: int, scans: int | None) -> dict
 def show(name: str, kind: str, found: dict[str, Any]) -> None:
     """Print a row of the table."""
     of = found[kind]
-    share = of["untouched_flipped"] / max(of["untouched"], 1)
     events = " | ".join(f"{of[event]:,}" for event in ("born", "died", "merged", "split"))
+    kinds = " | ".join(ever(of[some]) for some in ("untouched", "apart", "far"))
     print(
         f"| {name}, {kind} | {found['scans']:,} | {of['updates']:,} | {of['median_ms']:.0f} | "
         f"{of['p95_ms']:.0f} | {events} | {of['flipped_cells']:,.0f} | {of['flipped_share']:.2%} | "
-        f"{of['flips_per_untouched']:.3%} | {share:.1%} |",
+        f"{of['flipped_by_merging']:.0%} | {of['flipped_by_cutting_off']:.0%} | {kinds} |",
         flush=True,
     )
+
+
+def ever(found: dict[str, Any]) -> str:
+    """Return how many places of a kind ever flip."""
+    share = found["flipped"] / max(found["places"], 1)
+    return f"{found['flipped']} of {found['places']}, {share:.1%}"
 
 
 def main() -> None:
@@ -81,9 +89,10 @@ def main() -> None:
         parser.error("no folder of data: pass --data or set HYBRIDNAV_DATA")
     print(
         "| log | scans | updates | median, ms | p95, ms | born | died | merged | split | "
-        "cells that flip, an update | of free cells | untouched that flip, an update | ever |"
+        "cells that flip, an update | of free cells | by merging | by cutting off | "
+        "untouched that ever flip | no change beside them | nor in a place beside them |"
     )
-    print("|" + "---|" * 13)
+    print("|" + "---|" * 16)
     for name, file in LOGS.items():
         log = Path(arguments.data) / file
         found = followed(log, arguments.every, arguments.rooms_every, arguments.scans)

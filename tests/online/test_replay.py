@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
@@ -18,6 +21,7 @@ from hybridnav.online import OnlineRooms, ReplayFigures, grids_of_scans, replay
 from hybridnav.online.figures import faults_of
 from tests.online.test_rooms import check_version as check_rooms
 from tests.online.test_updates import check_version as check_places
+from tests.strategies import class_grids, examples
 
 NOTHING: Any = None
 NAN: Any = math.nan
@@ -48,21 +52,44 @@ def numbered(version, classes):
     return np.where(classes == 1, version.number_of, -1)
 
 
+def beside(cells):
+    """Cells beside others at a side, and at a side or a corner."""
+    cross = ndimage.binary_dilation(cells)
+    return cross & ~cells, ndimage.binary_dilation(cells, np.ones((3, 3), bool)) & ~cells
+
+
 def check_flips(flips, before, after, classes):
     """Count flips cell by cell; `classes` are those of both maps."""
     rows, cols = before.grid.shape
-    now, old = numbered(after, classes[1])[:rows, :cols], numbered(before, classes[0])
-    stays = (classes[0] == 1) & (classes[1][:rows, :cols] == 1)
-    cells, untouched, flipped = 0, set(), set()
+    number_of = np.full(after.grid.shape, -1)
+    number_of[:rows, :cols] = before.number_of
+    was = np.zeros(after.grid.shape, np.uint8)
+    was[:rows, :cols] = classes[0]
+    changed = was != classes[1]
+    old, now = np.where(was == 1, number_of, -1), after.number_of
+    stays = (was == 1) & ~changed
+    found: dict[str, set[int]] = {name: set() for name in ("untouched", "flipped", "apart", "far")}
+    cells = {"cells": 0, "merged": 0, "cut_off": 0}
     for place in set(old[old >= 0].tolist()):
         inside = old == place
+        flips_of = now[inside & stays & (now != place)]
         if 2 * (inside & stays).sum() > inside.sum():
-            cells += (now[inside & stays] != place).sum()
-        if stays[inside].all():
-            untouched.add(place)
-            if 2 * (now[inside] == place).sum() <= inside.sum():
-                flipped.add(place)
-    assert flips == (cells, stays.sum(), untouched, flipped)
+            cells["cells"] += flips_of.size
+            for number in flips_of.tolist():
+                most = 2 * (flips_of == number).sum() > inside.sum()
+                cells["cut_off"] += place in now
+                cells["merged"] += place not in now and most
+        if not stays[inside].all():
+            continue
+        found["untouched"].add(place)
+        if 2 * (now[inside] == place).sum() <= inside.sum():
+            found["flipped"].add(place)
+        if not changed[beside(inside)[1]].any():
+            found["apart"].add(place)
+            others = set(number_of[beside(number_of == place)[0]].tolist()) - {-1}
+            if not any(changed[number_of == other].any() for other in others):
+                found["far"].add(place)
+    assert flips._asdict() == {"free": stays.sum(), **cells, **found}
 
 
 def test_flips_are_those_of_the_definition():
@@ -78,6 +105,24 @@ def test_flips_are_those_of_the_definition():
         0,
         0,
     ]
+
+
+@given(
+    first=class_grids(12),
+    seed=st.integers(0, 2**32 - 1),
+    share=st.sampled_from([0.01, 0.03, 0.1, 0.5]),
+    merge_distance_m=st.sampled_from([0.5, 1.0, 1.5]),
+)
+@settings(max_examples=examples(40), deadline=None, derandomize=True)
+def test_flips_of_any_change_are_those_of_the_definition(first, seed, share, merge_distance_m):
+    rng = np.random.default_rng(seed)
+    differs = rng.random(first.shape) < share
+    second = np.where(differs, rng.integers(0, 3, first.shape), first).astype(np.uint8)
+    grids = grid_of(first), grid_of(second)
+    before, after = replay(grids, merge_distance_m=merge_distance_m)
+    classes = [grid.classes for grid in grids]
+    check_flips(after.place_flips, before.places, after.places, classes)
+    check_flips(after.room_flips, before.rooms, after.rooms, classes)
 
 
 def test_rooms_are_brought_up_to_date_at_times_and_at_the_end():
@@ -96,7 +141,7 @@ def test_a_replay_counts_what_happens():
     assert (found["maps"], found["n_rooms"], found["faults"]) == (5, 2, [])
     assert (found["rooms"]["updates"], found["rooms"]["born"], found["rooms"]["died"]) == (4, 1, 0)
     assert found["doors"] == {"born": 1, "died": 1}
-    assert found["rooms"]["untouched_flipped"] == 0
+    assert found["rooms"]["untouched"]["flipped"] == 0
 
 
 def simulated_scans():

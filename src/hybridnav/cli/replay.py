@@ -206,14 +206,22 @@ def _identities(kind: str, found: dict[str, Any]) -> list[str]:
     if not found["updates"]:
         return [f"{kind:<10} no update"]
     events = ", ".join(f"{found[event]:,} {event}" for event in ("born", "died", "merged", "split"))
-    share = found["untouched_flipped"] / max(found["untouched"], 1)
     times = f"median {found['median_ms']:.1f} ms, 95 % below {found['p95_ms']:.1f} ms"
     cells = f"{found['flipped_cells']:,.1f} cells an update, {found['flipped_share']:.3%} of those"
-    ever = f"{found['untouched_flipped']:,} of {found['untouched']:,} untouched {kind} ever"
     return [
         f"{kind:<10} {found['updates']:,} updates, {times}; {events}",
         (
-            f"{'flips':<10} {cells} that stay free; {ever} ({share:.2%}), "
-            f"{found['flips_per_untouched']:.3%} an update"
+            f"{'flips':<10} {cells} that stay free: {found['flipped_by_merging']:.0%} by merging, "
+            f"{found['flipped_by_cutting_off']:.0%} by cutting off"
+        ),
+        (
+            f"{'':<10} {_ever(found['untouched'])} untouched {kind} ever; with no change beside "
+            f"them {_ever(found['apart'])}, nor in {kind} beside them {_ever(found['far'])}"
         ),
     ]
+
+
+def _ever(found: dict[str, Any]) -> str:
+    """Return how many places of a kind flip, and the share."""
+    share = found["flipped"] / max(found["places"], 1)
+    return f"{found['flipped']:,} of {found['places']:,} ({share:.2%})"

@@ -1,12 +1,8 @@
 from .carrying import CarriedCosts as CarriedCosts, carry_costs as carry_costs
 from .figures import ReplayFigures as ReplayFigures
+from .flips import Flips as Flips
 from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
-from .replay import (
-    Flips as Flips,
-    ReplayStep as ReplayStep,
-    grids_of_scans as grids_of_scans,
-    replay as replay,
-)
+from .replay import ReplayStep as ReplayStep, grids_of_scans as grids_of_scans, replay as replay
 from .room_versions import OnlineRooms as OnlineRooms, RoomsUpdate as RoomsUpdate
 from .rooms_doors import DoorEvents as DoorEvents, OnlineDoor as OnlineDoor
 from .tiles import NO_PLACE as NO_PLACE

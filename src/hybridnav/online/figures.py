@@ -12,7 +12,8 @@ from hybridnav.pyramid.cracks import endpoints_of, find_cracks
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from hybridnav.online.replay import Flips, ReplayStep
+    from hybridnav.online.flips import Flips
+    from hybridnav.online.replay import ReplayStep
     from hybridnav.pyramid import Level
 
 _EVENTS = ("born", "died", "merged", "split")
@@ -24,36 +25,58 @@ class _Identities:
     def __init__(self) -> None:
         self.seconds: list[float] = []
         self.events: Counter[str] = Counter()
-        self._flips: list[tuple[int, int]] = []
-        self._compared = self._n_flips = 0
-        self._untouched: set[int] = set()
-        self._flipped: set[int] = set()
+        self._cells: Counter[str] = Counter()
+        self._flips = {kind: _Flipped() for kind in ("untouched", "apart", "far")}
 
     def add(self, update: object, flips: Flips, seconds: float) -> None:
         """Count an update."""
         self.seconds.append(seconds)
         for event in _EVENTS:
             self.events[event] += len(getattr(update, event))
-        self._flips.append((flips.cells, flips.free))
-        self._compared += len(flips.untouched)
-        self._n_flips += len(flips.flipped)
-        self._untouched |= flips.untouched
-        self._flipped |= flips.flipped
+        for name in ("cells", "merged", "cut_off", "free"):
+            self._cells[name] += getattr(flips, name)
+        for kind, flipped in self._flips.items():
+            flipped.add(getattr(flips, kind), flips.flipped)
 
     def figures(self) -> dict[str, Any]:
         """Return plain values; None where there was no update."""
-        cells, free = np.array(self._flips).reshape(-1, 2).T
-        median, high = np.percentile(self.seconds, [50, 95]) if self.seconds else (None, None)
+        n_updates, cells = len(self.seconds), self._cells
+        median, high = np.percentile(self.seconds, [50, 95]) if n_updates else (None, None)
         return {
-            "updates": len(self.seconds),
+            "updates": n_updates,
             "median_ms": None if median is None else round(1000 * median, 3),
             "p95_ms": None if high is None else round(1000 * high, 3),
             **{event: self.events[event] for event in _EVENTS},
-            "flipped_cells": round(float(cells.mean()), 3) if len(cells) else None,
-            "flipped_share": round(float(cells.sum() / max(free.sum(), 1)), 8),
-            "untouched": len(self._untouched),
-            "untouched_flipped": len(self._flipped),
-            "flips_per_untouched": round(self._n_flips / max(self._compared, 1), 8),
+            "flipped_cells": round(cells["cells"] / n_updates, 3) if n_updates else None,
+            "flipped_share": round(cells["cells"] / max(cells["free"], 1), 8),
+            "flipped_by_merging": round(cells["merged"] / max(cells["cells"], 1), 8),
+            "flipped_by_cutting_off": round(cells["cut_off"] / max(cells["cells"], 1), 8),
+            **{kind: flipped.figures() for kind, flipped in self._flips.items()},
+        }
+
+
+class _Flipped:
+    """Places of a kind, and those of them that flip."""
+
+    def __init__(self) -> None:
+        self._ever: set[int] = set()
+        self._ever_flipped: set[int] = set()
+        self._seen = self._n_flips = 0
+
+    def add(self, places: frozenset[int], flipped: frozenset[int]) -> None:
+        """Count the places of an update."""
+        self._ever |= places
+        self._ever_flipped |= places & flipped
+        self._seen += len(places)
+        self._n_flips += len(places & flipped)
+
+    def figures(self) -> dict[str, Any]:
+        """Return plain values."""
+        return {
+            "places": len(self._ever),
+            "flipped": len(self._ever_flipped),
+            "flips": self._n_flips,
+            "share_an_update": round(self._n_flips / max(self._seen, 1), 8),
         }
 
 
@@ -69,7 +92,7 @@ class ReplayFigures:
     >>> figures = ReplayFigures()
     >>> for step in replay([first, hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)]):
     ...     figures.add(step)
-    >>> figures.figures()["places"]["untouched_flipped"], figures.figures()["faults"]
+    >>> figures.figures()["places"]["apart"]["flipped"], figures.figures()["faults"]
     (0, [])
     """
 
@@ -95,9 +118,10 @@ class ReplayFigures:
         -------
         dict
             `places` and `rooms` with `updates`, `median_ms` and `p95_ms` of an update, counts of
-            events, `flipped_cells` an update, their share of the cells that stayed free, how many
-            were ever `untouched`, and of these ever `untouched_flipped`, and the share of an update
-            in which an untouched one flips (see `Flips`);
+            events, `flipped_cells` an update, `flipped_share`, their share of the cells that stayed
+            free, and the shares of them that flip by merging and by cutting off; for the places
+            that are `untouched`, `apart` and `far` in some update (see `Flips`) how many there are,
+            how many of them flip then, the number of flips, and the share that flips in an update;
             `doors` with events; counts of the last map; `faults` of its levels, see `faults_of`.
         """
         last = self._last

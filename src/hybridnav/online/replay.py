@@ -4,51 +4,26 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass, OccupancyGrid
+from hybridnav.grid import OccupancyGrid
 from hybridnav.grid.checks import checked_type
+from hybridnav.online.flips import Flips, Numbered, flips_between
 from hybridnav.online.pyramid import OnlinePyramid
 from hybridnav.online.room_versions import OnlineRooms
-from hybridnav.online.shift import placed, shift_of
+from hybridnav.online.shift import shift_of
 from hybridnav.pyramid import DualGraphPyramid
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from hybridnav._typing import BoolArray, ByteArray, IntArray
+    from hybridnav._typing import BoolArray
     from hybridnav.mapping import LaserScan, Mapper
     from hybridnav.online.pyramid import Update
     from hybridnav.online.room_versions import RoomsUpdate
-
-
-class Flips(NamedTuple):
-    """How stable the numbers of places or rooms are over one update.
-
-    A cell flips if it stays free and changes its number, although more than half of the cells of
-    its old place stay free. A place is untouched if none of its cells changes class; it flips if
-    its number is not on more than half of its cells any more. The same holds for rooms.
-
-    Examples
-    --------
-    >>> from hybridnav.online import replay
-    >>> grid = hn.OccupancyGrid(np.zeros((8, 8)), hn.Frame(0.25), robot_radius_m=0)
-    >>> first, second = replay([grid, grid])
-    >>> second.place_flips.cells, second.place_flips.free
-    (0, 64)
-    """
-
-    cells: int
-    """Cells that flip."""
-    free: int
-    """Cells that stay free."""
-    untouched: frozenset[int]
-    """Numbers of untouched places."""
-    flipped: frozenset[int]
-    """Those of them that flip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,10 +197,10 @@ def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayS
         rooms_update,
         updated - began,
         found - updated if with_rooms else 0.0,
-        flips_between(_Numbered.of(before), _Numbered.of(after)),
+        flips_between(_numbered(before), _numbered(after)),
         None
         if rooms_update is None
-        else flips_between(_Numbered.of(rooms), _Numbered.of(rooms_update.version)),
+        else flips_between(_numbered(rooms), _numbered(rooms_update.version)),
     )
 
 
@@ -246,38 +221,8 @@ def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
     return changed
 
 
-class _Numbered(NamedTuple):
-    """Cells with the numbers of their places or rooms."""
-
-    grid: OccupancyGrid
-    classes: ByteArray
-    number_of: IntArray
-
-    @classmethod
-    def of(cls, version: OnlinePyramid | OnlineRooms) -> _Numbered:
-        """Return the cells of a version; rooms know no robot."""
-        grid = version.grid
-        is_rooms = isinstance(version, OnlineRooms)
-        return cls(grid, grid.measured if is_rooms else grid.classes, version.number_of)
-
-
-def flips_between(before: _Numbered, after: _Numbered) -> Flips:
-    """Compare the numbers of cells of two versions; see `Flips`."""
-    shift = shift_of(before.grid, after.grid, otherwise="begin a new replay")
-    shape = after.grid.shape
-    free = before.classes == CellClass.FREE
-    old = placed(np.where(free, before.number_of, np.int32(-1)), shape, shift, -1)
-    stays = placed(free, shape, shift, 0) & (after.classes == CellClass.FREE)
-    inside = old >= 0
-    areas = np.bincount(old[inside])
-    kept = np.bincount(old[inside & stays], minlength=len(areas))
-    same = np.bincount(old[inside & (old == after.number_of)], minlength=len(areas))
-    moved = inside & stays & (old != after.number_of)
-    untouched = (areas > 0) & (kept == areas)
-    flipped = untouched & (2 * same <= areas)
-    return Flips(
-        int(np.count_nonzero((2 * kept > areas)[old[moved]])),
-        int(np.count_nonzero(stays)),
-        frozenset(np.flatnonzero(untouched).tolist()),
-        frozenset(np.flatnonzero(flipped).tolist()),
-    )
+def _numbered(version: OnlinePyramid | OnlineRooms) -> Numbered:
+    """Return the cells of a version; rooms know no robot."""
+    grid = version.grid
+    is_rooms = isinstance(version, OnlineRooms)
+    return Numbered(grid, grid.measured if is_rooms else grid.classes, version.number_of)
