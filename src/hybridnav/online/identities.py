@@ -11,14 +11,15 @@ from hybridnav.online import _tile_kernels
 from hybridnav.online.tiles import NO_PLACE, Box
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from hybridnav._typing import LongArray
     from hybridnav.online.cellwise import CellDraft
     from hybridnav.online.draft import Draft
 
-    Overlap = tuple[int, int, int]
-    """An old place, a new one or -1 for none, and the cells that they have in common."""
+
+Overlap = tuple[int, int, int]
+"""An old place, a new one or -1 for none, and the cells that they have in common."""
 
 
 class Events(NamedTuple):
@@ -36,7 +37,7 @@ class Events(NamedTuple):
     """Old ones that bear their number still."""
 
 
-class _Heirs(NamedTuple):
+class Heirs(NamedTuple):
     """The heirs of old places."""
 
     of: dict[int, int]
@@ -55,13 +56,13 @@ def settle(draft: Draft) -> Events:
     first = draft.before.next_place
     found = [overlap for overlap in _moved(draft) if overlap[0] != NO_PLACE]
     areas = _areas_before(draft, {old for old, _, _ in found})
-    heirs = _heirs(found, areas)
+    heirs = heirs_of(found, areas)
     new = [place for place in draft.places.numbers(first) if place not in heirs.name]
     born = {place: first + at for at, place in enumerate(new)}
     name = heirs.name | born
     _rename(draft, first, name)
     draft.next_place = first + len(born)
-    return _events(draft, found, _Heirs(heirs.of, name))
+    return events_of(found, Heirs(heirs.of, name), _areas_now(draft, name), first)
 
 
 def settle_cells(draft: CellDraft) -> Events:
@@ -78,7 +79,7 @@ def settle_cells(draft: CellDraft) -> Events:
         lost[old] += cells
     found = [overlap for overlap in moved if overlap[0] != NO_PLACE]
     found += [(old, old, area - lost[old]) for old, area in stay.items() if area > lost[old]]
-    heirs = _heirs(found, areas)
+    heirs = heirs_of(found, areas)
     name = dict(heirs.name)
     new = {place for _, place, _ in found} | set(draft.places.numbers(first))
     for place in sorted(new - name.keys() - {NO_PLACE}):
@@ -87,7 +88,7 @@ def settle_cells(draft: CellDraft) -> Events:
             name[place] = draft.next_place
             draft.next_place += 1
     _renumber(draft, {place: final for place, final in name.items() if place != final})
-    return _events(draft, found, _Heirs(heirs.of, name))
+    return events_of(found, Heirs(heirs.of, name), _areas_now(draft, name), first)
 
 
 def _moved(draft: Draft | CellDraft) -> list[Overlap]:
@@ -109,7 +110,7 @@ def _areas_before(draft: Draft | CellDraft, places: Iterable[int]) -> dict[int, 
     return dict(zip(numbers, areas, strict=True))
 
 
-def _heirs(found: list[Overlap], areas: dict[int, int]) -> _Heirs:
+def heirs_of(found: list[Overlap], areas: dict[int, int]) -> Heirs:
     """Return the heirs of old places, of which the cells that they had are given."""
     of, shared = {}, {}
     for old, new, cells in found:
@@ -118,34 +119,45 @@ def _heirs(found: list[Overlap], areas: dict[int, int]) -> _Heirs:
     name: dict[int, int] = {}
     for old in sorted(of, key=lambda place: (-shared[place], place)):
         name.setdefault(of[old], old)
-    return _Heirs(of, name)
+    return Heirs(of, name)
 
 
-def _events(draft: Draft | CellDraft, found: list[Overlap], heirs: _Heirs) -> Events:
-    """Return what became of places whose final numbers are known."""
-    first, kept = draft.before.next_place, set(heirs.name.values())
+def events_of(
+    found: list[Overlap], heirs: Heirs, areas_now: Mapping[int, int], first: int
+) -> Events:
+    """Return what became of places whose final numbers are known.
+
+    Parameters
+    ----------
+    found
+        What old places and new ones have in common.
+    heirs
+        The heirs, with the final numbers of all new places.
+    areas_now
+        The cells of each new place.
+    first
+        The least number that no old place has.
+    """
+    kept = set(heirs.name.values())
     old = sorted({place for place, _, _ in found})
     died = [place for place in old if place not in kept]
+    split: dict[int, list[int]] = {}
+    for place, new, cells in found:
+        if new != NO_PLACE and 2 * cells > areas_now[new]:
+            split.setdefault(place, []).append(heirs.name[new])
     return Events(
         tuple(sorted(place for place in kept if place >= first)),
         tuple(died),
         {place: heirs.name[heirs.of[place]] for place in died if place in heirs.of},
-        _split(draft, found, heirs.name),
+        {place: tuple(sorted(parts)) for place, parts in split.items() if len(parts) > 1},
         tuple(place for place in old if place in kept),
     )
 
 
-def _split(
-    draft: Draft | CellDraft, found: list[Overlap], name: dict[int, int]
-) -> dict[int, tuple[int, ...]]:
-    """Return the places of which several new ones mostly consist."""
-    final = [name[new] for _, new, _ in found if new != NO_PLACE]
-    areas = dict(zip(final, draft.places.read(final)["area"].tolist(), strict=True))
-    split: dict[int, list[int]] = {}
-    for old, new, cells in found:
-        if new != NO_PLACE and 2 * cells > areas[name[new]]:
-            split.setdefault(old, []).append(name[new])
-    return {old: tuple(sorted(parts)) for old, parts in split.items() if len(parts) > 1}
+def _areas_now(draft: Draft | CellDraft, name: Mapping[int, int]) -> dict[int, int]:
+    """Return the cells of new places, by the numbers before they had final ones."""
+    areas = draft.places.read([*name.values()])["area"].tolist()
+    return dict(zip(name, areas, strict=True))
 
 
 def _rename(draft: Draft, first: int, name: dict[int, int]) -> None:

@@ -167,6 +167,11 @@ class OnlinePyramid:
         return Update(version, *events, frozen(cells[order]))
 
     @property
+    def state(self) -> State:
+        """The cells and the table of places, for what follows the places."""
+        return self._state
+
+    @property
     def n_places(self) -> int:
         """Places of the version."""
         return int(self._state.vertex_ends[SURVIVES])

@@ -277,12 +277,15 @@ class Tiles:
         for key in sorted(self._own):
             yield before._tiles.get(key, _EMPTY).place, self._tiles[key].place
 
-    def boxes(self) -> list[Box]:
-        """Return the box of each tile."""
-        return [
-            Box(row * SIDE, col * SIDE, (row + 1) * SIDE, (col + 1) * SIDE)
-            for row, col in sorted(self._tiles)
-        ]
+    def differing_tiles(self, before: Tiles) -> Iterator[tuple[Tile, Tile]]:
+        """Yield the tiles that this version does not share with another one: theirs, and its own.
+
+        Their records may be shared or not.
+        """
+        for key in sorted(self._tiles.keys() | before._tiles.keys()):
+            old, new = before._tiles.get(key, _EMPTY), self._tiles.get(key, _EMPTY)
+            if old.place is not new.place or old.of_class is not new.of_class:
+                yield old, new
 
     def arrays(self) -> dict[tuple[int, int], Tile]:
         """Return each tile, by row and column of tiles."""

@@ -148,11 +148,13 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
     most_cells: int,
     seed: int,
     rooms: IntArray | None = None,
+    regions: IntArray | None = None,
 ) -> tuple[Record, BuildStats]:
     """Contract the arcs of the place level in the order of the expansion rating, up to the apex.
 
     There are two rounds: up to a number of cells a field, which makes the regions, and without such
-    a limit. With rooms the first two stay inside them, and a third one forgets them.
+    a limit. With rooms the first two stay inside them, and a third one forgets them. With regions
+    the first one stays inside these.
 
     Parameters
     ----------
@@ -166,6 +168,8 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
         Breaks ties between arcs of equal rating.
     rooms
         int32, label of each cell's room, -1 for none.
+    regions
+        int32, the same for regions that are known; not with rooms.
 
     Returns
     -------
@@ -173,12 +177,15 @@ def go_on_above(  # noqa: PLR0913 - what a pyramid is made of
         Up to the level of the places they describe the same levels.
     """
     classes = places.grid.classes
-    kinds = classes if rooms is None else kinds_of(classes, rooms)
+    labels = rooms if regions is None else regions
+    kinds = classes if labels is None else kinds_of(classes, labels)
     run = Decimation(start_at_level(places, record, kinds), seed)
     run.recall(stats)
     expansion = Expansion(places, most_cells)
     run.steer(expansion)
     run.exhaust()
+    if regions is not None:
+        run.forget_rooms()
     expansion.lift_limit()
     run.exhaust()
     if rooms is not None:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 N_CLASSES = 2
 """Classes of vertices: free and unexplored."""
-_MOST_KINDS = 256
-"""Kinds that one byte distinguishes."""
+_KINDS = (np.uint8, np.uint16, np.int32)
+"""Types of kinds, the least that has enough of them."""
 
 
 class Start(NamedTuple):
@@ -48,7 +48,7 @@ def kinds_of(classes: ByteArray, rooms: IntArray) -> KindArray:
     """
     n_kinds = N_CLASSES * (int(rooms.max()) + 2) + 1
     kinds = np.where(classes == 0, 0, N_CLASSES * (rooms + 1) + classes)
-    kinds = kinds.astype(np.uint8 if n_kinds <= _MOST_KINDS else np.uint16)
+    kinds = kinds.astype(next(kind for kind in _KINDS if n_kinds <= np.iinfo(kind).max + 1))
     kinds.flags.writeable = False  # as the classes are: another type is compiled once more
     return kinds
 

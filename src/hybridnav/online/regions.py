@@ -1,0 +1,323 @@
+"""Regions that follow the places of a changing map, with numbers that last."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybridnav._copies import frozen
+from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import checked_type
+from hybridnav.online.identities import Overlap, events_of, heirs_of
+from hybridnav.online.pyramid import OnlinePyramid
+from hybridnav.online.region_growth import Touched, grown, lengths_between, touched_between
+from hybridnav.online.shift import shift_of
+from hybridnav.online.tiles import NO_PLACE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from hybridnav._typing import IntArray, LongArray
+    from hybridnav.pyramid import DualGraphPyramid
+
+
+@dataclass(frozen=True, eq=False)
+class OnlineRegions:
+    """One version of the regions of a map that changes, the level above its places.
+
+    `update` returns the next version and leaves this one as it is. Regions have numbers that are
+    never used again; they are not indices of `pyramid`, in which `region_numbers` states the number
+    of each vertex of the level of the regions.
+
+    Examples
+    --------
+    >>> from hybridnav.online import OnlinePyramid, OnlineRegions
+    >>> cells = np.zeros((6, 24))
+    >>> grid = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
+    >>> places = OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
+    >>> regions = OnlineRegions.of(places, most_cells=72)
+    >>> regions.n_regions, regions.region_at((0, 0)) == regions.region_at((5, 0))
+    (2, True)
+    >>> cells[3, 3] = 1.0
+    >>> now = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
+    >>> update = regions.update(places.update(now).version)
+    >>> update.version.n_regions, update.born, update.died, update.changed
+    (2, (), (), (0,))
+    """
+
+    places: OnlinePyramid
+    """The places of this version."""
+    most_cells: int
+    """Most cells of a region of several places."""
+    region_of: Mapping[int, int] = field(repr=False)
+    """The number of the region of each place."""
+    _places_of: Mapping[int, tuple[int, ...]] = field(repr=False)
+    _next: int = field(repr=False)
+    """The least number that no region has had."""
+
+    @classmethod
+    def of(cls, places: OnlinePyramid, most_cells: int) -> OnlineRegions:
+        """Make the first version: the regions of `places.pyramid.with_regions`.
+
+        Takes time in proportion to the map.
+
+        Parameters
+        ----------
+        places
+            A version of the places.
+        most_cells
+            Most cells of a region, >= 1; a place that has more is a region by itself.
+
+        Raises
+        ------
+        InvalidValueError
+            When the number is not a whole number >= 1.
+        """
+        pyramid = checked_type("places", places, OnlinePyramid).pyramid.with_regions(most_cells)
+        regions = pyramid[pyramid.region_level]
+        region = regions.field_of[tuple(pyramid[pyramid.place_level].cells.T)]
+        region_of = dict(zip(places.place_numbers.tolist(), region.tolist(), strict=True))
+        members: dict[int, list[int]] = {}
+        for place, number in sorted(region_of.items()):
+            members.setdefault(number, []).append(place)
+        places_of = {number: tuple(held) for number, held in members.items()}
+        return cls(
+            places,
+            most_cells,
+            MappingProxyType(region_of),
+            MappingProxyType(places_of),
+            regions.n_vertices,
+        )
+
+    def update(self, places: OnlinePyramid) -> RegionsUpdate:
+        """Return the next version, that of later places.
+
+        Regions that hold a changed place are dissolved into places, and contracted again beside
+        those next to them, which take part whole. All others keep their places and their numbers.
+
+        Parameters
+        ----------
+        places
+            A later version of the places; updates in between may be left out.
+
+        Returns
+        -------
+        RegionsUpdate
+            The next version, and what became of the regions.
+
+        Raises
+        ------
+        InvalidValueError
+            When they are no later version of the places of this one.
+        """
+        before = self.places
+        checked_type("places", places, OnlinePyramid)
+        shift = shift_of(before.grid, places.grid, otherwise="make new regions")
+        if (before.low[0] - shift[0], before.low[1] - shift[1]) != places.low:
+            raise InvalidValueError(
+                f"the places lie at {places.low} among the cells of their first version, expected "
+                "a later version of the places of these regions: make new regions"
+            )
+        touched = touched_between(before.state, places.state)
+        if not len(touched.cells):
+            return RegionsUpdate(replace(self, places=places), (), (), {}, {}, ())
+        known = {*touched.old.tolist(), *touched.new.tolist()} & self.region_of.keys()
+        gone = {self.region_of[place] for place in known}
+        groups = self._contract(places, self._dissolved(gone, touched, places))
+        whole = gone.union(*(group.regions for group in groups))
+        areas = {region: self._area(region) for region in whole}
+        found = self._overlaps(gone, touched, groups)
+        heirs = heirs_of(found, areas)
+        name, following = dict(heirs.name), self._next
+        for at in range(len(groups)):
+            if at not in name:
+                name[at], following = following, following + 1
+        areas_now = {at: group.area for at, group in enumerate(groups)}
+        events = events_of(found, heirs._replace(name=name), areas_now, self._next)
+        held = {name[at]: group.places for at, group in enumerate(groups)}
+        return RegionsUpdate(self._with(places, whole, held, following), *events)
+
+    def _dissolved(self, gone: Iterable[int], touched: Touched, places: OnlinePyramid) -> list[int]:
+        """Return the places that are contracted again: those now of some regions, and new ones."""
+        members = [place for region in gone for place in self._places_of[region]]
+        return sorted({*places.state.places.known(members), *touched.new.tolist()} - {NO_PLACE})
+
+    def _contract(self, places: OnlinePyramid, dissolved: list[int]) -> list[_Group]:
+        """Contract places among themselves and with the regions beside them."""
+        rows, inside = places.state.places, set(dissolved)
+        areas = dict(zip(dissolved, rows.read(dissolved)["area"].tolist(), strict=True))
+        lengths: Counter[tuple[int, int]] = Counter()
+        for pair, length in lengths_between(places.state, dissolved).items():
+            # Regions as a whole are vertices with numbers below those of all places.
+            one, other = (p if p in inside else -1 - self.region_of[p] for p in pair)
+            lengths[min(one, other), max(one, other)] += length
+        for vertex in {vertex for pair in lengths for vertex in pair if vertex < 0}:
+            areas[vertex] = self._area(-1 - vertex)
+        groups = []
+        for vertices in grown(areas, lengths, self.most_cells):
+            regions = [-1 - vertex for vertex in vertices if vertex < 0]
+            if len(regions) < len(vertices) or len(regions) > 1:
+                held = [place for region in regions for place in self._places_of[region]]
+                held += [vertex for vertex in vertices if vertex >= 0]
+                area = sum(areas[vertex] for vertex in vertices)
+                groups.append(_Group(tuple(sorted(held)), frozenset(regions), area))
+        return groups
+
+    def _overlaps(
+        self, gone: Iterable[int], touched: Touched, groups: list[_Group]
+    ) -> list[Overlap]:
+        """Return the cells that old regions and groups have in common."""
+        group_of = {place: at for at, group in enumerate(groups) for place in group.places}
+        found: Counter[tuple[int, int]] = Counter()
+        left = {
+            place: area
+            for region in gone
+            for place, area in zip(
+                self._places_of[region], self._areas(region).tolist(), strict=True
+            )
+        }
+        for old, new, cells in zip(*(values.tolist() for values in touched), strict=True):
+            if old != NO_PLACE:
+                found[self.region_of[old], group_of.get(new, NO_PLACE)] += cells
+                left[old] -= cells
+        for place, cells in left.items():
+            if cells:
+                found[self.region_of[place], group_of[place]] += cells
+        for at, group in enumerate(groups):
+            for region in group.regions:
+                found[region, at] += self._area(region)
+        return [(old, new, cells) for (old, new), cells in sorted(found.items())]
+
+    def _with(
+        self,
+        places: OnlinePyramid,
+        gone: Iterable[int],
+        held: Mapping[int, tuple[int, ...]],
+        following: int,
+    ) -> OnlineRegions:
+        """Return the version in which regions are replaced by others."""
+        region_of, places_of = dict(self.region_of), dict(self._places_of)
+        for region in gone:
+            for place in places_of.pop(region):
+                del region_of[place]
+        for region, members in held.items():
+            places_of[region] = members
+            region_of.update(dict.fromkeys(members, region))
+        views = MappingProxyType(region_of), MappingProxyType(places_of)
+        return OnlineRegions(places, self.most_cells, *views, following)
+
+    def _areas(self, region: int) -> LongArray:
+        """Return the cells of each place of a region."""
+        areas: LongArray = self.places.state.places.read(self._places_of[region])["area"]
+        return areas
+
+    def _area(self, region: int) -> int:
+        return int(self._areas(region).sum())
+
+    @property
+    def n_regions(self) -> int:
+        """Regions of the version."""
+        return len(self._places_of)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The numbers of the regions, ascending."""
+        return tuple(sorted(self._places_of))
+
+    def places_of(self, region: int) -> tuple[int, ...]:
+        """Return the numbers of the places of a region, ascending.
+
+        Raises
+        ------
+        InvalidValueError
+            When the version has no such region.
+        """
+        is_number = isinstance(region, int | np.integer)
+        if not is_number or region not in self._places_of:
+            raise InvalidValueError(
+                f"there is no region {region!r:.40} in this version, expected one of its "
+                f"{self.n_regions}: an update states what became of a region"
+            )
+        return self._places_of[region]
+
+    def region_at(self, cell: tuple[int, int]) -> int:
+        """Return the number of the region that holds a cell (row, col) of the grid, -1 for none.
+
+        Raises
+        ------
+        InvalidValueError
+            When it is no cell.
+        """
+        return self.region_of.get(self.places.place_at(cell), NO_PLACE)
+
+    @cached_property
+    def number_of(self) -> IntArray:
+        """int32 (rows, cols), the number of the region of each cell of the grid, -1 for none."""
+        places, regions = map(np.array, (list(self.region_of), list(self.region_of.values())))
+        table = np.full(int(places.max(initial=-1)) + 2, NO_PLACE, np.int32)
+        table[places.astype(np.int64)] = regions
+        return frozen(table[self.places.number_of])
+
+    @cached_property
+    def pyramid(self) -> DualGraphPyramid:
+        """The version as a pyramid of dense arrays, from the cells to the regions and the apex.
+
+        Up to the places its levels are those of `places.pyramid`. It has the regions that
+        `with_regions(most_cells)` asks for. Making it takes time in proportion to the map.
+        """
+        below = self.places.pyramid
+        regions = [self.region_of[place] for place in self.places.place_numbers.tolist()]
+        return below.with_regions(self.most_cells, region_of=np.array(regions, np.int64))
+
+    @cached_property
+    def region_numbers(self) -> LongArray:
+        """int64 (n_regions,), the number of the region of each vertex of the level of the regions
+        in `pyramid`."""
+        rows, cols = self.pyramid[self.pyramid.region_level].cells.T
+        return frozen(self.number_of[rows, cols].astype(np.int64))
+
+
+class _Group(NamedTuple):
+    """What is one region after a contraction."""
+
+    places: tuple[int, ...]
+    """Its places, ascending."""
+    regions: frozenset[int]
+    """Old regions that took part whole and are in it."""
+    area: int
+    """Its cells."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegionsUpdate:
+    """A new version of regions, and what became of those of the one before, by number.
+
+    Examples
+    --------
+    >>> from hybridnav.online import OnlinePyramid, OnlineRegions
+    >>> grid = hn.OccupancyGrid(np.zeros((3, 5)), robot_radius_m=0)
+    >>> places = OnlinePyramid.of(hn.DualGraphPyramid.build(grid))
+    >>> wall = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+    >>> now = hn.OccupancyGrid(np.tile(wall, (3, 1)), robot_radius_m=0)
+    >>> update = OnlineRegions.of(places, most_cells=100).update(places.update(now).version)
+    >>> update.died, update.split
+    ((0,), {0: (1, 2)})
+    """
+
+    version: OnlineRegions
+    """The new version."""
+    born: tuple[int, ...]
+    """Regions that are none of the old ones; their numbers are new."""
+    died: tuple[int, ...]
+    """Old regions that are no more."""
+    merged: dict[int, int]
+    """Those of them most of whose cells went into another region, with that region."""
+    split: dict[int, tuple[int, ...]]
+    """Old regions of which several new ones mostly consist, with these."""
+    changed: tuple[int, ...]
+    """Regions that kept their number, but were contracted again."""
