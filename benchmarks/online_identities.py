@@ -1,4 +1,4 @@
-"""How stable the numbers of places and rooms are while a robot maps a building.
+"""How stable the numbers of places, regions and rooms are while a robot maps a building.
 
     python -m benchmarks.online_identities --data FOLDER [--every 10] [--rooms-every 5] [--scans N]
 
@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,9 @@ import numpy as np
 
 import hybridnav as hn
 from hybridnav.mapping import Mapper
-from hybridnav.online import OnlineRooms, ReplayFigures, grids_of_scans, replay
+from hybridnav.online import OnlineRegions, OnlineRooms, ReplayFigures, grids_of_scans, replay
+from hybridnav.online.figures import Identities, faults_of
+from hybridnav.online.flips import Numbered, flips_between
 
 LOGS = {
     "Intel": "radish_logs/intel-corrected.log.gz",
@@ -31,6 +34,8 @@ LOGS = {
 }
 RESOLUTION_M = 0.05
 RADIUS_M = 0.25
+MOST_CELLS = 20_000
+"""Most cells of a region: 50 square metres."""
 
 
 def agreement(rooms: OnlineRooms) -> float:
@@ -50,12 +55,35 @@ def followed(log: Path, every: int, rooms_every: int, scans: int | None) -> dict
     read = itertools.islice(hn.CarmenLog(log), scans)
     mapper = Mapper(resolution_m=RESOLUTION_M)
     grids = grids_of_scans(read, mapper, every=every, robot_radius_m=RADIUS_M)
-    step = None
+    step = regions = None
+    of_regions = Identities()
     for step in replay(grids, rooms_every=rooms_every):
         figures.add(step)
-    if step is not None:
+        if regions is None:
+            regions = OnlineRegions.of(step.places, MOST_CELLS)
+            continue
+        began = time.perf_counter()
+        update = regions.update(step.places)
+        seconds = time.perf_counter() - began
+        flips = flips_between(numbered(regions), numbered(update.version))
+        of_regions.add(update, flips, seconds)
+        regions = update.version
+    found = {**figures.figures(), "scans": mapper.n_scans, "regions": of_regions.figures()}
+    if step is not None and regions is not None:
         agreed = agreement(step.rooms)
-    return {**figures.figures(), "scans": mapper.n_scans, "agreement": agreed}
+        fresh = hn.DualGraphPyramid.build(step.places.grid).with_regions(MOST_CELLS)
+        found["n_regions"] = regions.n_regions
+        found["fresh"] = [fresh[at].n_vertices for at in (fresh.place_level, fresh.region_level)]
+        above = regions.pyramid[regions.pyramid.place_level + 1 :]
+        found["levels"] += len(above)
+        found["faults"] += faults_of(above)
+    return {**found, "agreement": agreed}
+
+
+def numbered(regions: OnlineRegions) -> Numbered:
+    """Return the cells of a version of regions with their numbers."""
+    grid = regions.places.grid
+    return Numbered(grid, grid.classes, regions.number_of)
 
 
 def show(name: str, kind: str, found: dict[str, Any]) -> None:
@@ -96,11 +124,13 @@ def main() -> None:
     for name, file in LOGS.items():
         log = Path(arguments.data) / file
         found = followed(log, arguments.every, arguments.rooms_every, arguments.scans)
-        for kind in ("places", "rooms"):
+        for kind in ("places", "regions", "rooms"):
             show(name, kind, found)
-        n_faults, rooms = len(found["faults"]), found["n_rooms"]
+        places, regions = found["fresh"]
         print(
-            f"{name}: {found['levels']} levels, {n_faults} of them with faults; {rooms} rooms, "
+            f"{name}: {found['levels']} levels, {len(found['faults'])} of them with faults; "
+            f"{found['n_places']} places, {found['n_regions']} regions (a fresh build has {places} "
+            f"and {regions}), {found['n_rooms']} rooms, "
             f"agreement with those of a fresh build {found['agreement']:.3f}",
             flush=True,
         )

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 _EVENTS = ("born", "died", "merged", "split")
 
 
-class _Identities:
-    """Events and flips of places, or of rooms, over a replay."""
+class Identities:
+    """Events and flips of places, of rooms or of regions, over a replay."""
 
     def __init__(self) -> None:
         self.seconds: list[float] = []
@@ -97,7 +97,7 @@ class ReplayFigures:
     """
 
     def __init__(self) -> None:
-        self._places, self._rooms = _Identities(), _Identities()
+        self._places, self._rooms = Identities(), Identities()
         self._last: ReplayStep | None = None
         self._n_doors: Counter[str] = Counter()
 

@@ -73,6 +73,51 @@ def lengths_between(state: State, places: Sequence[int]) -> dict[tuple[int, int]
     return found
 
 
+def held_together(
+    areas: Mapping[int, int],
+    lengths: Mapping[tuple[int, int], int],
+    region_of: Mapping[int, int],
+    most_cells: int,
+) -> dict[int, int]:
+    """Return the vertex of each place: those of an old region are one as far as they still may be.
+
+    They are if they connect to each other, without other places, and are not too large.
+
+    Parameters
+    ----------
+    areas
+        Cells of each place.
+    lengths
+        Pairs of places of one class with cracks in common.
+    region_of
+        The old region of places; new ones have none.
+    most_cells
+        Most cells of a region of several places.
+
+    Returns
+    -------
+    dict
+        The least place of the vertex of each place.
+    """
+    inside: dict[int, list[int]] = {place: [] for place in areas}
+    for one, other in lengths:
+        if one in inside and other in inside and region_of.get(one, -1) == region_of.get(other, -2):
+            inside[one].append(other)
+            inside[other].append(one)
+    vertex_of: dict[int, int] = {}
+    for start in sorted(areas):
+        if start in vertex_of:
+            continue
+        found, waiting = {start}, [start]
+        while waiting:
+            more = set(inside[waiting.pop()]) - found
+            found |= more
+            waiting += more
+        is_one = sum(areas[place] for place in found) <= most_cells
+        vertex_of.update((place, start if is_one else place) for place in found)
+    return vertex_of
+
+
 def grown(
     areas: Mapping[int, int], lengths: Mapping[tuple[int, int], int], most_cells: int
 ) -> list[list[int]]:

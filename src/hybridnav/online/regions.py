@@ -15,7 +15,13 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
 from hybridnav.online.identities import Overlap, events_of, heirs_of
 from hybridnav.online.pyramid import OnlinePyramid
-from hybridnav.online.region_growth import Touched, grown, lengths_between, touched_between
+from hybridnav.online.region_growth import (
+    Touched,
+    grown,
+    held_together,
+    lengths_between,
+    touched_between,
+)
 from hybridnav.online.shift import shift_of
 from hybridnav.online.tiles import NO_PLACE
 
@@ -97,8 +103,10 @@ class OnlineRegions:
     def update(self, places: OnlinePyramid) -> RegionsUpdate:
         """Return the next version, that of later places.
 
-        Regions that hold a changed place are dissolved into places, and contracted again beside
-        those next to them, which take part whole. All others keep their places and their numbers.
+        Regions that hold a changed place are contracted again with new places and with the regions
+        beside them, which take part whole. They are dissolved into places only where these do not
+        connect any more, or have too many cells. All other regions keep their places and their
+        numbers.
 
         Parameters
         ----------
@@ -149,23 +157,30 @@ class OnlineRegions:
 
     def _contract(self, places: OnlinePyramid, dissolved: list[int]) -> list[_Group]:
         """Contract places among themselves and with the regions beside them."""
-        rows, inside = places.state.places, set(dissolved)
-        areas = dict(zip(dissolved, rows.read(dissolved)["area"].tolist(), strict=True))
+        of_places = places.state.places.read(dissolved)["area"].tolist()
+        area_of = dict(zip(dissolved, of_places, strict=True))
+        between = lengths_between(places.state, dissolved)
+        vertex_of = held_together(area_of, between, self.region_of, self.most_cells)
+        held: dict[int, list[int]] = {}
+        for place, vertex in vertex_of.items():
+            held.setdefault(vertex, []).append(place)
         lengths: Counter[tuple[int, int]] = Counter()
-        for pair, length in lengths_between(places.state, dissolved).items():
+        for pair, length in between.items():
             # Regions as a whole are vertices with numbers below those of all places.
-            one, other = (p if p in inside else -1 - self.region_of[p] for p in pair)
-            lengths[min(one, other), max(one, other)] += length
+            one, other = (vertex_of[p] if p in vertex_of else -1 - self.region_of[p] for p in pair)
+            if one != other:
+                lengths[min(one, other), max(one, other)] += length
+        areas = {vertex: sum(area_of[place] for place in held[vertex]) for vertex in held}
         for vertex in {vertex for pair in lengths for vertex in pair if vertex < 0}:
             areas[vertex] = self._area(-1 - vertex)
+            held[vertex] = [*self._places_of[-1 - vertex]]
         groups = []
         for vertices in grown(areas, lengths, self.most_cells):
-            regions = [-1 - vertex for vertex in vertices if vertex < 0]
+            regions = frozenset(-1 - vertex for vertex in vertices if vertex < 0)
             if len(regions) < len(vertices) or len(regions) > 1:
-                held = [place for region in regions for place in self._places_of[region]]
-                held += [vertex for vertex in vertices if vertex >= 0]
+                members = sorted(place for vertex in vertices for place in held[vertex])
                 area = sum(areas[vertex] for vertex in vertices)
-                groups.append(_Group(tuple(sorted(held)), frozenset(regions), area))
+                groups.append(_Group(tuple(members), regions, area))
         return groups
 
     def _overlaps(
