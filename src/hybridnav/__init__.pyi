@@ -45,6 +45,7 @@ from .io import (
     BagLog as BagLog,
     CarmenLog as CarmenLog,
     Model as Model,
+    building_graph as building_graph,
     example_map as example_map,
     export_lif as export_lif,
     export_nav2 as export_nav2,

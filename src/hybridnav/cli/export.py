@@ -12,6 +12,8 @@ import typer
 
 import hybridnav as hn
 from hybridnav._files import printable
+from hybridnav.cli.building import check_options, is_building_file, refused_options
+from hybridnav.cli.building_export import EXPORT_OPTIONS, export_building
 from hybridnav.cli.common import (
     Reading,
     answer,
@@ -129,6 +131,7 @@ ReportOption = Annotated[
 
 
 def export(
+    ctx: typer.Context,
     map_file: MapArgument,
     out: OutOption,
     kind: FormatOption = "nav2",
@@ -155,7 +158,10 @@ def export(
     plot: PlotOption = None,
 ) -> None:
     """Write a graph of MAP's free space for Nav2's route server, Open-RMF, OpenStreetMap or VDA
-    5050, or its rooms or places."""
+    5050, or its rooms or places.
+
+    MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050.
+    """
     if kind not in _ENDINGS:
         raise UsageError(f"--format must be one of {', '.join(_ENDINGS)}, got {kind!r:.80}")
     if polylines and (report is not None or plot is not None or lanes_m is not None):
@@ -166,6 +172,10 @@ def export(
     check_output(out, "--out", _ENDINGS[kind])
     check_picture(plot)
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
+    if is_building_file(map_file):
+        check_options(refused_options(ctx, EXPORT_OPTIONS))
+        export_building(fleet, ctx.params)
+        return
     if fleet is not None and polylines:
         raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
     if kind in _PARTS:

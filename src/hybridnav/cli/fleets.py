@@ -14,6 +14,7 @@ from hybridnav.cli.errors import UsageError
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from hybridnav.building import BuildingGraph
     from hybridnav.graphs import RouteGraph
 
 ENDINGS = {"rmf": (".yaml", ".yml"), "osm": (".osm", ".xml"), "lif": (".json", ".lif")}
@@ -104,11 +105,14 @@ class Fleet:
         )
 
     def write(self, topology: hn.TopologicalMap, graph: RouteGraph, out: Path) -> tuple[str, ...]:
-        """Write a file; return what it does not hold."""
+        """Write a file of one floor; return what it does not hold."""
         from hybridnav.building import BuildingGraph  # noqa: PLC0415 - on demand
 
         floor = hn.floor_graph(topology, graph, name=self.floor)
-        building = BuildingGraph(name=graph.grid.name, floors=(floor,))
+        return self.write_building(BuildingGraph(name=graph.grid.name, floors=(floor,)), out)
+
+    def write_building(self, building: BuildingGraph, out: Path) -> tuple[str, ...]:
+        """Write a file of a building; return what it does not hold."""
         if self.kind == "rmf":
             return hn.export_rmf(building, out, doors=self.doors)
         if self.anchor is not None:

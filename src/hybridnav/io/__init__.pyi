@@ -11,7 +11,7 @@ from .features_out import (
     export_places as export_places,
     export_rooms as export_rooms,
 )
-from .floor_graphs import floor_graph as floor_graph
+from .floor_graphs import building_graph as building_graph, floor_graph as floor_graph
 from .graph_files import load_graph as load_graph
 from .lif_out import export_lif as export_lif
 from .maps import load as load, load_map as load_map

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._copies import frozen
-from hybridnav.building import DoorLine, FloorArea, FloorGraph
+from hybridnav._progress import no_progress
+from hybridnav.building import Building, BuildingGraph, DoorLine, FloorArea, FloorGraph
 from hybridnav.building.link_nodes import Stub, node_at, with_stubs
 from hybridnav.errors import InvalidValueError
-from hybridnav.graphs import RouteGraph, WaypointGraph
+from hybridnav.graphs import RouteGraph, WaypointGraph, build_route_graph
 from hybridnav.graphs.attach import Network
 from hybridnav.graphs.metadata import edge_metadata, node_metadata
 from hybridnav.graphs.space import free_cells_at
@@ -22,6 +23,7 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from hybridnav._progress import Progress
     from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.building import Link
     from hybridnav.topology import Door, Rooms
@@ -98,6 +100,68 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
         doors=() if rooms is None else tuple(_lines(rooms, doors, name)),
         areas=() if rooms is None else tuple(_areas(rooms, tolerance_m)),
     )
+
+
+def building_graph(  # noqa: PLR0913 - all but the first have defaults
+    building: Building,
+    *,
+    name: str = "building",
+    nodes: int | None = None,
+    spacing_m: float = 2.0,
+    stretch: float = 1.02,
+    seed: int = 0,
+    progress: Progress = no_progress,
+) -> BuildingGraph:
+    """Return the graph of a building: a route graph of each floor, and the links between them.
+
+    Parameters
+    ----------
+    building
+        The building. Links that its robot does not fit in are left out.
+    name
+        Name of the building in files.
+    nodes
+        Number of nodes of each floor to aim at, as in `build_route_graph`.
+    spacing_m, stretch, seed
+        See `build_route_graph`.
+    progress
+        Called after each floor with the number of floors done and of all floors.
+
+    Returns
+    -------
+    BuildingGraph
+        Each floor in the frame of its own map; `align_floors` brings them into one.
+
+    Raises
+    ------
+    InvalidValueError
+        As `build_route_graph` and `floor_graph` do.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [hn.Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")]
+    >>> ends = hn.LinkEnd("1", (0.5, 0.5)), hn.LinkEnd("2", (0.5, 0.5))
+    >>> house = hn.Building(floors, [hn.Link(name="lift", kind="lift", ends=ends)])
+    >>> graph = hn.building_graph(house, nodes=20)
+    >>> [floor.name for floor in graph.floors], [link.name for link in graph.links]
+    (['1', '2'], ['lift'])
+    """
+    checked_type("building", building, Building)
+    radius_m = building.robot_radius_m
+    links = tuple(link for link in building.links if link.admits(radius_m, stairs=True))
+    floors = []
+    for number, floor in enumerate(building.floors, start=1):
+        topology = floor.planner.topology
+        graph = build_route_graph(
+            topology, nodes=nodes, spacing_m=spacing_m, stretch=stretch, seed=seed
+        )
+        height = floor.elevation_m
+        floors.append(
+            floor_graph(topology, graph, name=floor.name, elevation_m=height, links=links)
+        )
+        progress(number, len(building.floors))
+    return BuildingGraph(name=name, floors=tuple(floors), links=links)
 
 
 def _named(door: Door, floor: str) -> str:
