@@ -16,7 +16,8 @@ from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.gather import Gathered, number_of, pair_of, shown
 from hybridnav.io.anchors import Anchor
 from hybridnav.io.osm_areas import add_area_graph
-from hybridnav.io.osm_xml import OsmData, OsmWay, levels_of, read_osm_xml
+from hybridnav.io.osm_out import ALONE
+from hybridnav.io.osm_xml import OsmData, OsmWay, Tags, levels_of, read_osm_xml
 from hybridnav.io.rmf_floors import MOST_FLOORS
 
 if TYPE_CHECKING:
@@ -44,13 +45,15 @@ class OsmFloor:
     routes: list[OsmWay] = field(default_factory=list)
     areas: list[OsmWay] = field(default_factory=list)
     passages: list[OsmWay] = field(default_factory=list)
+    alone: set[int] = field(default_factory=set)
+    """Nodes of the graph that are part of no way."""
     elevation_m: float | None = None
 
-    def describe(self, element: OsmWay) -> None:
-        """Take the name of the level from a element, and its height from an area of osmAG."""
-        self.name = element.tags.get("level:ref") or self.name
-        height = number_of(element.tags.get("height"))
-        if element.tags.get("osmAG:type") == "area" and not math.isnan(height):
+    def describe(self, tags: Tags) -> None:
+        """Take the name of the level from an element, and its height from an area of osmAG."""
+        self.name = tags.get("level:ref") or self.name
+        height = number_of(tags.get("height"))
+        if tags.get("osmAG:type") == "area" and not math.isnan(height):
             self.elevation_m = height
 
 
@@ -146,9 +149,14 @@ def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
             floor = floors.setdefault(level, OsmFloor(f"{level:g}", level))
             getattr(floor, part).append(way)
         if len(levels) == 1:
-            floors[levels[0]].describe(way)
-        if len(floors) > MOST_FLOORS:
-            raise MapError(f"{where}: more than {MOST_FLOORS} levels are not read")
+            floors[levels[0]].describe(way.tags)
+    for node, tags in data.tags.items():
+        for level in levels_of(tags)[:1] if ALONE in tags else ():
+            floor = floors.setdefault(level, OsmFloor(f"{level:g}", level))
+            floor.alone.add(node)
+            floor.describe(tags)
+    if len(floors) > MOST_FLOORS:
+        raise MapError(f"{where}: more than {MOST_FLOORS} levels are not read")
     found = sorted(floors.values(), key=lambda floor: floor.level)
     counts = Counter(floor.name for floor in found)
     if max(counts.values(), default=1) > 1:
@@ -158,7 +166,7 @@ def _sorted_floors(data: OsmData, where: str) -> list[OsmFloor]:
 
 
 def _part(element: OsmWay) -> str:
-    """Return the list of a floor that a element belongs to, empty for none."""
+    """Return the list of a floor that an element belongs to, empty for none."""
     kind = element.tags.get("osmAG:type")
     if kind == "passage":
         return "passages"
@@ -175,7 +183,7 @@ def _floor(
 ) -> FloorGraph | None:
     """Return the graph of a level, None without a node."""
     gathered = Gathered(where)
-    if floor.routes:
+    if floor.routes or floor.alone:
         _add_routes(gathered, floor, data, points)
     else:
         own = {way.id for way in floor.areas}
@@ -204,7 +212,7 @@ def _add_routes(
     gathered: Gathered, floor: OsmFloor, data: OsmData, points: dict[int, Point | None]
 ) -> None:
     """Add the nodes of ways, and an edge between each two that follow each other."""
-    used = {node for way in floor.routes for node in way.refs}
+    used = floor.alone.union(*(way.refs for way in floor.routes))
     for node in itertools.chain(data.places, data.lost):
         if node in used:
             gathered.add_node(node, points.get(node), data.tags.get(node, {}))

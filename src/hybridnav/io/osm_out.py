@@ -29,7 +29,11 @@ _DECIMALS = 11
 _HIGHWAYS = {"lift": "elevator", "stairs": "steps", "ramp": "footway"}
 AREA_TYPES = {"lift": "elevator", "stairs": "stairs", "ramp": "room"}
 """Values of `osmAG:areaType` for what joins floors; it has none for ramps."""
+ALONE = "hybridnav:alone"
+"""Key of the nodes that no edge joins: no way has them."""
 _KM_H = 3.6
+_MOST_LEVEL = 1000
+"""Greatest number of a floor that is taken for its level."""
 
 Tags = dict[str, str]
 
@@ -113,6 +117,10 @@ class _Writer:
         if anchor.heading_deg:
             root["hybridnav:heading_deg"] = repr(float(anchor.heading_deg))
         self._node((0.0, 0.0), root)
+        self._joined = {
+            floor.name: frozenset(floor.graph.edges.ravel().tolist())
+            for floor in self._building.floors
+        }
         self._graph_nodes = {
             floor.name: [
                 self._node(point, self._node_tags(floor, node))
@@ -161,7 +169,8 @@ class _Writer:
 
     def _node_tags(self, floor: FloorGraph, node: int) -> Tags:
         name = floor.graph.node_facts.get(node, {}).get("name")
-        return self._on(floor) | ({"name": name} if isinstance(name, str) and name else {})
+        tags = self._on(floor) | ({"name": name} if isinstance(name, str) and name else {})
+        return tags | ({} if node in self._joined[floor.name] else {ALONE: "yes"})
 
     def _areas(self, floor: FloorGraph, shapes: Shapes) -> dict[str, int]:
         """Write the areas of a floor; return the way of each name."""
@@ -249,7 +258,7 @@ def level_numbers(building: BuildingGraph) -> dict[str, str]:
     its place from 0."""
     names = [floor.name for floor in building.floors]
     numbers = [number_of(name) for name in names]
-    plain = all(math.isfinite(number) and number == round(number, 3) for number in numbers)
+    plain = all(abs(number) <= _MOST_LEVEL and number == round(number, 1) for number in numbers)
     if plain and all(low < high for low, high in itertools.pairwise(numbers)):
         return {name: f"{number:g}" for name, number in zip(names, numbers, strict=True)}
     return {name: str(place) for place, name in enumerate(names)}

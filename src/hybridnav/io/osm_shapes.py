@@ -15,6 +15,10 @@ Ring = list[Point]
 
 _NEAR_M = 0.3
 """Distance in metres up to which the end of a door becomes a corner of an outline beside it."""
+_LEAST_M = 0.01
+"""Least distance in metres of a new corner from both corners of its side: it makes no spike."""
+_DECIMALS = 3
+"""Decimals of metres to which outlines must not cross themselves, as degrees are rounded."""
 _CABIN_M = 2.0
 """Side in metres of the area of a link that holds robots of any size."""
 
@@ -55,19 +59,22 @@ class Shapes:
 def with_corner(ring: Ring, point: Point) -> Ring:
     """Return a ring with a point as corner, in the side nearest to it.
 
-    The same ring if the point is a corner already, lies more than 0.3 m away, or would make the
-    ring cross itself.
+    The same ring if the point is a corner already, lies more than 0.3 m away or beyond the side, or
+    would make the ring cross itself.
     """
     if point in ring:
         return ring
-    sides = zip(ring, ring[1:] + ring[:1], strict=True)
+    sides = [shapely.LineString(side) for side in zip(ring, ring[1:] + ring[:1], strict=True)]
     at = shapely.Point(point)
-    away = [shapely.LineString(side).distance(at) for side in sides]
+    away = [side.distance(at) for side in sides]
     nearest = min(range(len(away)), key=away.__getitem__)
-    if away[nearest] > _NEAR_M:
+    along = sides[nearest].project(at)
+    is_inside = _LEAST_M < along < sides[nearest].length - _LEAST_M
+    if away[nearest] > _NEAR_M or not is_inside:
         return ring
     changed = [*ring[: nearest + 1], point, *ring[nearest + 1 :]]
-    return changed if shapely.Polygon(changed).is_valid else ring
+    coarse = [(round(x, _DECIMALS), round(y, _DECIMALS)) for x, y in changed]
+    return changed if shapely.Polygon(coarse).is_valid else ring
 
 
 def cabin_corners(middle: Point, max_radius_m: float) -> Ring:
