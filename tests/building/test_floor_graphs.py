@@ -170,3 +170,15 @@ def test_floors_and_links_that_do_not_fit_are_refused(change, words):
 def test_a_floor_that_is_not_there():
     with pytest.raises(hn.InvalidValueError, match="no floor is named '3': there are 1, 2"):
         BuildingGraph(name="b", floors=(floor("1"), floor("2"))).floor("3")
+
+
+def test_stairs_count_where_no_lift_leads_to_the_floor():
+    """A flight of stairs leads sideways."""
+    lift = Link(name="a", kind="lift", ends=(LinkEnd("0", (1, 1)), LinkEnd("1", (3, 4))))
+    stairs = Link(name="b", kind="stairs", ends=(LinkEnd("0", (9, 1)), LinkEnd("1", (9, 9))))
+    floors = (floor("0"), floor("1", (7, 7)))
+    aligned = align_floors(BuildingGraph(name="b", floors=floors, links=(lift, stairs)))
+    assert aligned.floor("1").graph.points.tolist() == [[5.0, 4.0]]
+    assert aligned.links[1].ends[1].position_m == (7.0, 6.0)
+    alone = align_floors(BuildingGraph(name="b", floors=floors, links=(stairs,)))
+    assert alone.floor("1").graph.points.tolist() == [[7.0, -1.0]]

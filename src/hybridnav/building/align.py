@@ -79,8 +79,8 @@ def align_floors(building: BuildingGraph) -> BuildingGraph:
 
     Maps of two floors seldom have one frame. The first floor stays; floors that links join to it,
     and so on, are moved, and turned where two or more links determine that: a rigid motion with the
-    least sum of squared distances between the ends of links (Kabsch 1976). Floors that no link
-    joins to the first stay as they are.
+    least sum of squared distances between the ends of links (Kabsch 1976). Stairs and ramps count
+    where no lift leads to the floor. Floors that no link joins to the first stay as they are.
 
     Parameters
     ----------
@@ -131,15 +131,17 @@ def align_floors(building: BuildingGraph) -> BuildingGraph:
 def _pairs(
     links: Sequence[Link], floor: str, poses: dict[str, Pose]
 ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """Return each end on a floor, and the mean of the placed ends of its link."""
+    """Return each end on a floor, and the mean of the placed ends of its link; only of lifts where
+    there is one, because flights of stairs lead sideways."""
     found = []
     for link in links:
         end = link.end_on(floor)
         placed = [_point(e.position_m, poses[e.floor]) for e in link.ends if e.floor in poses]
         if end is not None and placed:
             x, y = np.mean(placed, axis=0).tolist()
-            found.append((end.position_m, (x, y)))
-    return found
+            found.append((link.kind == "lift", (end.position_m, (x, y))))
+    has_lift = any(is_lift for is_lift, _ in found)
+    return [pair for is_lift, pair in found if is_lift or not has_lift]
 
 
 def _fitted(own: FloatArray, wanted: FloatArray) -> Pose:
