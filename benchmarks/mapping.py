@@ -1,4 +1,4 @@
-"""Maps from logs: time, and agreement with counting grids of the same logs.
+"""Maps from logs, as `hybridnav map` makes them: time, and agreement with counting grids.
 
     python -m benchmarks.mapping --data FOLDER [--pictures FOLDER]
 
@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from hybridnav.mapping import Mapper
+from hybridnav.mapping import LaserModel, Mapper
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,12 @@ def compare(ours: hn.OccupancyGrid, given: hn.OccupancyGrid) -> Agreement:
 
 def map_log(path: Path, given: hn.OccupancyGrid) -> tuple[hn.OccupancyGrid, list[str]]:
     """Map a log on the lattice of a given grid; return the map, and cells of the table."""
-    mapper = Mapper(resolution_m=given.resolution_m, corner_m=given.frame.origin_m)
+    mapper = Mapper(
+        resolution_m=given.resolution_m,
+        laser=LaserModel(when_hit=0.988),
+        corner_m=given.frame.origin_m,
+        least_probability=0.0,
+    )
     log, adding_s = hn.CarmenLog(path), []
     began = time.perf_counter()
     for scan in log:

@@ -82,6 +82,7 @@ def test_what_cannot_be_mapped_is_refused(cli: Any, tmp_path: Path) -> None:
     assert cli("map", log, "-o", tmp_path / "no" / "room.yaml").refuses(2, "cannot write")
     assert cli("map", log, "-o", out, "--resolution", "0").refuses(2, "resolution")
     assert cli("map", log, "-o", out, "--hit", "0.4").refuses(2, "when_hit")
+    assert cli("map", log, "-o", out, "--least", "0.5").refuses(2, "least_probability")
     assert cli("map", log, "-o", out, "--max-cells", "9").refuses(3, "12 beyond --max-cells")
     assert not out.exists()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -14,6 +14,9 @@ import hybridnav as hn
 from hybridnav.mapping import LaserModel, LaserScan, Mapper, SonarModel, SonarScan, sonar_ring
 from tests.oracle.beams import kinds_of_cells
 from tests.strategies import examples
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 HIT, PASSED = math.log(0.95 / 0.05), math.log(0.19 / 0.81)
 LIMIT = math.log(0.98 / 0.02)
@@ -337,6 +340,34 @@ def test_sonars_need_one_finite_mount_each() -> None:
 def test_a_laser_refuses_settings_out_of_range(values: dict[str, float]) -> None:
     with pytest.raises(hn.InvalidValueError):
         LaserModel(**values)
+
+
+def corridor(*readings: float) -> Callable[..., float]:
+    """The occupancy of the cell 3 m ahead after scans of one beam each."""
+
+    def occupancy(**settings: Any) -> float:
+        mapper = Mapper(resolution_m=1.0, **settings)
+        for reading in readings:
+            mapper.add(
+                LaserScan(np.array([reading]), pose=(0.5, 0.5, 0.0), start_rad=0.0, step_rad=0.0)
+            )
+        return float(mapper.to_grid(robot_radius_m=0).probability[0, 3])
+
+    return occupancy
+
+
+def test_without_a_limit_all_scans_count_alike() -> None:
+    """A hundred scans pass through a door, then three hit it."""
+    occupancy = corridor(*[6.0] * 100, *[3.0] * 3)
+    assert occupancy() > 0.9
+    assert occupancy(least_probability=0.0) < 1e-6
+    odds = 100 * PASSED + 3 * HIT
+    assert occupancy(least_probability=1e-300) == pytest.approx(1 / (1 + math.exp(-odds)))
+    evenly = corridor(*[6.0, 3.0] * 2000)
+    assert evenly(least_probability=0.0) == 1.0
+    for least in (-0.1, 0.5, math.nan):
+        with pytest.raises(hn.InvalidValueError, match="least_probability"):
+            Mapper(least_probability=least)
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,15 @@ PassOption = Annotated[
     float,
     typer.Option("--pass", metavar="P", help="Occupancy of a cell after one scan that passed it."),
 ]
+LeastOption = Annotated[
+    float,
+    typer.Option(
+        "--least",
+        metavar="P",
+        help="Least occupancy of a cell: 0.02 lets later scans undo earlier ones, by 0 all count "
+        "alike.",
+    ),
+]
 CellsOption = Annotated[
     int,
     typer.Option(
@@ -104,8 +113,9 @@ def map(  # noqa: A001 - the command's name
     min_range_m: MinRangeOption = 0.0,
     clear_range_m: ClearRangeOption = 0.0,
     tolerance_m: ToleranceOption = 0.1,
-    when_hit: HitOption = 0.95,
+    when_hit: HitOption = 0.988,
     when_passed: PassOption = 0.19,
+    least: LeastOption = 0.0,
     max_cells: CellsOption = DEFAULT_MAX_CELLS,
     topic: TopicOption = None,
     frame: FrameOption = None,
@@ -122,7 +132,9 @@ def map(  # noqa: A001 - the command's name
     from hybridnav.mapping import LaserModel, Mapper  # noqa: PLC0415 - loads numba
 
     model = LaserModel(when_hit, when_passed, max_range_m, min_range_m, clear_range_m, tolerance_m)
-    mapper = Mapper(resolution_m=resolution_m, laser=model, max_cells=max_cells)
+    mapper = Mapper(
+        resolution_m=resolution_m, laser=model, least_probability=least, max_cells=max_cells
+    )
     log = open_log(log_file, topic, frame)
     began = time.perf_counter()
     _add_all(log, mapper)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _MARGIN_CELLS = 64
 """Cells beyond a scan by which extents grow at least, so that not every scan makes them grow."""
-_LEAST_P = 0.02
+_NO_LIMIT = 1e-300
 """Probabilities stay within this and 1 - this, so that few scans can overrule many: doors open."""
 
 
@@ -34,8 +34,8 @@ class Mapper:
 
     Each cell starts at the odds of 0.5. A scan adds the log odds of its inverse model, which is
     Bayes' rule for cells that are independent of each other (Elfes 1989); sums stay within the odds
-    of 0.02 and 0.98. The extents grow with the scans: cells lie on a lattice that never moves, so a
-    grid that grew is bit for bit one that was large from the start.
+    of `least_probability` and its complement. The extents grow with the scans: cells lie on a
+    lattice that never moves, so a grid that grew is bit for bit one that was large from the start.
 
     A scan that does not fit into the greatest size with those before is refused. While only one
     scan has met cells, it is the earlier one that goes: a wrong first pose does not cost the map.
@@ -48,6 +48,10 @@ class Mapper:
         Inverse models of the sensors; their defaults if None.
     corner_m
         A corner of the lattice of cells, `(x, y)` in metres, map frame.
+    least_probability
+        Least occupancy of a cell, from 0 up to, not including, 0.5. By default a few scans undo
+        what many have seen before, so the map follows changes. 0 sets no limit: all scans count
+        alike.
     max_cells
         The most cells that the grid may have. A scan that needs more has a wrong pose, or the
         resolution is too fine.
@@ -68,13 +72,14 @@ class Mapper:
     array([[1, 1, 1, 0]], dtype=uint8)
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - all have defaults
         self,
         *,
         resolution_m: float = 0.05,
         laser: LaserModel | None = None,
         sonar: SonarModel | None = None,
         corner_m: tuple[float, float] = (0.0, 0.0),
+        least_probability: float = 0.02,
         max_cells: int = DEFAULT_MAX_CELLS,
     ) -> None:
         corner = checked_array("corner_m", corner_m)
@@ -88,6 +93,13 @@ class Mapper:
         self._sonar = SonarModel() if sonar is None else sonar
         checked_type("laser", self._laser, LaserModel)
         checked_type("sonar", self._sonar, SonarModel)
+        least = checked_number("least_probability", least_probability)
+        if not 0 <= least < 0.5:  # noqa: PLR2004 - the prior
+            raise InvalidValueError(
+                f"least_probability is {least}, expected 0 <= least_probability < 0.5: 0.02 "
+                "follows changes, 0 counts all scans alike"
+            )
+        self._limit = -log_odds_of(max(least, _NO_LIMIT))
         self._max_cells = checked_count("max_cells", max_cells, MAX_CELLS)
         far_m = max(self._laser.max_range_m, self._sonar.max_range_m + self._sonar.tolerance_m)
         if far_m / self.resolution_m > MOST_RANGE_CELLS:
@@ -184,14 +196,13 @@ class Mapper:
         if area is None:
             return None
         changes = log_odds_of(model.when_hit), log_odds_of(model.when_passed)
-        limit = -log_odds_of(_LEAST_P)
         add_beams(
             self._evidence,
             self._seen_at,
             self._corner,
             (hits, ends, kinds),
             self._n_scans + 1,
-            (np.float32(changes[0]), np.float32(changes[1]), np.float32(limit)),
+            (np.float32(changes[0]), np.float32(changes[1]), np.float32(self._limit)),
         )
         return area
 
@@ -221,7 +232,7 @@ class Mapper:
         area = self._grown((low[0], high[0], low[1], high[1]))
         if area is None:
             return None
-        changes = model.when_hit, model.when_passed, -log_odds_of(_LEAST_P)
+        changes = model.when_hit, model.when_passed, self._limit
         lengths = model.tolerance_m / side_m, model.min_range_m / side_m
         for apex, range_m in readings:
             add_cone(
