@@ -12,6 +12,7 @@ from PIL import Image
 import hybridnav as hn
 from hybridnav.mesh import build_mesh, trace_search
 from hybridnav.viz import (
+    plot_building,
     plot_costs,
     plot_level,
     plot_levels,
@@ -24,6 +25,7 @@ from hybridnav.viz import (
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
+BUILDING = ROOT / "maps" / "building" / "building.yaml"
 LEVELS = (6, 8, 10, -1)
 REGION_CELLS = 26_420
 """A tenth of the free cells, as portals have it."""
@@ -102,6 +104,12 @@ def draw_robot(file: Path) -> None:
     save_figure(plot_costs(grid, layer, paths=lines, title=", ".join(lengths)), file, dpi=150)
 
 
+def draw_building(file: Path) -> None:
+    """Draw the route from a room of one floor to a room of another."""
+    building = hn.load_building(BUILDING, robot_radius_m=0.25)
+    save_figure(plot_building(building, building.plan("office 5", "2.04"))[0], file, dpi=130)
+
+
 def shrink(file: Path) -> None:
     """Keep 256 colours: flat areas need no more, and the file has a third of the size."""
     with Image.open(file) as image:
@@ -117,6 +125,7 @@ if __name__ == "__main__":
         (draw_mesh, "mesh-office.png"),
         (draw_search, "mesh-search.png"),
         (draw_robot, "office-robot.png"),
+        (draw_building, "building.png"),
     ):
         draw(IMAGES / name)
         shrink(IMAGES / name)

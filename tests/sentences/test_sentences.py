@@ -13,6 +13,7 @@ import pytest
 import hybridnav as hn
 from hybridnav.sentences import (
     Doorway,
+    FloorChange,
     Instruction,
     Landmark,
     Passed,
@@ -142,6 +143,38 @@ CASES = {
         "after 1 m you are at the goal in l3_404",
         "nach 1 m am Ziel in „l3_404“",
     ),
+    "lift": (
+        instruction(
+            "ride", 3.0, turn=Turn(1.5), change=FloorChange("west lift", "lift", "3", has_exit=True)
+        ),
+        "after 3 m take the west lift to floor 3, turn left out of it",
+        "nach 3 m mit dem Aufzug „west lift“ auf Etage 3 fahren, beim Aussteigen links abbiegen",
+    ),
+    "lift with a letter": (
+        instruction("ride", 3.0, change=FloorChange("A", "lift", "Level 2", has_exit=True)),
+        "after 3 m take lift A to Level 2, go straight on",
+        "nach 3 m mit dem Aufzug „A“ auf Etage „Level 2“ fahren, dann geradeaus",
+    ),
+    "stairs": (
+        instruction(
+            "ride",
+            3.0,
+            turn=TURN,
+            change=FloorChange("Stairs 4", "stairs", "basement", has_exit=True),
+        ),
+        "after 3 m take Stairs 4 to the basement, then turn right",
+        "nach 3 m über die Treppe „Stairs 4“ auf Etage „basement“ gehen, dann rechts abbiegen",
+    ),
+    "ramp": (
+        instruction("ride", 3.0, change=FloorChange("garden ramp", "ramp", "G")),
+        "after 3 m take the garden ramp to floor G",
+        "nach 3 m über die Rampe „garden ramp“ auf Etage G gehen",
+    ),
+    "floor without rooms": (
+        instruction("arrive", 3.0, Space(None, "storey"), waypoint="(1, 2)"),
+        "after 3 m you are at (1, 2) on this floor",
+        "nach 3 m am Ziel: (1, 2) auf dieser Etage",
+    ),
     "deep in the room": (
         instruction("arrive", 3.0, LAB, waypoint="l3_404"),
         "after 3 m you are there",
@@ -184,7 +217,7 @@ def test_every_template_is_used_and_filled(code):
     spaces = [
         KITCHEN,
         LAB,
-        *(Space(None, shape) for shape in ("corridor", "hall", "room", "passage")),
+        *(Space(None, shape) for shape in ("corridor", "hall", "room", "passage", "storey")),
     ]
     doors = [(None, False), (3, False), (3, True)]
     written: list[str] = []
@@ -223,6 +256,7 @@ def test_every_template_is_used_and_filled(code):
                 written += sentences([there], code)
             if turn is not None:
                 written += sentences([instruction(turn=turn, space=space, passed=passed)], code)
+    written += [sentences([given], code)[0] for given, *_ in CASES.values()]
     text = "\n".join(written)
     assert "{" not in text
     assert "  " not in text

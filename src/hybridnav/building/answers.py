@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav.building.floors import Floor
-    from hybridnav.building.search import Chosen, Ends, Network, Part, Search
+    from hybridnav.building.search import ChosenParts, Endpoint, LinkNetwork, LinkSearch, Part
 
 
 class Answers:
@@ -34,16 +34,20 @@ class Answers:
         Metres per second that the robot drives.
     """
 
-    def __init__(self, floors: Sequence[Floor], network: Network, speed_m_s: float) -> None:
+    def __init__(self, floors: Sequence[Floor], network: LinkNetwork, speed_m_s: float) -> None:
         self._floors, self._network, self._speed_m_s = floors, network, speed_m_s
 
-    def refused(self, status: PlanStatus, ends: tuple[Ends, Ends]) -> BuildingPlan:
+    def refused(self, status: PlanStatus, endpoints: tuple[Endpoint, Endpoint]) -> BuildingPlan:
         """Return the plan of a query without a route."""
-        start, goal = (self._named(end) for end in ends)
+        start, goal = (self._named(end) for end in endpoints)
         return BuildingPlan(status, "octile", start, goal, speed_m_s=self._speed_m_s)
 
     def found(
-        self, search: Search, ends: tuple[Ends, Ends], limits: tuple[int, float], began: float
+        self,
+        search: LinkSearch,
+        endpoints: tuple[Endpoint, Endpoint],
+        limits: tuple[int, float],
+        began: float,
     ) -> tuple[BuildingPlan, ...]:
         """Search routes, and return them as plans.
 
@@ -51,7 +55,7 @@ class Answers:
         ----------
         search
             The search of a query.
-        ends
+        endpoints
             Its start and goal.
         limits
             Most routes, and cost of one over that of the first, at most.
@@ -66,28 +70,32 @@ class Answers:
             ranked = search.ranked(lambda cost: stretch * cost / ROUNDED)
             chosen = list(itertools.islice(ranked, count))
         bound = search.bound()
-        plans = [self._plan(search, ends, one, bound) for one in chosen]
+        plans = [self._plan(search, endpoints, one, bound) for one in chosen]
         if not plans:
             metrics = [draft.result().metric for draft in search.planned[:1]]
-            refused = self.refused(search.reason(), ends)
+            refused = self.refused(search.reason(), endpoints)
             metric = metrics[0] if metrics else refused.metric
             plans = [replace(refused, metric=metric, lower_bound=bound)]
         stats = stats_of([draft.stats for draft in search.planned], time.perf_counter() - began)
         return tuple(replace(plan, stats=stats) for plan in plans)
 
     def _plan(
-        self, search: Search, ends: tuple[Ends, Ends], chosen: Chosen, bound: float
+        self,
+        search: LinkSearch,
+        endpoints: tuple[Endpoint, Endpoint],
+        chosen: ChosenParts,
+        bound: float,
     ) -> BuildingPlan:
         """Return the plan of one route."""
         results = tuple(search.drafts[part].result() for part in chosen.parts)
         rides = tuple(itertools.starmap(self._ride, itertools.pairwise(chosen.parts)))
-        floors = [self._floors[self._floor_of(part, ends)] for part in chosen.parts]
-        start, goal = (self._named(end) for end in ends)
+        floors = [self._floors[self._floor_of(part, endpoints)] for part in chosen.parts]
+        start, goal = (self._named(end) for end in endpoints)
         guided = GuidedRoute(
             tuple(floor.planner.guide for floor in floors),
             results,
             rides,
-            waypoint_text(ends[1].waypoint),
+            waypoint_text(endpoints[1].waypoint),
         )
         plan = BuildingPlan(
             PlanStatus.SOLVED,
@@ -104,8 +112,8 @@ class Answers:
         # Sums are rounded: a bound that differs from the cost by that alone is the cost.
         return replace(plan, lower_bound=cost if bound >= cost * ROUNDED else bound)
 
-    def _floor_of(self, part: Part, ends: tuple[Ends, Ends]) -> int:
-        return ends[0].floor if part[0] == START else self._network.ends[part[0]].floor
+    def _floor_of(self, part: Part, endpoints: tuple[Endpoint, Endpoint]) -> int:
+        return endpoints[0].floor if part[0] == START else self._network.ends[part[0]].floor
 
     def _ride(self, before: Part, after: Part) -> Ride:
         """Return the ride between two parts of a route."""
@@ -114,7 +122,7 @@ class Answers:
         from_floor, to_floor = self._floors[entered.floor].name, self._floors[left.floor].name
         return Ride(self._network.links[entered.link], from_floor, to_floor, charges[after[0]])
 
-    def _named(self, end: Ends) -> tuple[str, tuple[float, ...] | str]:
+    def _named(self, end: Endpoint) -> tuple[str, tuple[float, ...] | str]:
         name, waypoint = self._floors[end.floor].name, end.waypoint
         if isinstance(waypoint, str):
             return name, waypoint

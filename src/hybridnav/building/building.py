@@ -12,7 +12,7 @@ from hybridnav.building.answers import Answers
 from hybridnav.building.checks import check_floors, check_links, check_speed
 from hybridnav.building.endpoints import endpoint_of, refusal_of
 from hybridnav.building.floors import FloorTable
-from hybridnav.building.search import Network, Search
+from hybridnav.building.search import LinkNetwork, LinkSearch
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.names import did_you_mean
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from hybridnav._progress import Progress
-    from hybridnav.building.endpoints import Endpoint
+    from hybridnav.building.endpoints import FloorWaypoint
     from hybridnav.building.floors import Floor, Known
     from hybridnav.building.links import Link
     from hybridnav.building.plan import BuildingPlan
@@ -83,7 +83,7 @@ class Building:
             FloorTable(floor, np.array([at for _, at in ends[floor.name]]).reshape(-1, 2))
             for floor in floors
         ]
-        self._networks: dict[tuple[frozenset[str], bool], Network] = {}
+        self._networks: dict[tuple[frozenset[str], bool], LinkNetwork] = {}
 
     def __repr__(self) -> str:
         floors, links = len(self.floors), len(self.links)
@@ -123,8 +123,8 @@ class Building:
 
     def plan(  # noqa: PLR0913 - start, goal, and conditions with defaults
         self,
-        start: Endpoint,
-        goal: Endpoint,
+        start: FloorWaypoint,
+        goal: FloorWaypoint,
         *,
         blocked: Mapping[str, Closable] | None = None,
         closed_links: Collection[str] = (),
@@ -163,8 +163,8 @@ class Building:
 
     def alternatives(  # noqa: PLR0913 - start, goal, count, and conditions with defaults
         self,
-        start: Endpoint,
-        goal: Endpoint,
+        start: FloorWaypoint,
+        goal: FloorWaypoint,
         count: int,
         *,
         max_stretch: float = 2.0,
@@ -249,7 +249,7 @@ class Building:
                 self._tables[number] = table.renewed()
         return list(self._tables)
 
-    def _network(self, closed_links: Collection[str], stairs: bool) -> Network:  # noqa: FBT001
+    def _network(self, closed_links: Collection[str], stairs: bool) -> LinkNetwork:  # noqa: FBT001
         """Return the links that may be used."""
         if isinstance(closed_links, str):
             raise InvalidValueError(
@@ -265,14 +265,14 @@ class Building:
                 for link in self.links
                 if link.name not in key[0] and link.admits(radius_m, stairs=key[1])
             ]
-            found = Network(links, self._index_of, self._rows, self.speed_m_s)
+            found = LinkNetwork(links, self._index_of, self._rows, self.speed_m_s)
             self._networks = {**dict(list(self._networks.items())[-15:]), key: found}
         return found
 
     def _plans(  # noqa: PLR0913, PLR0917 - what both public methods were given
         self,
-        start: Endpoint,
-        goal: Endpoint,
+        start: FloorWaypoint,
+        goal: FloorWaypoint,
         blocked: Mapping[str, Closable] | None,
         usable: tuple[Collection[str], bool],
         at: At,
@@ -284,16 +284,16 @@ class Building:
         answers = Answers(self.floors, network, self.speed_m_s)
         while True:
             tables = self._current()
-            ends = (
+            endpoints = (
                 endpoint_of("start", start, self.floors),
                 endpoint_of("goal", goal, self.floors),
             )
             closed = self._closed(blocked)
-            search = Search(network, tables, ends, closed, at)
-            found = answers.found(search, ends, limits, began)
+            search = LinkSearch(network, tables, endpoints, closed, at)
+            found = answers.found(search, endpoints, limits, began)
             if not found[0].solved:
-                refused = refusal_of(ends, self.floors, closed)
-                found = found if refused is None else (answers.refused(refused, ends),)
+                refused = refusal_of(endpoints, self.floors, closed)
+                found = found if refused is None else (answers.refused(refused, endpoints),)
             if all(table.is_current for table in tables):
                 return found
 

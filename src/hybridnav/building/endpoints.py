@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from hybridnav.building.search import Ends
+from hybridnav.building.search import Endpoint
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.names import did_you_mean
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from hybridnav.building.floors import Floor
     from hybridnav.planner.closed import ClosedCells
 
-Endpoint: TypeAlias = "str | tuple[str, ArrayLike | str]"
+FloorWaypoint: TypeAlias = "str | tuple[str, ArrayLike | str]"
 """A floor and a point or name on it, or a name that only one floor has."""
 
 
-def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Ends:
+def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
     """Return the floor of a start or goal, and the point or name on it.
 
     Parameters
@@ -56,8 +56,8 @@ def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Ends:
         )
     if isinstance(waypoint, str):
         check_names(floors[index].planner.topology, [waypoint])
-        return Ends(index, waypoint)
-    return Ends(index, read_point(what, waypoint))
+        return Endpoint(index, waypoint)
+    return Endpoint(index, read_point(what, waypoint))
 
 
 def _floor_of_name(name: str, floors: Sequence[Floor]) -> int:
@@ -80,11 +80,11 @@ def _floor_of_name(name: str, floors: Sequence[Floor]) -> int:
 
 
 def refusal_of(
-    ends: tuple[Ends, Ends], floors: Sequence[Floor], closed: dict[int, ClosedCells]
+    endpoints: tuple[Endpoint, Endpoint], floors: Sequence[Floor], closed: dict[int, ClosedCells]
 ) -> PlanStatus | None:
     """Return the status of a query whose start or goal point cannot be entered; None if both can,
     and for names."""
-    for end, kind in zip(ends, ("START", "GOAL"), strict=True):
+    for end, kind in zip(endpoints, ("START", "GOAL"), strict=True):
         if isinstance(end.waypoint, str):
             continue
         planner = floors[end.floor].planner

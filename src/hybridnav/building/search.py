@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from hybridnav.building.floors import ROUNDED
-from hybridnav.planner.drafts import Draft
+from hybridnav.planner.drafts import PlanDraft
 from hybridnav.result import PlanStatus
 
 if TYPE_CHECKING:
@@ -32,23 +32,27 @@ class End(NamedTuple):
     """The end of a link in the network."""
 
     link: int
+    """Index of the link."""
     floor: int
+    """Index of the floor."""
     at: int
     """Its row in the table of the floor."""
 
 
-class Chosen(NamedTuple):
+class ChosenParts(NamedTuple):
     """A route, or a part of one: its parts in order, between which rides lead."""
 
     cost: float
+    """Costs of its parts, and charges of its rides, in metres."""
     parts: tuple[Part, ...]
+    """Its paths on floors."""
 
 
-Crossings = list[tuple[int, int, Chosen]]
+Crossings = list[tuple[int, int, ChosenParts]]
 """The end where a first ride begins, that where a last one ends, and what lies between."""
 
 
-class Network:
+class LinkNetwork:
     """The ends of the links of a building, and the rides between them.
 
     Parameters
@@ -129,7 +133,7 @@ class Network:
         for first in self.on_floor[floors[0]]:
             least = self._ways_from(first, cost_of)
             reached = [end for end in self.on_floor[floors[1]] if end in least]
-            found += [(first, end, Chosen(*least[end])) for end in reached]
+            found += [(first, end, ChosenParts(*least[end])) for end in reached]
         return found
 
     def _ways_from(
@@ -158,14 +162,14 @@ class Network:
 
 
 @dataclass(frozen=True)
-class Ends:
+class Endpoint:
     """Start or goal of a query: the index of its floor, and a point or a name on it."""
 
     floor: int
     waypoint: ArrayLike | str
 
 
-class Search:
+class LinkSearch:
     """One query over floors.
 
     A part of a route costs at least its lower bound, a straight line or better, until it is
@@ -178,7 +182,7 @@ class Search:
         The links that may be used.
     tables
         The table of each floor.
-    ends
+    endpoints
         Start and goal.
     closed
         Closed cells of floors, by index.
@@ -193,21 +197,21 @@ class Search:
 
     def __init__(
         self,
-        network: Network,
+        network: LinkNetwork,
         tables: Sequence[FloorTable],
-        ends: tuple[Ends, Ends],
+        endpoints: tuple[Endpoint, Endpoint],
         closed: dict[int, ClosedCells],
         at: At,
     ) -> None:
         self._network, self._tables, self._closed, self._at = network, tables, closed, at
-        self._start, self._goal = ends
-        self.drafts: dict[Part, Draft] = {}
+        self._start, self._goal = endpoints
+        self.drafts: dict[Part, PlanDraft] = {}
         """The plans of parts that were asked for."""
-        self.planned: list[Draft] = []
+        self.planned: list[PlanDraft] = []
         """Those made for this query."""
         self._lower: dict[Part, float] = {}
         self._cost: dict[Part, float] = {}
-        start, goal = ends
+        start, goal = endpoints
         for end, of in ((start, START), (goal, GOAL)):
             straight = tables[end.floor].straight_m(end.waypoint)
             for number in network.on_floor[end.floor]:
@@ -218,7 +222,7 @@ class Search:
             straight_m = table.straight_between_m(start.waypoint, goal.waypoint)
             self._lower[START, GOAL] = straight_m
 
-    def best(self) -> Chosen | None:
+    def best(self) -> ChosenParts | None:
         """Return the cheapest route, all of whose parts are planned; None if there is none."""
         while True:
             found = self._least(lower=False)
@@ -243,7 +247,7 @@ class Search:
         late = {PlanStatus.TIMEOUT, PlanStatus.APPROXIMATE}
         return PlanStatus.TIMEOUT if late.intersection(statuses) else PlanStatus.NO_PATH
 
-    def ranked(self, max_cost: Callable[[float], float]) -> Iterator[Chosen]:
+    def ranked(self, max_cost: Callable[[float], float]) -> Iterator[ChosenParts]:
         """Yield the cheapest route of each sequence of links, by cost; no link occurs twice.
 
         Parameters
@@ -286,7 +290,7 @@ class Search:
         if start != START and goal != GOAL and closed is None:
             rows = self._network.ends[start].at, self._network.ends[goal].at
             result, was_kept = table.between(*rows)
-            found = Draft.of(result)
+            found = PlanDraft.of(result)
         else:
             found, was_kept = self._between(table, part, closed), False
             self._cost[part] = found.cost
@@ -297,14 +301,14 @@ class Search:
         if not was_kept:
             self.planned.append(found)
 
-    def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> Draft:
+    def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> PlanDraft:
         start, goal = (
             end.waypoint if number == of else table.positions_m[self._network.ends[number].at]
             for number, of, end in zip(part, (START, GOAL), (self._start, self._goal), strict=True)
         )
         return table.floor.planner.draft(start, goal, blocked=closed, at=self._at)
 
-    def _compare(self, table: FloorTable, part: Part, found: Draft) -> None:
+    def _compare(self, table: FloorTable, part: Part, found: PlanDraft) -> None:
         """Raise the bounds of other parts from the start, or to the goal, by the triangle
         inequality; a name is not one point, and has none."""
         end = self._start if part[0] == START else self._goal
@@ -356,7 +360,7 @@ class Search:
             parts.append((start, GOAL))
         return parts
 
-    def _least(self, *, lower: bool) -> Chosen | None:
+    def _least(self, *, lower: bool) -> ChosenParts | None:
         """Return the cheapest route, by the costs of parts where they are known and not `lower`,
         else by lower bounds."""
         cost_of = self._bound_of if lower else self._expected
@@ -375,13 +379,13 @@ class Search:
                 least, best = cost, (one, between.parts, other)
         if floors[0] == floors[1] and cost_of((START, GOAL)) <= least:
             least = cost_of((START, GOAL))
-            return Chosen(least, ((START, GOAL),)) if least < math.inf else None
+            return ChosenParts(least, ((START, GOAL),)) if least < math.inf else None
         if best is None:
             return None
         one, parts, other = best
-        return Chosen(least, ((START, one), *parts, (other, GOAL)))
+        return ChosenParts(least, ((START, one), *parts, (other, GOAL)))
 
-    def _least_other(self, known: set[tuple[int, ...]], most: float) -> Chosen | None:
+    def _least_other(self, known: set[tuple[int, ...]], most: float) -> ChosenParts | None:
         """Return the cheapest route with a sequence of links that is not known."""
         ahead = self._to_goal()
         ends, rides = self._network.ends, self._network.rides
@@ -393,7 +397,7 @@ class Search:
             if least > most:
                 return None
             if node == GOAL and links not in known:
-                return Chosen(cost, parts)
+                return ChosenParts(cost, parts)
             if node == GOAL or (node, links) in done:
                 continue
             done.add((node, links))

@@ -40,12 +40,23 @@ _LOOKED_AT = 2**16
 
 
 def is_building(path: PathLike) -> bool:
-    """Return whether a file describes a building, by what it contains; False if there is none.
+    """Return whether a file describes a building, by what it contains.
 
     Parameters
     ----------
     path
         A YAML file or a model.
+
+    Returns
+    -------
+    bool
+        False if there is no such file, or it cannot be read.
+
+    Examples
+    --------
+    >>> from hybridnav.io import is_building
+    >>> is_building("maps/office/office.yaml")
+    False
     """
     file = Path(path)
     suffix = file.suffix.lower()

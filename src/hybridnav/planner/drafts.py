@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
+class PlanDraft:
     """A plan between two waypoints, for those who compare many and want the result of few."""
 
     status: PlanStatus
@@ -35,7 +35,7 @@ class Draft:
 
 def draft_on_mesh(
     cells: OverMesh, query: CellQuery, result_of: Callable[[CellPlan], PlanResult]
-) -> Draft:
+) -> PlanDraft:
     """Return the draft of a path, whose cells are found for its result alone.
 
     Parameters
@@ -50,7 +50,7 @@ def draft_on_mesh(
     found = cells.found(query)
     cost, path = found.length_m, found.path
     if not 0 < cost < float("inf"):
-        return Draft.of(result_of(cells.completed(found)))
+        return PlanDraft.of(result_of(cells.completed(found)))
     bound = min(cost * (path.lower_bound_cells / path.length_cells), cost)
     made = lambda: result_of(cells.completed(found))  # noqa: E731 - called once, by the caller
-    return Draft(PlanStatus.SOLVED, cost, bound, found.stats, made)
+    return PlanDraft(PlanStatus.SOLVED, cost, bound, found.stats, made)

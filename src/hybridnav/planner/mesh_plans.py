@@ -52,10 +52,13 @@ class FoundPath(NamedTuple):
     """A path on the mesh, before the cells that it passes are known."""
 
     query: CellQuery
+    """What was asked for."""
     path: MeshPath
+    """What the search has found."""
     points: FloatArray | None
     """float64 (n, 2), `(x, y)` in metres; None where no path was found."""
     stats: PlanStats
+    """Its effort."""
 
     @property
     def length_m(self) -> float:

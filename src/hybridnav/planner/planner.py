@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from hybridnav.grid.areas import Box
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlan, CellPlanner, Prepared
-    from hybridnav.planner.drafts import Draft
+    from hybridnav.planner.drafts import PlanDraft
     from hybridnav.planner.itinerary import Guide
     from hybridnav.planner.mesh_plans import OverMesh
     from hybridnav.planner.named import At
@@ -283,7 +283,7 @@ class HybridPlanner:
         *,
         blocked: Closable | ClosedCells | None = None,
         at: At = "anywhere",
-    ) -> Draft:
+    ) -> PlanDraft:
         """Plan a path as `plan` does, and make its result only if it is wanted.
 
         With `shortest` that saves half of the time, for a caller who compares many plans.
@@ -293,17 +293,17 @@ class HybridPlanner:
         start, goal, blocked, at
             As in `plan`.
         """
-        from hybridnav.planner.drafts import Draft, draft_on_mesh  # noqa: PLC0415 - on demand
+        from hybridnav.planner.drafts import PlanDraft, draft_on_mesh  # noqa: PLC0415 - on demand
 
         named = isinstance(start, str) or isinstance(goal, str)
         with self._query():
             if named or self._ompl is not None or self.preset.planner.coarse != "mesh":
-                return Draft.of(self._plan(start, goal, None, blocked, at))
+                return PlanDraft.of(self._plan(start, goal, None, blocked, at))
             poses = read_point("start", start), read_point("goal", goal)
             closed = self.closed(blocked)
             query = self._query_of(poses, closed)
             if isinstance(query, PlanStatus):
-                return Draft.of(self._outcomes.answer(query, poses))
+                return PlanDraft.of(self._outcomes.answer(query, poses))
             finish, outcomes, metric = self._finish, self._outcomes, self._cells.metric
 
             def result_of(plan: CellPlan) -> PlanResult:
