@@ -13,7 +13,13 @@ LinkKind = Literal["lift", "stairs", "ramp"]
 
 @dataclass(frozen=True)
 class LinkEnd:
-    """A point of a floor where robots enter and leave a link."""
+    """A point of a floor where robots enter and leave a link.
+
+    Examples
+    --------
+    >>> hn.LinkEnd("3", (1.5, 2.0)).floor
+    '3'
+    """
 
     floor: str
     """Name of the floor."""
@@ -124,7 +130,8 @@ class Link:
             Names of floors that it stops at.
         """
         floors = [end.floor for end in self.ends]
-        return self.wait_s + self.ride_s * abs(floors.index(from_floor) - floors.index(to_floor))
+        rides = abs(floors.index(from_floor) - floors.index(to_floor))
+        return float(self.wait_s + self.ride_s * rides)
 
     def charge_m(self, from_floor: str, to_floor: str, *, speed_m_s: float) -> float:
         """Return what a ride is charged in metres.
