@@ -100,6 +100,7 @@ class FloorTable:
     def __init__(self, floor: Floor, positions_m: FloatArray, known: Known | None = None) -> None:
         self.floor = floor
         self.positions_m = positions_m
+        self._positions: list[tuple[float, float]] = positions_m.tolist()
         planner = floor.planner
         self._of = planner.topology, planner.costs
         is_any_angle = planner.preset.planner.coarse == "mesh"
@@ -189,8 +190,16 @@ class FloorTable:
         waypoint
             A point `(x, y)` in metres, or a name of the floor.
         """
-        found: list[float] = self._safe(self._distance_m(waypoint, self.positions_m)).tolist()
-        return found
+        if isinstance(waypoint, str):
+            found: list[float] = self._safe(self._distance_m(waypoint, self.positions_m)).tolist()
+            return found
+        # Ends are few: numpy would take ten times as long for them.
+        x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
+        slack_m = self._slack_m
+        return [
+            max(math.hypot(x - end_x, y - end_y) - slack_m, 0.0) * ROUNDED
+            for end_x, end_y in self._positions
+        ]
 
     def straight_between_m(self, start: ArrayLike | str, goal: ArrayLike | str) -> float:
         """Return a lower bound on the cost between two waypoints in metres; 0 if both are names."""

@@ -369,9 +369,10 @@ class LinkSearch:
             crossings = self._network.crossings(floors, cost_of)
         else:
             crossings = self._network.between(floors, self._tables, lower=lower)
-        on_floor = self._network.on_floor
-        first = {end: cost_of((START, end)) for end in on_floor[floors[0]]}
-        last = {end: cost_of((end, GOAL)) for end in on_floor[floors[1]]}
+        on_floor, known = self._network.on_floor, {} if lower else self._cost
+        bounds = self._lower
+        first = {end: known.get((START, end), bounds[START, end]) for end in on_floor[floors[0]]}
+        last = {end: known.get((end, GOAL), bounds[end, GOAL]) for end in on_floor[floors[1]]}
         best, least = None, math.inf
         for one, other, between in crossings:
             cost = first[one] + between.cost + last[other]

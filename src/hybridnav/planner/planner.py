@@ -16,6 +16,7 @@ from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import Carried, CellQuery, Updatable
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.costs import PlannerCosts
+from hybridnav.planner.drafts import PlanDraft, draft_on_mesh
 from hybridnav.planner.endpoints import cells_of_endpoints, read_end, read_point, read_points
 from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.follow import MapChange, change_of, followed, is_stale
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from hybridnav.grid.areas import Box
     from hybridnav.planner.blocked import Closable
     from hybridnav.planner.cell_planner import CellPlan, CellPlanner, Prepared
-    from hybridnav.planner.drafts import PlanDraft
     from hybridnav.planner.itinerary import Guide
     from hybridnav.planner.mesh_plans import OverMesh
     from hybridnav.planner.named import At
@@ -293,8 +293,6 @@ class HybridPlanner:
         start, goal, blocked, at
             As in `plan`.
         """
-        from hybridnav.planner.drafts import PlanDraft, draft_on_mesh  # noqa: PLC0415 - on demand
-
         named = isinstance(start, str) or isinstance(goal, str)
         with self._query():
             if named or self._ompl is not None or self.preset.planner.coarse != "mesh":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
@@ -152,14 +153,10 @@ def open_building(
         if floor.map >= len(models):
             raise refusal(filed[0], f"floor {floor.name} has map {floor.map} of {len(models)}")
     wanted = None if preset is None else load_preset(preset)
-    planners, are_same = [], True
-    for model in models:
-        remade = model.remade(robot_radius_m=robot_radius_m)
-        chosen = remade.fitted(wanted)
-        saved = model.presets[:1]
-        are_same &= remade is model and bool(saved) and chosen.planner == saved[0].planner
-        topology = remade.topology if wanted is None else remade.grown(chosen.pyramid, model.rooms)
-        planners.append(remade.planner(wanted, topology=topology))
+    # Most of the time goes to checksums, which are computed without Python's lock.
+    with ThreadPoolExecutor() as pool:
+        made = list(pool.map(lambda model: _planner_of(model, robot_radius_m, wanted), models))
+    planners, are_same = [planner for planner, _ in made], all(is_same for _, is_same in made)
     try:
         floors = [Floor(one.name, planners[one.map], one.elevation_m) for one in values.floors]
         links = [_link(one) for one in values.links]
@@ -169,6 +166,17 @@ def open_building(
     if are_same:
         building.adopt(_known(filed[0], building))
     return building
+
+
+def _planner_of(
+    model: Model, robot_radius_m: float | None, wanted: Preset | None
+) -> tuple[HybridPlanner, bool]:
+    """Return the planner of a map, and whether it is the one that was saved."""
+    remade = model.remade(robot_radius_m=robot_radius_m)
+    chosen, saved = remade.fitted(wanted), model.presets[:1]
+    is_same = remade is model and bool(saved) and chosen.planner == saved[0].planner
+    topology = remade.topology if wanted is None else remade.grown(chosen.pyramid, model.rooms)
+    return remade.planner(wanted, topology=topology), is_same
 
 
 def _map_of(part: FiledPart, number: int, max_cells: int) -> Model:
