@@ -9,7 +9,6 @@ from hybridnav.building import BuildingGraph, FloorGraph, Link, LinkEnd
 from hybridnav.errors import MapError
 from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.gather import Gathered, pair_of, shown
-from hybridnav.io.json_stream import MOST_VALUES
 from hybridnav.io.rmf_floors import MOST_FLOORS, list_of, mapping_of
 
 if TYPE_CHECKING:
@@ -18,6 +17,9 @@ if TYPE_CHECKING:
     from hybridnav.building import LinkKind
 
 Point = tuple[float, float]
+_MOST_BYTES, _MOST_VALUES = 2**26, 2**22
+"""Most characters of a file, and most values, counted by its commas and brackets: it is read as a
+whole."""
 _KINDS: tuple[LinkKind, ...] = ("lift", "stairs", "ramp")
 
 
@@ -84,8 +86,10 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
 
 
 def _parsed(text: str, where: str) -> dict[str, Any]:
-    if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
-        raise MapError(f"{where}: JSON of more than {MOST_VALUES} values is not read")
+    if len(text) > _MOST_BYTES:
+        raise MapError(f"{where}: a layout of more than {_MOST_BYTES} bytes is not read")
+    if text.count(",") + text.count("[") + text.count("{") > _MOST_VALUES:
+        raise MapError(f"{where}: JSON of more than {_MOST_VALUES} values is not read")
     try:
         data = json.loads(text)
     except json.JSONDecodeError as failure:

@@ -39,6 +39,8 @@ _OPTIONS = 4
 """Place of the options of a vertex: x, y, z and name stand before."""
 _MOST_GRAPHS = 10
 """The editor numbers graphs from 0 to 9."""
+_MOST_CROSSINGS = 2_000_000
+"""Pairs of a lane and a door of one level that may cross."""
 _GAP_M = 0.05
 """Gap between a cabin and its shaft, `gap` of `lift.py`."""
 _IN_FILE_ONLY = ("bidirectional", "graph_idx", "orientation")
@@ -256,6 +258,11 @@ def _doors_passed(lanes: list[list[Point | None]], floor: RmfFloor) -> list[str]
     kept = [at for at, ends in enumerate(whole) if len(ends) == 2]  # noqa: PLR2004
     if not floor.doors or not kept:
         return passed
+    if len(floor.doors) * len(kept) > _MOST_CROSSINGS:
+        raise MapError(
+            f"{floor.where}, level {shown(floor.name)}: {len(floor.doors)} doors and {len(kept)} "
+            f"lanes, at most {_MOST_CROSSINGS} pairs of them are tested"
+        )
     doors = shapely.linestrings([door.ends for door in floor.doors])
     segments = shapely.linestrings([whole[at] for at in kept])
     found = shapely.STRtree(doors).query(segments, predicate="intersects")
