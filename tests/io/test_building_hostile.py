@@ -78,6 +78,8 @@ def read(tmp_path):
         ("a.osm", "<osm>" + PLACE + "".join(
             f'<way id="{k}"><nd ref="1"/><nd ref="2"/><tag k="highway" v="path"/>'
             f'<tag k="level" v="{k}"/></way>' for k in range(1001)) + "</osm>", "1000 levels"),
+        ("a.osm", "<osm>" + " " * 2**25, "is not read"),
+        ("a.json", " " * 2**26 + "{}", "is not read"),
         ("a.json", "[]", "expected a layout"),
         ("a.json", '{"layouts": 7}', "expected layouts as a list"),
         ("a.json", '{"layouts": []}', "no layout has a node"),

@@ -225,6 +225,18 @@ def test_what_is_wrong_is_one_line(tmp_path, change, words):
     assert "\n" not in str(caught.value)
 
 
+def test_lanes_are_not_tested_against_doors_without_end(tmp_path, monkeypatch):
+    monkeypatch.setattr("hybridnav.io.rmf_editor._MOST_CROSSINGS", 1)
+    vertices = [[0, 0, 0, ""], [9, 0, 0, ""], [4, -5, 0, ""], [4, 5, 0, ""]]
+    level = {"vertices": vertices, "lanes": [[0, 1, {}]], "doors": [[2, 3, {"name": [1, "d"]}]]}
+    changes = {"coordinate_system": "cartesian_meters", "lifts": {}, "levels": {"a": level}}
+    graph = hn.load_graph(write(tmp_path / "a.yaml", **changes))
+    assert graph.edge_facts[0]["door_name"] == "d"
+    level["doors"].append([2, 3, {"name": [1, "e"]}])
+    with pytest.raises(hn.MapError, match="2 doors and 1 lanes, at most 1 pairs"):
+        hn.load_graph(write(tmp_path / "a.yaml", **changes))
+
+
 def test_graphs_of_other_fleets_are_read_by_number(tmp_path):
     path = write(tmp_path / "a.yaml")
     with pytest.raises(hn.MapError, match="no lane of graph 2; graphs with lanes: 0"):

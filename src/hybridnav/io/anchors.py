@@ -28,7 +28,7 @@ class Anchor:
     >>> anchor = hn.Anchor(48.0, 11.0)
     >>> latitude, longitude = anchor.degrees_of((100.0, 0.0))
     >>> round(latitude, 7), round(longitude, 7)
-    (48.0, 11.0013404)
+    (48.0, 11.00134)
     >>> x, y = anchor.point_of(latitude, longitude)
     >>> round(x, 6), round(y, 6)
     (100.0, 0.0)

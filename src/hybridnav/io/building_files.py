@@ -11,7 +11,7 @@ from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.io import graph_yaml, json_stream
 from hybridnav.io.lif_in import is_lif, read_lif
 from hybridnav.io.osm_in import read_osm
-from hybridnav.io.osm_xml import MOST_BYTES, is_osm
+from hybridnav.io.osm_xml import is_osm
 from hybridnav.io.rmf_editor import is_drawn, read_drawn
 from hybridnav.io.rmf_in import is_rmf, read_rmf
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from hybridnav.graphs import WaypointGraph
     from hybridnav.io.anchors import Anchor
 
+_MOST_XML = 2**26
+"""Most bytes of GraphML, and of XML that turns out to be another format."""
 JSON, XML = (".geojson", ".json", ".lif"), (".graphml", ".osm", ".xml")
 
 
@@ -89,7 +91,7 @@ def read_graph_text(path: PathLike) -> str:
     if suffix in JSON:
         kind, most = "JSON", json_stream.MOST_BYTES
     elif suffix in XML:
-        kind, most = "XML", MOST_BYTES
+        kind, most = "XML", _MOST_XML
     return read_text(
         path, what="graph", error=MapError, missing=MapNotFoundError, max_bytes=most, kind=kind
     )

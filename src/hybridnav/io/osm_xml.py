@@ -12,8 +12,8 @@ from xml.parsers import expat
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import number_of, shown
 
-MOST_BYTES = 2**26
-"""Most bytes of a file."""
+MOST_BYTES = 2**25
+"""Most characters of a file: a building of a million edges takes half a gigabyte of memory."""
 _HEAD = 4096
 """Characters in which the first element begins."""
 _DEEPEST = 20
@@ -83,6 +83,8 @@ def read_osm_xml(text: str, where: str) -> OsmData:
         When it is no XML of OpenStreetMap, or declares a document type: entities could make it
         endless.
     """
+    if len(text) > MOST_BYTES:
+        raise MapError(f"{where}: XML of OpenStreetMap of more than {MOST_BYTES} bytes is not read")
     reader = _Reader(where)
     parser = expat.ParserCreate()
     parser.StartElementHandler = reader.start
