@@ -237,6 +237,18 @@ def test_lanes_are_not_tested_against_doors_without_end(tmp_path, monkeypatch):
         hn.load_graph(write(tmp_path / "a.yaml", **changes))
 
 
+def test_a_level_without_lanes_needs_no_scale(tmp_path):
+    path = write(tmp_path / "a.yaml")
+    data = yaml.safe_load(path.read_text())
+    data["levels"]["roof"] = {"vertices": [[0, 0, 0, ""]], "lanes": [], "elevation": 9}
+    path.write_text(yaml.safe_dump(data))
+    assert [floor.name for floor in hn.load_building_graph(path).floors] == ["down", "up"]
+    data["lifts"]["hoist"]["reference_floor_name"] = "roof"
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(hn.MapError, match="lift hoist, level roof: its scale is not known"):
+        hn.load_building_graph(path)
+
+
 def test_graphs_of_other_fleets_are_read_by_number(tmp_path):
     path = write(tmp_path / "a.yaml")
     with pytest.raises(hn.MapError, match="no lane of graph 2; graphs with lanes: 0"):

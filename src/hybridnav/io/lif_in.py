@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hybridnav.building import LinkKind
 
 Point = tuple[float, float]
-_MOST_BYTES, _MOST_VALUES = 2**26, 2**22
+_MOST_BYTES, _MOST_VALUES = 3 * 2**24, 2**22
 """Most characters of a file, and most values, counted by its commas and brackets: it is read as a
 whole."""
 _KINDS: tuple[LinkKind, ...] = ("lift", "stairs", "ramp")

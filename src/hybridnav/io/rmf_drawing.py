@@ -35,7 +35,7 @@ class Drawing:
 def drawings_of(
     data: dict[str, Any], contents: dict[str, dict[str, Any]], where: str
 ) -> dict[str, Drawing]:
-    """Return how each level is drawn.
+    """Return how each level is drawn, as far as its scale is known.
 
     In a drawing over an image y points down, and the scale is the mean of metres per pixel over the
     measurements. The reference level, or else the first, has its origin at the corner of the image;
@@ -55,7 +55,7 @@ def drawings_of(
     Raises
     ------
     MapError
-        When coordinates are degrees, or a scale is not known.
+        When coordinates are degrees, or the reference level is not there.
     """
     system = data.get("coordinate_system", _PIXELS)
     if system == _METRES:
@@ -83,13 +83,26 @@ def drawings_of(
             drawings[level] = _fitted(pairs, scale, at)
         else:
             known = _scale(content, at)
-            if known is None:
-                raise MapError(
-                    f"{at}: its scale is not known, expected measurements, or two fiducials of the "
-                    "reference level"
-                )
-            drawings[level] = Drawing(complex(known), y_up=False)
+            if known is not None:
+                drawings[level] = Drawing(complex(known), y_up=False)
     return drawings
+
+
+def drawing_of(drawings: dict[str, Drawing], level: str, where: str) -> Drawing:
+    """Return how a level is drawn.
+
+    Raises
+    ------
+    MapError
+        When its scale is not known.
+    """
+    found = drawings.get(level)
+    if found is None:
+        raise MapError(
+            f"{where}, level {shown(level)}: its scale is not known, expected measurements, or two "
+            "fiducials of the reference level"
+        )
+    return found
 
 
 def _scale(content: dict[str, Any], where: str) -> float | None:

@@ -16,7 +16,7 @@ import shapely
 from hybridnav.building import DoorLine
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import number_of, pair_of, shown
-from hybridnav.io.rmf_drawing import Drawing, drawings_of
+from hybridnav.io.rmf_drawing import Drawing, drawing_of, drawings_of
 from hybridnav.io.rmf_floors import (
     MOST_FLOORS,
     Name,
@@ -93,8 +93,9 @@ def read_drawn(
     }
     index = _graph_index(contents, where, graph_index)
     drawings = drawings_of(data, contents, where)
+    reference = str(data.get("reference_level_name", next(iter(contents), "")))
     lifts = {
-        lift: _Cabin(mapping_of(facts, at, "the lift"), data, drawings, at)
+        lift: _Cabin(mapping_of(facts, at, "the lift"), reference, drawings, at)
         for lift, facts in mapping_of(data.get("lifts"), where, "lifts", MOST_FLOORS).items()
         for at in [f"{where}, lift {shown(lift)}"]
     }
@@ -103,7 +104,8 @@ def read_drawn(
     floors = []
     for level, content in contents.items():
         floor = RmfFloor(level, where, _elevation(content))
-        _fill(floor, content, drawings[level], index, taken)
+        if any(_index_of(lane) == index for lane in _lanes(content)):
+            _fill(floor, content, drawing_of(drawings, level, where), index, taken)
         for lift, cabin in lifts.items():
             inside = (point for point in floor.points if cabin.holds(level, point))
             end = next(inside, None)
@@ -225,16 +227,13 @@ class _Cabin:
     """The rectangle of a lift, in the frame of the reference level."""
 
     def __init__(
-        self, facts: dict[str, Any], data: dict[str, Any], drawings: dict[str, Drawing], where: str
+        self, facts: dict[str, Any], reference: str, drawings: dict[str, Drawing], where: str
     ) -> None:
         raw = pair_of((facts.get("x"), facts.get("y")))
         width, depth, yaw = (number_of(facts.get(key)) for key in ("width", "depth", "yaw"))
         if raw is None or not (width > 0 and depth > 0 and math.isfinite(yaw)):
             raise MapError(f"{where}: expected x, y, yaw, and width and depth in metres")
-        level = facts.get("reference_floor_name", data.get("reference_level_name"))
-        drawing = next(iter(drawings.values())) if level is None else drawings.get(str(level))
-        if drawing is None:
-            raise MapError(f"{where}: its level {level!r:.60} is not there")
+        drawing = drawing_of(drawings, str(facts.get("reference_floor_name", reference)), where)
         self.dims_m = width, depth
         self._at, self._yaw = drawing.point(raw), yaw
         self._levels = {
