@@ -31,7 +31,7 @@ HONOUR = {"grid-astar": True, "paper": False, "portals": False, "robot": False}
 REFUSE = {"shortest", "octile"} | {
     f"ompl-{name}" for name in ("bitstar", "informed-rrtstar", "prmstar", "rrtconnect", "rrtstar")
 }
-COMMANDS = {"plan", "build", "evaluate"}
+COMMANDS = {"plan", "build", "evaluate", "view"}
 """Commands that make a planner."""
 NO_PLANNER = {"show", "rooms", "compare", "preset", "map", "replay", "explore", "export", "check"}
 RADIUS_M = 0.25

@@ -24,6 +24,7 @@ _HOME_OF = {
     "show": "show",
     "rooms": "rooms",
     "replay": "replay",
+    "view": "view",
     "export": "export",
     "check": "check",
     "evaluate": "evaluate",

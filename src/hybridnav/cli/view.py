@@ -1,0 +1,154 @@
+"""`hybridnav view`: a local page for people who would rather click than type."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hybridnav._files import printable
+from hybridnav.cli.common import (
+    Reading,
+    answer,
+    check_output,
+    check_room_to_be,
+    grow_topology,
+    load_model,
+    overridden,
+    read_settings,
+)
+from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
+from hybridnav.cli.errors import UsageError
+from hybridnav.cli.options import (
+    FreeOption,
+    LeastIslandOption,
+    MapArgument,
+    MaxCellsOption,
+    OccupiedOption,
+    PresetOption,
+    RadiusOption,
+    RoomsOption,
+    SeedOption,
+    SetOption,
+)
+from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.grid.names import read_point
+
+if TYPE_CHECKING:
+    import hybridnav as hn
+    from hybridnav.view import Session
+    from hybridnav.view.requests import PlanQuery
+
+_ROOMS = "rooms.yaml"
+_ENDS = 2
+
+SaveOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--save", metavar="FILE", help="Write the page into one .html file instead of serving it."
+    ),
+]
+RouteOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--route", metavar="X,Y:X,Y", help="A route of the saved page, in metres; may be repeated."
+    ),
+]
+PortOption = Annotated[
+    int,
+    typer.Option("--port", metavar="N", min=0, max=65535, help="Port on 127.0.0.1; 0 for any."),
+]
+BrowserOption = Annotated[
+    bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+]
+
+
+def view(
+    map_file: MapArgument,
+    save: SaveOption = None,
+    routes: RouteOption = None,
+    port: PortOption = 0,
+    browser: BrowserOption = True,
+    rooms_file: RoomsOption = None,
+    costs: CostsOption = None,
+    preset: PresetOption = None,
+    overrides: SetOption = None,
+    robot_radius_m: RadiusOption = None,
+    seed: SeedOption = None,
+    free_threshold: FreeOption = None,
+    occupied_threshold: OccupiedOption = None,
+    least_island_m2: LeastIslandOption = 0.0,
+    max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+) -> None:
+    """Open MAP as a page on 127.0.0.1: click routes, close doors, name rooms. Ctrl-C ends it."""
+    check_output(save, "--save", (".html",))
+    if routes and save is None:
+        raise UsageError("--route is for a saved page: add --save FILE, or leave it out")
+    ends = [_ends(text) for text in routes or ()]
+    given = parsed_costs(costs)
+    settings = read_settings(
+        PRESET if preset is None and given else preset, None, None, None, map_file=map_file
+    )
+    settings = overridden(settings, [*given.overrides, *(overrides or ())], robot_radius_m, seed)
+    seconds: dict[str, float] = {}
+    reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
+    model = load_model(map_file, settings, seconds, reading)
+    check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
+    rooms_path = map_file.parent / _ROOMS if rooms_file is None else rooms_file
+    session = _session(model, settings, rooms_path, given.read(model.grid))
+    if save is not None:
+        _save(session, save, ends, settings.name)
+        return
+    from hybridnav.view import serve  # noqa: PLC0415 - loads numba and matplotlib
+
+    def ready(address: str) -> None:
+        answer(f"page       {address}\nCtrl-C     ends it\n")
+        if browser:
+            import webbrowser  # noqa: PLC0415 - on demand
+
+            webbrowser.open(address)
+
+    serve(session, rooms_path.parent, port=port, ready=ready)
+
+
+def _session(
+    model: hn.Model, settings: hn.Preset, rooms_path: Path, costs: hn.CostLayer | None
+) -> Session:
+    # These load numba and matplotlib, which help and wrong usage can do without.
+    from hybridnav.view import Session  # noqa: PLC0415
+    from hybridnav.view.rooms_file import RoomsFile  # noqa: PLC0415
+
+    rooms = rooms_path if rooms_path.exists() else None
+    file = RoomsFile(rooms_path.parent, rooms_path.name)
+    topology = grow_topology(model, settings, {}, rooms_file=rooms, find_rooms=True)
+    return Session(model, topology, settings, costs=costs, file=file)
+
+
+def _ends(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the two points of `X,Y:X,Y`."""
+    points = [read_point(part) for part in text.split(":")]
+    good = [p for p in points if p is not None and len(p) == _ENDS and all(map(math.isfinite, p))]
+    if len(points) != _ENDS or len(good) != _ENDS:
+        raise UsageError(f"--route must be X,Y:X,Y in metres, got {text!r:.80}")
+    return good[0], good[1]
+
+
+def _save(
+    session: Session,
+    path: Path,
+    ends: list[tuple[tuple[float, ...], tuple[float, ...]]],
+    preset: str,
+) -> None:
+    from hybridnav.view import save_page  # noqa: PLC0415 - loads numba and matplotlib
+    from hybridnav.view.graph import in_grid  # noqa: PLC0415
+    from hybridnav.view.requests import PlanQuery  # noqa: PLC0415
+
+    queries: list[PlanQuery] = []
+    for start, goal in ends:
+        first, last = in_grid([start, goal], session.grid)
+        queries.append(PlanQuery(start=first, goal=last, preset=preset))
+    save_page(session, path, queries)
+    size = path.stat().st_size / 1e6
+    answer(f"page       {printable(path)}, {size:.1f} MB, {len(queries)} routes\n")

@@ -1,0 +1,5 @@
+from .saved import save_page as save_page
+from .serving import serve as serve
+from .session import Session as Session
+
+__all__: list[str]

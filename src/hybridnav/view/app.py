@@ -1,0 +1,264 @@
+"""The server of the page: checked requests in, JSON, tiles and files out."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from typing import TYPE_CHECKING, Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from hybridnav.errors import HybridNavError, InvalidValueError, MapError
+from hybridnav.view.export import KINDS, exported
+from hybridnav.view.page import ASSETS, POLICY, asset, live_page
+from hybridnav.view.requests import (
+    AlternativesQuery,
+    At,
+    Edit,
+    PlanQuery,
+    Query,
+    Save,
+    Undo,
+    checked,
+)
+from hybridnav.view.session import ConflictError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from starlette.requests import Request
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
+    from hybridnav.view.session import Session
+    from hybridnav.view.tiles import Theme
+
+_MOST_BYTES = 2_000_000
+"""Size of a request's body."""
+_HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"x-frame-options", b"DENY"),
+)
+_FORBIDDEN, _TOO_LARGE, _WRONG_KIND, _UNPROCESSABLE, _CONFLICT, _FULL = 403, 413, 415, 422, 409, 507
+
+
+class Guard:
+    """What answers only the page itself: its token, its host, its origin.
+
+    A page of another site knows no token, and a name that points to 127.0.0.1 is not a host of
+    this server.
+    """
+
+    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
+        self._app = app
+        self._prefix = f"/{token}/".encode()
+        self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
+        self._origins = {b"http://" + host for host in self._hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_safely(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message.get("headers", ()), *_HEADERS]
+            await send(message)
+
+        refusal = self._refusal(scope) if scope["type"] == "http" else "no such protocol"
+        if refusal is not None:
+            await _error(refusal, _FORBIDDEN)(scope, receive, send_safely)
+            return
+        await self._app(scope, receive, send_safely)
+
+    def _refusal(self, scope: Scope) -> str | None:
+        headers: dict[bytes, list[bytes]] = {}
+        for name, value in scope["headers"]:
+            headers.setdefault(name.lower(), []).append(value)
+        raw: bytes = scope.get("raw_path") or scope["path"].encode()
+        given = raw[: len(self._prefix)]
+        if not secrets.compare_digest(given, self._prefix):
+            return "the address has no valid token: open the address that the command printed"
+        hosts = headers.get(b"host", [])
+        if len(hosts) != 1 or hosts[0].lower() not in self._hosts:
+            return "wrong host"
+        if any(origin not in self._origins for origin in headers.get(b"origin", [])):
+            return "wrong origin"
+        if headers.get(b"sec-fetch-site", [b"none"])[0] not in {b"same-origin", b"none"}:
+            return "wrong site"
+        return None
+
+
+def make_app(session: Session, *, token: str, port: int, folder: Path) -> ASGIApp:
+    """Return the application of a page.
+
+    Parameters
+    ----------
+    session
+        What it shows.
+    token
+        The first part of every path.
+    port
+        The port on 127.0.0.1.
+    folder
+        The only folder in which anything is written.
+    """
+    answers = _Answers(session, folder)
+    at = f"/{token}"
+    posts: dict[str, Callable[[Any], Any]] = {
+        "plan": answers.plan,
+        "optimum": answers.optimum,
+        "alternatives": answers.alternatives,
+        "at": answers.at,
+        "edit": answers.edit,
+        "undo": answers.undo,
+        "save": answers.save,
+    }
+    gets: dict[str, Callable[[Request], Any]] = {
+        "map.json": lambda _: session.describe(),
+        "rooms.json": lambda _: session.describe_rooms(),
+        "outlines.json": lambda _: session.outlines(),
+        "graph/{level}.json": lambda request: session.graph(request.path_params["level"]),
+        "costs/{preset}.json": lambda request: session.costs(request.path_params["preset"]),
+    }
+    routes = [
+        Route(f"{at}/", _get(lambda _: live_page(), "text/html")),
+        *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in ASSETS),
+        Route(f"{at}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png", _get(answers.tile, "image/png")),
+        Route(f"{at}/export/{{kind}}", _post_file(answers), methods=["POST"]),
+        *(Route(f"{at}/{name}", _get_json(answer)) for name, answer in gets.items()),
+        *(Route(f"{at}/{name}", _post(act), methods=["POST"]) for name, act in posts.items()),
+    ]
+    return Guard(Starlette(routes=routes), token, port)
+
+
+class _Answers:
+    """What each request does."""
+
+    def __init__(self, session: Session, folder: Path) -> None:
+        self.session, self.folder = session, folder
+
+    def plan(self, value: Any) -> dict[str, Any]:
+        return self.session.planning.plan(checked(PlanQuery, value))
+
+    def optimum(self, value: Any) -> dict[str, Any]:
+        return self.session.planning.optimum(checked(Query, value))
+
+    def alternatives(self, value: Any) -> dict[str, Any]:
+        return self.session.planning.alternatives(checked(AlternativesQuery, value))
+
+    def at(self, value: Any) -> dict[str, Any]:
+        return {"room": self.session.room_at(checked(At, value).point)}
+
+    def edit(self, value: Any) -> dict[str, Any]:
+        return self.session.edit(checked(Edit, value))
+
+    def undo(self, value: Any) -> dict[str, Any]:
+        return self.session.undo(checked(Undo, value).version)
+
+    def save(self, value: Any) -> dict[str, Any]:
+        return self.session.save(checked(Save, value))
+
+    def export(self, kind: str, value: Any) -> bytes:
+        query = checked(Query, value) if value else None
+        return exported(self.session.planning, kind, query, self.folder)
+
+    def tile(self, request: Request) -> bytes:
+        place = request.path_params
+        numbers = [place[name] for name in ("zoom", "row", "col")]
+        if not all(n.isascii() and n.isdigit() and len(n) < 8 for n in numbers):  # noqa: PLR2004
+            raise InvalidValueError("a tile has three whole numbers")
+        zoom, row, col = map(int, numbers)
+        theme: Theme = "dark" if request.query_params.get("theme") == "dark" else "light"
+        return self.session.layer(place["layer"]).png(zoom, row, col, theme)
+
+
+def _error(message: str, code: int) -> JSONResponse:
+    return JSONResponse({"error": message}, status_code=code)
+
+
+async def _done(work: Callable[[], Any]) -> Any:
+    """Return what work returns, or the response that states why it does not."""
+    try:
+        return await run_in_threadpool(work)
+    except ConflictError as error:
+        return _error(str(error), _CONFLICT)
+    except MapError as error:
+        return _error(str(error), _FULL)
+    except HybridNavError as error:
+        return _error(str(error), _UNPROCESSABLE)
+    except OSError as error:
+        return _error(f"cannot write: {error.strerror}", _FULL)
+
+
+def _get(read: Callable[[Any], Any], kind: str) -> Any:
+    async def answer(request: Request) -> Response:
+        found = await _done(lambda: read(request))
+        if isinstance(found, Response):
+            return found
+        return Response(found, media_type=kind, headers={"cache-control": "no-cache"})
+
+    return answer
+
+
+def _asset_reader(name: str) -> Callable[[Any], str]:
+    return lambda _: asset(name)
+
+
+def _get_json(read: Callable[[Any], Any]) -> Any:
+    async def answer(request: Request) -> Response:
+        return _json(await _done(lambda: read(request)))
+
+    return answer
+
+
+def _post(act: Callable[[Any], Any]) -> Any:
+    async def answer(request: Request) -> Response:
+        value = await _body(request)
+        return value if isinstance(value, Response) else _json(await _done(lambda: act(value)))
+
+    return answer
+
+
+def _post_file(answers: _Answers) -> Any:
+    async def answer(request: Request) -> Response:
+        value, kind = await _body(request), request.path_params["kind"]
+        if isinstance(value, Response):
+            return value
+        found = await _done(lambda: answers.export(kind, value))
+        if isinstance(found, Response):
+            return found
+        named = f'attachment; filename="{KINDS[kind]}"'
+        headers = {"content-disposition": named, "cache-control": "no-store"}
+        return Response(found, media_type="application/octet-stream", headers=headers)
+
+    return answer
+
+
+def _json(found: Any) -> Response:
+    if isinstance(found, Response):
+        return found
+    return JSONResponse(found, headers={"cache-control": "no-store"})
+
+
+async def _body(request: Request) -> Any:
+    """Return the value of a request's body, or the response that refuses it."""
+    if request.headers.get("content-type", "").partition(";")[0] != "application/json":
+        return _error("expected application/json", _WRONG_KIND)
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > _MOST_BYTES:
+            return _error(f"more than {_MOST_BYTES} bytes", _TOO_LARGE)
+    try:
+        return json.loads(body)
+    except (ValueError, RecursionError):
+        return _error("expected JSON", _UNPROCESSABLE)

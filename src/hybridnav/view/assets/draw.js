@@ -1,0 +1,211 @@
+// What is drawn over the cells: arcs, doors, names, routes, closures, the scale bar.
+
+export const ROUTE_COLOURS = {
+  light: ["#c4122f", "#4837b6", "#b36b00", "#110328", "#6d6e6d"],
+  dark: ["#ff6b7f", "#a99cff", "#ffc266", "#f2e8ff", "#b9bab9"],
+};
+const INKS = {
+  light: { ink: "#1a1a1a", halo: "#ffffff", free: "#5c5c5c", rim: "#868686", unexplored: "#a6a6a6",
+    loop: "#cc3311", closed: "#7b3294", door: "#1a1a1a", dot: "#8c8c8c" },
+  dark: { ink: "#f2f4f5", halo: "#14181b", free: "#c3cad0", rim: "#8d979f", unexplored: "#6b757d",
+    loop: "#ff9a80", closed: "#d79bea", door: "#f2f4f5", dot: "#7d8790" },
+};
+const FONT = "system-ui, 'Segoe UI', 'Noto Sans', 'DejaVu Sans', sans-serif";
+
+export function inksOf(scene) {
+  return INKS[scene.theme];
+}
+
+function traced(scene, points, isClosed = false) {
+  const { context } = scene;
+  points.forEach((point, at) => {
+    const [x, y] = scene.toScreen(point);
+    if (at) context.lineTo(x, y);
+    else context.moveTo(x, y);
+  });
+  if (isClosed) context.closePath();
+}
+
+function stroked(scene, lines, colour, width, dash = []) {
+  const { context } = scene;
+  context.beginPath();
+  for (const line of lines) traced(scene, line);
+  Object.assign(context, { strokeStyle: colour, lineWidth: width, lineCap: "round", lineJoin: "round" });
+  context.setLineDash(dash);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+function dots(scene, points, colour, radius) {
+  const { context } = scene;
+  context.fillStyle = colour;
+  for (const point of points) {
+    const [x, y] = scene.toScreen(point);
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.fill();
+  }
+}
+
+export function paintGraph(scene, graph) {
+  if (!graph?.drawn) return;
+  const inks = inksOf(scene);
+  const radius = Math.min(4.5, Math.max(0.7, 0.09 * graph.spacing * scene.scale));
+  const width = Math.min(1.6, Math.max(0.4, 0.5 * radius));
+  stroked(scene, graph.unexplored_arcs, inks.unexplored, 0.6 * width);
+  stroked(scene, graph.rim_arcs, inks.rim, 0.6 * width);
+  stroked(scene, graph.free_arcs, inks.free, width);
+  stroked(scene, graph.loops, inks.loop, width, [4, 2]);
+  dots(scene, graph.unexplored_dots, inks.dot, 0.75 * radius);
+  dots(scene, graph.free_dots, inks.ink, radius);
+}
+
+export function paintDoors(scene, doors) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  const half = Math.min(5, Math.max(2, 5 * scene.scale));
+  context.lineWidth = 1.5;
+  for (const door of doors) {
+    const [x, y] = scene.toScreen(door.at);
+    context.beginPath();
+    if (door.kind === "opening") context.rect(x - half, y - half, 2 * half, 2 * half);
+    else context.arc(x, y, half, 0, 2 * Math.PI);
+    context.fillStyle = door.passable ? inks.door : inks.halo;
+    context.strokeStyle = door.passable ? inks.halo : inks.door;
+    context.fill();
+    context.stroke();
+  }
+}
+
+// Write names where they do not hide one another, those of large rooms first.
+export function paintNames(scene, rooms, taken, chosen) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  const order = [...rooms].sort((a, b) => (b.name === chosen) - (a.name === chosen) || b.area_m2 - a.area_m2);
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  for (const room of order) {
+    const [x, y] = scene.toScreen(room.at);
+    if (x < 0 || y < 0 || x > scene.width || y > scene.height) continue;
+    context.font = `${room.name === chosen ? "700" : "500"} 13px ${FONT}`;
+    const half = context.measureText(room.name).width / 2 + 3;
+    const wide = 2.4 * Math.sqrt(room.area_m2) / scene.map.resolution_m * scene.scale;
+    if (2 * half > wide && room.name !== chosen) continue;
+    const boxAt = (down) => [x - half, y + down - 9, x + half, y + down + 9];
+    const isFree = (box) => !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);
+    const down = [0, -20, 20].find((each) => isFree(boxAt(each)));
+    if (down === undefined) continue;
+    taken.push(boxAt(down));
+    Object.assign(context, { strokeStyle: inks.halo, lineWidth: 3.5, lineJoin: "round", fillStyle: inks.ink });
+    context.strokeText(room.name, x, y + down);
+    context.fillText(room.name, x, y + down);
+  }
+}
+
+export function paintRoutes(scene, routes, chosen) {
+  const inks = inksOf(scene);
+  const order = routes.map((route, at) => [route, at]).sort((a, b) => (a[1] === chosen) - (b[1] === chosen));
+  for (const [route, at] of order) {
+    if (!route.line.length) continue;
+    const width = at === chosen ? 4 : 2.75;
+    stroked(scene, [route.line], inks.halo, width + 2.5);
+    stroked(scene, [route.line], ROUTE_COLOURS[scene.theme][at % 5], width);
+  }
+}
+
+export function paintDashed(scene, line) {
+  if (!line?.length) return;
+  const inks = inksOf(scene);
+  stroked(scene, [line], inks.halo, 4.5);
+  stroked(scene, [line], inks.free, 2.25, [7, 6]);
+}
+
+// Letters say which end is which where colours do not.
+export function paintEnd(scene, point, letter) {
+  if (!point) return;
+  const { context } = scene;
+  const [x, y] = scene.toScreen(point);
+  const inks = inksOf(scene);
+  context.beginPath();
+  context.arc(x, y, 10, 0, 2 * Math.PI);
+  Object.assign(context, { fillStyle: letter === "A" ? inks.ink : ROUTE_COLOURS[scene.theme][0],
+    strokeStyle: inks.halo, lineWidth: 2 });
+  context.fill();
+  context.stroke();
+  Object.assign(context, { fillStyle: inks.halo, font: `700 12px ${FONT}`,
+    textAlign: "center", textBaseline: "middle" });
+  context.fillText(letter, x, y + 0.5);
+}
+
+export function paintClosed(scene, closed, map, draft) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  const cross = (point) => {
+    const [x, y] = scene.toScreen(point);
+    context.beginPath();
+    for (const side of [-1, 1]) {
+      context.moveTo(x - 8, y - 8 * side);
+      context.lineTo(x + 8, y + 8 * side);
+    }
+    for (const [colour, width] of [[inks.halo, 7], [inks.closed, 4]]) {
+      Object.assign(context, { strokeStyle: colour, lineWidth: width, lineCap: "round" });
+      context.stroke();
+    }
+  };
+  for (const ring of closed.polygons) {
+    context.beginPath();
+    traced(scene, ring, true);
+    Object.assign(context, { fillStyle: `${inks.closed}66`, strokeStyle: inks.closed, lineWidth: 2 });
+    context.fill();
+    context.stroke();
+  }
+  map.rooms.doors.filter((door) => closed.doors.includes(door.number)).forEach((door) => cross(door.at));
+  map.rooms.rooms.filter((room) => closed.rooms.includes(room.name)).forEach((room) => cross(room.at));
+  if (draft.length) {
+    stroked(scene, [draft], inks.closed, 2, [5, 4]);
+    dots(scene, draft, inks.closed, 4);
+  }
+}
+
+export function paintOutline(scene, rings, hasCorners) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  context.beginPath();
+  for (const ring of rings) traced(scene, ring, true);
+  Object.assign(context, { strokeStyle: inks.closed, lineWidth: 2.5, lineJoin: "round" });
+  context.stroke();
+  if (!hasCorners) return;
+  context.lineWidth = 2;
+  for (const corner of rings.flat()) {
+    const [x, y] = scene.toScreen(corner);
+    context.fillStyle = inks.halo;
+    context.fillRect(x - 4, y - 4, 8, 8);
+    context.strokeRect(x - 4, y - 4, 8, 8);
+  }
+}
+
+// A bar of 1, 2 or 5 times a power of ten metres, between a tenth and a quarter of the width.
+export function paintScaleBar(scene) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  const perMetre = scene.scale / scene.map.resolution_m;
+  const most = Math.min(240, 0.25 * scene.width) / perMetre;
+  const power = 10 ** Math.floor(Math.log10(most));
+  const metres = [5, 2, 1].map((n) => n * power).find((n) => n <= most) ?? power;
+  const [left, bottom, length] = [16, scene.height - 20, metres * perMetre];
+  const text = metres >= 1 ? `${metres} m` : `${Math.round(metres * 100 * 10) / 10} cm`;
+  context.font = `600 13px ${FONT}`;
+  const wide = Math.max(length, context.measureText(text).width);
+  context.fillStyle = `${inks.halo}d9`;
+  context.fillRect(left - 8, bottom - 26, wide + 16, 38);
+  context.beginPath();
+  context.moveTo(left, bottom - 6);
+  context.lineTo(left, bottom);
+  context.lineTo(left + length, bottom);
+  context.lineTo(left + length, bottom - 6);
+  Object.assign(context, { strokeStyle: inks.ink, lineWidth: 2, lineCap: "butt", lineJoin: "miter" });
+  context.stroke();
+  Object.assign(context, { fillStyle: inks.ink, textAlign: "left", textBaseline: "alphabetic" });
+  context.fillText(text, left, bottom - 11);
+  scene.canvas.dataset.scaleBar = text;
+}

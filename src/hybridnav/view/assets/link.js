@@ -1,0 +1,85 @@
+// Where the page's data come from: the server behind it, or the file that it was saved in.
+
+export class Failure extends Error {
+  constructor(message, code) {
+    super(message);
+    this.code = code;
+  }
+}
+
+export class LiveLink {
+  isLive = true;
+
+  async #fetched(path, options) {
+    let response;
+    try {
+      response = await fetch(path, options);
+    } catch {
+      throw new Failure("The server does not answer: is the command still running? " +
+        "Changes of rooms are kept and come back when it is started again.", 0);
+    }
+    if (response.ok) return response;
+    const answer = await response.json().catch(() => ({}));
+    throw new Failure(answer.error ?? `error ${response.status}`, response.status);
+  }
+
+  async get(name) {
+    return (await this.#fetched(`${name}.json`)).json();
+  }
+
+  #posted(name, body) {
+    const headers = { "content-type": "application/json" };
+    return this.#fetched(name, { method: "POST", headers, body: JSON.stringify(body) });
+  }
+
+  async post(name, body) {
+    return (await this.#posted(name, body)).json();
+  }
+
+  async file(kind, body) {
+    return (await this.#posted(`export/${kind}`, body)).blob();
+  }
+
+  firstZoom() {
+    return 0;
+  }
+
+  tileAddress(layer, { zoom, row, col, theme, version }) {
+    return `tile/${layer}/${zoom}/${row}/${col}.png?theme=${theme}&version=${version}`;
+  }
+}
+
+export class SavedLink {
+  isLive = false;
+
+  constructor(data) {
+    this.data = data;
+  }
+
+  async get(name) {
+    if (name === "map") return this.data.map;
+    if (name.startsWith("graph/")) return this.data.graph;
+    throw new Failure("not in this file", 404);
+  }
+
+  firstZoom(layer) {
+    return this.data.tiles[layer]?.first ?? 0;
+  }
+
+  tileAddress(layer, { zoom, row, col, theme }) {
+    return this.data.tiles[layer]?.found[`${theme}/${zoom}/${row}/${col}`];
+  }
+}
+
+export function openLink() {
+  const saved = document.getElementById("saved");
+  return saved ? new SavedLink(JSON.parse(saved.textContent)) : new LiveLink();
+}
+
+export function download(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

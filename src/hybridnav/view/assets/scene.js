@@ -1,0 +1,231 @@
+// The view of the map on its canvas: where it is, and the tiles under everything else.
+// Points are [column, row] in grid units, row 0 at the bottom.
+
+const TILE = 256;
+const MOST_TILES = 600;
+const LEAST_SCALE = 0.005;
+const MOST_SCALE = 64;
+
+export class Scene {
+  middle = [0, 0];
+  scale = 1; // CSS pixels per cell
+  width = 0;
+  height = 0;
+  painters = [];
+  #tiles = new Map();
+  #isDue = false;
+
+  constructor(canvas, map, link) {
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d");
+    this.map = map;
+    this.link = link;
+    this.theme = "light";
+    this.layer = "rooms";
+    this.overlay = null;
+    this.version = 0;
+    new ResizeObserver(() => this.#resize()).observe(canvas);
+    this.#resize();
+    this.fit();
+  }
+
+  #resize() {
+    const ratio = window.devicePixelRatio || 1;
+    this.ratio = ratio;
+    this.width = this.canvas.clientWidth;
+    this.height = this.canvas.clientHeight;
+    this.canvas.width = Math.round(this.width * ratio);
+    this.canvas.height = Math.round(this.height * ratio);
+    this.draw();
+  }
+
+  fit() {
+    const [left, right, bottom, top] = this.map.known;
+    this.middle = [(left + right) / 2, (bottom + top) / 2];
+    const room = Math.min(this.width / (right - left), this.height / (top - bottom));
+    this.scale = this.#clamped(0.94 * room);
+    this.draw();
+  }
+
+  #clamped(scale) {
+    return Math.min(MOST_SCALE, Math.max(LEAST_SCALE, scale || 1));
+  }
+
+  toScreen([x, y]) {
+    return [
+      this.width / 2 + (x - this.middle[0]) * this.scale,
+      this.height / 2 - (y - this.middle[1]) * this.scale,
+    ];
+  }
+
+  toGrid([left, top]) {
+    return [
+      this.middle[0] + (left - this.width / 2) / this.scale,
+      this.middle[1] - (top - this.height / 2) / this.scale,
+    ];
+  }
+
+  toMetres([x, y]) {
+    const { origin, along, up } = this.map.frame;
+    return [origin[0] + x * along[0] + y * up[0], origin[1] + x * along[1] + y * up[1]];
+  }
+
+  fromMetres([x, y]) {
+    const { origin, along, up } = this.map.frame;
+    const area = along[0] * up[1] - along[1] * up[0];
+    const [dx, dy] = [x - origin[0], y - origin[1]];
+    return [(dx * up[1] - dy * up[0]) / area, (dy * along[0] - dx * along[1]) / area];
+  }
+
+  pan(right, down) {
+    this.middle = [this.middle[0] - right / this.scale, this.middle[1] + down / this.scale];
+    this.draw();
+  }
+
+  zoom(factor, at = [this.width / 2, this.height / 2]) {
+    const held = this.toGrid(at);
+    this.scale = this.#clamped(this.scale * factor);
+    const now = this.toGrid(at);
+    this.middle = [this.middle[0] + held[0] - now[0], this.middle[1] + held[1] - now[1]];
+    this.draw();
+  }
+
+  draw() {
+    if (this.#isDue) return;
+    this.#isDue = true;
+    requestAnimationFrame(() => {
+      this.#isDue = false;
+      this.paint();
+    });
+  }
+
+  paint() {
+    const { context, ratio } = this;
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    context.save();
+    const [left, top] = this.toScreen([0, this.map.rows]).map((v) => Math.round(v * ratio));
+    const [right, bottom] = this.toScreen([this.map.cols, 0]).map((v) => Math.round(v * ratio));
+    context.beginPath();
+    context.rect(left, top, right - left, bottom - top);
+    context.clip();
+    this.#paintTiles(this.layer, true);
+    if (this.overlay) this.#paintTiles(this.overlay, false);
+    context.restore();
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    for (const painter of this.painters) painter(this);
+    this.canvas.dataset.view = [...this.middle, this.scale].join(" ");
+    this.canvas.dataset.waiting = [...this.#tiles.values()].filter((t) => !t.isReady).length;
+  }
+
+  #paintTiles(layer, isOpaque) {
+    const last = this.map.zooms - 1;
+    const first = this.link.firstZoom(layer);
+    const wanted = Math.floor(-Math.log2(this.scale * this.ratio));
+    const zoom = Math.max(first, Math.min(Math.max(last, first), wanted));
+    if (isOpaque && zoom < last) this.#paintZoom(layer, last); // seen until finer tiles arrive
+    this.#paintZoom(layer, zoom);
+  }
+
+  #paintZoom(layer, zoom) {
+    const { context, ratio } = this;
+    const side = TILE * 2 ** zoom;
+    const [west, north] = this.toGrid([0, 0]);
+    const [east, south] = this.toGrid([this.width, this.height]);
+    const lastRow = Math.min(Math.floor(north / side), Math.ceil(this.map.rows / side) - 1);
+    const lastCol = Math.min(Math.floor(east / side), Math.ceil(this.map.cols / side) - 1);
+    context.imageSmoothingEnabled = this.scale * ratio * 2 ** zoom < 1;
+    context.imageSmoothingQuality = "high";
+    context.setTransform(1, 0, 0, -1, 0, 0); // row 0 of a tile is the lowest
+    for (let row = Math.max(0, Math.floor(south / side)); row <= lastRow; row++) {
+      for (let col = Math.max(0, Math.floor(west / side)); col <= lastCol; col++) {
+        const tile = this.#tile(layer, zoom, row, col);
+        if (!tile?.isReady) continue;
+        const [wide, high] = [tile.image.width * 2 ** zoom, tile.image.height * 2 ** zoom];
+        const from = this.toScreen([col * side, row * side]).map((v) => Math.round(v * ratio));
+        const to = this.toScreen([col * side + wide, row * side + high])
+          .map((v) => Math.round(v * ratio));
+        context.drawImage(tile.image, from[0], -from[1], to[0] - from[0], from[1] - to[1]);
+      }
+    }
+    context.setTransform(1, 0, 0, 1, 0, 0);
+  }
+
+  #tile(layer, zoom, row, col) {
+    const { theme, version } = this;
+    const address = this.link.tileAddress(layer, { zoom, row, col, theme, version });
+    if (!address) return null;
+    let tile = this.#tiles.get(address);
+    if (tile) {
+      this.#tiles.delete(address); // the last used stands last
+    } else {
+      tile = { image: new Image(), isReady: false };
+      tile.image.onload = () => { tile.isReady = true; this.draw(); };
+      tile.image.onerror = () => { this.#tiles.delete(address); };
+      tile.image.src = address;
+    }
+    this.#tiles.set(address, tile);
+    if (this.#tiles.size > MOST_TILES) this.#tiles.delete(this.#tiles.keys().next().value);
+    return tile;
+  }
+}
+
+// Connect a scene with pointer, wheel and keys; `handlers` decide what a click or drag means.
+export function steer(scene, handlers) {
+  const { canvas } = scene;
+  const pointers = new Map();
+  let held = null;
+  let moved = 0;
+  const at = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  };
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, at(event));
+    moved = 0;
+    if (pointers.size === 1) held = handlers.grab(at(event));
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const [before, now] = [pointers.get(event.pointerId), at(event)];
+    handlers.hover(now);
+    if (!before) return;
+    moved += Math.hypot(now[0] - before[0], now[1] - before[1]);
+    if (pointers.size === 2) {
+      const other = [...pointers].find(([id]) => id !== event.pointerId)[1];
+      const apart = (point) => Math.hypot(point[0] - other[0], point[1] - other[1]);
+      scene.zoom(apart(now) / Math.max(1, apart(before)), other);
+    } else if (held && moved > 2) {
+      handlers.drag(held, now);
+    } else if (moved > 4) {
+      scene.pan(now[0] - before[0], now[1] - before[1]);
+    }
+    pointers.set(event.pointerId, now);
+  });
+  const release = (event) => {
+    if (!pointers.delete(event.pointerId) || pointers.size) return;
+    if (held && moved > 2) handlers.drop(held, at(event));
+    else if (moved <= 4 && event.type === "pointerup") handlers.click(at(event));
+    held = null;
+  };
+  canvas.addEventListener("pointerup", release);
+  canvas.addEventListener("pointercancel", release);
+  canvas.addEventListener("pointerleave", () => handlers.hover(null));
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    const lines = event.deltaMode === 1 ? 24 : 1;
+    scene.zoom(1.0016 ** -(event.deltaY * lines), at(event));
+  }, { passive: false });
+  canvas.addEventListener("keydown", (event) => {
+    const step = 80;
+    const actions = {
+      ArrowLeft: () => scene.pan(step, 0), ArrowRight: () => scene.pan(-step, 0),
+      ArrowUp: () => scene.pan(0, step), ArrowDown: () => scene.pan(0, -step),
+      "+": () => scene.zoom(1.4), "=": () => scene.zoom(1.4),
+      "-": () => scene.zoom(1 / 1.4), 0: () => scene.fit(),
+    };
+    if (event.ctrlKey || event.metaKey || !actions[event.key]) return;
+    event.preventDefault();
+    actions[event.key]();
+  });
+}

@@ -1,0 +1,174 @@
+"""Plans for the page: planners by preset, and answers as plain values in grid units."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import TYPE_CHECKING, Any
+
+import shapely
+
+from hybridnav.config import load_preset, preset_names
+from hybridnav.errors import InvalidValueError
+from hybridnav.planner import Blocked, plan_alternatives, plan_tour
+from hybridnav.view.graph import in_grid, in_metres
+
+if TYPE_CHECKING:
+    from hybridnav.config import Preset
+    from hybridnav.costs import CostLayer
+    from hybridnav.io import Model
+    from hybridnav.planner import HybridPlanner, Tour
+    from hybridnav.result import PlanResult
+    from hybridnav.topology import TopologicalMap
+    from hybridnav.view.requests import AlternativesQuery, Closed, PlanQuery, Query
+
+GRID = "grid-astar"
+"""The preset of the optimum on the grid."""
+
+
+class Planning:
+    """The planners of one topological map, made when a preset is first asked for.
+
+    Parameters
+    ----------
+    model
+        The map or model.
+    topology
+        Its topological map with rooms.
+    settings
+        The preset that the page begins with; its section `pyramid` holds for all.
+    costs
+        Costs given beside the presets, None for none.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        topology: TopologicalMap,
+        settings: Preset,
+        costs: CostLayer | None = None,
+    ) -> None:
+        self.topology = topology
+        self.grid = topology.grid
+        self._model, self._settings, self._costs = model, settings, costs
+        self._planners: dict[str, HybridPlanner] = {}
+        self._making = threading.Lock()
+
+    @property
+    def presets(self) -> list[str]:
+        """The names to choose from, the one of the start first."""
+        first = self._settings.name
+        return [first, *(name for name in preset_names() if name != first)]
+
+    def planner(self, name: str) -> HybridPlanner:
+        """Return the planner of a preset.
+
+        Raises
+        ------
+        HybridNavError
+            When there is no such preset, or it cannot plan on this map.
+        """
+        with self._making:
+            if name not in self._planners:
+                self._planners[name] = self._made(name)
+            return self._planners[name]
+
+    def _made(self, name: str) -> HybridPlanner:
+        preset = self._settings
+        if name != preset.name:
+            if name not in self.presets:
+                raise InvalidValueError(f"no preset is called {name!r:.80}")
+            preset = load_preset(name).model_copy(update={"pyramid": self._settings.pyramid})
+        return self._model.planner(preset, topology=self.topology, costs=self._costs)
+
+    def plan(self, query: PlanQuery) -> dict[str, Any]:
+        """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
+        planner, points = self.planner(query.preset), self._points(query)
+        closed = self._blocked(query.closed)
+        if query.brief:
+            return self._facts(planner.plan(*points, blocked=closed))
+        tour = plan_tour(planner, points, blocked=closed)
+        return self._facts(tour.results[0]) | self._way(tour)
+
+    def outcome(self, query: Query) -> PlanResult:
+        """Return the plan itself, to be written."""
+        closed = self._blocked(query.closed)
+        return self.planner(query.preset).plan(*self._points(query), blocked=closed)
+
+    def optimum(self, query: Query) -> dict[str, Any]:
+        """Return the shortest path of cells on the whole grid."""
+        on_grid = query.model_copy(update={"preset": GRID})
+        return self._facts(self.outcome(on_grid))
+
+    def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
+        """Return some routes that differ for people."""
+        start, goal = self._points(query)
+        found = plan_alternatives(
+            self.planner(query.preset),
+            start,
+            goal,
+            query.count,
+            by=query.by,
+            blocked=self._blocked(query.closed),
+        )
+        routes = [
+            self._facts(each.result) | self._way(each.tour) | {"overlap": round(each.overlap, 3)}
+            for each in found
+        ]
+        return {"routes": routes, "complete": found.complete, "note": found.note}
+
+    def _points(self, query: Query) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        start, goal = (in_metres(point, self.grid) for point in (query.start, query.goal))
+        if not self.planner(query.preset).needs_headings:
+            return start, goal
+        yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
+        return (*start, yaw), (*goal, yaw)
+
+    def _blocked(self, closed: Closed) -> Blocked | None:
+        if not closed:
+            return None
+        areas: list[list[tuple[float, float]]] = [
+            [in_metres(p, self.grid) for p in ring] for ring in closed.polygons
+        ]
+        for ring in areas:
+            if not shapely.Polygon(ring).is_valid:
+                raise InvalidValueError(
+                    "the drawn area crosses itself: draw its corners in one turn round it"
+                )
+        return Blocked(doors=closed.doors, rooms=closed.rooms, polygons=areas)
+
+    def _facts(self, result: PlanResult) -> dict[str, Any]:
+        """Return the figures and the line of a plan; None stands for what is not finite."""
+        figures: dict[str, float | None] = {
+            "length_m": result.path.length_m if result.path is not None else None,
+            "cost": result.cost,
+            "lower_bound": result.lower_bound,
+            "gap": result.gap,
+        }
+        line = [] if result.path is None else in_grid(result.path.points, self.grid)
+        return {
+            "status": str(result.status),
+            "solved": result.solved,
+            "metric": result.metric,
+            "line": line,
+            "seconds": round(sum(result.stats.seconds.values()), 6),
+        } | {name: _finite(value) for name, value in figures.items()}
+
+    def _way(self, tour: Tour) -> dict[str, Any]:
+        """Return rooms, doors and words of a plan, and the places that it passes."""
+        route = tour.results[0].route
+        return {
+            "legs": [
+                {
+                    "room": leg.room or f"the {leg.shape}",
+                    "door": leg.door.number if leg.door else None,
+                }
+                for leg in tour.legs
+            ],
+            "words": tour.words(),
+            "places": list(route.places) if route is not None else [],
+        }
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

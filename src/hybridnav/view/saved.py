@@ -1,0 +1,76 @@
+"""The page as one file that opens without a server."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybridnav._files import printable, replace_file
+from hybridnav.errors import MapError
+from hybridnav.view.page import whole_page
+from hybridnav.view.tiles import TILE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import PathLike
+    from hybridnav.view.requests import PlanQuery
+    from hybridnav.view.session import Session
+    from hybridnav.view.tiles import Layer, Theme
+
+_MOST_CELLS = 4_000_000
+"""Cells of a picture in the file; a larger map is halved until it has no more."""
+_THEMES: tuple[Theme, ...] = ("light", "dark")
+
+
+def save_page(session: Session, path: PathLike, queries: Sequence[PlanQuery] = ()) -> None:
+    """Write the page with the map, its rooms and some routes into one HTML file.
+
+    Parameters
+    ----------
+    session
+        What it shows.
+    path
+        The file; one that exists is replaced.
+    queries
+        The routes that it holds, planned now.
+
+    Raises
+    ------
+    MapError
+        When the file cannot be written.
+    """
+    place = session.planning.topology.pyramid.place_level
+    layers = {"map": "map", "rooms": "rooms", f"level-{place}": f"level-{place}"}
+    data = {
+        "map": session.describe(),
+        "graph": session.graph(str(place)),
+        "tiles": {name: _tiles(session.layer(layer)) for name, layer in layers.items()},
+        "routes": [
+            {"start": query.start, "goal": query.goal, "preset": query.preset}
+            | session.planning.plan(query)
+            for query in queries
+        ],
+    }
+    try:
+        replace_file(Path(path), whole_page(data).encode())
+    except OSError as error:
+        raise MapError(f"page {printable(path)}: cannot write: {error.strerror}") from None
+
+
+def _tiles(layer: Layer) -> dict[str, Any]:
+    """Return the tiles of a layer as addresses that hold their data, for both themes."""
+    rows, cols = layer.index.shape
+    first = 0
+    while (rows >> first) * (cols >> first) > _MOST_CELLS:
+        first += 1
+    found = {}
+    for zoom in range(first, max(layer.n_zooms, first + 1)):
+        side = TILE << zoom
+        for theme in _THEMES:
+            for row in range(-(-rows // side)):
+                for col in range(-(-cols // side)):
+                    content = base64.b64encode(layer.png(zoom, row, col, theme)).decode()
+                    found[f"{theme}/{zoom}/{row}/{col}"] = f"data:image/png;base64,{content}"
+    return {"first": first, "found": found}

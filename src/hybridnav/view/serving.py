@@ -1,0 +1,73 @@
+"""The server on 127.0.0.1."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from typing import TYPE_CHECKING
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from hybridnav.view.session import Session
+
+
+def serve(
+    session: Session,
+    folder: Path,
+    *,
+    port: int = 0,
+    ready: Callable[[str], object] | None = None,
+) -> None:
+    """Serve the page of a session on 127.0.0.1 until Ctrl-C.
+
+    Parameters
+    ----------
+    session
+        What the page shows.
+    folder
+        The only folder in which anything is written.
+    port
+        The port; 0 for a free one.
+    ready
+        Called with the address, which holds a token that nobody can guess.
+
+    Raises
+    ------
+    InvalidValueError
+        When the port is taken, or the extra `view` is not installed.
+    """
+    try:
+        import uvicorn  # noqa: PLC0415 - an extra
+
+        from hybridnav.view.app import make_app  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise InvalidValueError(
+            f"the page needs the package {error.name}, which is not installed: "
+            "pip install 'hybridnav[view]'"
+        ) from None
+    token = secrets.token_urlsafe(24)
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind(("127.0.0.1", port))
+        except OSError as error:
+            raise InvalidValueError(f"port {port} cannot be used: {error.strerror}") from None
+        listening.listen(64)
+        port = listening.getsockname()[1]
+        app = make_app(session, token=token, port=port, folder=folder)
+        config = uvicorn.Config(
+            app,
+            lifespan="off",
+            ws="none",
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+        )
+        server = uvicorn.Server(config)
+        if ready is not None:
+            ready(f"http://127.0.0.1:{port}/{token}/")
+        server.run(sockets=[listening])
