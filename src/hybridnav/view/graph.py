@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 MOST_VERTICES = 20_000
 """Vertices of a level beyond which its graph is not sent: it would be one grey area."""
 _DECIMALS = 3
+_METRE_DECIMALS = 6
+"""Decimals of points in metres: the page converts them there and back."""
 
 
 def in_grid(points_m: ArrayLike, grid: OccupancyGrid) -> list[Any]:
@@ -36,7 +38,7 @@ def in_grid(points_m: ArrayLike, grid: OccupancyGrid) -> list[Any]:
 
 def in_metres(point: Sequence[float], grid: OccupancyGrid) -> tuple[float, float]:
     """Return a point `[column, row]` in grid units as `(x, y)` in metres."""
-    x, y = grid.frame.points_of_grid([point[1], point[0]]).tolist()
+    x, y = grid.frame.points_of_grid([point[1], point[0]]).round(_METRE_DECIMALS).tolist()
     return x, y
 
 

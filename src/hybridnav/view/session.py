@@ -106,7 +106,7 @@ class Session:
             rooms = after
         if self._changes:
             self._use(self._model.grown(self._settings.pyramid, rooms))
-        self.notice = f"{len(self._changes)} changes of rooms that were not saved are back"
+        self.notice = f"unsaved changes of rooms are back: {len(self._changes)}"
         if lost:
             self.notice += f"; {lost} do not fit the rooms any more and are left out"
 

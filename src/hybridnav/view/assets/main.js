@@ -24,7 +24,6 @@ const page = {
 
   // Draw anew what depends on the rooms.
   async changed() {
-    page.names.list();
     page.graph = null;
     await showLayer();
     page.legend();
@@ -174,7 +173,7 @@ const handlers = {
     else routes.addCorner(point);
   })(),
   hover(at) {
-    const text = at ? page.scene.toMetres(page.scene.toGrid(at)).map((v) => v.toFixed(2)).join(", ") : "";
+    const text = at ? page.scene.textOf(page.scene.toGrid(at)) : "";
     byId("pointer").textContent = text && `${text} m`;
   },
 };

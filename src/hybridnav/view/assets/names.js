@@ -137,6 +137,7 @@ export class Names {
     this.rings = [];
     this.page.scene.version = rooms.version;
     this.page.routes.forget(rooms);
+    this.list();
     await this.choose(rooms.rooms.some((room) => room.name === chosen) ? chosen : "");
     await this.page.changed();
   }

@@ -54,9 +54,8 @@ export class Routes {
   // --- ends
 
   setEnd(which, point, isBrief = false) {
-    this[which] = point;
-    const text = this.page.scene.toMetres(point).map((v) => v.toFixed(2)).join(", ");
-    this.byId(which).value = text;
+    this[which] = this.page.scene.rounded(point);
+    this.byId(which).value = this.page.scene.textOf(point);
     this.page.scene.draw();
     return this.plan(isBrief);
   }

@@ -77,6 +77,17 @@ export class Scene {
     return [(dx * up[1] - dy * up[0]) / area, (dy * along[0] - dx * along[1]) / area];
   }
 
+  // A point in whole centimetres, or in fifths of finer cells: what the panel shows is what is meant.
+  rounded(point) {
+    const text = this.textOf(point).split(", ");
+    return this.fromMetres(text.map(Number));
+  }
+
+  textOf(point) {
+    const decimals = Math.max(2, Math.ceil(-Math.log10(this.map.resolution_m / 5)));
+    return this.toMetres(point).map((value) => value.toFixed(decimals)).join(", ");
+  }
+
   pan(right, down) {
     this.middle = [this.middle[0] - right / this.scale, this.middle[1] + down / this.scale];
     this.draw();
