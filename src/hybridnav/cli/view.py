@@ -141,13 +141,14 @@ def _save(
     ends: list[tuple[tuple[float, ...], tuple[float, ...]]],
     preset: str,
 ) -> None:
+    import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
+
     from hybridnav.view import save_page  # noqa: PLC0415 - loads numba and matplotlib
-    from hybridnav.view.graph import in_grid  # noqa: PLC0415
     from hybridnav.view.requests import PlanQuery  # noqa: PLC0415
 
     queries: list[PlanQuery] = []
     for start, goal in ends:
-        first, last = in_grid([start, goal], session.grid)
+        first, last = session.grid.frame.positions_of(np.array([start, goal]))[:, ::-1].tolist()
         queries.append(PlanQuery(start=first, goal=last, preset=preset))
     save_page(session, path, queries)
     size = path.stat().st_size / 1e6

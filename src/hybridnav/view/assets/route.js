@@ -2,6 +2,7 @@
 
 import { ROUTE_COLOURS } from "./draw.js";
 
+const MOST_UNDER_WAY = 3; // requests at a time
 const METRICS = { "any-angle": "at any angle", octile: "from cell to cell", weighted: "by costs" };
 
 export function element(name, attributes = {}, ...children) {
@@ -33,7 +34,9 @@ export class Routes {
   draft = []; // corners of an area that is being drawn
   #before = []; // closures to go back to
   #wanted = null;
-  #isBusy = false;
+  #underWay = 0;
+  #asked = 0;
+  #answered = 0;
   #plans = 0;
   #last = "";
 
@@ -81,6 +84,8 @@ export class Routes {
   }
 
   clear() {
+    this.#asked += 1;
+    this.#answered = this.#asked; // what is still under way is about other ends
     Object.assign(this, { start: null, goal: null, routes: [], open: null, grid: null, chosen: 0 });
     for (const id of ["start", "goal"]) this.byId(id).value = "";
     this.show();
@@ -88,34 +93,40 @@ export class Routes {
 
   // --- plans
 
-  // One request at a time; of those that come meanwhile only the last is answered.
+  // A few requests at a time, so that none waits for the way of another; of those that come
+  // meanwhile only the last is sent, and an answer older than the one shown is dropped.
   async plan(isBrief = false) {
     if (!this.start || !this.goal) {
       this.show();
       return;
     }
     this.#wanted = this.query({ brief: isBrief });
-    if (this.#isBusy) return;
-    this.#isBusy = true;
+    if (this.#underWay >= MOST_UNDER_WAY) return;
+    this.#underWay += 1;
     this.page.canvas.dataset.busy = "true";
-    try {
-      while (this.#wanted) {
-        const asked = this.#wanted;
-        this.#wanted = null;
-        const found = await this.page.link.post("plan", asked);
-        this.open = this.isClosed && !asked.brief ? await this.#planOpen(asked) : null;
-        Object.assign(this, { routes: [found], chosen: 0, grid: null });
-        this.#plans += 1;
-        this.show(asked.brief);
-      }
-    } catch (problem) {
-      Object.assign(this, { routes: [], open: null, grid: null });
-      this.show();
-      this.page.say(problem.message, true);
-    } finally {
-      this.#isBusy = false;
-      this.page.canvas.dataset.busy = "false";
+    while (this.#wanted) {
+      const asked = this.#wanted;
+      this.#wanted = null;
+      await this.#planned(asked, (this.#asked += 1));
     }
+    this.#underWay -= 1;
+    this.page.canvas.dataset.busy = String(this.#underWay > 0);
+  }
+
+  async #planned(asked, number) {
+    let [found, open, problem] = [[], null, null];
+    try {
+      found = [await this.page.link.post("plan", asked)];
+      if (this.isClosed && !asked.brief) open = await this.#planOpen(asked);
+    } catch (error) {
+      problem = error;
+    }
+    if (number < this.#answered) return;
+    this.#answered = number;
+    this.#plans += 1;
+    Object.assign(this, { routes: found, open, grid: null, chosen: 0 });
+    this.show(asked.brief);
+    if (problem) this.page.say(problem.message, true);
   }
 
   #planOpen(asked) {
