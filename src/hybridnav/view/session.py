@@ -87,6 +87,7 @@ class Session:
         return self.planning.topology.rooms.labels
 
     def _use(self, topology: TopologicalMap) -> None:
+        self._facts: dict[str, Any] | None = None
         self.planning = Planning(self._model, topology, self._settings, self._costs)
         for name in [name for name in self._layers if not name.startswith("costs-")]:
             del self._layers[name]
@@ -143,9 +144,9 @@ class Session:
     def describe_rooms(self) -> dict[str, Any]:
         """Return the rooms, their doors, and the state of their file."""
         with self._lock:
-            rooms = self.planning.topology.rooms
-            facts = room_facts(rooms)
-            return facts | {
+            if self._facts is None:
+                self._facts = room_facts(self.planning.topology.rooms)
+            return self._facts | {
                 "version": self.version,
                 "unsaved": len(self._changes),
                 "notice": self.notice,

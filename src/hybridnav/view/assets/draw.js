@@ -189,7 +189,7 @@ export function paintScaleBar(scene) {
   const { context } = scene;
   const inks = inksOf(scene);
   const perMetre = scene.scale / scene.map.resolution_m;
-  const most = Math.min(240, 0.25 * scene.width) / perMetre;
+  const most = Math.min(320, 0.25 * scene.width) / perMetre;
   const power = 10 ** Math.floor(Math.log10(most));
   const metres = [5, 2, 1].map((n) => n * power).find((n) => n <= most) ?? power;
   const [left, bottom, length] = [16, scene.height - 20, metres * perMetre];

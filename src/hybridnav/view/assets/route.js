@@ -155,6 +155,8 @@ export class Routes {
 
   choose(at) {
     this.chosen = at;
+    const { start, goal } = this.routes[at]; // routes of a saved page have ends of their own
+    if (start) Object.assign(this, { start, goal });
     this.show();
     this.byId("others").children[at]?.focus();
   }
@@ -277,11 +279,13 @@ export class Routes {
     const shortest = this.routes[0];
     const cards = this.routes.length < 2 ? [] : this.routes.map((route, at) => {
       const colour = ROUTE_COLOURS[this.page.scene.theme][at % 5];
-      const more = at ? `, ${metres(route.length_m - shortest.length_m)} more` : ", first";
+      const isOther = at && !route.start && route.solved && shortest.solved; // between the same ends
+      const more = isOther ? `, ${metres(route.length_m - shortest.length_m)} more` : "";
+      const text = route.solved ? metres(route.length_m) + more : `no route: ${route.status}`;
       const doors = (route.legs ?? []).filter((leg) => leg.door).map((leg) => leg.door).join(", ");
       const line = picture(`<path d="M2 4h22" stroke="${colour}" stroke-width="4" stroke-linecap="round"/>`);
       return element("button", { className: "route-card", ariaPressed: String(at === this.chosen), onclick: () => this.choose(at) },
-        line, element("span", {}, metres(route.length_m) + more), element("small", {}, doors ? `doors ${doors}` : "no doors"));
+        line, element("span", {}, text), element("small", {}, doors ? `doors ${doors}` : "no doors"));
     });
     this.byId("others").replaceChildren(...cards);
   }
