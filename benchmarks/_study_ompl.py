@@ -13,8 +13,9 @@ from hybridnav.config import load_preset
 from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import nanmean, nanquantile
+from hybridnav.harness.rows import figures
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import figures, to_markdown
+from hybridnav.harness.tables import to_markdown
 from hybridnav.viz import plot_losses
 
 if TYPE_CHECKING:

@@ -31,14 +31,9 @@ from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.methods import BASELINES
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.output import write_outputs
+from hybridnav.harness.rows import EFFICIENCY_COLUMNS, loss_columns, rows_of_map, rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import (
-    EFFICIENCY_COLUMNS,
-    loss_columns,
-    rows_of_map,
-    rows_of_study,
-    to_markdown,
-)
+from hybridnav.harness.tables import to_markdown
 from hybridnav.viz import plot_losses, plot_speed, save_figure
 
 if TYPE_CHECKING:

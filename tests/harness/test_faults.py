@@ -11,8 +11,8 @@ from hybridnav.harness.analysis import load_study
 from hybridnav.harness.frames import to_frame
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
+from hybridnav.harness.rows import rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import rows_of_study
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, ROOT, name_of, write_map
 

@@ -15,18 +15,15 @@ from hybridnav.harness.outcome import Outcome, nanquantile, query_key
 from hybridnav.harness.paths import decode_path
 from hybridnav.harness.records import map_digest
 from hybridnav.harness.report import MapSection, ReportData, Table, WorstCase, render_report
-from hybridnav.harness.scenes import MapSpec, read_map
-from hybridnav.harness.tables import (
+from hybridnav.harness.rows import (
     EFFICIENCY_COLUMNS,
-    Row,
     loss_columns,
     rows_by_distance,
     rows_of_map,
     rows_of_study,
-    text_of,
-    to_csv,
-    to_markdown,
 )
+from hybridnav.harness.scenes import MapSpec, read_map
+from hybridnav.harness.tables import Row, text_of, to_csv, to_markdown
 from hybridnav.metrics import chords_of
 
 if TYPE_CHECKING:
