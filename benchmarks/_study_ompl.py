@@ -34,11 +34,13 @@ BESIDE = "portals"
 
 _COLUMNS = (
     "method", "pairs", "solved by itself", "by the grid", "without an answer", "faults",
-    "loss mean %", "loss 95 % interval", "loss median %", "loss p95 %", "loss max %",
+    "any-angle loss mean %", "any-angle loss 95 % interval", "any-angle loss median %",
+    "any-angle loss p95 %", "any-angle loss max %",
     "loss by the grid %", "first path ms, median", "query ms, median", "query ms, max",
 )  # fmt: skip
 _OF_MAPS = (
-    "map", "method", "solved by itself", "by the grid", "loss mean %", "loss max %",
+    "map", "method", "solved by itself", "by the grid", "any-angle loss mean %",
+    "any-angle loss max %",
     "first path ms, median", "query ms, median",
 )  # fmt: skip
 

@@ -30,8 +30,8 @@ from benchmarks import _study_ompl
 from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.methods import BASELINES
 from hybridnav.harness.outcome import nanquantile
-from hybridnav.harness.output import write_outputs
-from hybridnav.harness.rows import EFFICIENCY_COLUMNS, loss_columns, rows_of_map, rows_of_study
+from hybridnav.harness.output import markdown, write_outputs
+from hybridnav.harness.rows import rows_of_map, rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.tables import to_markdown
 from hybridnav.viz import plot_losses, plot_speed, save_figure
@@ -127,8 +127,11 @@ def page(study: Study, pairs: int) -> str:
     """The page of the study."""
     overall = rows_of_study(study)
     maps = [row for name in study.maps for row in rows_of_map(study, name)]
-    short = ("map", "method", "solved", "loss mean %", "loss p95 %", "loss max %", "without loss %",
-             "query ms, median", "speed-up", "preparation s", "memory MB")  # fmt: skip
+    short = (
+        "map", "method", "solved %", "any-angle loss mean %", "octile loss mean %",
+        "octile loss p95 %", "octile loss max %", "octile loss without loss %", "query ms, median",
+        "speed-up", "preparation s", "memory MB",
+    )  # fmt: skip
     return f"""# The study: consistency, loss, efficiency
 
 Thrun's three questions, asked of every method on twelve ROS maps (robot radius 0.25 m, merge
@@ -142,20 +145,10 @@ were routes over portals. Times are of single queries with cold caches; [portals
 them interleaved, pair by pair. [study-ompl.md](study-ompl.md) has the presets with OMPL, whose
 paths are any-angle.
 
-## Consistency
-
-{study.checks:,} answers checked: {len(study.faults)} counter-examples, {study.failures} queries
-without an answer.
-
+{markdown(overall, study)}
 {_failures(study)}
-## Loss
-
-{to_markdown(overall, ("method", "maps", *loss_columns(study.metric)))}
 ![Share of pairs that lose more than x, for each method](images/study-loss.svg)
 
-## Efficiency
-
-{to_markdown(overall, ("method", *EFFICIENCY_COLUMNS))}
 ![Median query time against mean loss, for each method](images/study-speed.svg)
 
 ## Beside published figures

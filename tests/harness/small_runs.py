@@ -1,5 +1,6 @@
 """What small runs of the harness share: a map, names of methods, runs in this process."""
 
+import os
 from pathlib import Path
 
 from hybridnav.harness.task import run_task
@@ -19,6 +20,11 @@ ROOMS = [
     "####################",
 ]
 """Four rooms in a row of doors, and a closet without one."""
+
+
+def importable():
+    """Return a value of PYTHONPATH with which other processes import this clone's tests."""
+    return os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
 
 
 def name_of(method):

@@ -266,9 +266,9 @@ def test_a_reference_with_a_fault_is_caught_by_what_it_does_not_share(method, wo
     pair = Pair((6, 4), (4, 6))
     judge = Judge(ROOMS, Prepared(method(ROOMS), None, 0, 0), reference=True)
     answer = method(ROOMS).solve(pair.start, pair.goal)
-    length_m, faults = judge.faults(pair, answer)
+    length_m, faults, _ = judge.faults(pair, answer)
     known, wrong = judge.oracles(answer, pair, length_m)
-    assert any(words in fault for fault in faults + wrong)
+    assert any(words in text for text in [*(fault.text for fault in faults), *wrong])
     assert known["scipy_optimum_m"] == pytest.approx(4.0)
 
 
@@ -278,7 +278,7 @@ def test_a_false_optimum_of_a_scenario_is_caught():
     for stated, wrong in ((4.0, []), (4.004, []), (4.01, [1]), (3.9, [1]), (0.0, [1])):
         pair = Pair((6, 4), (4, 6), "scenario", stated)
         answer = method.solve(pair.start, pair.goal)
-        length_m, faults = judge.faults(pair, answer)
+        length_m, faults, _ = judge.faults(pair, answer)
         assert not faults
         assert len(judge.oracles(answer, pair, length_m)[1]) == len(wrong)
 
@@ -289,8 +289,9 @@ def test_a_reference_that_finds_no_path_where_there_is_one_is_caught():
     answer = method.solve(pair.start, pair.goal)
     assert answer.cells is None
     judge = Judge(ROOMS, Prepared(method, None, 0, 0), reference=True)
-    length_m, faults = judge.faults(pair, answer)
-    assert faults == ["solvability: no path was found, which moves on the grid contradict"]
+    length_m, faults, _ = judge.faults(pair, answer)
+    text = "solvability: no path was found, which moves on the grid contradict"
+    assert faults == [("no path", text)]
     assert judge.oracles(answer, pair, length_m)[1] == [
         "the optimum by scipy is 4.000000 m, not inf m"
     ]

@@ -17,7 +17,14 @@ from PIL import Image
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
 from hybridnav.harness.figures import paths_uri
-from hybridnav.harness.report import MapSection, ReportData, Table, WorstCase, render_report
+from hybridnav.harness.report import (
+    CounterExample,
+    MapSection,
+    ReportData,
+    Table,
+    WorstCase,
+    render_report,
+)
 
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 NAMES = ["grid A*", "weighted A*", "HPA*", "Thrun's map", "exact overlay", "corridor", "portal"]
@@ -106,7 +113,7 @@ def a_report(n_maps=1, names=NAMES, map_name="office"):
         facts=[("seed", "7")],
         faults=[],
         checks=1234,
-        criteria=criteria,
+        overall=[criteria],
         maps=maps,
         overall_losses={name: lengthy(rng, 0.01) for name in names},
         overall_times_ms={name: float(rng.gamma(2)) for name in names},
@@ -114,9 +121,13 @@ def a_report(n_maps=1, names=NAMES, map_name="office"):
 
 
 def bare_report(**changes):
-    table = Table(["method"], [], "Criteria")
-    report = ReportData(title="t", facts=[], faults=[], checks=0, criteria=table, maps=[])
+    report = ReportData(title="t", facts=[], faults=[], checks=0, maps=[])
     return dataclasses.replace(report, **changes)
+
+
+def wrong_report(*faults, checks):
+    examples = [CounterExample(fault) for fault in faults]
+    return bare_report(faults=examples, n_faults=len(faults), checks=checks)
 
 
 def drawings(page):
@@ -136,7 +147,7 @@ def text():
 def test_the_page_is_whole_and_needs_no_network(text):
     page = Page(text)
     ids = [attributes["id"] for _, attributes in page.seen if "id" in attributes]
-    assert sorted(ids) == ["all", "map-1", "map-2"]
+    assert sorted(ids) == ["all", "case-1-1", "case-2-1", "map-1", "map-2"]
     assert {a["href"] for a in page.all("a")} == {"#all", "#map-1", "#map-2"}
     assert not page.all("script") + page.all("link")
     assert not re.search(r"url\((?!#)|@import", unquote(text))
@@ -184,8 +195,8 @@ def test_names_cannot_break_out_of_the_page():
         report,
         title=nasty,
         facts=[(nasty, nasty)],
-        faults=[nasty],
-        criteria=Table([nasty], [[nasty]], nasty),
+        faults=[CounterExample(nasty)],
+        overall=[Table([nasty], [[nasty]], nasty)],
     )
     html = render_report(again)
     page = Page(html)
@@ -202,21 +213,25 @@ def test_names_cannot_break_out_of_the_page():
 
 
 def test_names_in_other_scripts_are_drawn_as_text():
-    (chart,) = drawings(
+    (_, chart) = drawings(
         Page(
-            render_report(bare_report(overall_losses={"規劃": [0.1]}, overall_times_ms={"規劃": 1}))
+            render_report(
+                bare_report(
+                    maps=[MapSection("m", times_ms={"規劃": 1}, losses={"規劃": np.array([0.1])})]
+                )
+            )
         )
     )
     assert any((element.text or "").startswith("規劃: ") for element in chart.iter())
 
 
 def test_counter_examples_come_first_and_in_red():
-    html = render_report(bare_report(faults=["corridor: no path", "portal: wall"], checks=9000))
+    html = render_report(wrong_report("corridor: no path", "portal: wall", checks=9000))
     assert '<div class="box bad">' in html
     assert "2 counter-examples in 9,000 checks" in html
     assert html.index("corridor: no path") < html.index("Contents") < html.index("<main>")
     assert "No counter-example" not in html
-    assert "1 counter-example in 3 checks" in render_report(bare_report(faults=["a"], checks=3))
+    assert "1 counter-example in 3 checks" in render_report(wrong_report("a", checks=3))
 
 
 def test_a_clean_run_says_how_much_was_checked():
@@ -226,7 +241,7 @@ def test_a_clean_run_says_how_much_was_checked():
 
 def test_a_table_aligns_numbers_and_refuses_ragged_rows():
     table = Table(["method", "loss"], [["a", "1"]], "Loss", frozenset({1}))
-    html = render_report(bare_report(criteria=table))
+    html = render_report(bare_report(overall=[table]))
     assert '<th scope="col" class="n">loss</th>' in html
     assert '<th scope="row">a</th><td class="n">1</td>' in html
     with pytest.raises(InvalidValueError, match="'Loss': a row has 1 cells, expected 2"):
@@ -255,7 +270,7 @@ def test_sparse_data_still_make_a_page(section):
         )
     )
     page = Page(html)
-    assert html.count("<figcaption>") == 1 + 2 * bool(section.losses or section.times_ms)
+    assert html.count("<figcaption>") == 2 * bool(section.losses or section.times_ms)
     for chart in drawings(page):
         assert not re.search(r"\b(nan|inf)\b", ET.tostring(chart, "unicode"))
 
@@ -263,7 +278,8 @@ def test_sparse_data_still_make_a_page(section):
 def test_methods_without_values_are_named_below_their_chart():
     losses = {"a": np.array([0.1]), "dead & gone": np.array([np.nan])}
     times_ms = {"a": 1.0, "dead & gone": 2.0}
-    html = render_report(bare_report(maps=[MapSection("m", losses=losses, times_ms=times_ms)]))
+    section = MapSection("m", losses=losses, times_ms=times_ms)
+    html = render_report(bare_report(maps=[section, MapSection("none", losses={"a": losses["a"]})]))
     assert html.count("Not drawn, for want of values: dead &amp; gone.") == 2
     assert "No method has both a time and a loss." in html
 

@@ -25,7 +25,7 @@ from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.io import load_map
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, ROOT, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, ROOT, importable, name_of, run_here, write_map
 
 N_PAIRS = 60
 TIMES = ("seconds", "stages", "pyramid_seconds", "method_seconds", "environment")
@@ -34,7 +34,7 @@ TIMES = ("seconds", "stages", "pyramid_seconds", "method_seconds", "environment"
 @pytest.fixture(scope="module", autouse=True)
 def _importable():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(ROOT))
+        patch.setenv("PYTHONPATH", importable())
         yield
 
 

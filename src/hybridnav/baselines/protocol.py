@@ -94,6 +94,10 @@ class MethodResult:
     """Cells expanded by the metric layer."""
     expanded_nodes: int = 0
     """Nodes expanded by the topological layer."""
+    expanded_border_cells: int = 0
+    """Border cells expanded by a search over tables of distances between them."""
+    expanded_intervals: int = 0
+    """Intervals expanded by a search on a mesh."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall-clock seconds by stage: `coarse` for the topological search, `refine` for the metric
     one; `first path` until the first path of a planner that improves its path."""

@@ -227,4 +227,8 @@ def compare(
     from hybridnav.harness.compare import compare_runs  # noqa: PLC0415 - loads scipy.stats
     from hybridnav.harness.tables import to_markdown  # noqa: PLC0415
 
-    answer(to_markdown(compare_runs(first, second, metric=_yardstick(metric))))
+    rows = compare_runs(first, second, metric=_yardstick(metric))
+    for over in dict.fromkeys(row["loss over"] for row in rows):
+        own = [row for row in rows if row["loss over"] == over]
+        columns = [column for column in own[0] if column != "loss over"]
+        answer(f"## Loss over {over}\n\n{to_markdown(own, columns)}\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,11 @@ class Study:
     def costs(self) -> str:
         """Costs of the run as a text, empty for lengths."""
         return self.outcomes[0].costs if self.outcomes else ""
+
+    @cached_property
+    def common(self) -> set[MapQuery]:
+        """The pairs that all methods solved, on all maps."""
+        return pairs_in_common(self.outcomes)
 
     @property
     def maps(self) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import load_study
+from hybridnav.harness.columns import OPTIMA
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import loss_of, nanmean, query_key
 from hybridnav.metrics import paired_difference
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import Outcome
     from hybridnav.harness.tables import Row
-    from hybridnav.harness.yardstick import Yardstick
+    from hybridnav.harness.yardstick import Optimum, Yardstick
 
 _Sample = tuple["FloatArray", "FloatArray", "FloatArray", "FloatArray"]
 
@@ -40,7 +41,8 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
     Returns
     -------
     list of dict
-        One row for each method and map, and one for all maps. Differences are second minus first:
+        One row for each method and map, and one for all maps; "loss over" names the optimum, by
+        which rows belong into different tables. Differences are second minus first:
         of the loss in percentage points with its 95 % bootstrap interval and the p-value of
         Wilcoxon's signed-rank test, and of the time as the median ratio, with the same test.
 
@@ -61,17 +63,23 @@ def compare_runs(first: Path, second: Path, *, metric: Yardstick = "both") -> li
     studies = _loaded(first, metric), _loaded(second, metric)
     rows: list[Row] = []
     for labels in _methods(*studies):
-        samples: list[_Sample] = []
+        samples: list[tuple[Optimum, _Sample]] = []
         for one in studies[0].of_method(labels[0]):
             for other in studies[1].of_method(labels[1]):
                 if one.preparation["map_sha"] == other.preparation["map_sha"]:
                     sample = _paired(one, other)
                     if len(sample[0]):
-                        rows.append(_row(labels, one.map_name, sample))
-                        samples.append(sample)
-        if len(samples) > 1:
-            pooled = tuple(np.concatenate(part) for part in zip(*samples, strict=True))
-            rows.append(_row(labels, "all maps", (pooled[0], pooled[1], pooled[2], pooled[3])))
+                        over = _optimum(one, other)
+                        rows.append(_row(labels, one.map_name, over, sample))
+                        samples.append((over, sample))
+        overs = {over for over, _ in samples}
+        if len(samples) > 1 and len(overs) == 1:
+            pooled = [
+                np.concatenate(part) for part in zip(*(one for _, one in samples), strict=True)
+            ]
+            rows.append(
+                _row(labels, "all maps", overs.pop(), (pooled[0], pooled[1], pooled[2], pooled[3]))
+            )
     if not rows:
         raise InvalidValueError(f"runs {first} and {second} share no method, map and pair")
     return rows
@@ -105,7 +113,14 @@ def _paired(first: Outcome, second: Outcome) -> _Sample:
     return *losses, first.seconds[one], second.seconds[other]
 
 
-def _row(labels: tuple[str, str], map_name: str, sample: _Sample) -> Row:
+def _optimum(first: Outcome, second: Outcome) -> Optimum:
+    """Return what the losses of two outcomes refer to."""
+    if first.yardstick != "both":
+        return first.yardstick
+    return "any-angle" if first.is_any_angle or second.is_any_angle else "octile"
+
+
+def _row(labels: tuple[str, str], map_name: str, over: Optimum, sample: _Sample) -> Row:
     losses, others, seconds, other_seconds = sample
     loss = paired_difference(100 * others, 100 * losses)
     time = paired_difference(1e3 * other_seconds, 1e3 * seconds)
@@ -115,6 +130,7 @@ def _row(labels: tuple[str, str], map_name: str, sample: _Sample) -> Row:
     return {
         "method": labels[0] if labels[0] == labels[1] else f"{labels[1]} against {labels[0]}",
         "map": map_name,
+        "loss over": OPTIMA[over],
         "pairs": len(losses),
         "solved by the first only": int((solved[0] & ~solved[1]).sum()),
         "solved by the second only": int((solved[1] & ~solved[0]).sum()),

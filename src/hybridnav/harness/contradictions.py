@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 if TYPE_CHECKING:
     from hybridnav.harness.records import Record
@@ -19,6 +19,20 @@ ARC_SLACK = 1e-5
 
 ANSWERED = ("solved", "no path")
 """Statuses of records that hold an answer."""
+
+
+Kind = Literal["regions", "plan to path", "path to plan", "paths", "no path", "bounds"]
+"""What a contradiction is about: the regions of a map; a plan without a path; a path without a
+plan; a path that is none; whether there is a path; lengths, costs and bounds."""
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+class Fault(NamedTuple):
+    """A contradiction that the judge found."""
+
+    kind: Kind
+    text: str
 
 
 def is_any_angle(record: Record) -> bool:
@@ -51,6 +65,11 @@ def contradiction(record: Record, reference: Record) -> str | None:
     if is_any_angle(record):
         return _any_angle_contradiction(record, reference.get("any_angle_m"))
     return _cells_contradiction(record, reference)
+
+
+def kind_of_contradiction(text: str) -> Kind:
+    """Return the kind of a contradiction by the optima."""
+    return "no path" if text.startswith("solvability") else "bounds"
 
 
 def octile_optimum_m(reference: Record) -> float:

@@ -29,7 +29,8 @@ def to_frame(study: Study) -> pd.DataFrame:
         `goal_col`; `length_m`, NaN where the method found no path without a fault itself;
         `octile_optimum_m` and `any_angle_optimum_m`; `loss` over the reference that the study
         uses, `octile_loss` and `any_angle_loss`, as shares; `seconds` of the query and
-        `reference_seconds` of A* on the whole grid; `expanded` cells or nodes. In a run with costs
+        `reference_seconds` of A* on the whole grid; `expanded` cells,
+        border cells, intervals and nodes together. In a run with costs
         also `costs`, their text; `cost_m`, `weighted_optimum_m`, `cost_lower_bound_m` and, for
         any-angle paths with a bound on paths of cells, `cost_grid_bound_m`; `weighted_loss`, `gap`
         and `grid_gap`, as shares.
@@ -76,7 +77,7 @@ def _columns(outcome: Outcome) -> dict[str, object]:
         "any_angle_loss": outcome.any_angle_losses,
         "seconds": outcome.seconds,
         "reference_seconds": outcome.reference_seconds,
-        "expanded": outcome.figure("expanded"),
+        "expanded": outcome.expansions,
         **(_of_costs(outcome) if outcome.costs else {}),
     }
 

@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
-from hybridnav.harness.contradictions import SLACK
+from hybridnav.harness.contradictions import SLACK, Fault
 from hybridnav.harness.cost_judge import CostJudge
 from hybridnav.harness.methods import HybridMethod, Prepared
 from hybridnav.harness.yardstick import AnyAngleOptimum
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from hybridnav.baselines import AnyAngleResult, MethodResult
     from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.contradictions import Kind
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
     from hybridnav.metrics import Chords
@@ -93,36 +94,45 @@ class Judge:
             self._search = GridSearch(free, corner_cutting=grid.corner_cutting, units=units)
             self._regions = np.zeros(int(self._region_of.max(initial=-1)) + 1, dtype=np.bool_)
 
-    def faults(self, pair: Pair, answer: MethodResult) -> tuple[float | None, list[str]]:
-        """Return the length of the path, counted anew, and all faults of the answer."""
+    def faults(
+        self, pair: Pair, answer: MethodResult
+    ) -> tuple[float | None, list[Fault], list[Kind]]:
+        """Return the length of the path, counted anew, all faults of the answer, and what was
+        checked between its plan and its path."""
         length_m, faults = self._judged_path(pair, answer)
+        checked: list[Kind] = []
         checks = self._consistency
         if checks is None:
-            return length_m, faults
+            return length_m, faults, checked
         if answer.nodes is not None:
+            checked.append("plan to path")
             arcs = answer.arcs if self._has_arcs else None  # they may belong to another map
             wrong = checks.check_plan(pair.start, pair.goal, answer.nodes, arcs)
-            faults += [wrong] if wrong else []
+            faults += [Fault("plan to path", wrong)] if wrong else []
         if not answer.gave_up and answer.is_path != checks.joined(pair.start, pair.goal):
             found = "a path" if answer.is_path else "no path"
-            faults.append(f"solvability: {found} was found, which moves on the grid contradict")
+            text = f"solvability: {found} was found, which moves on the grid contradict"
+            faults.append(Fault("no path", text))
         if answer.is_path and not faults:
+            checked.append("path to plan")
             wrong = checks.check_walk(self._cells_of(answer))
-            faults += [wrong] if wrong else []
-        return length_m, faults
+            faults += [Fault("path to plan", wrong)] if wrong else []
+        return length_m, faults, checked
 
-    def _judged_path(self, pair: Pair, answer: MethodResult) -> tuple[float | None, list[str]]:
+    def _judged_path(self, pair: Pair, answer: MethodResult) -> tuple[float | None, list[Fault]]:
         if answer.any_angle is not None:
             line, chords = answer.any_angle, self._chords_of(answer.any_angle)
             points = line.points if chords is None else chords.points
             verdict = judge_line(self._grid, points, start=pair.start, goal=pair.goal)
             length_m = verdict.length_m if chords is None else chords.length_m
             wrong = () if chords is None else chords.faults[:1]
-            return length_m, [*wrong, *verdict.faults, *_false_claims(line, length_m)]
+            of_path = [Fault("paths", text) for text in (*wrong, *verdict.faults)]
+            claims = [Fault("bounds", text) for text in _false_claims(line, length_m)]
+            return length_m, of_path + claims
         if answer.cells is None:
             return None, []
         verdict = judge_path(self._grid, answer.cells, start=pair.start, goal=pair.goal)
-        return verdict.length_m, [*verdict.faults]
+        return verdict.length_m, [Fault("paths", text) for text in verdict.faults]
 
     def _chords_of(self, line: AnyAngleResult) -> Chords | None:
         """Return a path with arcs as a polyline, None for one of lines."""

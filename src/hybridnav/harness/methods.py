@@ -228,8 +228,10 @@ class HybridMethod:
             arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
             bound=1 + result.gap if is_factor else np.inf,
             by_costs=claim,
-            expanded=stats.expanded + stats.expanded_intervals,
+            expanded=stats.expanded,
             expanded_nodes=stats.expanded_places,
+            expanded_border_cells=stats.expanded_border_cells,
+            expanded_intervals=stats.expanded_intervals,
             seconds=_stages(result),
         )
 

@@ -23,7 +23,15 @@ from hybridnav.metrics import thrun_count
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.harness.records import Record
-    from hybridnav.harness.yardstick import Yardstick
+    from hybridnav.harness.yardstick import Optimum, Yardstick
+
+EXPANSIONS = {
+    "expanded": "cells expanded",
+    "expanded_nodes": "nodes expanded",
+    "expanded_border_cells": "border cells expanded",
+    "expanded_intervals": "intervals expanded",
+}
+"""Fields of records that count things taken from the queue of a search, and their columns."""
 
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
 MapQuery = tuple[str, QueryKey]
@@ -176,6 +184,18 @@ class Outcome:
         solved = np.isfinite(self.lengths_m)
         return {(self.map_name, query_key(self.references[at])) for at in np.flatnonzero(solved)}
 
+    def losses_over(self, optimum: Optimum) -> FloatArray:
+        """Return lengths, or with "weighted" costs, over an optimum, minus one."""
+        if optimum == "weighted":
+            return self.weighted_losses
+        return self.octile_losses if optimum == "octile" else self.any_angle_losses
+
+    @cached_property
+    def expansions(self) -> FloatArray:
+        """Things taken from the queues of the searches, of all kinds; NaN without a path."""
+        kinds = np.array([self.figure(key) for key in EXPANSIONS])
+        return np.where(np.isfinite(self.lengths_m), np.nansum(kinds, axis=0), math.nan)
+
     def among(self, pairs: set[MapQuery]) -> BoolArray:
         """Return whether each pair is one of some."""
         mine = [(self.map_name, query_key(record)) in pairs for record in self.references]
@@ -236,6 +256,12 @@ class Outcome:
         return np.array([record["seconds"] for record in self.references], dtype=float)
 
     @cached_property
+    def reference_expansions(self) -> FloatArray:
+        """Expansions of the reference on the same pairs."""
+        counts = [sum(record.get(key) or 0 for key in EXPANSIONS) for record in self.references]
+        return np.array(counts, dtype=float)
+
+    @cached_property
     def refine_seconds(self) -> FloatArray:
         """Seconds of these queries in the metric layer."""
         return self._stage("refine")
@@ -255,9 +281,13 @@ class Outcome:
     @cached_property
     def thrun_count(self) -> float:
         """Thrun's count: nodes times mean steps of a plan; for a method without a topological
-        layer, cells times mean steps of a path."""
+        layer, cells times mean steps of a path. NaN for plans that no search in that layer made,
+        which tell nothing of its price."""
         steps = self.figure("plan_steps")
-        if not np.isfinite(steps).any():
+        if np.isfinite(steps).any():
+            if not np.nansum(self.figure("expanded_nodes")) > 0:
+                return math.nan
+        else:
             paths = ((record or {}).get("path") for record in self._matched)
             steps = np.array([math.nan if path is None else path_steps(path) for path in paths])
         return thrun_count(self.preparation.get("n_nodes", math.nan), nanmean(steps))

@@ -46,6 +46,19 @@ class WorstCase:
     title: str
     picture: str
     """A data URI: drawn at once, so that a report does not hold the cells of all its maps."""
+    command: str = ""
+    """A command that plans the same pair, in metres."""
+
+
+@dataclass(frozen=True)
+class CounterExample:
+    """A contradiction that was found."""
+
+    text: str
+    command: str = ""
+    """A command that plans the same pair, in metres."""
+    anchor: str = ""
+    """Id of the element with its picture, empty if it is not drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +81,19 @@ class ReportData:
 
     title: str
     facts: list[tuple[str, str]]
-    faults: list[str]
-    """Counter-examples to consistency and paths that failed a check, one line each."""
+    faults: list[CounterExample]
+    """Counter-examples to consistency and paths that failed a check, as many as are shown."""
     checks: int
     """Checks made, passed or not."""
-    criteria: Table
-    """Thrun's three criteria, a row per method, all maps together."""
     maps: list[MapSection]
+    n_faults: int = 0
+    """Counter-examples found."""
+    overall: list[Table] = field(default_factory=list)
+    """Tables of all maps together, none for one map."""
+    definition: str = ""
+    """What consistency is."""
+    meanings: list[tuple[str, str]] = field(default_factory=list)
+    """What each column of the tables holds."""
     overall_losses: dict[str, FloatArray] = field(default_factory=dict)
     overall_times_ms: dict[str, float] = field(default_factory=dict)
     metric_of: dict[str, str] = field(default_factory=dict)

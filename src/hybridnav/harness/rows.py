@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.harness.analysis import pairs_in_common
+from hybridnav.harness.columns import OPTIMA
+from hybridnav.harness.kinds import consistency_row
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import nanmean, nanquantile
+from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile
 from hybridnav.harness.tables import text_of
 from hybridnav.metrics import distance_buckets, summarise
 
@@ -20,63 +22,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import MapQuery, Outcome
     from hybridnav.harness.tables import Row
-    from hybridnav.harness.yardstick import Yardstick
-
-_LOSS_COLUMNS = (
-    "metric",
-    "pairs",
-    "solved",
-    "by the grid",
-    "faults",
-    "pairs in common",
-    "any-angle loss %",
-    "octile loss %",
-    "loss mean %",
-    "loss 95 % interval",
-    "loss median %",
-    "loss p95 %",
-    "loss p99 %",
-    "loss max %",
-    "without loss %",
-    "loss of the plan %",
-    "loss mean m",
-)
-_COST_COLUMNS = (
-    "length mean m",
-    "cost mean m",
-    "weighted loss %",
-    "gap mean %",
-    "gap max %",
-    "gap to cells mean %",
-    "gap to cells p99 %",
-)
-EFFICIENCY_COLUMNS = (
-    "nodes",
-    "backups",
-    "backups of the grid / backups",
-    "cells expanded",
-    "nodes expanded",
-    "query ms, median",
-    "query ms, p95",
-    "without refinement ms",
-    "with preparation ms",
-    "speed-up",
-    "preparation s",
-    "memory MB",
-    "break-even queries",
-)
-
-
-def loss_columns(metric: Yardstick) -> tuple[str, ...]:
-    """Return the columns of a table of losses; the loss over the requested optimum comes first."""
-    if metric == "weighted":
-        at = _LOSS_COLUMNS.index("any-angle loss %")
-        return _LOSS_COLUMNS[:at] + _COST_COLUMNS + _LOSS_COLUMNS[at + 2 :]
-    leading, other = "any-angle loss %", "octile loss %"
-    if metric != "octile":
-        return _LOSS_COLUMNS
-    swapped = {leading: other, other: leading}
-    return tuple(swapped.get(column, column) for column in _LOSS_COLUMNS)
+    from hybridnav.harness.yardstick import Optimum
 
 
 def figures(
@@ -91,56 +37,69 @@ def figures(
     references
         Outcomes of the reference on the same maps, in the same order.
     common
-        The pairs over which losses of different methods are compared.
+        The pairs over which methods are compared: losses, times and expansions are theirs.
 
     Returns
     -------
     dict
-        By column. Losses are pooled over all pairs; nodes, memory and preparation are means over
-        the maps; counts and times are means or quantiles over all pairs. Columns about costs are
-        those of runs with costs alone.
+        By column, see `MEANINGS`. Nodes, memory and preparation are means over the maps. Columns
+        about costs are those of runs with costs alone; losses over an optimum that no pair has are
+        left out.
     """
-    losses = _pooled([outcome.losses for outcome in outcomes])
-    finite = losses[np.isfinite(losses)]
-    summary = summarise(finite)
     lengths = _pooled([outcome.lengths_m for outcome in outcomes])
-    judged = _pooled([outcome.judged_m for outcome in outcomes])
     shared = np.array([one for outcome in outcomes for one in outcome.among(common)], np.bool_)
-    best = _pooled([outcome.best_m for outcome in outcomes])
     fallbacks = [outcome.by_grid for outcome in outcomes if not math.isnan(outcome.by_grid)]
-    low, high = (100 * end for end in summary.mean_interval)
-    return {
+    by_grid = int(sum(fallbacks)) if fallbacks else math.nan
+    solved, pairs = int(np.isfinite(lengths).sum()), len(lengths)
+    by_costs = any(outcome.costs for outcome in outcomes)
+    row: Row = {
         "metric": outcomes[0].metric if outcomes else "",
-        "pairs": len(losses),
-        "solved": int(np.isfinite(lengths).sum()),
-        "by the grid": int(sum(fallbacks)) if fallbacks else math.nan,
+        "pairs": pairs,
+        "solved": solved,
+        "solved %": 100 * solved / pairs if pairs else math.nan,
+        "by the grid": by_grid,
+        "by the grid %": 100 * by_grid / pairs if pairs else math.nan,
         "faults": sum(len(outcome.faults) for outcome in outcomes),
         "pairs in common": int(np.isfinite(lengths[shared]).sum()),
-        "any-angle loss %": 100 * nanmean(_pooled([o.any_angle_losses for o in outcomes])[shared]),
-        "octile loss %": 100 * nanmean(_pooled([o.octile_losses for o in outcomes])[shared]),
-        **(_of_costs(outcomes, shared) if any(outcome.costs for outcome in outcomes) else {}),
-        "loss mean %": 100 * summary.mean,
-        "loss 95 % interval": f"{text_of(low)} to {text_of(high)}" if len(finite) else "",
-        "loss median %": 100 * summary.median,
-        "loss p95 %": 100 * summary.p95,
-        "loss p99 %": 100 * summary.p99,
-        "loss max %": 100 * summary.max,
-        "without loss %": 100 * summary.share_without_loss,
-        "loss of the plan %": 100 * nanmean(_pooled([o.plan_losses for o in outcomes])),
-        "loss mean m": nanmean(judged - best),
-        **_efficiency(outcomes, references),
+        **consistency_row(outcomes),
     }
+    for optimum in OPTIMA:
+        if optimum != "weighted" or by_costs:
+            row |= _losses(outcomes, shared, optimum)
+    plan = _pooled([outcome.plan_losses for outcome in outcomes])[shared]
+    row["loss of the plan %"] = 100 * nanmean(plan)
+    if by_costs:
+        row |= _of_costs(outcomes, shared)
+    return row | _efficiency(outcomes, references, shared)
+
+
+def _losses(outcomes: Sequence[Outcome], shared: BoolArray, optimum: Optimum) -> Row:
+    """Return the losses over one optimum: over the pairs in common, and, in one column, over all
+    that the method solved."""
+    every = _pooled([outcome.losses_over(optimum) for outcome in outcomes])
+    finite = every[shared & np.isfinite(every)]
+    summary = summarise(finite)
+    low, high = (100 * end for end in summary.mean_interval)
+    figures: Row = {
+        "mean %": 100 * summary.mean,
+        "95 % interval": f"{text_of(low)} to {text_of(high)}" if len(finite) else "",
+        "median %": 100 * summary.median,
+        "p95 %": 100 * summary.p95,
+        "p99 %": 100 * summary.p99,
+        "max %": 100 * summary.max,
+        "without loss %": 100 * summary.share_without_loss,
+        "mean of all solved %": 100 * nanmean(every),
+    }
+    return {f"{optimum} loss {what}": value for what, value in figures.items()}
 
 
 def _of_costs(outcomes: Sequence[Outcome], shared: BoolArray) -> Row:
     """Return lengths and costs over the pairs in common, beside each other, and proved gaps."""
-    gaps = _pooled([outcome.gaps for outcome in outcomes])
-    to_cells = _pooled([outcome.grid_gaps for outcome in outcomes])
+    gaps = _pooled([outcome.gaps for outcome in outcomes])[shared]
+    to_cells = _pooled([outcome.grid_gaps for outcome in outcomes])[shared]
     return {
         "length mean m": nanmean(_pooled([outcome.lengths_m for outcome in outcomes])[shared]),
         "cost mean m": nanmean(_pooled([outcome.costs_m for outcome in outcomes])[shared]),
-        "weighted loss %": 100
-        * nanmean(_pooled([outcome.weighted_losses for outcome in outcomes])[shared]),
         "gap mean %": 100 * nanmean(gaps),
         "gap max %": 100 * nanquantile(gaps, 1.0),
         "gap to cells mean %": 100 * nanmean(to_cells),
@@ -148,32 +107,53 @@ def _of_costs(outcomes: Sequence[Outcome], shared: BoolArray) -> Row:
     }
 
 
-def _efficiency(outcomes: Sequence[Outcome], references: Sequence[Outcome]) -> Row:
-    seconds = _pooled([outcome.seconds for outcome in outcomes])
-    whole = _pooled([outcome.reference_seconds for outcome in outcomes])
-    coarse = seconds - _pooled([outcome.refine_seconds for outcome in outcomes])
+def _efficiency(
+    outcomes: Sequence[Outcome], references: Sequence[Outcome], shared: BoolArray
+) -> Row:
+    """Return counts and times over the pairs in common, and what preparation takes."""
+    seconds = _pooled([outcome.seconds for outcome in outcomes])[shared]
+    whole = _pooled([outcome.reference_seconds for outcome in outcomes])[shared]
+    coarse = seconds - _pooled([outcome.refine_seconds for outcome in outcomes])[shared]
+    expansions = _pooled([outcome.expansions for outcome in outcomes])[shared]
+    of_grid = _pooled([outcome.reference_expansions for outcome in outcomes])[shared]
     preparation = nanmean(np.array([outcome.preparation_seconds for outcome in outcomes]))
-    queries = len(seconds) / max(len(outcomes), 1)
+    queries = len(_pooled([outcome.lengths_m for outcome in outcomes])) / max(len(outcomes), 1)
     own = nanmean(np.array([outcome.preparation_seconds for outcome in references]))
     counts = np.array([outcome.thrun_count for outcome in outcomes])
     grid_counts = np.array([outcome.thrun_count for outcome in references])
+    kinds: Row = {
+        column: nanmean(_pooled([outcome.figure(key) for outcome in outcomes])[shared])
+        for key, column in EXPANSIONS.items()
+    }
+    both = np.isfinite(seconds)
+    each = _quotient(float(np.nansum(seconds)), float(np.nansum(expansions)))
+    of_cell = _quotient(float(whole[both].sum()), float(of_grid[both].sum()))
     return {
         "nodes": _mean_of(outcomes, "n_nodes"),
         "backups": nanmean(counts),
         "backups of the grid / backups": nanquantile(_ratio(grid_counts, counts), 0.5),
-        "cells expanded": nanmean(_pooled([outcome.figure("expanded") for outcome in outcomes])),
-        "nodes expanded": nanmean(
-            _pooled([outcome.figure("expanded_nodes") for outcome in outcomes])
-        ),
+        **kinds,
+        "expansions": nanmean(expansions),
+        "expansions of the grid / expansions": nanquantile(_ratio(of_grid, expansions), 0.5),
+        "us an expansion": 1e6 * each,
+        "an expansion in cells": _quotient(each, of_cell),
+        "work in cells": _quotient(nanmean(seconds), of_cell),
         "query ms, median": 1e3 * nanquantile(seconds, 0.5),
         "query ms, p95": 1e3 * nanquantile(seconds, 0.95),
+        "query ms, mean": 1e3 * nanmean(seconds),
         "without refinement ms": 1e3 * nanquantile(coarse, 0.5),
         "with preparation ms": 1e3 * (nanmean(seconds) + preparation / max(queries, 1)),
         "speed-up": nanquantile(_ratio(whole, seconds), 0.5),
+        "speed-up of means": _quotient(nanmean(whole[both]), nanmean(seconds)),
         "preparation s": preparation,
         "memory MB": _mean_of(outcomes, "memory_bytes") / 1e6,
         "break-even queries": _break_even(preparation - own, nanmean(whole - seconds)),
     }
+
+
+def _quotient(first: float, second: float) -> float:
+    """Return a quotient, NaN for a zero divisor."""
+    return first / second if second else math.nan
 
 
 def _break_even(price: float, gain: float) -> float:
@@ -215,7 +195,7 @@ def rows_of_map(study: Study, name: str) -> list[Row]:
 def rows_of_study(study: Study) -> list[Row]:
     """Return one row for each method, over all of its maps."""
     references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
-    common = pairs_in_common(study.outcomes)
+    common = study.common
     rows = []
     for label in study.labels:
         outcomes = [o for o in study.of_method(label) if o.map_name in references]
@@ -224,16 +204,20 @@ def rows_of_study(study: Study) -> list[Row]:
     return rows
 
 
-def rows_by_distance(study: Study, name: str) -> list[Row]:
-    """Return the mean loss in per cent by the length of the optimum, one row for each method on a
-    map."""
+def rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[Row]:
+    """Return the mean loss over an optimum in per cent by the length of the octile optimum, one row
+    for each method on a map, over the pairs that all methods solved."""
+    outcomes = study.of_map(name)
+    common = pairs_in_common(outcomes)
     rows = []
-    for outcome in study.of_map(name):
+    for outcome in outcomes:
         buckets = distance_buckets(outcome.optima_m)
+        losses = np.where(outcome.among(common), outcome.losses_over(optimum), math.nan)
         row: Row = {"method": outcome.label}
         for at, label in enumerate(buckets.labels):
-            inside = outcome.losses[buckets.indices == at]
+            inside = losses[(buckets.indices == at) & np.isfinite(losses)]
             if len(inside):
                 row[f"{label} ({len(inside)})"] = 100 * nanmean(inside)
-        rows.append(row)
+        if len(row) > 1:
+            rows.append(row)
     return rows

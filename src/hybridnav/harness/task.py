@@ -13,6 +13,7 @@ from hybridnav.costs import CostLayer
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.grid.worlds import figure1_world
+from hybridnav.harness.contradictions import Fault
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.pairs import SAMPLER_VERSION
@@ -21,7 +22,7 @@ from hybridnav.harness.records import environment, map_digest, pair_id, preparat
 from hybridnav.harness.scenes import read_map, read_scene, text_of_costs
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from hybridnav.baselines import AnyAngleResult, MethodResult
     from hybridnav.harness.pairs import Pair
@@ -96,6 +97,7 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
         "n_nodes": int(method.n_nodes),
         "n_edges": int(method.n_edges),
         "memory_bytes": int(method.memory_bytes),
+        **({} if method.region_of is None else {"checked": ["regions"]}),
         "faults": [text for text, _ in judge.region_faults],
         "fault_cells": [cells for _, cells in judge.region_faults],
     }
@@ -121,6 +123,7 @@ def _about(scene: Scene, task: Task) -> Record:
         "file": task.map.path,
         "shape": list(grid.shape),
         "resolution_m": grid.resolution_m,
+        "origin": [*grid.frame.origin_m, grid.frame.yaw_rad],
         "robot_radius_m": grid.robot_radius_m,
         "corner_cutting": grid.corner_cutting,
         "free_cells": int((grid.classes == CellClass.FREE).sum()),
@@ -204,17 +207,20 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
     ) as error:
         # The answer names no cells, regions or arcs of this map.
         reason = _reason(error)
-        return {"status": "error", "error": reason, "faults": [f"no answer to judge: {reason}"]}
+        wrong = Fault("paths", f"no answer to judge: {reason}")
+        return {"status": "error", "error": reason, **_of_faults([wrong])}
 
 
 def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> Record:
-    length_m, faults = judge.faults(pair, answer)
+    length_m, faults, checked = judge.faults(pair, answer)
     known: Record = {}
     costs: Record = {}
     if not faults:
-        costs, faults = judge.cost(answer, length_m)
+        costs, wrong = judge.cost(answer, length_m)
+        faults = [Fault("bounds", text) for text in wrong]
     if not faults:
-        known, faults = judge.oracles(answer, pair, length_m)
+        known, wrong = judge.oracles(answer, pair, length_m)
+        faults = [Fault("bounds", text) for text in wrong]
     unsolved = answer.gave_up or "no path"
     return {
         "status": "solved" if answer.is_path else unsolved,
@@ -226,12 +232,21 @@ def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> R
         **({} if answer.any_angle is None else _of_line(answer.any_angle)),
         "expanded": int(answer.expanded),
         "expanded_nodes": int(answer.expanded_nodes),
+        "expanded_border_cells": int(answer.expanded_border_cells),
+        "expanded_intervals": int(answer.expanded_intervals),
         "seconds": seconds,
         "stages": {stage: float(value) for stage, value in answer.seconds.items()},
         **costs,
         **known,
-        "faults": faults,
+        **({"checked": checked} if checked else {}),
+        **_of_faults(faults),
     }
+
+
+def _of_faults(faults: Sequence[Fault]) -> Record:
+    """Return the fields that hold the faults of an answer, texts and kinds."""
+    texts = [fault.text for fault in faults]
+    return {"faults": texts, **({"fault_kinds": [fault.kind for fault in faults]} if texts else {})}
 
 
 def _of_line(line: AnyAngleResult) -> Record:

@@ -19,6 +19,10 @@ any-angle optimum; the octile optimum, which any-angle paths have no loss over; 
 paths of cells, for the costs of all paths."""
 
 
+Optimum = Literal["any-angle", "octile", "weighted"]
+"""What the losses of one table refer to."""
+
+
 def check_yardstick(metric: str) -> None:
     """Raise `InvalidValueError` if there is no such yardstick."""
     if metric not in get_args(Yardstick):

@@ -1,0 +1,210 @@
+"""Contents of the report: facts, tables and charts of all maps together, and of each map."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridnav.harness.cases import cases_of, counter_examples
+from hybridnav.harness.columns import (
+    EFFICIENCY_COLUMNS,
+    MEANINGS,
+    OPTIMA,
+    YARDSTICKS,
+    loss_columns,
+    shown,
+)
+from hybridnav.harness.kinds import CONSISTENCY_COLUMNS, DEFINITION
+from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import Outcome, nanquantile
+from hybridnav.harness.report import MapSection, ReportData, Table
+from hybridnav.harness.rows import rows_by_distance
+from hybridnav.harness.tables import text_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hybridnav._typing import FloatArray
+    from hybridnav.harness.analysis import Study
+    from hybridnav.harness.cases import CaseKey
+    from hybridnav.harness.tables import Row
+    from hybridnav.harness.yardstick import Yardstick
+
+_WORDS = ("method", "map", "metric")
+"""Columns that hold no numbers."""
+
+REFERS_TO: dict[Yardstick, str] = {
+    "both": "the any-angle optimum in one table, the octile optimum in another, which any-angle "
+    "paths are not in",
+    "any-angle": "the any-angle optimum, for all paths",
+    "octile": "the octile optimum; any-angle paths have none",
+    "weighted": "the least cost of paths of cells, for the costs of all paths",
+}
+"""What losses refer to, in words."""
+
+_BY_DISTANCE = "Mean loss over {} in per cent, by length of the octile optimum (pairs)"
+
+
+def report_of(
+    study: Study, title: str, overall: Sequence[Row], by_map: dict[str, list[Row]]
+) -> ReportData:
+    """Return the contents of the report.
+
+    Parameters
+    ----------
+    study
+        The study.
+    title
+        Title of the report.
+    overall, by_map
+        Rows of all maps together, and of each map.
+
+    Returns
+    -------
+    ReportData
+        With a section of all maps together only where there are several.
+    """
+    drawn: dict[CaseKey, str] = {}
+    maps = [
+        _section(study, name, by_map[name], number, drawn)
+        for number, name in enumerate(study.maps, start=1)
+    ]
+    together = _tables(study, overall) if len(maps) > 1 else []
+    facts = [
+        *_machines(study).items(),
+        ("maps", str(len(study.maps))),
+        ("methods", ", ".join(study.labels)),
+        *([("costs", study.costs)] if study.costs else []),
+        ("losses refer to", REFERS_TO[study.metric]),
+        ("pairs", _pairs_text(study)),
+        ("queries without an answer", f"{study.failures:,}"),
+    ]
+    labels = dict.fromkeys(outcome.label for outcome in _drawn(study, study.outcomes))
+    several = labels if together else {}
+    used = dict.fromkeys(
+        column
+        for table in [*together, *(t for m in maps for t in m.tables)]
+        for column in table.columns
+    )
+    return ReportData(
+        title=title,
+        facts=facts,
+        faults=counter_examples(study, drawn),
+        n_faults=len(study.faults),
+        checks=study.checks,
+        overall=together,
+        maps=maps,
+        definition=DEFINITION,
+        meanings=[(column, MEANINGS[column]) for column in used if column in MEANINGS],
+        overall_losses={label: _losses(study.of_method(label), study) for label in several},
+        overall_times_ms={label: _median_ms(study.of_method(label), study) for label in several},
+        metric_of={
+            outcome.label: outcome.metric for outcome in study.outcomes if study.metric == "both"
+        },
+    )
+
+
+def _pairs_text(study: Study) -> str:
+    """Return the number of pairs, and how many of them all methods solved."""
+    asked = sum(len(outcome.references) for outcome in study.of_method(REFERENCE))
+    text = f"{asked:,} of joined cells, of which all methods solved {len(study.common):,}"
+    shares = {
+        label: sum(len(outcome.solved_keys) for outcome in study.of_method(label))
+        for label in study.labels
+    }
+    fewest = min((label for label in shares if shares[label]), key=shares.__getitem__, default="")
+    if fewest and shares[fewest] < asked:
+        text += f"; the fewest, {shares[fewest]:,}, {fewest}"
+    return text
+
+
+def _machines(study: Study) -> dict[str, str]:
+    """Return versions and host of the runs, as recorded; several if they differ."""
+    found: dict[str, dict[str, None]] = {}
+    for outcome in study.outcomes:
+        for key, value in outcome.preparation.get("environment", {}).items():
+            found.setdefault(key, {})[value] = None
+    return {key: ", ".join(values) for key, values in found.items()}
+
+
+def with_values(rows: Sequence[Row], column: str) -> list[Row]:
+    """Return the rows that have a value in a column."""
+    return [row for row in rows if text_of(row.get(column, "")) != ""]
+
+
+def _tables(study: Study, rows: Sequence[Row]) -> list[Table]:
+    """Return the tables of Thrun's three criteria: one of losses over each optimum."""
+    tables = [_table(rows, CONSISTENCY_COLUMNS, "Consistency")]
+    for optimum in YARDSTICKS[study.metric]:
+        known = with_values(rows, f"{optimum} loss mean %")
+        if known:
+            tables.append(_table(known, loss_columns(optimum), f"Loss over {OPTIMA[optimum]}"))
+    return [*tables, _table(rows, EFFICIENCY_COLUMNS, "Efficiency")]
+
+
+def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
+    """Return a table without columns that are empty."""
+    kept = ["method", *(column for column in columns if with_values(rows, column))]
+    return Table(
+        columns=[shown(column) for column in kept],
+        rows=[[text_of(row.get(column, "")) for column in kept] for row in rows],
+        caption=caption,
+        numeric=frozenset(at for at, column in enumerate(kept) if column not in _WORDS),
+    )
+
+
+def _section(
+    study: Study, name: str, rows: list[Row], number: int, drawn: dict[CaseKey, str]
+) -> MapSection:
+    """Return the section of a map; the anchors of its pictures are added to `drawn`."""
+    outcomes = study.of_map(name)
+    charted = _drawn(study, outcomes)
+    first = outcomes[0].preparation
+    shape = first.get("shape", [0, 0])
+    tables = _tables(study, rows)
+    for optimum in YARDSTICKS[study.metric]:
+        distance = rows_by_distance(study, name, optimum)
+        columns = [key for row in distance for key in row if key != "method"]
+        if columns:
+            caption = _BY_DISTANCE.format(OPTIMA[optimum])
+            tables.append(_table(distance, list(dict.fromkeys(columns)), caption))
+    cases = [case for outcome in outcomes for case in cases_of(outcome)]
+    for at, (key, _) in enumerate(cases, start=1):
+        drawn.setdefault(key, f"case-{number}-{at}")
+    return MapSection(
+        name=name,
+        facts=[
+            ("size", f"{shape[0]} x {shape[1]} cells of {first.get('resolution_m', 0):g} m"),
+            ("free cells", f"{first.get('free_cells', 0):,}"),
+            ("robot radius", f"{first.get('robot_radius_m', 0):g} m"),
+            ("SHA-256", str(first["map_sha"])[:16]),
+        ],
+        tables=tables,
+        losses={outcome.label: _losses([outcome], study) for outcome in charted},
+        times_ms={outcome.label: _median_ms([outcome], study) for outcome in charted},
+        worst=[case for _, case in cases],
+    )
+
+
+def _median_ms(outcomes: Sequence[Outcome], study: Study) -> float:
+    """Return the median time of a method over the pairs that all methods solved."""
+    parts = [outcome.seconds[outcome.among(study.common)] for outcome in outcomes]
+    return 1e3 * nanquantile(np.concatenate(parts), 0.5) if parts else math.nan
+
+
+def _losses(outcomes: Sequence[Outcome], study: Study) -> FloatArray:
+    """Return the losses of a method over the pairs that all methods solved."""
+    parts = [np.where(o.among(study.common), o.losses, math.nan) for o in outcomes]
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _drawn(study: Study, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
+    """Return the methods for charts, each with those that its losses are compared with."""
+    if study.metric == "octile":
+        return [outcome for outcome in outcomes if not outcome.is_any_angle]
+    others = [outcome for outcome in outcomes if outcome.label != REFERENCE]
+    if study.metric == "both" and all(outcome.metric == "any-angle" for outcome in others):
+        return others or outcomes
+    return outcomes
