@@ -43,9 +43,16 @@ def counter_examples(study: Study, drawn: dict[CaseKey, str]) -> list[CounterExa
     Returns
     -------
     list of CounterExample
-        In the order of the study; a line about the number of others last.
+        The first of each method, then the second of each, and so on; a line about the number of
+        others last.
     """
-    found = study.faults
+    ranked = [
+        (rank, outcome, record, text)
+        for outcome in study.outcomes
+        for rank, (record, text) in enumerate(outcome.faults)
+    ]
+    ranked.sort(key=lambda fault: fault[0])
+    found = [(outcome, record, text) for _, outcome, record, text in ranked]
     lines = [
         CounterExample(
             f"{outcome.map_name}, {outcome.label}, {_pair_text(record)}: {text}",
