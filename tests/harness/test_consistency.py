@@ -13,8 +13,9 @@ from hybridnav.baselines.grid import GridAstar
 from hybridnav.config import Preset
 from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
+from hybridnav.harness.hybrid_method import HybridMethod
 from hybridnav.harness.judging import Judge
-from hybridnav.harness.methods import HybridMethod, Prepared
+from hybridnav.harness.methods import Prepared
 from hybridnav.harness.pairs import Pair, sample_pairs
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import GridSearch

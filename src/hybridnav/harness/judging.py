@@ -14,7 +14,8 @@ from hybridnav.grid import CellClass
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.contradictions import SLACK, Fault
 from hybridnav.harness.cost_judge import CostJudge
-from hybridnav.harness.methods import HybridMethod, Prepared
+from hybridnav.harness.hybrid_method import HybridMethod
+from hybridnav.harness.methods import Prepared
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.metrics import (
     ScipyOptimum,

@@ -11,27 +11,19 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from hybridnav.baselines import AnyAngleResult, CostClaim, MethodResult
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import CellClass
 from hybridnav.harness.graph_method import GraphMethod
-from hybridnav.planner import HybridPlanner
+from hybridnav.harness.hybrid_method import HybridMethod
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.result import PlanStatus
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav._typing import IntArray
     from hybridnav.baselines import Method
     from hybridnav.costs import CostLayer
     from hybridnav.graphs import WaypointGraph
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.result import Metric, PlanResult
-
-Cell = tuple[int, int]
+    from hybridnav.result import Metric
 
 REFERENCE = "grid-astar"
 """The baseline whose lengths are the optimum; part of every run."""
@@ -183,116 +175,6 @@ def graph_spec(graph: WaypointGraph, *, clear_edges_only: bool = False) -> Metho
 def _given(merge_distance_m: float | None, seed: int | None) -> dict[str, Any]:
     settings = {"merge_distance_m": merge_distance_m, "seed": seed}
     return {key: value for key, value in settings.items() if value is not None}
-
-
-class HybridMethod:
-    """A preset of `HybridPlanner` as a method; see `baselines.Method`."""
-
-    def __init__(
-        self, topology: TopologicalMap, preset: Preset, costs: CostLayer | None = None
-    ) -> None:
-        self.topology = topology
-        self.name = preset.name
-        self._planner = HybridPlanner(topology, preset=preset, costs=costs)
-        self._planner.prepare()
-        self._frame = topology.grid.frame
-        free = topology.classes == CellClass.FREE
-        self.region_of: IntArray = topology.level.field_of
-        self.n_nodes = int(free.sum())
-        plain = ~topology.level.is_self_loop & free[topology.arcs].all(axis=1)
-        self.n_edges = int(plain.sum())
-
-    @cached_property
-    def memory_bytes(self) -> int:
-        """Sum of the arrays of the planner, the topological map and the record, in bytes."""
-        return _nbytes(self._planner, set())
-
-    def solve(self, start: Cell, goal: Cell) -> MethodResult:
-        """Plan between two free cells."""
-        endpoints = self._frame.points_of(np.array([start, goal]))
-        result = self._planner.plan(endpoints[0], endpoints[1])
-        route, stats = result.route, result.stats
-        path = result.path if result.solved else None
-        line = _line(result)
-        arc_ids = self.topology.arc_ids
-        by_costs = self._planner.costs is not None
-        claim = None
-        if by_costs and result.solved:
-            claim = CostClaim(result.cost, result.lower_bound, result.grid_bound)
-        is_factor = result.solved and line is None and not by_costs
-        return MethodResult(
-            None if path is None or line is not None else path.cells,
-            any_angle=line,
-            gave_up=str(result.status) if result.status in _GAVE_UP else "",
-            nodes=None if route is None else _dense(self.topology.place_ids, route.places),
-            arcs=None if route is None or -1 in route.arcs else _dense(arc_ids, route.arcs),
-            bound=1 + result.gap if is_factor else np.inf,
-            by_costs=claim,
-            expanded=stats.expanded,
-            expanded_nodes=stats.expanded_places,
-            expanded_border_cells=stats.expanded_border_cells,
-            expanded_intervals=stats.expanded_intervals,
-            seconds=_stages(result),
-        )
-
-    def close(self) -> None:
-        """End the process of a planner with OMPL."""
-        self._planner.close()
-
-
-LINE_METRICS: frozenset[Metric] = frozenset({"any-angle", "any-angle-weighted"})
-_GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
-
-
-def _line(result: PlanResult) -> AnyAngleResult | None:
-    """Return the path of a solved query if it is an any-angle path."""
-    is_line = result.metric in LINE_METRICS
-    if not is_line or result.path is None or not result.solved:
-        return None
-    how = result.refinement
-    return AnyAngleResult(
-        result.path.points,
-        result.path.length_m,
-        lower_bound_m=result.lower_bound if result.metric == "any-angle" else 0.0,
-        headings_rad=result.path.headings_rad if result.path.is_curved else None,
-        by_grid=None if how is None else how.by_grid,
-    )
-
-
-def _stages(result: PlanResult) -> dict[str, float]:
-    """Return seconds by stage, under the names that all methods use."""
-    seconds = dict(result.stats.seconds)
-    if "ompl" in seconds:
-        seconds["refine"] = seconds.pop("ompl")
-    if result.refinement is not None and result.refinement.trace:
-        seconds["first path"] = result.refinement.trace[0][0]
-    return seconds
-
-
-def _dense(ids: Any, named: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(np.searchsorted(ids, np.array(named, dtype=np.int64)).tolist())
-
-
-def _nbytes(thing: Any, seen: set[int]) -> int:
-    """Return the bytes of all arrays that a thing of this package holds, each counted once."""
-    if id(thing) in seen:
-        return 0
-    seen.add(id(thing))
-    if isinstance(thing, np.ndarray):
-        owner = thing
-        while isinstance(owner.base, np.ndarray):
-            owner = owner.base
-        counted = id(owner) in seen and owner is not thing
-        seen.add(id(owner))
-        return 0 if counted else owner.nbytes
-    if isinstance(thing, (list, tuple)):
-        return sum(_nbytes(item, seen) for item in thing)
-    if isinstance(thing, dict):
-        return sum(_nbytes(item, seen) for item in thing.values())
-    module = type(thing).__module__
-    if not module.startswith("hybridnav.") or module.startswith("hybridnav.grid"):
-        return 0
-    return _nbytes(getattr(thing, "__dict__", {}), seen)
 
 
 @dataclass
