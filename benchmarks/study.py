@@ -27,7 +27,6 @@ from typing import TYPE_CHECKING
 
 import hybridnav as hn
 from benchmarks import _study_ompl
-from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.methods import BASELINES
 from hybridnav.harness.outcome import nanquantile
 from hybridnav.harness.output import markdown, write_outputs
@@ -146,7 +145,6 @@ them interleaved, pair by pair. [study-ompl.md](study-ompl.md) has the presets w
 paths are any-angle.
 
 {markdown(overall, study)}
-{_failures(study)}
 ![Share of pairs that lose more than x, for each method](images/study-loss.svg)
 
 ![Median query time against mean loss, for each method](images/study-speed.svg)
@@ -157,19 +155,6 @@ paths are any-angle.
 ## Map by map
 
 {to_markdown(maps, short)}"""
-
-
-def _failures(study: Study) -> str:
-    """Why some queries have no answer, one line for each map and method."""
-    lines = []
-    for outcome in study.outcomes:
-        failed = [r for r in outcome.records if r["status"] not in ANSWERED]
-        if failed:
-            reason = failed[0].get("error", failed[0]["status"])
-            lines.append(
-                f"* {outcome.map_name}, {outcome.label}: {len(failed)} queries, {reason}\n"
-            )
-    return "".join(lines)
 
 
 def main() -> None:

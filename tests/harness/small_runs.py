@@ -31,6 +31,11 @@ def name_of(method):
     return f"{method.__module__}:{method.__name__}"
 
 
+def label_of(method):
+    """Return the name that a class of `faulty_methods` gives itself."""
+    return method.__name__
+
+
 def write_map(folder, lines, name="rooms"):
     body = "".join(f"{line}\n" for line in lines).replace("#", "@")
     path = folder / f"{name}.map"

@@ -30,7 +30,7 @@ from hybridnav.io import load_map
 from hybridnav.metrics import VisibilityGraph
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import ROOMS, ROOT, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, ROOT, label_of, name_of, run_here, write_map
 
 FAULTS = {
     faulty.LineThroughWall: "m enters a blocked cell",
@@ -87,8 +87,8 @@ def rows(folder, study):
 
 
 def outcome_of(study, method):
-    name = method if isinstance(method, str) else name_of(method)
-    return next(outcome for outcome in study.outcomes if outcome.label == name)
+    names = {method} if isinstance(method, str) else {name_of(method), label_of(method)}
+    return next(outcome for outcome in study.outcomes if outcome.label in names)
 
 
 @pytest.mark.parametrize("method", FAULTS)
@@ -152,7 +152,7 @@ def test_both_losses_are_over_the_pairs_that_all_methods_solved(study, rows):
 
 
 def test_the_metric_decides_what_losses_refer_to(folder, study):
-    line = name_of(faulty.SoundLine)
+    line = label_of(faulty.SoundLine)
     for metric in ("any-angle", "octile"):
         other = write_outputs(folder, metric=metric)
         cells, lines = outcome_of(other, "grid-astar"), outcome_of(other, line)
@@ -180,7 +180,7 @@ def test_runs_are_compared_over_the_optimum_that_is_asked_for(folder):
         for metric in METRICS
         for row in compare_runs(folder, folder, metric=metric)
     }
-    line = name_of(faulty.SoundLine)
+    line = label_of(faulty.SoundLine)
     assert loss["any-angle", "paper"] > loss["octile", "paper"] + 1
     assert loss["both", "paper"] == loss["octile", "paper"]
     assert loss["both", line] == loss["any-angle", line]
@@ -234,7 +234,7 @@ def test_each_metric_has_rows_and_charts_of_its_own(folder, rows):
     assert metrics == sorted(metrics, reverse=True)
     assert rows["paper"]["metric"] == rows["grid-astar"]["metric"] == "octile"
     assert rows["paper"]["by the grid"] == ""
-    for name in ("portals+line-of-sight", name_of(faulty.SoundLine)):
+    for name in ("portals+line-of-sight", label_of(faulty.SoundLine)):
         assert rows[name]["metric"] == "any-angle"
         assert rows[name]["octile loss mean %"] == ""
     report = (folder / "report.html").read_text()
@@ -249,7 +249,7 @@ def test_a_path_by_the_grid_is_not_its_method_s(study, rows):
     turns = [(record["start"][0] + record["goal"][0]) % 3 for record in outcome.references]
     own, grid = turns.count(1), turns.count(2)
     assert min(own, grid, turns.count(0)) > 3
-    row = rows[name_of(faulty.OwnGridOrNothing)]
+    row = rows[label_of(faulty.OwnGridOrNothing)]
     assert (row["solved"], row["by the grid"]) == (str(own), str(grid))
     # Its own are as good as can be, the grid's longer: those do not count.
     assert np.isfinite(outcome.losses).sum() == own
@@ -268,7 +268,7 @@ def test_the_page_of_the_study_counts_a_method_s_own_paths_by_themselves(study):
     named = {row[0]: dict(zip(head, row, strict=True)) for row in rows}
     assert named.keys().isdisjoint({"paper", "grid-astar"})
     outcome = outcome_of(study, faulty.OwnGridOrNothing)
-    row = named[name_of(faulty.OwnGridOrNothing)]
+    row = named[label_of(faulty.OwnGridOrNothing)]
     assert int(row["solved by itself"]) == np.isfinite(outcome.losses).sum()
     assert int(row["by the grid"]) == outcome.by_grid
     assert int(row["without an answer"]) == outcome.failures
@@ -276,7 +276,7 @@ def test_the_page_of_the_study_counts_a_method_s_own_paths_by_themselves(study):
 
 
 def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_path, monkeypatch):
-    name = name_of(faulty.SoundLine)
+    name = label_of(faulty.SoundLine)
     rows = {row["method"]: row for row in compare_runs(folder, folder)}
     assert rows[name]["difference, points"] == 0
     monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)

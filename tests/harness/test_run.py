@@ -290,7 +290,7 @@ def rows_of(first, second):
 
 def test_a_run_equals_itself(unbroken):
     rows = compare_runs(unbroken, unbroken)
-    assert {row["method"] for row in rows} == {name_of(faulty.Slow), "simple-graph", "paper"}
+    assert {row["method"] for row in rows} == {"Slow", "simple-graph", "paper"}
     for row in rows:
         assert row["map"] == "rooms"
         assert row["pairs"] == N_PAIRS

@@ -36,6 +36,15 @@ BaselinesOption = Annotated[
         help="A baseline, or module:class; may be given several times.",
     ),
 ]
+MethodsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--methods",
+        metavar="FILE",
+        help="A YAML file of methods: presets, baselines, classes and graphs with names and "
+        "settings.",
+    ),
+]
 GraphsOption = Annotated[
     list[Path] | None,
     typer.Option(
@@ -120,6 +129,7 @@ def evaluate(
     out: OutOption,
     preset: PresetsOption = None,
     baseline: BaselinesOption = None,
+    methods: MethodsOption = None,
     graph: GraphsOption = None,
     floor: GraphFloorOption = None,
     clear_edges: ClearEdgesOption = False,
@@ -147,6 +157,7 @@ def evaluate(
         raise UsageError(
             "--all-pairs chooses the pairs: leave out --scen and --pairs, or --all-pairs"
         )
+    from hybridnav.harness.names import read_methods  # noqa: PLC0415
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
@@ -162,12 +173,14 @@ def evaluate(
         raise UsageError("--clear-edges goes with --graph: name the graph, or leave it out")
     if floor is not None and not graph:
         raise UsageError("--floor goes with --graph: name the graph, or leave it out")
-    names = preset if preset is not None else ([] if baseline or graph else ["shortest"])
+    others = baseline or graph or methods
+    names = preset if preset is not None else ([] if others else ["shortest"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
         presets=tuple(read_settings(name, overrides, None, None) for name in names),
         baselines=tuple(baseline or ()),
         graphs=tuple(_graph(file, floor) for file in graph or ()),
+        methods=() if methods is None else read_methods(methods),
         clear_edges_only=clear_edges,
         pairs=pairs,
         lattice_step_m=all_pairs,

@@ -6,17 +6,20 @@ S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, 1
 from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.frames import to_frame
+from hybridnav.harness.names import NamedMethod, read_methods
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.yardstick import AnyAngleOptimum
 
 __all__ = [
     "AnyAngleOptimum",
+    "NamedMethod",
     "RunSettings",
     "Study",
     "compare_runs",
     "evaluate",
     "load_study",
+    "read_methods",
     "to_frame",
     "write_outputs",
 ]

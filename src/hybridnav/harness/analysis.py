@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
-from hybridnav.harness.records import read_records
+from hybridnav.harness.records import latest_sources, read_records
 from hybridnav.harness.yardstick import check_yardstick
 
 if TYPE_CHECKING:
@@ -131,12 +131,13 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
             preparations[key] = record
         else:
             pairs.setdefault(key, []).append(record)
+    preparations = _latest(preparations, folder)
     metric = _metric_of(preparations, metric, folder)
     names = _map_labels(preparations, root)
     digests: dict[str, set[tuple[str, str]]] = {}
     for record in preparations.values():
         settings = record["method_sha"], names[record["map_sha"]]
-        digests.setdefault(f"{record['method']}@{settings[1]}", set()).add(settings)
+        digests.setdefault(f"{_name_of(record)}@{settings[1]}", set()).add(settings)
     optima = {
         sha: {query_key(record): record for record in pairs.get((sha, method), ())}
         for (sha, method), record in preparations.items()
@@ -145,8 +146,9 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     outcomes = []
     for (sha, method), record in preparations.items():
         name = names[sha]
-        several = len(digests[f"{record['method']}@{name}"]) > 1
-        label = f"{record['method']} {method[:4]}" if several else record["method"]
+        label = _name_of(record)
+        if len(digests[f"{label}@{name}"]) > 1:
+            label = f"{label} {method[:4]}"
         own = pairs.get((sha, method), [])
         outcomes.append(Outcome(name, label, record, own, optima.get(sha, {}), metric))
     order = {name: at for at, name in enumerate(dict.fromkeys(names.values()))}
@@ -160,6 +162,28 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
         )
     )
     return Study(outcomes, metric)
+
+
+def _name_of(record: Record) -> str:
+    """Return the name of a method: the one that its class gives itself, else that of its record."""
+    return str(record.get("label") or record["method"])
+
+
+def _latest(
+    preparations: dict[tuple[str, str], Record], folder: Path
+) -> dict[tuple[str, str], Record]:
+    """Return the preparations without those of a class before it was mended."""
+    sources = latest_sources(folder)
+    kept: dict[tuple[str, str, str], tuple[str, str]] = {}
+    current: set[tuple[str, str] | None] = set()
+    for key, record in preparations.items():
+        place = key[0], record["method"], record.get("settings_sha", key[1])
+        is_current = record.get("source") == sources.get(record["method"])
+        if is_current or kept.get(place) not in current:
+            kept[place] = key
+        current |= {key} if is_current else set()
+    shown = set(kept.values())
+    return {key: record for key, record in preparations.items() if key in shown}
 
 
 def _metric_of(

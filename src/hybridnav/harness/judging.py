@@ -15,7 +15,6 @@ from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.contradictions import SLACK, Fault
 from hybridnav.harness.cost_judge import CostJudge
 from hybridnav.harness.hybrid_method import HybridMethod
-from hybridnav.harness.methods import Prepared
 from hybridnav.harness.yardstick import AnyAngleOptimum
 from hybridnav.metrics import (
     ScipyOptimum,
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
     from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
     from hybridnav.harness.contradictions import Kind
+    from hybridnav.harness.methods import Prepared
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
     from hybridnav.metrics import Chords

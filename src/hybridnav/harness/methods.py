@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import inspect
 import json
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,8 @@ from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.graph_method import GraphMethod
 from hybridnav.harness.hybrid_method import HybridMethod
+from hybridnav.harness.names import baseline_name, class_of, source_hash
+from hybridnav.io import load_graph
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from hybridnav.costs import CostLayer
     from hybridnav.graphs import WaypointGraph
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.names import NamedMethod
     from hybridnav.result import Metric
 
 REFERENCE = "grid-astar"
@@ -64,6 +66,22 @@ class MethodSpec:
     """The graph whose routes it follows, if that is all that it does."""
     clear_edges_only: bool = False
     """Whether edges of the graph that the robot cannot follow are left out."""
+    factory: str = ""
+    """The baseline, or the class as `module:class`, that makes it; empty for that of its name."""
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Keyword arguments of its class."""
+    source: str = ""
+    """Hash of the file of a class of others: a class that was mended is another method."""
+
+    @property
+    def made_by(self) -> str:
+        """The baseline, or the class as `module:class`."""
+        return self.factory or self.name
+
+    @property
+    def is_named(self) -> bool:
+        """Whether a user named it: else a class names itself."""
+        return bool(self.factory)
 
     @property
     def metric(self) -> Metric:
@@ -87,6 +105,8 @@ class MethodSpec:
         parts: list[Any] = [self.name, self.preset, self.pyramid]
         if self.graph is not None:
             parts += [self.graph.digest, self.clear_edges_only]
+        if self.factory or self.settings or self.source:
+            parts += [self.factory, self.settings, self.source]
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -146,24 +166,56 @@ def _check_metric(preset: Preset, *, by_costs: bool) -> None:
 
 
 def baseline_spec(
-    name: str, *, merge_distance_m: float | None = None, seed: int | None = None
+    name: str,
+    *,
+    merge_distance_m: float | None = None,
+    seed: int | None = None,
+    named: NamedMethod | None = None,
 ) -> MethodSpec:
-    """Return the method of a baseline.
+    """Return the method of a baseline, or of a class written `module:class`.
+
+    Names are those of `BASELINES`, or as in the literature, such as "HPA*". An entry of a file of
+    methods adds a name and settings.
 
     Raises
     ------
     InvalidValueError
         When there is none of that name, or its class cannot be imported.
     """
-    if name not in BASELINES and ":" not in name:
-        raise InvalidValueError(
-            f"no baseline is called {name!r}: there are {', '.join(BASELINES)}, or module:class"
-        )
-    _class_of(name)
+    if ":" not in name:
+        name = baseline_name(name, BASELINES)
+    class_of(BASELINES.get(name, (name, {}))[0])
+    spec = MethodSpec(name, None, source="" if name in BASELINES else source_hash(name))
+    if named is not None and (named.name or named.settings):
+        settings = named.settings
+        spec = replace(spec, name=named.name or name, factory=name, settings=settings)
     if name not in ON_PLACES:
-        return MethodSpec(name, None)
+        return spec
     pyramid = Preset().pyramid.model_dump(exclude={"robot_radius_m"})
-    return MethodSpec(name, None, pyramid | _given(merge_distance_m, seed))
+    return replace(spec, pyramid=pyramid | _given(merge_distance_m, seed))
+
+
+def named_spec(
+    method: NamedMethod, *, merge_distance_m: float | None, by_costs: bool, clear_edges_only: bool
+) -> MethodSpec:
+    """Return the method of an entry of a file of methods.
+
+    Raises
+    ------
+    InvalidValueError
+        When there is no such baseline or class, or settings do not go with the source.
+    """
+    if method.kind in {"baseline", "class"}:
+        return baseline_spec(method.source, merge_distance_m=merge_distance_m, named=method)
+    if method.kind == "preset":
+        overrides = [f"{key}={json.dumps(value)}" for key, value in method.settings.items()]
+        preset = load_preset(method.source, overrides=overrides)
+        spec = preset_spec(preset, merge_distance_m=merge_distance_m, by_costs=by_costs)
+    else:
+        if method.settings:
+            raise InvalidValueError(f"a graph has no settings, got {sorted(method.settings)}")
+        spec = graph_spec(load_graph(method.source), clear_edges_only=clear_edges_only)
+    return replace(spec, name=method.name or spec.name)
 
 
 def graph_spec(graph: WaypointGraph, *, clear_edges_only: bool = False) -> MethodSpec:
@@ -188,6 +240,8 @@ class Prepared:
     method_seconds: float
     by_costs: bool = False
     """Whether it plans by the costs of the run."""
+    is_named: bool = True
+    """Whether its name in tables is that of its specification: a class of others names itself."""
 
     def close(self) -> None:
         """End the processes of the method, which answers no more."""
@@ -213,28 +267,25 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
         costs = None
         method = GraphMethod(grid, spec.graph, clear_edges_only=spec.clear_edges_only)
     else:
-        made_of, options = _class_of(spec.name)
-        if not _takes_costs(made_of):
+        path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
+        made_of = class_of(path)
+        options = options | spec.settings
+        if not _takes(made_of, "costs"):
             costs = None
         if costs is not None:
             options = options | {"costs": costs}
+        if spec.is_named and _takes(made_of, "name"):
+            options = {"name": spec.name} | options
         method = made_of(grid if topology is None else topology, **options)
     by_costs = costs is not None
-    return Prepared(method, topology, built - began, time.perf_counter() - built, by_costs)
+    seconds = built - began, time.perf_counter() - built
+    is_named = spec.is_named or not spec.source
+    return Prepared(method, topology, *seconds, by_costs, is_named)
 
 
-def _takes_costs(made_of: Any) -> bool:
-    """Return whether a class is made with costs."""
+def _takes(made_of: Any, parameter: str) -> bool:
+    """Return whether a class is made with a keyword argument of a name."""
     try:
-        return "costs" in inspect.signature(made_of).parameters
+        return parameter in inspect.signature(made_of).parameters
     except (TypeError, ValueError):  # a class without a signature
         return False
-
-
-def _class_of(name: str) -> tuple[Any, dict[str, Any]]:
-    path, options = BASELINES.get(name, (name, {}))
-    module, _, attribute = path.partition(":")
-    try:
-        return getattr(importlib.import_module(module), attribute), options
-    except (ImportError, AttributeError) as error:
-        raise InvalidValueError(f"baseline {name}: {error}") from None

@@ -33,6 +33,8 @@ EXPANSIONS = {
 }
 """Fields of records that count things taken from the queue of a search, and their columns."""
 
+_FINE = ("ready", *ANSWERED)
+
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
 MapQuery = tuple[str, QueryKey]
 
@@ -308,6 +310,12 @@ class Outcome:
     def checks(self) -> int:
         """Number of judged answers."""
         return sum(record["status"] in ANSWERED for record in self.records)
+
+    @property
+    def failure(self) -> Record | None:
+        """The first record that says why there is no answer: of the preparation, or a query."""
+        failed = [r for r in (self.preparation, *self.records) if r["status"] not in _FINE]
+        return failed[0] if failed else None
 
     @property
     def failures(self) -> int:

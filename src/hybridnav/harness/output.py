@@ -10,7 +10,7 @@ from hybridnav.harness.columns import EFFICIENCY_COLUMNS, OPTIMA, YARDSTICKS, lo
 from hybridnav.harness.kinds import CONSISTENCY_COLUMNS
 from hybridnav.harness.report import render_report
 from hybridnav.harness.rows import rows_of_map, rows_of_study
-from hybridnav.harness.sections import report_of, with_values
+from hybridnav.harness.sections import failures_of, report_of, with_values
 from hybridnav.harness.tables import Row, to_csv, to_markdown
 
 if TYPE_CHECKING:
@@ -73,6 +73,11 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
         f"{study.failures} queries without an answer.\n\n"
         f"{_table(overall, CONSISTENCY_COLUMNS)}\n"
     )
+    failures = failures_of(study)
+    if failures:
+        text += "## Methods without answers\n\n"
+    for reason, trace in failures:
+        text += f"* {reason}\n\n" + (f"```text\n{trace.rstrip()}\n```\n\n" if trace else "")
     for optimum in YARDSTICKS[study.metric]:
         rows = with_values(overall, f"{optimum} loss mean %")
         if rows:

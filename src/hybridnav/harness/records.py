@@ -7,6 +7,7 @@ import importlib.metadata
 import json
 import os
 import platform
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 Record = dict[str, Any]
 
-RECORDS_FILE = "records.jsonl"
+RECORDS_FILE, RUNS_FILE = "records.jsonl", "runs.jsonl"
 
 _KEYS = ("id", "type", "map", "map_sha", "method", "method_sha", "status")
 _LIBRARIES = ("numpy", "scipy", "numba")
@@ -134,6 +135,16 @@ def _drop_cut_line(path: Path) -> None:
     if whole < len(content):
         with path.open("r+b") as stream:
             stream.truncate(whole)
+
+
+def latest_sources(folder: Path) -> dict[str, str]:
+    """Return by method the hash of the source of each class of others that its last run had."""
+    path = folder / RUNS_FILE
+    latest: dict[str, str] = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        with suppress(ValueError):  # a line that a kill cut short
+            latest |= json.loads(line).get("sources", {})
+    return latest
 
 
 def read_records(folder: Path) -> list[Record]:

@@ -90,6 +90,8 @@ class ReportData:
     """Counter-examples found."""
     overall: list[Table] = field(default_factory=list)
     """Tables of all maps together, none for one map."""
+    failures: list[tuple[str, str]] = field(default_factory=list)
+    """Methods with queries without an answer: the reason in words, and a traceback or nothing."""
     definition: str = ""
     """What consistency is."""
     meanings: list[tuple[str, str]] = field(default_factory=list)

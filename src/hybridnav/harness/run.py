@@ -15,7 +15,14 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.graphs import WaypointGraph
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.checks import checked_type
-from hybridnav.harness.methods import REFERENCE, MethodSpec, baseline_spec, graph_spec, preset_spec
+from hybridnav.harness.methods import (
+    REFERENCE,
+    MethodSpec,
+    baseline_spec,
+    graph_spec,
+    named_spec,
+    preset_spec,
+)
 from hybridnav.harness.pairs import (
     SAMPLER_VERSION,
     Pair,
@@ -24,7 +31,7 @@ from hybridnav.harness.pairs import (
     sample_pairs,
     scenario_pairs,
 )
-from hybridnav.harness.records import RECORDS_FILE, RecordFile
+from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, RecordFile
 from hybridnav.harness.scenes import (
     GivenCosts,
     MapSpec,
@@ -44,9 +51,8 @@ if TYPE_CHECKING:
     from hybridnav._typing import PathLike
     from hybridnav.config import Preset
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.harness.names import NamedMethod
     from hybridnav.harness.records import Record
-
-RUNS_FILE = "runs.jsonl"
 
 MOVINGAI_MERGE_DISTANCE_M = 40.0
 """Default on MovingAI maps, whose cells are 1 m by agreement; the robot is a point there."""
@@ -76,6 +82,8 @@ class RunSettings:
     """Graphs that others have made, or files of them; there must be one map. Routes go straight to
     the nearest node in sight of the start, over the edges that are shortest in metres, and straight
     from the nearest node in sight of the goal."""
+    methods: tuple[NamedMethod, ...] = ()
+    """Methods with names and settings of their own, as `read_methods` reads them from a file."""
     clear_edges_only: bool = False
     """Whether edges of these graphs that the robot cannot follow are left out."""
     pairs: int | None = None
@@ -157,7 +165,7 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
             raise InvalidValueError(f"folder {folder} holds other files and no run: take a new one")
         with RecordFile(path) as records:
             _check_costs(settings, records)
-            _write_settings(settings, path)
+            _write_settings(settings, path, _sources(tasks))
             total = len({name for task in tasks for name in task.ids})
             wanted = [rest for task in tasks if (rest := _missing(task, records.ids)) is not None]
             before = len(records.ids)
@@ -238,8 +246,10 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
 
 def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[MethodSpec]:
     """Return the methods of a run on a map, the reference first, none twice."""
-    names = dict.fromkeys((REFERENCE, *settings.baselines))
-    specs = [baseline_spec(name, merge_distance_m=merge_distance_m) for name in names]
+    specs = [
+        baseline_spec(name, merge_distance_m=merge_distance_m)
+        for name in (REFERENCE, *settings.baselines)
+    ]
     for preset in settings.presets:
         spec = preset_spec(
             preset, merge_distance_m=merge_distance_m, by_costs=bool(text_of_costs(settings.costs))
@@ -251,6 +261,16 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
         read = load_graph(graph) if isinstance(graph, str) else graph
         checked_type("graph", read, WaypointGraph)
         specs.append(graph_spec(read, clear_edges_only=settings.clear_edges_only))
+    for named in settings.methods:
+        spec = named_spec(
+            named,
+            merge_distance_m=merge_distance_m,
+            by_costs=bool(text_of_costs(settings.costs)),
+            clear_edges_only=settings.clear_edges_only,
+        )
+        if spec.name in {other.name for other in specs}:
+            raise InvalidValueError(f"two methods are called {spec.name}: name one of them")
+        specs.append(spec)
     lines = [spec.name for spec in specs if spec.metric != "octile"]
     if lines and settings.corner_cutting:
         raise InvalidValueError(
@@ -276,7 +296,12 @@ def _pairs_of(settings: RunSettings, grid: OccupancyGrid) -> list[Pair]:
     )
 
 
-def _write_settings(settings: RunSettings, folder: Path) -> None:
+def _sources(tasks: Sequence[Task]) -> dict[str, str]:
+    """Return the hash of the source of each class of others."""
+    return {task.method.name: task.method.source for task in tasks if task.method.source}
+
+
+def _write_settings(settings: RunSettings, folder: Path, sources: dict[str, str]) -> None:
     """Note the settings of this run, one line for each run into the folder."""
     plain = asdict(replace(settings, graphs=()))
     plain["graphs"] = [graph if isinstance(graph, str) else graph.name for graph in settings.graphs]
@@ -284,6 +309,7 @@ def _write_settings(settings: RunSettings, folder: Path) -> None:
         preset if isinstance(preset, str) else preset.name for preset in settings.presets
     ]
     plain["sampler_version"] = SAMPLER_VERSION
+    plain["sources"] = sources
     plain["costs"] = text_of_costs(settings.costs)
     if settings.merge_distance_m == math.inf:  # JSON has no such number
         plain["merge_distance_m"] = "inf"

@@ -96,6 +96,7 @@ def report_of(
         checks=study.checks,
         overall=together,
         maps=maps,
+        failures=failures_of(study),
         definition=DEFINITION,
         meanings=[(column, MEANINGS[column]) for column in used if column in MEANINGS],
         overall_losses={label: _losses(study.of_method(label), study) for label in several},
@@ -104,6 +105,23 @@ def report_of(
             outcome.label: outcome.metric for outcome in study.outcomes if study.metric == "both"
         },
     )
+
+
+def failures_of(study: Study) -> list[tuple[str, str]]:
+    """Return for each method and map with queries without an answer the reason of the first, and
+    its traceback, empty for none."""
+    found = []
+    for outcome in study.outcomes:
+        record = outcome.failure
+        if record is not None:
+            reason = record.get("error", record["status"])
+            what = "preparation" if record["type"] == "preparation" else "a query"
+            text = (
+                f"{outcome.map_name}, {outcome.label}: {outcome.failures:,} queries without an "
+                f"answer; {what}: {reason}"
+            )
+            found.append((text, str(record.get("traceback", ""))))
+    return found
 
 
 def _pairs_text(study: Study) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import time
+import traceback
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav.costs import CostLayer
@@ -16,6 +18,7 @@ from hybridnav.grid.worlds import figure1_world
 from hybridnav.harness.contradictions import Fault
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
+from hybridnav.harness.names import own_name
 from hybridnav.harness.pairs import SAMPLER_VERSION
 from hybridnav.harness.paths import encode_path
 from hybridnav.harness.records import environment, map_digest, pair_id, preparation_id
@@ -73,12 +76,13 @@ def run_task(task: Task) -> Iterator[Record]:
         "method": task.method.name,
         "method_sha": task.method.digest,
     }
-    head = {"id": task.ids[0], "type": "preparation", **common}
+    head = {"id": task.ids[0], "type": "preparation", **common, **source_fields(task.method)}
     try:
         prepared, judge = _ready(scene, task)
     except Exception as error:  # noqa: BLE001 - a method that cannot be made is a result
         reason = _reason(error)
-        yield {**head, "status": "error", "error": reason, **_about(scene, task)}
+        why = {"error": reason, "traceback": _traceback_of(error)}
+        yield {**head, "status": "error", **why, **_about(scene, task)}
         for name, pair in zip(task.ids[1:], task.pairs, strict=True):
             yield {**_of_pair(name, pair, common), "status": "error", "error": reason, "faults": []}
         return
@@ -90,7 +94,9 @@ def run_task(task: Task) -> Iterator[Record]:
 
 def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     method = prepared.method
+    label = "" if prepared.is_named else own_name(method)
     return {
+        **({"label": label} if label else {}),
         **({"by_costs": True} if prepared.by_costs else {}),
         "pyramid_seconds": prepared.pyramid_seconds,
         "method_seconds": prepared.method_seconds,
@@ -172,6 +178,26 @@ def _reason(error: Exception) -> str:
     return " ".join(text.split())[:200]
 
 
+def source_fields(spec: MethodSpec) -> Record:
+    """Return the fields that the record of a preparation has for a class of others."""
+    if not spec.source:
+        return {}
+    return {"source": spec.source, "settings_sha": replace(spec, source="").digest}
+
+
+def _traceback_of(error: Exception) -> str:
+    """Return the end of a traceback, without the harness's own frames."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith(_HERE)]
+    lines = traceback.format_list(own[-_FRAMES:]) + traceback.format_exception_only(error)
+    return "".join(lines)[-_TRACEBACK:]
+
+
+_HERE = str(Path(__file__).parent)
+_FRAMES, _TRACEBACK = 8, 4000
+"""Frames and characters of a traceback that a record holds."""
+
+
 def _of_pair(name: str, pair: Pair, common: Record) -> Record:
     record = {
         "id": name,
@@ -193,7 +219,12 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
     try:
         answer = prepared.method.solve(pair.start, pair.goal)
     except Exception as error:  # noqa: BLE001 - a failing method is a result
-        return {"status": "error", "error": _reason(error), "faults": []}
+        return {
+            "status": "error",
+            "error": _reason(error),
+            "traceback": _traceback_of(error),
+            "faults": [],
+        }
     seconds = time.perf_counter() - began
     try:
         return _judged(answer, judge, pair, seconds)

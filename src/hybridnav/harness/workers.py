@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.scenes import text_of_costs
-from hybridnav.harness.task import Task, run_task
+from hybridnav.harness.task import Task, run_task, source_fields
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -188,6 +188,8 @@ def failed_record(task: Task, index: int, status: str) -> Record:
         "status": status,
         "faults": [],
     }
+    if not index:
+        common |= source_fields(task.method)
     if task.map.costs and not index:
         common["costs"] = text_of_costs(task.map.costs)
     if index:

@@ -1,0 +1,180 @@
+"""Names of methods: aliases, classes and the hashes of their sources, lists in YAML files."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import importlib
+import json
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from hybridnav.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from hybridnav._typing import PathLike
+
+ALIASES = {
+    "a-star": "grid-astar",
+    "astar": "grid-astar",
+    "dijkstra": "grid-dijkstra",
+    "weighted-a-star": "weighted-astar",
+    "wa-star": "weighted-astar",
+    "hpa": "hpa-star",
+    "thrun-1998": "thrun",
+}
+"""Other names of baselines, as the literature writes them, in small letters, "-" for blanks and
+"-star" for "*"."""
+
+_KEYS = ("name", "baseline", "class", "preset", "graph", "settings")
+_SOURCES = _KEYS[1:5]
+_HASH_DIGITS = 12
+_MOST_LETTERS = 60
+
+
+@dataclass(frozen=True)
+class NamedMethod:
+    """One entry of a YAML file of methods.
+
+    Examples
+    --------
+    >>> from hybridnav.harness import NamedMethod
+    >>> NamedMethod("baseline", "HPA*", settings={"cluster_cells": 20}).kind
+    'baseline'
+    """
+
+    kind: str
+    """What `source` names: a "baseline", a "class" as module:class, a "preset", or a "graph"."""
+    source: str
+    name: str = ""
+    """Name in tables; empty for that of the source."""
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Keyword arguments of the class; of a preset, values by dotted key."""
+
+
+def baseline_name(name: str, known: Iterable[str]) -> str:
+    """Return the baseline of a name or an alias, such as "hpa-star" of "HPA*".
+
+    Raises
+    ------
+    InvalidValueError
+        When there is none; the message names those that look like it.
+    """
+    plain = "-".join(name.lower().replace("*", "-star").split()).replace("--", "-")
+    found = ALIASES.get(plain, plain)
+    names = list(known)
+    if found in names:
+        return found
+    near = difflib.get_close_matches(found, [*names, *ALIASES], n=1)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    raise InvalidValueError(
+        f"no baseline is called {name!r}{hint}: there are {', '.join(names)}, or module:class"
+    )
+
+
+def class_of(path: str) -> Any:
+    """Return the class of a path `module:class`.
+
+    Raises
+    ------
+    InvalidValueError
+        When it cannot be imported; the last line of the reason.
+    """
+    module, _, attribute = path.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # a module of others may fail in any way
+        reason = f"{type(error).__name__}: {error}"
+        raise InvalidValueError(f"baseline {path}: {' '.join(reason.split())}") from error
+
+
+def source_hash(path: str) -> str:
+    """Return a short hash of the file of a module `module:class`, as it is on the disk now; empty
+    for a module without a file."""
+    module = sys.modules.get(path.partition(":")[0])
+    file = getattr(module, "__file__", None)
+    if file is None or not Path(file).is_file():
+        return ""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:_HASH_DIGITS]
+
+
+def own_name(method: Any) -> str:
+    """Return the name that a method gives itself, on one line; empty for none."""
+    name = getattr(method, "name", "")
+    return " ".join(name.split())[:_MOST_LETTERS] if isinstance(name, str) else ""
+
+
+def read_methods(path: PathLike) -> tuple[NamedMethod, ...]:
+    """Read a YAML file of methods.
+
+    Parameters
+    ----------
+    path
+        A file with a list `methods`. Each entry has one of `baseline`, `class`, `preset` and
+        `graph`, and may have a `name` and `settings`.
+
+    Returns
+    -------
+    tuple of NamedMethod
+        In the order of the file.
+
+    Raises
+    ------
+    InvalidValueError
+        When the file cannot be read or has another form; the message names the entry.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.harness import read_methods
+    >>> _ = Path("methods.yaml").write_text("methods: [{name: taut, preset: shortest}]")
+    >>> read_methods("methods.yaml")[0].name
+    'taut'
+    """
+    try:
+        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidValueError(f"methods {path}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InvalidValueError(f"methods {path}: {' '.join(str(error).split())}") from None
+    entries = content.get("methods") if isinstance(content, dict) else None
+    if not isinstance(entries, list) or not entries:
+        raise InvalidValueError(f"methods {path}: expected a list under the key methods")
+    methods = tuple(
+        _entry(entry, f"methods {path}, entry {at}") for at, entry in enumerate(entries, 1)
+    )
+    names = [method.name or method.source for method in methods]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InvalidValueError(f"methods {path}: two are called {twice[0]}: set a name for each")
+    return methods
+
+
+def _entry(entry: Any, where: str) -> NamedMethod:
+    if not isinstance(entry, dict):
+        raise InvalidValueError(f"{where}: expected keys and values, got {entry!r}")
+    unknown = [key for key in entry if key not in _KEYS]
+    if unknown:
+        raise InvalidValueError(f"{where}: no key {unknown[0]!r}: there are {', '.join(_KEYS)}")
+    kinds = [key for key in _SOURCES if key in entry]
+    if len(kinds) != 1:
+        raise InvalidValueError(f"{where}: expected one of {', '.join(_SOURCES)}, got {kinds}")
+    source, name = entry[kinds[0]], entry.get("name", "")
+    if not isinstance(source, str) or not isinstance(name, str):
+        raise InvalidValueError(f"{where}: {kinds[0]} and name must be texts")
+    if kinds[0] == "class" and ":" not in source:
+        raise InvalidValueError(f"{where}: class {source!r} must be written module:class")
+    settings = entry.get("settings") or {}
+    if not isinstance(settings, dict) or not all(isinstance(key, str) for key in settings):
+        raise InvalidValueError(f"{where}: settings must be keys with values")
+    try:
+        json.dumps(settings, sort_keys=True)
+    except TypeError as error:
+        raise InvalidValueError(f"{where}: settings must be numbers and texts: {error}") from None
+    return NamedMethod(kinds[0], source, " ".join(name.split())[:_MOST_LETTERS], settings)

@@ -1,0 +1,164 @@
+"""Methods by name: aliases, files of methods, classes that were mended, tracebacks."""
+
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+
+from hybridnav.errors import InvalidValueError
+from hybridnav.harness.methods import BASELINES, baseline_spec
+from hybridnav.harness.names import NamedMethod, read_methods
+from hybridnav.harness.output import write_outputs
+from hybridnav.harness.records import read_records
+from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from tests.harness.small_runs import ROOMS, run_here, write_map
+
+CLASS = """
+from hybridnav.baselines.grid import GridAstar
+
+class Mine(GridAstar):
+    def __init__(self, grid, *, name="HPA* of mine", weight=1):
+        super().__init__(grid)
+        self.name = name
+        self.weight = weight
+        if grid.shape != (30, 40) and weight == 3:
+            self.helper()
+
+    def helper(self):
+        raise RuntimeError("weights above 2 are beyond me")
+
+    def solve(self, start, goal):
+        answer = super().solve(start, goal)
+        return answer  # mended: {}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _here(monkeypatch):
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
+
+
+@pytest.fixture
+def settings(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
+    (tmp_path / "mine.py").write_text(CLASS)
+    rooms = write_map(tmp_path, ROOMS)
+    return RunSettings(maps=(str(rooms),), presets=(), pairs=5, baselines=("mine:Mine",))
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("A*", "grid-astar"),
+        ("HPA*", "hpa-star"),
+        ("hpa*", "hpa-star"),
+        ("HPA* raw", "hpa-star-raw"),
+        ("Dijkstra", "grid-dijkstra"),
+        ("weighted A*", "weighted-astar"),
+        ("WA*", "weighted-astar"),
+        ("Thrun", "thrun"),
+        ("exact overlay", "exact-overlay"),
+        *((name, name) for name in BASELINES),
+    ],
+)
+def test_names_of_the_literature(written, name):
+    assert baseline_spec(written).name == name
+
+
+def test_a_name_that_is_not_there_has_a_hint():
+    with pytest.raises(InvalidValueError, match=r"did you mean hpa-star\?"):
+        baseline_spec("hpa-sta")
+
+
+def test_a_class_is_called_what_it_calls_itself(settings, tmp_path):
+    evaluate(settings, tmp_path / "run")
+    assert write_outputs(tmp_path / "run").labels == ["grid-astar", "HPA* of mine"]
+    assert "HPA* of mine" in (tmp_path / "run" / "report.html").read_text()
+
+
+def test_a_class_that_was_mended_is_run_again(settings, tmp_path):
+    made = evaluate(settings, tmp_path / "run")
+    assert evaluate(settings, tmp_path / "run") == 0
+    (tmp_path / "mine.py").write_text(CLASS.replace("{}", "twice"))
+    assert evaluate(settings, tmp_path / "run") == made // 2
+    study = write_outputs(tmp_path / "run")
+    assert study.labels == ["grid-astar", "HPA* of mine"]
+    sources = [r["source"] for r in read_records(tmp_path / "run") if "source" in r]
+    assert study.of_method("HPA* of mine")[0].preparation["source"] == sources[-1]
+    # Back again: the records are there, and the tables show them.
+    (tmp_path / "mine.py").write_text(CLASS)
+    assert evaluate(settings, tmp_path / "run") == 0
+    study = write_outputs(tmp_path / "run")
+    assert study.of_method("HPA* of mine")[0].preparation["source"] == sources[0]
+
+
+def test_a_file_of_methods_names_and_sets_them(settings, tmp_path):
+    file = tmp_path / "methods.yaml"
+    file.write_text(
+        "methods:\n"
+        "- {name: 'HPA* (20)', baseline: 'HPA*', settings: {cluster_cells: 20}}\n"
+        "- {name: heavy, class: 'mine:Mine', settings: {weight: 2}}\n"
+        "- {class: 'mine:Mine', settings: {weight: 1}}\n"
+        "- {name: 'near', preset: portals, settings: {planner.epsilon: 0.1}}\n"
+    )
+    run = replace(settings, baselines=(), methods=read_methods(file))
+    evaluate(run, tmp_path / "run")
+    study = write_outputs(tmp_path / "run")
+    assert study.faults == []
+    assert set(study.labels) == {"grid-astar", "HPA* (20)", "heavy", "mine:Mine", "near"}
+    near = study.of_method("near")[0].preparation
+    assert near["preset"]["planner"]["epsilon"] == 0.1
+    specs = {spec.name: spec for spec in methods_of(run, None)}
+    assert specs["HPA* (20)"].settings == {"cluster_cells": 20}
+    assert len({spec.digest for spec in specs.values()}) == 5
+
+
+def test_a_class_that_fails_shows_its_traceback(settings, tmp_path):
+    bad = NamedMethod("class", "mine:Mine", "bad", {"weight": 3})
+    evaluate(replace(settings, baselines=(), methods=(bad,)), tmp_path / "run")
+    write_outputs(tmp_path / "run")
+    for file in ("summary.md", "report.html"):
+        text = (tmp_path / "run" / file).read_text()
+        assert "weights above 2 are beyond me" in text
+        assert "in helper" in text
+        assert "harness/task.py" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "expected a list under the key methods"),
+        ("methods: {}", "expected a list"),
+        ("methods: [1]", "entry 1: expected keys and values"),
+        ("methods: [{preset: paper, colour: red}]", "no key 'colour'"),
+        ("methods: [{name: x}]", "expected one of baseline, class, preset, graph"),
+        ("methods: [{preset: paper, baseline: thrun}]", "expected one of"),
+        ("methods: [{class: mine}]", "must be written module:class"),
+        ("methods: [{preset: 3}]", "must be texts"),
+        ("methods: [{preset: paper, settings: 3}]", "settings must be keys with values"),
+        ("methods: [{preset: paper, settings: {a: 2020-01-01}}]", "must be numbers and texts"),
+        ("methods: [{preset: paper}, {preset: paper}]", "two are called paper"),
+        ("methods: [", "methods .*yaml"),
+    ],
+)
+def test_a_file_of_another_form_is_refused_in_one_line(tmp_path, text, words):
+    file = tmp_path / "methods.yaml"
+    file.write_text(text)
+    with pytest.raises(InvalidValueError, match=words) as refusal:
+        read_methods(file)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(InvalidValueError, match="No such file"):
+        read_methods(tmp_path / "none.yaml")
+
+
+def test_a_module_that_cannot_be_imported_is_told_at_once(settings, tmp_path):
+    (tmp_path / "broken.py").write_text("import nothing_of_that_name\n")
+    began = time.monotonic()
+    with pytest.raises(InvalidValueError, match=r"ModuleNotFoundError: .*nothing_of_that_name"):
+        evaluate(replace(settings, baselines=("broken:Class",)), tmp_path / "run")
+    assert time.monotonic() - began < 5
