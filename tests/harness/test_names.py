@@ -126,6 +126,20 @@ def test_a_class_that_fails_shows_its_traceback(settings, tmp_path):
         assert "harness/task.py" not in text
 
 
+def test_a_class_that_fails_costs_no_reference(settings, tmp_path):
+    bad = NamedMethod("class", "mine:Mine", "bad", {"weight": 3})
+    only = replace(settings, baselines=(), methods=(bad,))
+    seen = []
+    made = evaluate(only, tmp_path / "run", progress=lambda *counts: seen.append(counts))
+    assert seen[-1][0] <= seen[-1][1] == 2 * made
+    study = write_outputs(tmp_path / "run")
+    assert (study.labels, study.checks, study.failures) == (["bad"], 0, made - 1)
+    assert evaluate(only, tmp_path / "run") == 0
+    # Beside a method that works the reference is asked.
+    assert evaluate(replace(only, baselines=("thrun",)), tmp_path / "run") == 2 * made
+    assert write_outputs(tmp_path / "run").labels == ["grid-astar", "thrun", "bad"]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

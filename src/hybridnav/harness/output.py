@@ -82,7 +82,8 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
         rows = with_values(overall, f"{optimum} loss mean %")
         if rows:
             text += f"## Loss over {OPTIMA[optimum]}\n\n{_table(rows, loss_columns(optimum))}\n"
-    return text + f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}"
+    timed = any(with_values(overall, column) for column in EFFICIENCY_COLUMNS)
+    return text + (f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}" if timed else "")
 
 
 def _table(rows: Sequence[Row], columns: Sequence[str]) -> str:

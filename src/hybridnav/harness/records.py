@@ -90,6 +90,9 @@ class RecordFile:
         made = (record for record in there if record["type"] == "preparation")
         self.costs = {str(record.get("costs", "")) for record in made}
         """Costs of the runs in this folder, as texts; empty for lengths."""
+        self.failed: set[tuple[str, str]] = set()
+        """Hashes of map and method of the preparations that failed."""
+        self._note_failed(there)
         self._stream = self.path.open("ab")
         _lock(self._stream, folder)
 
@@ -114,6 +117,12 @@ class RecordFile:
         self._stream.flush()
         os.fsync(self._stream.fileno())
         self.ids.update(record["id"] for record in fresh)
+        self._note_failed(fresh)
+
+    def _note_failed(self, records: Iterable[Record]) -> None:
+        for record in records:
+            if record["type"] == "preparation" and record["status"] != "ready":
+                self.failed.add((record["map_sha"], record["method_sha"]))
 
 
 def _lock(stream: BinaryIO, folder: Path) -> None:

@@ -120,7 +120,8 @@ def _efficiency(
     queries = len(_pooled([outcome.lengths_m for outcome in outcomes])) / max(len(outcomes), 1)
     own = nanmean(np.array([outcome.preparation_seconds for outcome in references]))
     counts = np.array([outcome.thrun_count for outcome in outcomes])
-    grid_counts = np.array([outcome.thrun_count for outcome in references])
+    of_map = {outcome.map_name: outcome.thrun_count for outcome in references}
+    grid_counts = np.array([of_map.get(outcome.map_name, math.nan) for outcome in outcomes])
     kinds: Row = {
         column: nanmean(_pooled([outcome.figure(key) for outcome in outcomes])[shared])
         for key, column in EXPANSIONS.items()
@@ -198,8 +199,8 @@ def rows_of_study(study: Study) -> list[Row]:
     common = study.common
     rows = []
     for label in study.labels:
-        outcomes = [o for o in study.of_method(label) if o.map_name in references]
-        there = [references[outcome.map_name] for outcome in outcomes]
+        outcomes = study.of_method(label)
+        there = [references[o.map_name] for o in outcomes if o.map_name in references]
         rows.append({"method": label, "maps": len(outcomes), **figures(outcomes, there, common)})
     return rows
 

@@ -170,11 +170,14 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
             wanted = [rest for task in tasks if (rest := _missing(task, records.ids)) is not None]
             before = len(records.ids)
             done = total - sum(len(_new_ids(task, records.ids)) for task in wanted)
-            for batch in _run(settings, wanted):
-                known = len(records.ids)
-                records.append(batch)
-                done += len(records.ids) - known
-                progress(done, total)
+            for part in _in_parts(wanted):
+                needed = _needed(part, tasks, records)
+                done += sum(len(task.ids) for task in part) - sum(len(task.ids) for task in needed)
+                for batch in _run(settings, needed):
+                    known = len(records.ids)
+                    records.append(batch)
+                    done += len(records.ids) - known
+                    progress(done, total)
             return len(records.ids) - before
     except OSError as error:
         raise InvalidValueError(f"folder {folder}: {error.strerror}") from None
@@ -200,6 +203,23 @@ def _run(settings: RunSettings, tasks: Sequence[Task]) -> Iterator[list[Record]]
     if settings.scheduler is not None:
         return run_on_cluster(tasks, address=settings.scheduler)
     return run_local(tasks, workers=settings.workers, timeout_s=settings.timeout_s)
+
+
+def _in_parts(tasks: Sequence[Task]) -> tuple[list[Task], list[Task]]:
+    """Return the tasks of classes of others, which may fail at once, and the other tasks."""
+    return [task for task in tasks if task.method.source], [
+        task for task in tasks if not task.method.source
+    ]
+
+
+def _needed(part: Sequence[Task], tasks: Sequence[Task], records: RecordFile) -> list[Task]:
+    """Return tasks without those of the reference on maps where no other method could be made:
+    there is nothing to compare with it."""
+    others = [task for task in tasks if task.method.name != REFERENCE]
+    asked = {task.map_sha for task in others}
+    made = {t.map_sha for t in others if (t.map_sha, t.method.digest) not in records.failed}
+    in_vain = asked - made
+    return [t for t in part if t.method.name != REFERENCE or t.map_sha not in in_vain]
 
 
 def _missing(task: Task, there: set[str]) -> Task | None:

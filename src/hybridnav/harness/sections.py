@@ -159,7 +159,8 @@ def _tables(study: Study, rows: Sequence[Row]) -> list[Table]:
         known = with_values(rows, f"{optimum} loss mean %")
         if known:
             tables.append(_table(known, loss_columns(optimum), f"Loss over {OPTIMA[optimum]}"))
-    return [*tables, _table(rows, EFFICIENCY_COLUMNS, "Efficiency")]
+    timed = any(with_values(rows, column) for column in EFFICIENCY_COLUMNS)
+    return [*tables, *([_table(rows, EFFICIENCY_COLUMNS, "Efficiency")] if timed else [])]
 
 
 def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
