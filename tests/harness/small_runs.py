@@ -3,8 +3,6 @@
 import os
 from pathlib import Path
 
-from hybridnav.harness.task import run_task
-
 ROOT = Path(__file__).parents[2]
 ROOMS = [
     "####################",
@@ -45,4 +43,4 @@ def write_map(folder, lines, name="rooms"):
 
 def run_here(tasks, **_settings):
     """Instead of `run_local`: no process is started, where none is what a test is about."""
-    return (list(run_task(task)) for task in tasks)
+    return (list(task.run()) for task in tasks)

@@ -72,6 +72,16 @@ ScenariosOption = Annotated[
     Path | None, typer.Option("--scen", metavar="FILE", help="The pairs of a scenario file.")
 ]
 SeedOption = Annotated[int, typer.Option("--seed", metavar="S", help="Seed of the sampler.")]
+RepeatOption = Annotated[
+    int,
+    typer.Option(
+        "--repeat",
+        metavar="N",
+        min=0,
+        help="Time each query N times in a pass of its own, all methods in shuffled order; 0 for "
+        "times of the answers alone.",
+    ),
+]
 WorkersOption = Annotated[
     int, typer.Option("--workers", metavar="W", help="Processes on this machine.")
 ]
@@ -137,6 +147,7 @@ def evaluate(
     all_pairs: LatticeOption = None,
     scen: ScenariosOption = None,
     seed: SeedOption = 0,
+    repeat: RepeatOption = 0,
     workers: WorkersOption = 1,
     scheduler: SchedulerOption = None,
     overrides: SetOption = None,
@@ -186,6 +197,7 @@ def evaluate(
         lattice_step_m=all_pairs,
         scenarios=None if scen is None else str(scen),
         seed=seed,
+        repeat=repeat,
         robot_radius_m=robot_radius_m,
         merge_distance_m=merge_distance_m,
         corner_cutting=corner_cutting,

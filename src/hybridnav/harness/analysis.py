@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,8 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.outcome import Outcome, query_key
-from hybridnav.harness.records import latest_sources, read_records
+from hybridnav.harness.records import commands_of, latest_sources, read_records
+from hybridnav.harness.times import Circumstances, circumstances_of, lay_times
 from hybridnav.harness.yardstick import check_yardstick
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class Study:
     outcomes: list[Outcome]
     metric: Yardstick = "both"
     """What losses refer to."""
+    circumstances: Circumstances = field(default_factory=Circumstances)
+    """Those of its times."""
 
     @property
     def costs(self) -> str:
@@ -125,13 +128,17 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     check_yardstick(metric)
     preparations: dict[tuple[str, str], Record] = {}
     pairs: dict[tuple[str, str], list[Record]] = {}
+    timed: list[Record] = []
     for record in read_records(folder):
         key = record["map_sha"], record["method_sha"]
-        if record["type"] == "preparation":
+        if record["type"] in {"timing", "timed pair"}:
+            timed.append(record)
+        elif record["type"] == "preparation":
             preparations[key] = record
         else:
             pairs.setdefault(key, []).append(record)
     preparations = _latest(preparations, folder)
+    together = lay_times(timed, pairs)
     metric = _metric_of(preparations, metric, folder)
     names = _map_labels(preparations, root)
     digests: dict[str, set[tuple[str, str]]] = {}
@@ -161,7 +168,7 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
             outcome.label,
         )
     )
-    return Study(outcomes, metric)
+    return Study(outcomes, metric, circumstances_of(timed, outcomes, together, commands_of(folder)))
 
 
 def _name_of(record: Record) -> str:

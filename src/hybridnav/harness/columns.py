@@ -31,6 +31,7 @@ EFFICIENCY_COLUMNS = (
     "work in cells",
     "query ms, median",
     "query ms, p95",
+    "spread %",
     "speed-up",
     "speed-up of means",
     "preparation s",
@@ -89,8 +90,11 @@ MEANINGS: dict[str, str] = {
     "work in cells": "expansions times that price: the mean time of a query in the unit in which "
     "the reference expands one cell. Work of different methods can be compared, their expansions "
     "cannot",
-    "query ms, median": "median wall-clock time of one query over these pairs, kernels warm",
+    "query ms, median": "median wall-clock time of one query over these pairs, kernels warm; with "
+    "repeats the time of a pair is their median",
     "query ms, p95": "95th percentile of these times",
+    "spread %": "longest minus shortest time of the repeats of a pair, over their median: the "
+    "median of this over these pairs",
     "speed-up": "median over these pairs of the ratio of the reference's time to the method's",
     "speed-up of means": "ratio of the reference's mean time to the method's, over the same pairs: "
     "what a robot saves that asks them all",

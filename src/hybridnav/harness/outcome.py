@@ -264,6 +264,28 @@ class Outcome:
         return np.array(counts, dtype=float)
 
     @cached_property
+    def coarse_seconds(self) -> FloatArray:
+        """Seconds of the answers themselves, without those in the metric layer."""
+        asked = np.where(
+            np.isfinite(self.figure("asked_seconds")),
+            self.figure("asked_seconds"),
+            self.figure("seconds"),
+        )
+        return np.where(np.isfinite(self.lengths_m), asked, math.nan) - self.refine_seconds
+
+    @cached_property
+    def spreads(self) -> FloatArray:
+        """Longest minus shortest time of the repeats of each pair, over their median."""
+        spreads = []
+        for record in self._matched:
+            times = (record or {}).get("repeats") or ()
+            known = len(times) > 1
+            spreads.append(
+                (max(times) - min(times)) / float(np.median(times)) if known else math.nan
+            )
+        return np.array(spreads, dtype=float)
+
+    @cached_property
     def refine_seconds(self) -> FloatArray:
         """Seconds of these queries in the metric layer."""
         return self._stage("refine")

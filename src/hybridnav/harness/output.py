@@ -82,6 +82,7 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
         rows = with_values(overall, f"{optimum} loss mean %")
         if rows:
             text += f"## Loss over {OPTIMA[optimum]}\n\n{_table(rows, loss_columns(optimum))}\n"
+    text += "".join(f"{warning}\n\n" for warning in study.circumstances.warnings)
     timed = any(with_values(overall, column) for column in EFFICIENCY_COLUMNS)
     return text + (f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}" if timed else "")
 

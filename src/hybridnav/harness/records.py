@@ -8,6 +8,8 @@ import json
 import os
 import platform
 from contextlib import suppress
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
@@ -22,7 +24,6 @@ from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
     from types import TracebackType
 
     from hybridnav.grid import OccupancyGrid
@@ -63,8 +64,19 @@ def environment() -> dict[str, str]:
         "python": platform.python_version(),
         **versions,
         "host": platform.node(),
+        "processor": _processor(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
     }
+
+
+@cache
+def _processor() -> str:
+    """Return the name of the processor, as far as the system knows it."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or "unknown"
 
 
 class RecordFile:
@@ -146,14 +158,27 @@ def _drop_cut_line(path: Path) -> None:
             stream.truncate(whole)
 
 
-def latest_sources(folder: Path) -> dict[str, str]:
-    """Return by method the hash of the source of each class of others that its last run had."""
+def _runs(folder: Path) -> list[Record]:
+    """Return the settings of the runs into a folder."""
     path = folder / RUNS_FILE
-    latest: dict[str, str] = {}
+    runs = []
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
         with suppress(ValueError):  # a line that a kill cut short
-            latest |= json.loads(line).get("sources", {})
+            runs.append(json.loads(line))
+    return runs
+
+
+def latest_sources(folder: Path) -> dict[str, str]:
+    """Return by method the hash of the source of each class of others that its last run had."""
+    latest: dict[str, str] = {}
+    for run in _runs(folder):
+        latest |= run.get("sources", {})
     return latest
+
+
+def commands_of(folder: Path) -> list[str]:
+    """Return the command lines of the runs into a folder, each once."""
+    return list(dict.fromkeys(run["command"] for run in _runs(folder) if "command" in run))
 
 
 def read_records(folder: Path) -> list[Record]:

@@ -92,6 +92,8 @@ class ReportData:
     """Tables of all maps together, none for one map."""
     failures: list[tuple[str, str]] = field(default_factory=list)
     """Methods with queries without an answer: the reason in words, and a traceback or nothing."""
+    warnings: list[str] = field(default_factory=list)
+    """What speaks against the times."""
     definition: str = ""
     """What consistency is."""
     meanings: list[tuple[str, str]] = field(default_factory=list)

@@ -113,7 +113,8 @@ def _efficiency(
     """Return counts and times over the pairs in common, and what preparation takes."""
     seconds = _pooled([outcome.seconds for outcome in outcomes])[shared]
     whole = _pooled([outcome.reference_seconds for outcome in outcomes])[shared]
-    coarse = seconds - _pooled([outcome.refine_seconds for outcome in outcomes])[shared]
+    coarse = _pooled([outcome.coarse_seconds for outcome in outcomes])[shared]
+    spreads = _pooled([outcome.spreads for outcome in outcomes])[shared]
     expansions = _pooled([outcome.expansions for outcome in outcomes])[shared]
     of_grid = _pooled([outcome.reference_expansions for outcome in outcomes])[shared]
     preparation = nanmean(np.array([outcome.preparation_seconds for outcome in outcomes]))
@@ -141,6 +142,7 @@ def _efficiency(
         "work in cells": _quotient(nanmean(seconds), of_cell),
         "query ms, median": 1e3 * nanquantile(seconds, 0.5),
         "query ms, p95": 1e3 * nanquantile(seconds, 0.95),
+        "spread %": 100 * nanquantile(spreads, 0.5),
         "query ms, mean": 1e3 * nanmean(seconds),
         "without refinement ms": 1e3 * nanquantile(coarse, 0.5),
         "with preparation ms": 1e3 * (nanmean(seconds) + preparation / max(queries, 1)),

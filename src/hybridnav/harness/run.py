@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
+import sys
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 from hybridnav._files import MODEL_SUFFIX
 from hybridnav._progress import no_progress
@@ -15,6 +17,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.graphs import WaypointGraph
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.checks import checked_type
+from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.methods import (
     REFERENCE,
     MethodSpec,
@@ -31,7 +34,7 @@ from hybridnav.harness.pairs import (
     sample_pairs,
     scenario_pairs,
 )
-from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, RecordFile
+from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, RecordFile, read_records
 from hybridnav.harness.scenes import (
     GivenCosts,
     MapSpec,
@@ -40,6 +43,7 @@ from hybridnav.harness.scenes import (
     text_of_costs,
 )
 from hybridnav.harness.task import Task
+from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.io import load_graph
 from hybridnav.io.movingai import read_scenarios
@@ -95,6 +99,9 @@ class RunSettings:
     """Instead of sampled pairs: a MovingAI scenario file; there must be one map."""
     seed: int = 0
     """Seed of the sampler."""
+    repeat: int = 0
+    """Queries of each method and pair in the timing pass, in which one process asks all methods in
+    shuffled order; 0 for none: times are then those of the answers, one method after the other."""
     robot_radius_m: float | None = None
     """None: 0.25 m for ROS maps, 0 for MovingAI's."""
     merge_distance_m: float | None = None
@@ -153,6 +160,8 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     12
     """
     path = Path(folder)
+    if settings.repeat < 0:
+        raise InvalidValueError(f"repeats are at least 0, got {settings.repeat}")
     clear_scenes()  # a file may have changed since the last run of this process
     if settings.graphs and len(settings.maps) != 1:
         raise InvalidValueError(
@@ -170,14 +179,22 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
             wanted = [rest for task in tasks if (rest := _missing(task, records.ids)) is not None]
             before = len(records.ids)
             done = total - sum(len(_new_ids(task, records.ids)) for task in wanted)
-            for part in _in_parts(wanted):
-                needed = _needed(part, tasks, records)
-                done += sum(len(task.ids) for task in part) - sum(len(task.ids) for task in needed)
+            for some in _in_parts(wanted):
+                needed = _needed(some, tasks, records)
+                done += sum(len(task.ids) for task in some) - sum(len(task.ids) for task in needed)
                 for batch in _run(settings, needed):
                     known = len(records.ids)
                     records.append(batch)
                     done += len(records.ids) - known
                     progress(done, total)
+            timing = _timing_tasks(settings, tasks, records, path)
+            total += sum(len(task.ids) for task in timing)
+            alone = replace(settings, workers=1)
+            left = [part for one in timing if (part := _missing(one, records.ids)) is not None]
+            for batch in _run(alone, left):
+                done += len(batch)
+                records.append(batch)
+                progress(min(done, total), total)
             return len(records.ids) - before
     except OSError as error:
         raise InvalidValueError(f"folder {folder}: {error.strerror}") from None
@@ -197,7 +214,7 @@ def _with(costs: str) -> str:
     return f"with costs {costs}" if costs else "without costs"
 
 
-def _run(settings: RunSettings, tasks: Sequence[Task]) -> Iterator[list[Record]]:
+def _run(settings: RunSettings, tasks: Sequence[Task | TimingTask]) -> Iterator[list[Record]]:
     if not tasks:
         return iter(())
     if settings.scheduler is not None:
@@ -222,7 +239,38 @@ def _needed(part: Sequence[Task], tasks: Sequence[Task], records: RecordFile) ->
     return [t for t in part if t.method.name != REFERENCE or t.map_sha not in in_vain]
 
 
-def _missing(task: Task, there: set[str]) -> Task | None:
+def _timing_tasks(
+    settings: RunSettings, tasks: Sequence[Task], records: RecordFile, folder: Path
+) -> list[TimingTask]:
+    """Return the timing pass of each map: the methods that could be made, and the pairs without
+    those queries that had no answer."""
+    if settings.repeat == 0:
+        return []
+    answered = {r["id"] for r in read_records(folder) if r["status"] in ANSWERED}
+    found = []
+    for sha in dict.fromkeys(task.map_sha for task in tasks):
+        own = [task for task in tasks if task.map_sha == sha]
+        made = [task for task in own if (sha, task.method.digest) not in records.failed]
+        methods = {task.method.digest: task.method for task in made}
+        without = {
+            (task.method.digest, pair.key)
+            for task in made
+            for pair, name in zip(task.pairs, task.ids[1:], strict=True)
+            if name not in answered
+        }
+        pairs = tuple(dict.fromkeys(pair for task in made for pair in task.pairs))
+        if len(methods) > 1 and pairs:
+            specs = tuple(methods.values())
+            timing = (settings.repeat, settings.seed, frozenset(without))
+            found.append(TimingTask(own[0].map, sha, specs, pairs, *timing))
+    return found
+
+
+@overload
+def _missing(task: Task, there: set[str]) -> Task | None: ...
+@overload
+def _missing(task: TimingTask, there: set[str]) -> TimingTask | None: ...
+def _missing(task: Task | TimingTask, there: set[str]) -> Task | TimingTask | None:
     """Return the part of a task without records, None if there is no such part."""
     pairs = tuple(
         pair for pair, name in zip(task.pairs, task.ids[1:], strict=True) if name not in there
@@ -330,6 +378,7 @@ def _write_settings(settings: RunSettings, folder: Path, sources: dict[str, str]
     ]
     plain["sampler_version"] = SAMPLER_VERSION
     plain["sources"] = sources
+    plain |= {"command": shlex.join(sys.argv), **circumstances()}
     plain["costs"] = text_of_costs(settings.costs)
     if settings.merge_distance_m == math.inf:  # JSON has no such number
         plain["merge_distance_m"] = "inf"

@@ -79,6 +79,7 @@ def report_of(
         *([("costs", study.costs)] if study.costs else []),
         ("losses refer to", REFERS_TO[study.metric]),
         ("pairs", _pairs_text(study)),
+        *study.circumstances.facts,
         ("queries without an answer", f"{study.failures:,}"),
     ]
     labels = dict.fromkeys(outcome.label for outcome in _drawn(study, study.outcomes))
@@ -97,6 +98,7 @@ def report_of(
         overall=together,
         maps=maps,
         failures=failures_of(study),
+        warnings=study.circumstances.warnings,
         definition=DEFINITION,
         meanings=[(column, MEANINGS[column]) for column in used if column in MEANINGS],
         overall_losses={label: _losses(study.of_method(label), study) for label in several},

@@ -55,6 +55,32 @@ class Task:
         of_pairs = (pair_id(self.map_sha, self.method, pair) for pair in self.pairs)
         return preparation_id(self.map_sha, self.method), *of_pairs
 
+    def run(self) -> Iterator[Record]:
+        """Yield the records; see `run_task`."""
+        return run_task(self)
+
+    def failed_record(self, index: int, status: str) -> Record:
+        """Return the record of a query, or with index 0 of a preparation, whose process was lost or
+        too slow."""
+        common: Record = {
+            "id": self.ids[index],
+            "type": "pair" if index else "preparation",
+            "map_sha": self.map_sha,
+            "map": Path(self.map.path).stem,
+            "method": self.method.name,
+            "method_sha": self.method.digest,
+            "status": status,
+            "faults": [],
+        }
+        if not index:
+            common |= source_fields(self.method)
+        if self.map.costs and not index:
+            common["costs"] = text_of_costs(self.map.costs)
+        if index:
+            pair = self.pairs[index - 1]
+            common |= {"kind": pair.kind, "start": list(pair.start), "goal": list(pair.goal)}
+        return common
+
 
 def run_task(task: Task) -> Iterator[Record]:
     """Prepare the method, answer the pairs, judge the answers.
@@ -112,7 +138,7 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
 def _ready(scene: Scene, task: Task) -> tuple[Prepared, Judge]:
     if scene.digest != task.map_sha:
         raise InvalidValueError(f"map {task.map.path} has changed since the run began")
-    _warm_up(task.method, by_costs=scene.costs is not None)
+    warm_up(task.method, by_costs=scene.costs is not None)
     prepared = prepare(task.method, scene.grid, scene.costs)
     is_reference = task.method.name == REFERENCE
     judge = Judge(
@@ -299,7 +325,7 @@ def _plan_steps(answer: MethodResult) -> int | None:
     return None if answer.nodes is None else len(answer.nodes) - 1
 
 
-def _warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
+def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
     """Compile or load the kernels of a method on a small map, so that no time includes it."""
     if (spec.digest, by_costs) in _WARM:
         return

@@ -9,18 +9,19 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import wait
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.scenes import text_of_costs
-from hybridnav.harness.task import Task, run_task, source_fields
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from multiprocessing.connection import Connection
 
     from hybridnav.harness.records import Record
+    from hybridnav.harness.task import Task
+    from hybridnav.harness.timing import TimingTask
+
+    Work = Task | TimingTask
 
 _FLUSH_S = 0.2
 _ATTEMPTS = 2
@@ -40,7 +41,7 @@ def _serve(connection: Connection, turn: Any) -> None:
             task = connection.recv()
             batch: list[Record] = []
             sent = time.monotonic()
-            for record in run_task(task):
+            for record in task.run():
                 batch.append(record)
                 turn.value += 1
                 if time.monotonic() - sent > _FLUSH_S:
@@ -60,11 +61,11 @@ class _Worker:
         self._process = context.Process(target=_serve, args=(theirs, self._turn), daemon=True)
         self._process.start()
         theirs.close()
-        self.task: Task | None = None
+        self.task: Work | None = None
         self.missing: list[str] = []
         self.heard = time.monotonic()
 
-    def start(self, task: Task) -> None:
+    def start(self, task: Work) -> None:
         self.task = task
         self.missing = list(task.ids)
         self.heard = time.monotonic()
@@ -72,7 +73,7 @@ class _Worker:
         with suppress(OSError):  # it died while idle, which the next poll notices
             self.connection.send(task)
 
-    def failed_at(self, task: Task) -> int:
+    def failed_at(self, task: Work) -> int:
         """Return the index of the first missing record of a task, once the process is stopped."""
         turn = int(self._turn.value)
         # After the last one what fails is to send: it must not be tried for ever.
@@ -84,7 +85,7 @@ class _Worker:
         self._process.join()
 
 
-def run_local(tasks: Sequence[Task], *, workers: int, timeout_s: float) -> Iterator[list[Record]]:
+def run_local(tasks: Sequence[Work], *, workers: int, timeout_s: float) -> Iterator[list[Record]]:
     """Run tasks in processes of this machine.
 
     Parameters
@@ -153,7 +154,7 @@ def _listen(worker: _Worker, *, heard: bool) -> tuple[list[Record], bool]:
     return records, len(records) < len(batch)
 
 
-def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
+def _give_up(worker: _Worker, waiting: list[Work], status: str) -> list[Record]:
     """Record the query that a worker failed at; the rest of its task waits for another."""
     worker.stop()
     task = worker.task
@@ -164,7 +165,7 @@ def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
         waiting.append(replace(task, attempt=task.attempt + 1))
         return []
     if index == 0:  # it never becomes ready, and no other would
-        return [failed_record(task, at, status) for at in range(len(task.ids))]
+        return [task.failed_record(at, status) for at in range(len(task.ids))]
     left = tuple(
         pair
         for pair, name in zip(task.pairs, task.ids[1:], strict=True)
@@ -172,37 +173,14 @@ def _give_up(worker: _Worker, waiting: list[Task], status: str) -> list[Record]:
     )
     if left or task.ids[0] in worker.missing:
         waiting.append(replace(task, pairs=left, attempt=0))
-    return [failed_record(task, index, status)]
+    return [task.failed_record(index, status)]
 
 
-def failed_record(task: Task, index: int, status: str) -> Record:
-    """Return the record of a query, or with index 0 of a preparation, whose process was lost or too
-    slow."""
-    common: Record = {
-        "id": task.ids[index],
-        "type": "pair" if index else "preparation",
-        "map_sha": task.map_sha,
-        "map": Path(task.map.path).stem,
-        "method": task.method.name,
-        "method_sha": task.method.digest,
-        "status": status,
-        "faults": [],
-    }
-    if not index:
-        common |= source_fields(task.method)
-    if task.map.costs and not index:
-        common["costs"] = text_of_costs(task.map.costs)
-    if index:
-        pair = task.pairs[index - 1]
-        common |= {"kind": pair.kind, "start": list(pair.start), "goal": list(pair.goal)}
-    return common
+def _whole(task: Work) -> list[Record]:
+    return list(task.run())
 
 
-def _whole(task: Task) -> list[Record]:
-    return list(run_task(task))
-
-
-def run_on_cluster(tasks: Sequence[Task], *, address: str) -> Iterator[list[Record]]:
+def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Record]]:
     """Run tasks on a dask.distributed cluster; those of a lost worker run again elsewhere.
 
     Parameters
@@ -248,7 +226,7 @@ def run_on_cluster(tasks: Sequence[Task], *, address: str) -> Iterator[list[Reco
             try:
                 yield client.submit(_whole, task, pure=False).result()
             except distributed.KilledWorker:
-                yield [failed_record(task, at, "lost") for at in range(len(task.ids))]
+                yield [task.failed_record(at, "lost") for at in range(len(task.ids))]
 
 
 def _knock(address: str) -> None:
