@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hybridnav.building.floors import ROUNDED
-from hybridnav.building.plan import BuildingPlan, Ride, stats_of
+from hybridnav.building.plan import BuildingPlan, Ride, cost_of, stats_of
 from hybridnav.building.search import START
 from hybridnav.building.words import GuidedRoute
 from hybridnav.planner.itinerary import waypoint_text
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav.building.floors import Floor
-    from hybridnav.building.search import ChosenParts, Endpoint, LinkNetwork, LinkSearch, Part
+    from hybridnav.building.search import Endpoint, LinkNetwork, LinkSearch, Part
+    from hybridnav.result import PlanResult, PlanStats
 
 
 class Answers:
@@ -70,26 +71,29 @@ class Answers:
             ranked = search.ranked(lambda cost: stretch * cost / ROUNDED)
             chosen = list(itertools.islice(ranked, count))
         bound = search.bound()
-        plans = [self._plan(search, endpoints, one, bound) for one in chosen]
-        if not plans:
+        results = [tuple(search.drafts[part].result() for part in one.parts) for one in chosen]
+        stats = stats_of([draft.stats for draft in search.planned], time.perf_counter() - began)
+        if not chosen:
             metrics = [draft.result().metric for draft in search.planned[:1]]
             refused = self.refused(search.reason(), endpoints)
             metric = metrics[0] if metrics else refused.metric
-            plans = [replace(refused, metric=metric, lower_bound=bound)]
-        stats = stats_of([draft.stats for draft in search.planned], time.perf_counter() - began)
-        return tuple(replace(plan, stats=stats) for plan in plans)
+            return (replace(refused, metric=metric, lower_bound=bound, stats=stats),)
+        return tuple(
+            self._plan(endpoints, (one.parts, of_parts), bound, stats)
+            for one, of_parts in zip(chosen, results, strict=True)
+        )
 
     def _plan(
         self,
-        search: LinkSearch,
         endpoints: tuple[Endpoint, Endpoint],
-        chosen: ChosenParts,
+        route: tuple[tuple[Part, ...], tuple[PlanResult, ...]],
         bound: float,
+        stats: PlanStats,
     ) -> BuildingPlan:
-        """Return the plan of one route."""
-        results = tuple(search.drafts[part].result() for part in chosen.parts)
-        rides = tuple(itertools.starmap(self._ride, itertools.pairwise(chosen.parts)))
-        floors = [self._floors[self._floor_of(part, endpoints)] for part in chosen.parts]
+        """Return the plan of one route, of its parts and their results."""
+        parts, results = route
+        rides = tuple(itertools.starmap(self._ride, itertools.pairwise(parts)))
+        floors = [self._floors[self._floor_of(part, endpoints)] for part in parts]
         start, goal = (self._named(end) for end in endpoints)
         guided = GuidedRoute(
             tuple(floor.planner.guide for floor in floors),
@@ -97,7 +101,8 @@ class Answers:
             rides,
             waypoint_text(endpoints[1].waypoint),
         )
-        plan = BuildingPlan(
+        cost = cost_of(results, rides)
+        return BuildingPlan(
             PlanStatus.SOLVED,
             results[0].metric,
             start,
@@ -105,12 +110,12 @@ class Answers:
             results,
             tuple(floor.name for floor in floors),
             rides,
+            # Sums are rounded: a bound that differs from the cost by that alone is the cost.
+            lower_bound=cost if bound >= cost * ROUNDED else bound,
             speed_m_s=self._speed_m_s,
+            stats=stats,
             instruction_source=guided,
         )
-        cost = plan.cost
-        # Sums are rounded: a bound that differs from the cost by that alone is the cost.
-        return replace(plan, lower_bound=cost if bound >= cost * ROUNDED else bound)
 
     def _floor_of(self, part: Part, endpoints: tuple[Endpoint, Endpoint]) -> int:
         return endpoints[0].floor if part[0] == START else self._network.ends[part[0]].floor

@@ -12,6 +12,8 @@ from hybridnav.result import PlanStats, PlanStatus
 from hybridnav.sentences import sentences
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from hybridnav.building.links import Link
     from hybridnav.result import InstructionSource, Metric, PlanResult
     from hybridnav.sentences import Instruction
@@ -128,12 +130,7 @@ class BuildingPlan:
         """Costs of the plans on all floors and of the rides, metres; infinite without a route."""
         if not self.solved:
             return math.inf
-        cost = 0.0
-        for number, result in enumerate(self.results):
-            cost += result.cost
-            if number < len(self.rides):
-                cost += self.rides[number].charge_m
-        return cost
+        return cost_of(self.results, self.rides)
 
     @property
     def gap(self) -> float:
@@ -213,6 +210,15 @@ class BuildingPlan:
 def _plain(end: tuple[str, tuple[float, ...] | str]) -> list[Any]:
     floor, waypoint = end
     return [floor, waypoint if isinstance(waypoint, str) else list(waypoint)]
+
+
+def cost_of(results: Sequence[PlanResult], rides: Sequence[Ride]) -> float:
+    """Return the cost of a route in metres, summed from its start to its goal."""
+    cost = results[0].cost
+    for ride, result in zip(rides, results[1:], strict=True):
+        cost += ride.charge_m
+        cost += result.cost
+    return cost
 
 
 def stats_of(planned: list[PlanStats], seconds: float) -> PlanStats:
