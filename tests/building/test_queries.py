@@ -231,8 +231,10 @@ def test_words_say_which_link_to_take_and_how_to_leave_it() -> None:
     over = building.plan(("1", (1.5, 3.5)), ("2", (1.5, 4.5)), closed_links=["B"])
     assert over.words()[1:] == [
         "after 2 m take the west lift to floor 2, turn left out of it",
-        "after 3 m you are at (1.5, 4.5) in the store, with door 1 to the kitchen behind you on the "
-         "right",
+        (
+            "after 3 m you are at (1.5, 4.5) in the store, "
+            "with door 1 to the kitchen behind you on the right"
+        ),
     ]
     assert over.words("de")[1] == (
         "nach 2 m mit dem Aufzug „west lift“ auf Etage 2 fahren, beim Aussteigen links abbiegen"
