@@ -47,6 +47,11 @@ def test_alternatives_have_a_line_each_and_none_is_needed() -> None:
     building = office()
     found = building.alternatives(("1", (1.5, 3.5)), ("2", (1.5, 4.5)), 2, max_stretch=9.0)
     axes = plot_building(building, found)
+    legend = axes[0].get_legend() or axes[1].get_legend()
+    assert legend is not None
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert len(set(texts)) == len(texts)
+    assert {"lift", "stairs", "rooms", "occupied"} <= set(texts)
     assert {"route-1", "route-2"} <= set(gids(axes[0]))
     assert not [gid for ax in plot_building(building) for gid in gids(ax) if "route" in gid]
     none = building.plan(("1", (1.5, 3.5)), ("2", (1.5, 4.5)), closed_links=["B", "west lift"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -89,13 +89,15 @@ def plot_building(
         axes = _panels(views, order, width_in)
     elif len(axes) != len(views):
         raise InvalidValueError(f"{len(views)} floors need as many axes, got {len(axes)}")
-    entries: list[Entry] = []
+    entries: dict[str, Any] = {}
     for number in order:
         floor = building.floors[number]
         canvas = Canvas.opened(axes[number], width_in, views[number])
         # One scale for all: sizes are those of the whole picture.
         found = _draw_floor(canvas, building, floor, shown)
-        entries += [entry for entry in found if entry[1] not in {text for _, text in entries}]
+        for handle, text in found:
+            # Floors leave out different numbers of names: one entry is enough.
+            entries.setdefault(text.partition(" (")[0], handle)
         frame_axes(canvas)
         add_title(canvas, _words(floor, shown))
     lowest = Canvas.opened(axes[order[-1]], width_in, views[order[-1]])
@@ -104,7 +106,8 @@ def plot_building(
         (Line2D([], [], color=colour, lw=_LINE * lowest.sizes.line), _route_words(plan, number))
         for number, (plan, colour) in enumerate(zip(shown, _colours(shown), strict=True), start=1)
     ]
-    add_legend(lowest, lines + entries, bar=bar, below=0.35 * lowest.sizes.font)
+    ground: list[Entry] = [(handle, text) for text, handle in entries.items()]
+    add_legend(lowest, lines + ground, bar=bar, below=0.35 * lowest.sizes.font)
     return tuple(axes)
 
 
