@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav.building.floors import Floor
-    from hybridnav.building.search import Endpoint, LinkNetwork, LinkSearch, Part
+    from hybridnav.building.network import LinkNetwork, Part
+    from hybridnav.building.search import Endpoint, LinkSearch
     from hybridnav.result import PlanResult, PlanStats
 
 

@@ -12,7 +12,8 @@ from hybridnav.building.answers import Answers
 from hybridnav.building.checks import check_floors, check_links, check_speed
 from hybridnav.building.endpoints import endpoint_of, refusal_of
 from hybridnav.building.floors import FloorTable
-from hybridnav.building.search import LinkNetwork, LinkSearch
+from hybridnav.building.network import LinkNetwork
+from hybridnav.building.search import LinkSearch
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.names import did_you_mean
 
