@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("uvicorn", reason="the page needs the extra view")
 pytest.importorskip("starlette", reason="the page needs the extra view")
 
-from tests.view.server import served, session_of, write_map
+from tests.view.server import folder_in, served, session_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """The folder of a map, with another one beside it that nothing may touch."""
-    inside = tmp_path / "maps"
-    inside.mkdir()
-    (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
-    write_map(inside)
-    return inside
+    return folder_in(tmp_path)
 
 
 @pytest.fixture

@@ -54,6 +54,15 @@ def write_map(folder: Path) -> Path:
     return folder / "four.yaml"
 
 
+def folder_in(above: Path) -> Path:
+    """Make the folder of a map, with a file above it that no page may read or change."""
+    inside = above / "maps"
+    inside.mkdir()
+    (above / "secret.txt").write_text("secret", encoding="utf-8")
+    write_map(inside)
+    return inside
+
+
 def session_of(file: Path) -> Session:
     """Return the session that the command would make."""
     model = hn.load(file, robot_radius_m=0.2)

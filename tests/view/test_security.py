@@ -8,14 +8,28 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.view.server import TOKEN
+from tests.view.server import TOKEN, folder_in, served, session_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from tests.view.server import Client
 
 QUERY = {"start": [10.5, 40.5], "goal": [70.5, 10.5], "preset": "shortest"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a map, with another file above it that nothing may touch."""
+    return folder_in(tmp_path_factory.mktemp("hostile"))
+
+
+@pytest.fixture(scope="module")
+def client(folder: Path) -> Iterator[Client]:
+    """One server for all hostile requests: none may change anything."""
+    with served(session_of(folder / "four.yaml"), folder) as client:
+        yield client
 
 
 @pytest.fixture(autouse=True)
