@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 ROWS, COLS = 12, 18
-GRID = hn.OccupancyGrid(np.zeros((ROWS, COLS)), robot_radius_m=0)
+GRID = hn.OccupancyGrid(np.zeros((ROWS, COLS), np.float32), robot_radius_m=0)
 ROOMS = hn.RoomLabels(
     ("a", "b", "c"), np.tile(np.repeat([0, 1, 2], COLS // 3), (ROWS, 1)), {"a": (1.0, 1.0)}
 )
@@ -36,7 +36,7 @@ def test_a_cut_leaves_every_cell_on_its_side(
     left = np.array(
         [
             [
-                np.linalg.det([np.subtract(other, one), (c + 0.5 - one[0], r + 0.5 - one[1])])
+                (other[0] - one[0]) * (r + 0.5 - one[1]) - (other[1] - one[1]) * (c + 0.5 - one[0])
                 for c in range(COLS)
             ]
             for r in range(ROWS)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from hybridnav.view.requests import PlanQuery
 
 _ROOMS = "rooms.yaml"
-_ENDS = 2
+_TWO = 2
 
 SaveOption = Annotated[
     Path | None,
@@ -86,7 +86,7 @@ def view(
     check_output(save, "--save", (".html",))
     if routes and save is None:
         raise UsageError("--route is for a saved page: add --save FILE, or leave it out")
-    ends = [_ends(text) for text in routes or ()]
+    pairs = [_endpoints(text) for text in routes or ()]
     given = parsed_costs(costs)
     settings = read_settings(
         PRESET if preset is None and given else preset, None, None, None, map_file=map_file
@@ -99,7 +99,7 @@ def view(
     rooms_path = map_file.parent / _ROOMS if rooms_file is None else rooms_file
     session = _session(model, settings, rooms_path, given.read(model.grid))
     if save is not None:
-        _save(session, save, ends, settings.name)
+        _save(session, save, pairs, settings.name)
         return
     from hybridnav.view import serve  # noqa: PLC0415 - loads numba and matplotlib
 
@@ -126,11 +126,11 @@ def _session(
     return Session(model, topology, settings, costs=costs, file=file)
 
 
-def _ends(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _endpoints(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return the two points of `X,Y:X,Y`."""
     points = [read_point(part) for part in text.split(":")]
-    good = [p for p in points if p is not None and len(p) == _ENDS and all(map(math.isfinite, p))]
-    if len(points) != _ENDS or len(good) != _ENDS:
+    good = [p for p in points if p is not None and len(p) == _TWO and all(map(math.isfinite, p))]
+    if len(points) != _TWO or len(good) != _TWO:
         raise UsageError(f"--route must be X,Y:X,Y in metres, got {text!r:.80}")
     return good[0], good[1]
 
@@ -138,7 +138,7 @@ def _ends(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
 def _save(
     session: Session,
     path: Path,
-    ends: list[tuple[tuple[float, ...], tuple[float, ...]]],
+    pairs: list[tuple[tuple[float, ...], tuple[float, ...]]],
     preset: str,
 ) -> None:
     import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
@@ -147,7 +147,7 @@ def _save(
     from hybridnav.view.requests import PlanQuery  # noqa: PLC0415
 
     queries: list[PlanQuery] = []
-    for start, goal in ends:
+    for start, goal in pairs:
         first, last = session.grid.frame.positions_of(np.array([start, goal]))[:, ::-1].tolist()
         queries.append(PlanQuery(start=first, goal=last, preset=preset))
     save_page(session, path, queries)

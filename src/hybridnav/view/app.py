@@ -18,8 +18,8 @@ from hybridnav.view.requests import (
     AlternativesQuery,
     At,
     Edit,
+    PathQuery,
     PlanQuery,
-    Query,
     Save,
     Undo,
     checked,
@@ -150,7 +150,7 @@ class _Answers:
         return self.session.planning.plan(checked(PlanQuery, value))
 
     def optimum(self, value: Any) -> dict[str, Any]:
-        return self.session.planning.optimum(checked(Query, value))
+        return self.session.planning.optimum(checked(PathQuery, value))
 
     def alternatives(self, value: Any) -> dict[str, Any]:
         return self.session.planning.alternatives(checked(AlternativesQuery, value))
@@ -168,7 +168,7 @@ class _Answers:
         return self.session.save(checked(Save, value))
 
     def export(self, kind: str, value: Any) -> bytes:
-        query = checked(Query, value) if value else None
+        query = checked(PathQuery, value) if value else None
         return exported(self.session.planning, kind, query, self.folder)
 
     def tile(self, request: Request) -> bytes:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav.view.planning import Planning
-    from hybridnav.view.requests import Query
+    from hybridnav.view.requests import PathQuery
 
 KINDS = {
     "nav2": "route-graph.geojson",
@@ -26,7 +26,7 @@ KINDS = {
 """Name of the file of each kind."""
 
 
-def exported(planning: Planning, kind: str, query: Query | None, folder: Path) -> bytes:
+def exported(planning: Planning, kind: str, query: PathQuery | None, folder: Path) -> bytes:
     """Return the content of a file.
 
     Parameters
@@ -55,7 +55,7 @@ def exported(planning: Planning, kind: str, query: Query | None, folder: Path) -
         return file.read_bytes()
 
 
-def _writer(planning: Planning, kind: str, query: Query | None) -> Callable[[Path], None]:
+def _writer(planning: Planning, kind: str, query: PathQuery | None) -> Callable[[Path], None]:
     topology = planning.topology
     if kind == "nav2":
         return lambda file: export_nav2(build_route_graph(topology), file)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybridnav.planner import HybridPlanner, Tour
     from hybridnav.result import PlanResult
     from hybridnav.topology import TopologicalMap
-    from hybridnav.view.requests import AlternativesQuery, Closed, PlanQuery, Query
+    from hybridnav.view.requests import AlternativesQuery, Closed, PathQuery, PlanQuery
 
 GRID = "grid-astar"
 """The preset of the optimum on the grid."""
@@ -88,14 +88,14 @@ class Planning:
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
         tour = plan_tour(planner, points, blocked=closed)
-        return self._facts(tour.results[0]) | self._way(tour)
+        return self._facts(tour.results[0]) | self._itinerary(tour)
 
-    def outcome(self, query: Query) -> PlanResult:
+    def outcome(self, query: PathQuery) -> PlanResult:
         """Return the plan itself, to be written."""
         closed = self._blocked(query.closed)
         return self.planner(query.preset).plan(*self._points(query), blocked=closed)
 
-    def optimum(self, query: Query) -> dict[str, Any]:
+    def optimum(self, query: PathQuery) -> dict[str, Any]:
         """Return the shortest path of cells on the whole grid."""
         on_grid = query.model_copy(update={"preset": GRID})
         return self._facts(self.outcome(on_grid))
@@ -112,12 +112,14 @@ class Planning:
             blocked=self._blocked(query.closed),
         )
         routes = [
-            self._facts(each.result) | self._way(each.tour) | {"overlap": round(each.overlap, 3)}
+            self._facts(each.result)
+            | self._itinerary(each.tour)
+            | {"overlap": round(each.overlap, 3)}
             for each in found
         ]
         return {"routes": routes, "complete": found.complete, "note": found.note}
 
-    def _points(self, query: Query) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def _points(self, query: PathQuery) -> tuple[tuple[float, ...], tuple[float, ...]]:
         start, goal = (in_metres(point, self.grid) for point in (query.start, query.goal))
         if not self.planner(query.preset).needs_headings:
             return start, goal
@@ -154,7 +156,7 @@ class Planning:
             "seconds": round(sum(result.stats.seconds.values()), 6),
         } | {name: _finite(value) for name, value in figures.items()}
 
-    def _way(self, tour: Tour) -> dict[str, Any]:
+    def _itinerary(self, tour: Tour) -> dict[str, Any]:
         """Return rooms, doors and words of a plan, and the places that it passes."""
         route = tour.results[0].route
         return {

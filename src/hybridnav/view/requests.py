@@ -35,7 +35,7 @@ class Closed(_Strict):
         return bool(self.doors or self.rooms or self.polygons)
 
 
-class Query(_Strict):
+class PathQuery(_Strict):
     """A query between two points in grid units."""
 
     start: Point
@@ -44,13 +44,13 @@ class Query(_Strict):
     closed: Closed = Closed()
 
 
-class PlanQuery(Query):
+class PlanQuery(PathQuery):
     """A plan; brief while an end is dragged."""
 
     brief: bool = False
 
 
-class AlternativesQuery(Query):
+class AlternativesQuery(PathQuery):
     """Some routes between two points."""
 
     count: Annotated[int, Field(ge=2, le=5)] = 3
