@@ -290,6 +290,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     presets = {f"hybridnav/presets/{name}" for name in PLANNERS}
     content = {name for name in names if ".dist-info/" not in name}
     pages = {f"hybridnav/harness/{page}.html.j2" for page in ("check", "report")}
+    assets = source / "hybridnav" / "view" / "assets"
+    pages |= {path.relative_to(source).as_posix() for path in assets.iterdir()}
     others = {"hybridnav/py.typed", "hybridnav/topology/room_judge.npz", *pages}
     assert "hybridnav/__init__.pyi" in stubs
     assert content == modules | stubs | presets | others

@@ -40,6 +40,18 @@ def save_page(session: Session, path: PathLike, queries: Sequence[PlanQuery] = (
     ------
     MapError
         When the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from hybridnav.view import Session, save_page
+    >>> grid = hn.example_map("figure1")
+    >>> hn.save(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "figure1.hnm")
+    >>> model = hn.load("figure1.hnm")
+    >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
+    >>> save_page(Session(model, topology, model.fitted(None)), "page.html")
+    >>> Path("page.html").read_text()[:15]
+    '<!doctype html>'
     """
     place = session.planning.topology.pyramid.place_level
     layers = {"map": "map", "rooms": "rooms", f"level-{place}": f"level-{place}"}

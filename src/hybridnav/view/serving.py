@@ -39,6 +39,23 @@ def serve(
     ------
     InvalidValueError
         When the port is taken, or the extra `view` is not installed.
+
+    Examples
+    --------
+    >>> from contextlib import suppress
+    >>> from pathlib import Path
+    >>> from hybridnav.view import Session, serve
+    >>> grid = hn.example_map("figure1")
+    >>> hn.save(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), "figure1.hnm")
+    >>> model = hn.load("figure1.hnm")
+    >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
+    >>> session = Session(model, topology, model.fitted(None))
+    >>> def ready(address):
+    ...     print(address[:17])
+    ...     raise KeyboardInterrupt  # as Ctrl-C does
+    >>> with suppress(KeyboardInterrupt):
+    ...     serve(session, Path(), ready=ready)
+    http://127.0.0.1:
     """
     try:
         import uvicorn  # noqa: PLC0415 - an extra
