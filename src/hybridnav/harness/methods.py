@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from hybridnav.baselines.rivals import needed_package
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.graph_method import GraphMethod
@@ -49,7 +50,17 @@ BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
 `TopologicalMap`, the others from an `OccupancyGrid`. Work outside this package names its own class
 as `module:class`."""
 
+RIVALS: dict[str, tuple[str, dict[str, Any]]] = {
+    "networkx": ("hybridnav.baselines.rivals:Networkx", {}),
+    "pyastar2d": ("hybridnav.baselines.rivals:Pyastar2d", {}),
+    "tcod": ("hybridnav.baselines.rivals:Tcod", {}),
+}
+"""Planners of others by the package that each needs; named like baselines."""
+
 ON_PLACES = frozenset({"simple-graph", "exact-overlay"})
+
+
+_KNOWN = BASELINES | RIVALS
 
 
 @dataclass(frozen=True)
@@ -183,9 +194,11 @@ def baseline_spec(
         When there is none of that name, or its class cannot be imported.
     """
     if ":" not in name:
-        name = baseline_name(name, BASELINES)
-    class_of(BASELINES.get(name, (name, {}))[0])
-    spec = MethodSpec(name, None, source="" if name in BASELINES else source_hash(name))
+        name = baseline_name(name, _KNOWN)
+    if name in RIVALS:
+        needed_package(name)
+    class_of(_KNOWN.get(name, (name, {}))[0])
+    spec = MethodSpec(name, None, source="" if name in _KNOWN else source_hash(name))
     if named is not None and (named.name or named.settings):
         settings = named.settings
         spec = replace(spec, name=named.name or name, factory=name, settings=settings)
@@ -267,7 +280,7 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
         costs = None
         method = GraphMethod(grid, spec.graph, clear_edges_only=spec.clear_edges_only)
     else:
-        path, options = BASELINES.get(spec.made_by, (spec.made_by, {}))
+        path, options = _KNOWN.get(spec.made_by, (spec.made_by, {}))
         made_of = class_of(path)
         options = options | spec.settings
         if not _takes(made_of, "costs"):

@@ -194,8 +194,11 @@ class Outcome:
 
     @cached_property
     def expansions(self) -> FloatArray:
-        """Things taken from the queues of the searches, of all kinds; NaN without a path."""
+        """Things taken from the queues of the searches, of all kinds; NaN without a path, and for a
+        method that counts none."""
         kinds = np.array([self.figure(key) for key in EXPANSIONS])
+        if not np.nansum(kinds) > 0:
+            return np.full(len(self.references), math.nan)
         return np.where(np.isfinite(self.lengths_m), np.nansum(kinds, axis=0), math.nan)
 
     def among(self, pairs: set[MapQuery]) -> BoolArray:

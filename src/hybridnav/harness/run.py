@@ -378,7 +378,10 @@ def _write_settings(settings: RunSettings, folder: Path, sources: dict[str, str]
     ]
     plain["sampler_version"] = SAMPLER_VERSION
     plain["sources"] = sources
-    plain |= {"command": shlex.join(sys.argv), **circumstances()}
+    program, *arguments = sys.argv or [""]
+    own = Path(program).name in {"hybridnav", "__main__.py"}
+    command = shlex.join(["hybridnav" if own else program, *arguments])
+    plain |= {"command": command, **circumstances()}
     plain["costs"] = text_of_costs(settings.costs)
     if settings.merge_distance_m == math.inf:  # JSON has no such number
         plain["merge_distance_m"] = "inf"

@@ -146,6 +146,10 @@ def _machines(study: Study) -> dict[str, str]:
     for outcome in study.outcomes:
         for key, value in outcome.preparation.get("environment", {}).items():
             found.setdefault(key, {})[value] = None
+    for outcome in study.outcomes:
+        version = outcome.preparation.get("version")
+        if version:
+            found.setdefault("planners of others", {})[version] = None
     return {key: ", ".join(values) for key, values in found.items()}
 
 

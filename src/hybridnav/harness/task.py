@@ -123,6 +123,7 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     label = "" if prepared.is_named else own_name(method)
     return {
         **({"label": label} if label else {}),
+        **({"version": str(version)} if (version := getattr(method, "version", "")) else {}),
         **({"by_costs": True} if prepared.by_costs else {}),
         "pyramid_seconds": prepared.pyramid_seconds,
         "method_seconds": prepared.method_seconds,
