@@ -146,7 +146,7 @@ def test_wrong_usage_and_unreadable_files(cli, rooms, tmp_path):
         ((rooms, "--scen", other, *out), 2, "8 x 8 cells, rooms has 11 x 20"),
         ((rooms, "--scen", other, "--all-pairs", 1, *out), 2, "--scen"),
         ((rooms, rooms, "--scen", other, *out), 2, "one map"),
-        ((rooms, "--baseline", "astar", *out), 2, "no baseline is called 'astar'"),
+        ((rooms, "--baseline", "star", *out), 2, "no baseline is called 'star'"),
         ((rooms, "--preset", "nonsense", *out), 2, "nonsense"),
         ((rooms, "--set", "planner.nonsense=1", *out), 2, "nonsense"),
         ((rooms, "--pairs", 0, *out), 2, "--pairs"),

@@ -24,7 +24,7 @@ from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.rows import rows_of_study
 from hybridnav.poses import Motion
 from tests.harness import faulty_costs as faulty
-from tests.harness.small_runs import ROOMS, name_of, run_here, write_map
+from tests.harness.small_runs import ROOMS, label_of, name_of, run_here, write_map
 from tests.layers import layer_of
 from tests.oracle.grid import distances, move_graph
 from tests.search.test_weighted import weighted
@@ -86,8 +86,8 @@ def scene(settings: RunSettings) -> Any:
 
 
 def outcome_of(study: Any, method: Any) -> Any:
-    name = method if isinstance(method, str) else name_of(method)
-    return next(outcome for outcome in study.outcomes if outcome.label == name)
+    names = {method} if isinstance(method, str) else {name_of(method), label_of(method)}
+    return next(outcome for outcome in study.outcomes if outcome.label in names)
 
 
 @pytest.mark.parametrize("method", FAULTS)

@@ -78,6 +78,15 @@ def test_a_class_is_called_what_it_calls_itself(settings, tmp_path):
     assert "HPA* of mine" in (tmp_path / "run" / "report.html").read_text()
 
 
+def test_a_class_that_takes_the_name_of_another_method_has_its_path(settings, tmp_path):
+    (tmp_path / "mine.py").write_text(CLASS.replace("HPA* of mine", "grid-astar"))
+    evaluate(settings, tmp_path / "run")
+    study = write_outputs(tmp_path / "run")
+    assert study.labels == ["grid-astar", "mine:Mine"]
+    assert study.checks > 0
+    assert study.faults == []
+
+
 def test_a_class_that_was_mended_is_run_again(settings, tmp_path):
     made = evaluate(settings, tmp_path / "run")
     assert evaluate(settings, tmp_path / "run") == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -141,10 +142,11 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     together = lay_times(timed, pairs)
     metric = _metric_of(preparations, metric, folder)
     names = _map_labels(preparations, root)
+    own = _own_names(preparations.values())
     digests: dict[str, set[tuple[str, str]]] = {}
     for record in preparations.values():
         settings = record["method_sha"], names[record["map_sha"]]
-        digests.setdefault(f"{_name_of(record)}@{settings[1]}", set()).add(settings)
+        digests.setdefault(f"{own[record['method']]}@{settings[1]}", set()).add(settings)
     optima = {
         sha: {query_key(record): record for record in pairs.get((sha, method), ())}
         for (sha, method), record in preparations.items()
@@ -153,11 +155,11 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     outcomes = []
     for (sha, method), record in preparations.items():
         name = names[sha]
-        label = _name_of(record)
+        label = own[record["method"]]
         if len(digests[f"{label}@{name}"]) > 1:
             label = f"{label} {method[:4]}"
-        own = pairs.get((sha, method), [])
-        outcomes.append(Outcome(name, label, record, own, optima.get(sha, {}), metric))
+        answers = pairs.get((sha, method), [])
+        outcomes.append(Outcome(name, label, record, answers, optima.get(sha, {}), metric))
     order = {name: at for at, name in enumerate(dict.fromkeys(names.values()))}
     place = {name: at for at, name in enumerate(BASELINES)}
     outcomes.sort(
@@ -171,9 +173,14 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
     return Study(outcomes, metric, circumstances_of(timed, outcomes, together, commands_of(folder)))
 
 
-def _name_of(record: Record) -> str:
-    """Return the name of a method: the one that its class gives itself, else that of its record."""
-    return str(record.get("label") or record["method"])
+def _own_names(records: Iterable[Record]) -> dict[str, str]:
+    """Return the name of each method in tables: the one that its class gives itself, unless another
+    method has it, else that of its records."""
+    own: dict[str, str] = {}
+    for record in records:
+        own[record["method"]] = record.get("label") or own.get(record["method"], record["method"])
+    taken = Counter([*own.values(), *(name for name in own if own[name] != name)])
+    return {name: label if taken[label] == 1 else name for name, label in own.items()}
 
 
 def _latest(

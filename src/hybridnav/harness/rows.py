@@ -162,7 +162,7 @@ def _quotient(first: float, second: float) -> float:
 def _break_even(price: float, gain: float) -> float:
     """Return the queries after which a gain for each has paid a price, seconds both. The result is
     infinite without a gain, and NaN if nothing is known or the method is the reference itself."""
-    if not abs(gain) > 0:
+    if not abs(gain) > 0 or math.isnan(price):
         return math.nan
     return math.ceil(max(price, 0.0) / gain) if gain > 0 else math.inf
 
