@@ -32,7 +32,9 @@ class Fault(NamedTuple):
     """A contradiction that the judge found."""
 
     kind: Kind
+    """What the contradiction is about."""
     text: str
+    """The contradiction in words."""
 
 
 def is_any_angle(record: Record) -> bool:

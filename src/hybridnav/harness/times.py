@@ -30,7 +30,7 @@ class Circumstances:
     dates: tuple[str, str] = ("", "")
     """First and last, UTC."""
     loads: tuple[float, ...] = ()
-    """Of the machine in the timing pass, in the order of the records."""
+    """Loads of the machine in the timing pass, in the order of the records."""
     apart: tuple[str, ...] = ()
     """Methods whose times are not of the timing pass of the others."""
     commands: tuple[str, ...] = field(default=())
@@ -87,7 +87,7 @@ def lay_times(
 ) -> dict[str, set[str]]:
     """Lay the times of the timing pass over the seconds of the answers.
 
-    Of several passes on a map the one with the most methods counts, and of equals the last.
+    The pass with the most methods on a map counts, the last one of equals.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ class TimingTask:
     repeat: int
     """Queries of each method and pair."""
     seed: int = 0
-    """Of the order of methods."""
+    """Seed of the order of methods."""
     without: frozenset[tuple[str, str]] = frozenset()
     """Digests of methods and keys of pairs that had no answer: they are not asked again."""
     attempt: int = 0
