@@ -153,16 +153,26 @@ class PlaceTable:
             self._numbers, self._rows, self._used = numbers, rows, len(stays)
             self._is_own, self._columns = True, None
         elif not self._is_own:
-            self._numbers, self._rows = self._numbers.copy(), self._rows.copy()
+            self._numbers, self._rows = self._numbers.copy(), _rows(_words(self._rows).copy())
             self._is_own, self._columns = True, None
 
     def _add(self, numbers: LongArray) -> None:
         """Make rows for numbers that have none."""
         self.append(0, np.zeros(len(numbers), PLACE))
         self._numbers[self._used - len(numbers) : self._used] = numbers
-        order = np.argsort(self._numbers, kind="stable")
-        self._numbers, self._rows = self._numbers[order], self._rows[order]
-        self._columns = None
+        used = self._numbers[: self._used]
+        last = used[max(self._used - len(numbers) - 1, 0) :]
+        if (last[:-1] < last[1:]).all():  # above all others
+            return
+        order = np.argsort(used, kind="stable")
+        self._numbers[: self._used] = used[order]
+        _words(self._rows)[: self._used] = _words(self._rows)[order]
+
+
+def _rows(words: LongArray) -> AnyArray:
+    """Return as rows what `_words` returned."""
+    rows: AnyArray = words.view(PLACE).reshape(len(words))
+    return rows
 
 
 def _words(rows: AnyArray) -> LongArray:
