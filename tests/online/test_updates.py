@@ -23,7 +23,7 @@ from benchmarks.chain import OFFICE
 from benchmarks.online import area_of, random_changes, with_classes
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import Frame, OccupancyGrid
-from hybridnav.online import OnlinePyramid, cellwise, draft
+from hybridnav.online import OnlinePyramid, cellwise
 from hybridnav.pyramid.cracks import find_cracks
 from tests.oracle.checks import check_base, check_cap, check_level, check_step, passes
 from tests.oracle.pyramid import Base
@@ -32,15 +32,12 @@ from tests.strategies import class_grids, drawn, examples, occupancy_grid
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-LINKAGES = ("radius", "survivor", "diameter")
 MOST_CELLS = 900
 
 
-def version_of(classes, *, merge_distance_m=4.0, linkage="radius"):
+def version_of(classes, *, merge_distance_m=4.0):
     grid = occupancy_grid(classes)
-    return OnlinePyramid.of(
-        hn.DualGraphPyramid.build(grid, merge_distance_m=merge_distance_m, linkage=linkage)
-    )
+    return OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=merge_distance_m))
 
 
 def check_version(version):
@@ -53,11 +50,10 @@ def check_version(version):
     cap = {"limit_m": version.merge_distance_m, "resolution_m": version.grid.resolution_m}
     for level in levels:
         check_level(level, base)
-        if version.linkage != "survivor":
-            check_cap(level, linkage=version.linkage, **cap)
+        check_cap(level, linkage="radius", **cap)
     for lower, upper in itertools.pairwise(levels):
         check_step(lower, upper)
-    assert not passes(levels[-1], linkage=version.linkage, **cap).any()
+    assert not passes(levels[-1], linkage="radius", **cap).any()
     sizes = [(level.n_vertices, level.n_arcs) for level in levels]
     assert sizes == [(size.vertices, size.arcs) for size in pyramid.stats.sizes]
 
@@ -114,22 +110,18 @@ class Robot(RuleBasedStateMachine):
 
     old: Sequence[Any] = ()
     """The version before, and the number of the place of each of its cells."""
-    linkages = LINKAGES
-    """The linkages to choose from."""
     keeps_levels = True
     """Whether an update begins with the levels that were read of the version before."""
 
     @initialize(
         classes=class_grids(14),
-        data=st.data(),
         merge_distance_m=st.sampled_from([1.5, 2.0, 3.0, 4.0, 5.0, 8.0, 13.0, 40.0]),
         keeps_levels=st.booleans(),
     )
-    def start(self, classes, data, merge_distance_m, keeps_levels):
+    def start(self, classes, merge_distance_m, keeps_levels):
         """Build the first version."""
-        linkage = data.draw(st.sampled_from(self.linkages))
         self.classes, self.origin, self.keeps_levels = classes, (0.0, 0.0), keeps_levels
-        self.version = version_of(classes, linkage=linkage, merge_distance_m=merge_distance_m)
+        self.version = version_of(classes, merge_distance_m=merge_distance_m)
 
     def follow(self, classes, *, changed, shift=(0, 0)):
         """Update, and check what the update states."""
@@ -201,19 +193,8 @@ def test_versions_follow_a_map():
     )
 
 
-def test_versions_follow_a_map_where_whole_places_merge(monkeypatch):
-    monkeypatch.setattr(draft, "_ROUNDS", 0)
-    run_state_machine_as_test(
-        Robot,
-        settings=settings(
-            max_examples=examples(5), stateful_step_count=8, deadline=None, derandomize=True
-        ),
-    )
-
-
 def test_versions_follow_a_map_in_groups_of_changes(monkeypatch):
     monkeypatch.setattr(cellwise, "_SMALL_CELLS", 0)
-    monkeypatch.setattr(Robot, "linkages", ("radius",))
     run_state_machine_as_test(
         Robot,
         settings=settings(
@@ -399,6 +380,14 @@ def test_a_pyramid_with_rooms_is_refused():
     rooms = hn.RoomLabels(("a",), np.zeros((4, 4), np.int32))
     with pytest.raises(InvalidValueError, match="built with rooms"):
         OnlinePyramid.of(hn.DualGraphPyramid.build(grid, rooms=rooms))
+
+
+@pytest.mark.parametrize("linkage", ["survivor", "diameter"])
+def test_a_pyramid_of_another_linkage_is_refused(linkage):
+    grid = occupancy_grid(np.ones((4, 4), np.uint8))
+    with pytest.raises(InvalidValueError, match=f"linkage '{linkage}', expected 'radius'") as error:
+        OnlinePyramid.of(hn.DualGraphPyramid.build(grid, linkage=linkage))
+    assert "\n" not in str(error.value)
 
 
 def test_a_number_that_is_no_place_is_refused():

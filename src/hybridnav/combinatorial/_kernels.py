@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.combinatorial._piece_kernels import bounds_two_fields
 
 ALIVE = 0
 CONTRACTED = 1
@@ -192,31 +191,7 @@ def start_together(dart, partner, darts, whole_at, level, cols):
 
 
 @njit(cache=True, nogil=True)
-def are_one(dart, partner, darts, record, whole_at, level, cols):
-    """Return whether two edges on a face are one boundary although vertices may be in pieces.
-
-    Between fields in pieces of any shape the face of the level decides, which the base knows.
-
-    Parameters
-    ----------
-    dart, partner
-        Darts of the two edges.
-    darts, record, whole_at, level, cols
-        See `simplify`.
-    """
-    if record[2].size == 0:
-        return start_together(dart, partner, darts, whole_at, level, cols)
-    u, v = darts.origin[dart], darts.origin[dart ^ 1]
-    if max(whole_at[u], whole_at[v]) <= level:
-        return True
-    if u == v:
-        return False  # the record of a field in pieces already holds the ends of its self-loops
-    base_dart = 2 * np.int64(darts.base_edge[dart >> 1]) + (dart & 1)
-    return bounds_two_fields(base_dart, record, level, cols)
-
-
-@njit(cache=True, nogil=True)
-def simplify(darts, touched, any_loop, state, inverse, cols, record, whole_at, level, all_whole):
+def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, all_whole):
     """Remove redundant edges through ordinary faces until none is left, in place.
 
     Rules one and two: a face of degree one, a face of degree two. Rules three and four need a
@@ -229,11 +204,8 @@ def simplify(darts, touched, any_loop, state, inverse, cols, record, whole_at, l
         See `contract`; removed edges become `REMOVED`.
     touched, any_loop
         Results of `contract`.
-    record
-        `vertex_end`, `vertex_parent` and `edge_end` of the base, up to this level, where vertices
-        other than blocks are in pieces; empty arrays elsewhere. Removed edges are entered.
     whole_at
-        uint8 (n_vertices,), the level from which a vertex is whole. An edge that ends at a vertex
+        uint8 (n_vertices,), the level from which a block is whole. An edge that ends at a vertex
         in pieces waits for the pieces to merge, so all of those are looked at again.
     level
         The level to make.
@@ -262,7 +234,7 @@ def simplify(darts, touched, any_loop, state, inverse, cols, record, whole_at, l
                 dart, partner = redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols)
             if dart < 0:
                 break
-            if not all_whole and not are_one(dart, partner, darts, record, whole_at, level, cols):
+            if not all_whole and not start_together(dart, partner, darts, whole_at, level, cols):
                 break
             other = dart ^ 1
             # A dart that stays in the merged face: from this side, else from the other.
@@ -279,8 +251,6 @@ def simplify(darts, touched, any_loop, state, inverse, cols, record, whole_at, l
             unlink(dart, sigma, inverse)
             unlink(other, sigma, inverse)
             state[dart >> 1] = REMOVED
-            if record[2].size > 0:
-                record[2][base_edge[dart >> 1]] = 2 * level + 1
 
 
 @njit(cache=True, nogil=True)

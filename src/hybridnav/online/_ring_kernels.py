@@ -72,8 +72,10 @@ def ring_round(dissolved):
 
 @guarded
 @njit(cache=True, nogil=True)
-def in_places(place, numbers):
-    """Return the cells whose place is one of some numbers, bool (rows, cols).
+def index_in(place, numbers):
+    """Return 1 plus the index of the place of each cell among some numbers, 0 for others.
+
+    The result is int32 (rows, cols).
 
     Parameters
     ----------
@@ -81,28 +83,6 @@ def in_places(place, numbers):
         int32 (rows, cols).
     numbers
         int64 (n,), ascending.
-    """
-    rows, cols = place.shape
-    found = np.zeros((rows, cols), np.bool_)
-    if numbers.size == 0:
-        return found
-    last, was_in = np.int64(-1), False
-    for row in range(rows):
-        for col in range(cols):
-            number = np.int64(place[row, col])
-            if number != last:
-                at = np.searchsorted(numbers, number)
-                last, was_in = number, at < numbers.size and numbers[at] == number
-            found[row, col] = was_in
-    return found
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def index_in(place, numbers):
-    """Return 1 plus the index of the place of each cell among some numbers, 0 for others.
-
-    The result is int32 (rows, cols); for the parameters see `in_places`.
     """
     rows, cols = place.shape
     found = np.zeros((rows, cols), np.int32)
@@ -155,54 +135,3 @@ def box_groups(boxes):
     for i in range(count):
         group[i] = group[group[i]]
     return group
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def pairs_across(field_of, fresh, ring, of_class, place):
-    """Return the pairs of a field and a place beside it of its class, int64 (n, 2), with repeats.
-
-    Parameters
-    ----------
-    field_of
-        int32 (rows, cols), the fields of the window.
-    fresh
-        uint8 (rows, cols), `CellClass` of the cells that were contracted, 0 elsewhere.
-    ring, of_class, place
-        bool, uint8 and int32 (rows, cols), the cells round those, and fields of `CELL`.
-    """
-    rows, cols = fresh.shape
-    pairs = np.empty((64, 2), np.int64)
-    count = 0
-    for row in range(rows):
-        for col in range(cols):
-            if not ring[row, col]:
-                continue
-            for step in range(4):
-                at_row = row + (1, -1, 0, 0)[step]
-                at_col = col + (0, 0, 1, -1)[step]
-                if not (0 <= at_row < rows and 0 <= at_col < cols):
-                    continue
-                if fresh[at_row, at_col] != of_class[row, col]:
-                    continue
-                first, second = field_of[at_row, at_col], place[row, col]
-                if count > 0 and pairs[count - 1, 0] == first and pairs[count - 1, 1] == second:
-                    continue
-                if count == len(pairs):
-                    longer = np.empty((2 * count, 2), np.int64)
-                    longer[:count] = pairs
-                    pairs = longer
-                pairs[count, 0], pairs[count, 1] = first, second
-                count += 1
-    return pairs[:count].copy()
-
-
-@njit(cache=True, nogil=True)
-def farthest_squared(labels, label, box, row, col):
-    """Return the squared distance from a cell to the farthest one with a label in a box."""
-    farthest = 0
-    for i in range(box[0], box[2]):
-        for j in range(box[1], box[3]):
-            if labels[i, j] == label:
-                farthest = max(farthest, (i - row) ** 2 + (j - col) ** 2)
-    return farthest

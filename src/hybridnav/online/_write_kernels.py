@@ -8,44 +8,38 @@ _SURVIVES = 255
 
 
 @njit(cache=True, nogil=True)
-def enter(cells, changed, record, field_of, numbers, n_ends):
+def enter(cells, changed, record, field_of, numbers):
     """Enter the record of a window into its cells, in place.
 
-    Nothing changes beyond the cells that took part or began anew, and the edges between them.
+    Nothing changes beyond the cells that began anew, and their edges.
 
     Parameters
     ----------
     cells
         The fields class, end, parent, edges and place of `CELL`, of shape (rows, cols).
     changed
-        bool and uint8 (rows, cols) in three arrays: the cells of whole places, those that began
-        anew, and the `CellClass` of these now, 0 elsewhere.
+        bool and uint8 (rows, cols): the cells that began anew, and the `CellClass` of these now, 0
+        elsewhere.
     record
         `vertex_end`, `vertex_parent` and `edge_end` of the window, flat.
     field_of
         int32 (rows, cols), the fields.
     numbers
         int64 (n_fields,), the number of the place of each.
-    n_ends
-        int64 (256,), how many cells have each end; changed.
     """
     of_class, end, parent, edges, place = cells
-    stays, gone, fresh = changed
+    gone, fresh = changed
     vertex_end, vertex_parent, edge_end = record
-    rows, cols = stays.shape
+    rows, cols = gone.shape
     for row in range(rows):
         for col in range(cols):
             cell = row * cols + col
-            is_part = stays[row, col] or fresh[row, col] > 0
-            if is_part or gone[row, col]:
-                n_ends[end[row, col]] -= 1
-                n_ends[vertex_end[cell]] += 1
+            if gone[row, col]:
                 end[row, col] = vertex_end[cell]
                 parent[row, col, 0] = parent[row, col, 1] = 0
-                if gone[row, col]:
-                    of_class[row, col] = fresh[row, col]
+                of_class[row, col] = fresh[row, col]
                 place[row, col] = -1
-                if is_part:
+                if fresh[row, col] > 0:
                     place[row, col] = numbers[field_of[row, col]]
                     if vertex_end[cell] != _SURVIVES:
                         parent[row, col, 0] = vertex_parent[cell] // cols - row
@@ -54,6 +48,5 @@ def enter(cells, changed, record, field_of, numbers, n_ends):
                 to_row, to_col = row + north, col + 1 - north
                 if to_row == rows or to_col == cols:
                     continue
-                to_part = stays[to_row, to_col] or fresh[to_row, to_col] > 0
-                if gone[row, col] or gone[to_row, to_col] or (is_part and to_part):
+                if gone[row, col] or gone[to_row, to_col]:
                     edges[row, col, north] = edge_end[2 * cell + north]

@@ -10,8 +10,8 @@ from hybridnav.online import _cell_kernels as kernels
 from hybridnav.online import _merge_kernels as merging
 from hybridnav.online import _removal_kernels
 from hybridnav.online._ring_kernels import box_groups
-from hybridnav.online.draft import State
 from hybridnav.online.places import PLACE
+from hybridnav.online.state import State
 from hybridnav.online.tiles import NO_PLACE, SIDE, Box, Differing
 from hybridnav.pyramid.record import SURVIVES
 from hybridnav.pyramid.window import contract_alone

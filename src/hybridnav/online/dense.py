@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.online.draft import State
 from hybridnav.online.places import PLACE, PlaceTable
+from hybridnav.online.state import State
 from hybridnav.online.tiles import CELL, NO_PLACE, Box, Tiles
-from hybridnav.online.windows import record_of
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.record import SURVIVES, BuildStats
+from hybridnav.pyramid.record import SURVIVES, BuildStats, Record
 
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, LongArray
@@ -63,9 +62,6 @@ def state_of(pyramid: DualGraphPyramid) -> State:
     table = np.zeros(level.n_vertices, PLACE)
     table["area"], table["cell"] = level.areas, level.cells
     table["box"] = level.boxes + np.array([0, 0, 1, 1])
-    whole_at = np.zeros(level.n_vertices, np.uint8)
-    np.maximum.at(whole_at, level.field_of[row, col], end[row, col])
-    table["whole_at"] = whole_at
     places = PlaceTable()
     places.write(range(level.n_vertices), table)
     places.close()
@@ -94,7 +90,7 @@ def pyramid_of(state: State, box: Box, settings: Settings) -> DualGraphPyramid:
             f"row {row}, column {col}: pass changed=None to compare all cells"
         )
     _close_levels(cells, state.vertex_ends)
-    record = record_of(cells)
+    record = _record_of(cells)
     record.vertex_parent[cells["place"].ravel() == NO_PLACE] = -1
     stats = BuildStats()
     pyramid = DualGraphPyramid(
@@ -121,3 +117,16 @@ def _close_levels(cells: AnyArray, vertex_ends: LongArray) -> None:
     new_end[2 * levels] = 2 * new_level[levels]
     new_end[2 * levels + 1] = 2 * new_level[levels] + 1
     cells["end"], cells["edges"] = new_level[cells["end"]], new_end[cells["edges"]]
+
+
+def _record_of(cells: AnyArray) -> Record:
+    """Return the record of a window, flat."""
+    rows, cols = cells.shape
+    steps = cells["parent"].astype(np.int32)
+    parent = np.arange(rows * cols, dtype=np.int32).reshape(rows, cols)
+    parent += steps[..., 0] * np.int32(cols) + steps[..., 1]
+    return Record(
+        cells["end"].ravel(),
+        np.where(cells["end"] == SURVIVES, -1, parent).ravel().astype(np.int32),
+        cells["edges"].ravel(),
+    )

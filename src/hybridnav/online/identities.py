@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import LongArray
     from hybridnav.online.cellwise import CellDraft
-    from hybridnav.online.draft import Draft
 
 
 Overlap = tuple[int, int, int]
@@ -46,29 +45,12 @@ class Heirs(NamedTuple):
     """The final number of each heir."""
 
 
-def settle(draft: Draft) -> Events:
+def settle(draft: CellDraft) -> Events:
     """Give the places of a draft the numbers of old ones as far as these have heirs.
 
     The heir of an old place is the new one that holds more than half of its cells. An heir of
     several bears the number of the one with which it shares the most cells; the least number breaks
-    ties.
-    """
-    first = draft.before.next_place
-    found = [overlap for overlap in _moved(draft) if overlap[0] != NO_PLACE]
-    areas = _areas_before(draft, {old for old, _, _ in found})
-    heirs = heirs_of(found, areas)
-    new = [place for place in draft.places.numbers(first) if place not in heirs.name]
-    born = {place: first + at for at, place in enumerate(new)}
-    name = heirs.name | born
-    _rename(draft, first, name)
-    draft.next_place = first + len(born)
-    return events_of(found, Heirs(heirs.of, name), _areas_now(draft, name), first)
-
-
-def settle_cells(draft: CellDraft) -> Events:
-    """Give the places of a draft, in which cells moved, their final numbers; see `settle`.
-
-    Most of them bear these already.
+    ties. Most places bear their final numbers already.
     """
     first = draft.before.next_place
     moved = _moved(draft)
@@ -91,7 +73,7 @@ def settle_cells(draft: CellDraft) -> Events:
     return events_of(found, Heirs(heirs.of, name), _areas_now(draft, name), first)
 
 
-def _moved(draft: Draft | CellDraft) -> list[Overlap]:
+def _moved(draft: CellDraft) -> list[Overlap]:
     """Return the cells in common of places that differ; old places are -1 where there was none."""
     keys, count = np.empty(0, np.int64), 0
     for before, after in draft.tiles.changed(draft.before.tiles):
@@ -103,7 +85,7 @@ def _moved(draft: Draft | CellDraft) -> list[Overlap]:
     return [*zip(old.tolist(), new.tolist(), counts.tolist(), strict=True)]
 
 
-def _areas_before(draft: Draft | CellDraft, places: Iterable[int]) -> dict[int, int]:
+def _areas_before(draft: CellDraft, places: Iterable[int]) -> dict[int, int]:
     """Return the cells that old places had."""
     numbers = sorted(places)
     areas = draft.before.places.read(numbers)["area"].tolist()
@@ -154,23 +136,10 @@ def events_of(
     )
 
 
-def _areas_now(draft: Draft | CellDraft, name: Mapping[int, int]) -> dict[int, int]:
+def _areas_now(draft: CellDraft, name: Mapping[int, int]) -> dict[int, int]:
     """Return the cells of new places, by the numbers before they had final ones."""
     areas = draft.places.read([*name.values()])["area"].tolist()
     return dict(zip(name, areas, strict=True))
-
-
-def _rename(draft: Draft, first: int, name: dict[int, int]) -> None:
-    """Write the final numbers of places in place of the numbers of the draft."""
-    table = np.full(draft.next_place - first, NO_PLACE, np.int32)
-    for number, final in name.items():
-        table[number - first] = final
-    for _, place in draft.tiles.changed(draft.before.tiles):
-        drafted = place >= first
-        place[drafted] = table[place[drafted] - first]
-    rows = draft.places.read([*name])
-    draft.places.drop(name)
-    draft.places.write([*name.values()], rows)
 
 
 def _renumber(draft: CellDraft, name: dict[int, int]) -> None:

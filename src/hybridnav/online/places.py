@@ -18,14 +18,12 @@ PLACE = np.dtype(
         ("area", np.int64),
         ("cell", np.int32, (2,)),
         ("box", np.int32, (4,)),
-        ("whole_at", np.uint8),
         ("is_stale", np.bool_),
     ],
     align=True,
 )
 """A place: its cells, 0 where there is no place; its surviving cell; its least row and column, and
-the first ones beyond it; the level from which it is whole; whether the levels in it are those of
-older cells."""
+the first ones beyond it; whether the levels in it are those of older cells."""
 
 
 _NONE = np.iinfo(np.int64).max

@@ -15,8 +15,7 @@ from hybridnav.grid.areas import box_of_area, class_reach, class_rules
 from hybridnav.grid.checks import checked_cell, checked_type
 from hybridnav.online.cellwise import CellDraft
 from hybridnav.online.dense import pyramid_of, state_of
-from hybridnav.online.draft import Draft, State
-from hybridnav.online.identities import settle, settle_cells
+from hybridnav.online.identities import settle
 from hybridnav.online.levels import with_levels
 from hybridnav.online.shift import check_sides, shift_of
 from hybridnav.online.tiles import Box
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from hybridnav._typing import IntArray, LongArray
+    from hybridnav.online.state import State
     from hybridnav.pyramid import Linkage
 
 
@@ -61,6 +61,7 @@ class OnlinePyramid:
     """The map of this version."""
     merge_distance_m: float
     linkage: Linkage
+    """Always "radius"."""
     seed: int
     low: tuple[int, int]
     """Row and column of cell (0, 0) among the cells of the first version, negative where the map
@@ -75,17 +76,22 @@ class OnlinePyramid:
         Parameters
         ----------
         pyramid
-            A pyramid without rooms; levels above its places are left out.
+            A pyramid without rooms, of the linkage "radius"; levels above its places are left out.
 
         Raises
         ------
         InvalidValueError
-            When the pyramid was built with rooms, or its grid is too long.
+            When the pyramid was built with rooms or another linkage, or its grid is too long.
         """
         if checked_type("pyramid", pyramid, DualGraphPyramid).rooms is not None:
             raise InvalidValueError(
                 "the pyramid was built with rooms, expected one without: "
                 "build it without rooms, and find them on a version"
+            )
+        if pyramid.linkage != "radius":
+            raise InvalidValueError(
+                f"the pyramid was built with the linkage {pyramid.linkage!r}, expected 'radius', "
+                "the default: places of other linkages do not follow a map"
             )
         check_sides(pyramid.grid)
         # Loading a version needs no decimation.
@@ -108,10 +114,8 @@ class OnlinePyramid:
         """Return the next version, that of a changed map.
 
         Places that hold no changed cell keep their cells, their levels and their numbers, unless
-        they take in new cells, or may merge with what changed beside them. With the linkage
-        "radius" the other places give away and take in single cells, and their levels are made
-        when they are read; with the other linkages they are dissolved into cells and contracted
-        again.
+        they take in new cells, or may merge with what changed beside them. The other places give
+        away and take in single cells. Levels are made when they are read.
 
         Parameters
         ----------
@@ -151,16 +155,9 @@ class OnlinePyramid:
         inside = box.common(apart)
         boxes = [*_outside(apart, whole), *([] if inside.is_empty else [inside])]
         state = vars(self).get("_with_levels", self._state)
-        draft: Draft | CellDraft
-        if self.linkage == "radius":
-            draft = CellDraft(state, self._criterion)
-            draft.change([part.moved(*low) for part in boxes], grid.classes, low)
-            events = settle_cells(draft)
-        else:
-            draft = Draft(state, self._criterion)
-            for part in boxes:
-                draft.change(part.moved(*low), grid.classes[part.inside(whole)])
-            events = settle(draft)
+        draft = CellDraft(state, self._criterion)
+        draft.change([part.moved(*low) for part in boxes], grid.classes, low)
+        events = settle(draft)
         cells = draft.cells - np.array(low)
         version = replace(self, grid=grid, low=low, _state=draft.close())
         order = np.argsort(cells[:, 0] * grid.shape[1] + cells[:, 1])

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from hybridnav._typing import LongArray
-    from hybridnav.online.draft import State
+    from hybridnav.online.state import State
 
 
 class Touched(NamedTuple):

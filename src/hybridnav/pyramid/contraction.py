@@ -25,15 +25,11 @@ NO_LIMIT = 2**62
 """A squared distance beyond all others."""
 _NO_HULLS = _kernels.Hulls(np.empty(0, np.int64), np.empty((0, 2), np.int32))
 """Hulls where distances do not count."""
-_NO_PIECES = (np.empty(0, np.uint8), np.empty(0, np.int32), np.empty(0, np.uint8))
-"""Where blocks alone are in pieces, which need no record."""
 
 
 class Decimation:
     """The shrinking arrays of the current level; every pass works on them in place."""
 
-    fields_in_pieces = False
-    """Whether vertices other than blocks are in pieces at the start."""
     joins: ByteArray = np.empty(0, np.uint8)
     """By base edge, the level at which its cells join anyway, 0 for none; see `contract_within`."""
     last_join = 0
@@ -161,23 +157,12 @@ class Decimation:
             scratch.state,
             scratch.inverse,
             self._cols,
-            self._record_so_far(),
             self._vertices.whole_at,
             self._level,
             self._level > self._whole_at,
         )
         self._lap("removal")
         self._close_gaps(scratch)
-
-    def _record_so_far(self) -> tuple[ByteArray, IntArray, ByteArray]:
-        """Return what states how vertices other than blocks are in pieces, up to this level."""
-        if not self.fields_in_pieces:
-            return _NO_PIECES
-        record, scratch = self.record, self._scratch
-        base_edge = self._darts.base_edge
-        gone = scratch.state[: len(base_edge)] == dart_kernels.CONTRACTED
-        record.edge_end[base_edge[gone]] = 2 * self._level
-        return record.vertex_end, record.vertex_parent, record.edge_end
 
     def _select(self, scratch: Scratch, count: int) -> None:
         """Choose the stars of this level from its first `count` candidates."""

@@ -100,17 +100,6 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
     return run.record, run.stats, places
 
 
-def contract_all(start: Start, linkage: Linkage, limit: int, seed: int) -> None:
-    """Contract stars from a start until no edge may be contracted, into the start's record.
-
-    Vertices of the start may be fields in pieces, for which the record is complete. The parameters
-    are those of `decimate`.
-    """
-    run = Decimation(start, seed, _LINKAGES[linkage], limit)
-    run.fields_in_pieces = True
-    run.exhaust()
-
-
 def contract_within(  # noqa: PLR0913 - each criterion of merging is an argument of its own
     start: Start,
     linkage: Linkage,
