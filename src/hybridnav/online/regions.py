@@ -48,12 +48,12 @@ class OnlineRegions:
     >>> places = OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
     >>> regions = OnlineRegions.of(places, most_cells=72)
     >>> regions.n_regions, regions.region_at((0, 0)) == regions.region_at((5, 0))
-    (2, True)
+    (3, True)
     >>> cells[3, 3] = 1.0
     >>> now = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
     >>> update = regions.update(places.update(now).version)
     >>> update.version.n_regions, update.born, update.died, update.changed
-    (2, (), (), (0,))
+    (3, (), (), (0,))
     """
 
     places: OnlinePyramid
