@@ -60,9 +60,9 @@ class OnlineRegions:
     """The places of this version."""
     most_cells: int
     """Most cells of a region of several places."""
-    region_of: Mapping[int, int] = field(repr=False)
+    region_of: MappingProxyType[int, int] = field(repr=False)
     """The number of the region of each place."""
-    _places_of: Mapping[int, tuple[int, ...]] = field(repr=False)
+    _places_of: MappingProxyType[int, tuple[int, ...]] = field(repr=False)
     _next: int = field(repr=False)
     """The least number that no region has had."""
 
@@ -138,8 +138,8 @@ class OnlineRegions:
         gone = {self.region_of[place] for place in known}
         groups = self._contract(places, self._dissolved(gone, touched, places))
         whole = gone.union(*(group.regions for group in groups))
-        areas = {region: self._area(region) for region in whole}
-        found = self._overlaps(gone, touched, groups)
+        areas = self._areas_of(sorted(whole))
+        found = self._overlaps(gone, touched, groups, areas)
         heirs = heirs_of(found, areas)
         name, following = dict(heirs.name), self._next
         for at in range(len(groups)):
@@ -171,9 +171,10 @@ class OnlineRegions:
             if one != other:
                 lengths[min(one, other), max(one, other)] += length
         areas = {vertex: sum(area_of[place] for place in held[vertex]) for vertex in held}
-        for vertex in {vertex for pair in lengths for vertex in pair if vertex < 0}:
-            areas[vertex] = self._area(-1 - vertex)
-            held[vertex] = [*self._places_of[-1 - vertex]]
+        beside = sorted({-1 - vertex for pair in lengths for vertex in pair if vertex < 0})
+        for region, area in self._areas_of(beside).items():
+            areas[-1 - region] = area
+            held[-1 - region] = [*self._places_of[region]]
         groups = []
         for vertices in grown(areas, lengths, self.most_cells):
             regions = frozenset(-1 - vertex for vertex in vertices if vertex < 0)
@@ -184,18 +185,18 @@ class OnlineRegions:
         return groups
 
     def _overlaps(
-        self, gone: Iterable[int], touched: Touched, groups: list[_Group]
+        self,
+        gone: Iterable[int],
+        touched: Touched,
+        groups: list[_Group],
+        areas: Mapping[int, int],
     ) -> list[Overlap]:
         """Return the cells that old regions and groups have in common."""
         group_of = {place: at for at, group in enumerate(groups) for place in group.places}
         found: Counter[tuple[int, int]] = Counter()
-        left = {
-            place: area
-            for region in gone
-            for place, area in zip(
-                self._places_of[region], self._areas(region).tolist(), strict=True
-            )
-        }
+        members = [place for region in gone for place in self._places_of[region]]
+        area_of = self.places.state.places.read(members)["area"].tolist()
+        left = dict(zip(members, area_of, strict=True))
         for old, new, cells in zip(*(values.tolist() for values in touched), strict=True):
             if old != NO_PLACE:
                 found[self.region_of[old], group_of.get(new, NO_PLACE)] += cells
@@ -205,7 +206,7 @@ class OnlineRegions:
                 found[self.region_of[place], group_of[place]] += cells
         for at, group in enumerate(groups):
             for region in group.regions:
-                found[region, at] += self._area(region)
+                found[region, at] += areas[region]
         return [(old, new, cells) for (old, new), cells in sorted(found.items())]
 
     def _with(
@@ -216,7 +217,7 @@ class OnlineRegions:
         following: int,
     ) -> OnlineRegions:
         """Return the version in which regions are replaced by others."""
-        region_of, places_of = dict(self.region_of), dict(self._places_of)
+        region_of, places_of = self.region_of.copy(), self._places_of.copy()
         for region in gone:
             for place in places_of.pop(region):
                 del region_of[place]
@@ -226,13 +227,13 @@ class OnlineRegions:
         views = MappingProxyType(region_of), MappingProxyType(places_of)
         return OnlineRegions(places, self.most_cells, *views, following)
 
-    def _areas(self, region: int) -> LongArray:
-        """Return the cells of each place of a region."""
-        areas: LongArray = self.places.state.places.read(self._places_of[region])["area"]
-        return areas
-
-    def _area(self, region: int) -> int:
-        return int(self._areas(region).sum())
+    def _areas_of(self, regions: list[int]) -> dict[int, int]:
+        """Return the cells of some regions."""
+        members = [place for region in regions for place in self._places_of[region]]
+        counts = [len(self._places_of[region]) for region in regions]
+        cells = np.append(0, np.cumsum(self.places.state.places.read(members)["area"]))
+        ends = cells[np.append(0, np.cumsum(counts)).astype(np.int64)]
+        return dict(zip(regions, np.diff(ends).tolist(), strict=True))
 
     @property
     def n_regions(self) -> int:
