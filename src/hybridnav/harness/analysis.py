@@ -178,7 +178,8 @@ def _own_names(records: Iterable[Record]) -> dict[str, str]:
     method has it, else that of its records."""
     own: dict[str, str] = {}
     for record in records:
-        own[record["method"]] = record.get("label") or own.get(record["method"], record["method"])
+        name: str = record["method"]
+        own[name] = record.get("label") or own.get(name, name)
     taken = Counter([*own.values(), *(name for name in own if own[name] != name)])
     return {name: label if taken[label] == 1 else name for name, label in own.items()}
 

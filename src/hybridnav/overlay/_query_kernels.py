@@ -122,7 +122,19 @@ def _inside(ground, endpoints, distance):
 
 @njit(cache=True, nogil=True)
 def _find_flat(ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work):
-    """Return what `find_path` does, with flat cells and without sums."""
+    """Find a path of least cost between two cells that may be entered.
+
+    Parameters
+    ----------
+    ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work
+        See `find_path`.
+
+    Returns
+    -------
+    tuple
+        The cost, and a lower bound on it; int64 (n,) flat cells of the path; the numbers of cells
+        and of nodes expanded.
+    """
     start, goal = endpoints
     inside, cells, is_proved, expanded = search_near(ground, start, goal, near_cells, cell_work)
     if is_proved:
