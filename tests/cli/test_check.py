@@ -105,7 +105,7 @@ def test_evaluate_follows_a_graph(cli, sound, faulty, tmp_path):
     query = ("evaluate", FIGURE, *POINT, "--pairs", 20)
     done = cli(*query, "--graph", sound, "-o", tmp_path / "run")
     assert (done.code, done.err) == (0, "")
-    assert "| graph figure1 | 1 | any-angle | 20 | 20 |" in done.out
+    assert "| graph figure1 | any-angle | 100 |" in done.out
     assert json.loads((tmp_path / "run" / "runs.jsonl").read_text())["graphs"] == [str(sound)]
     done = cli(*query, "--graph", faulty, "--clear-edges", "-o", tmp_path / "clear")
     assert "| graph figure1 (clear edges) |" in done.out

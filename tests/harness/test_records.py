@@ -132,5 +132,5 @@ def test_a_description_is_no_setting():
 
 
 def test_an_unknown_baseline_is_named_with_those_that_there_are():
-    with pytest.raises(InvalidValueError, match=r"'astar'.*grid-astar.*thrun"):
-        baseline_spec("astar")
+    with pytest.raises(InvalidValueError, match=r"'a-stern'.*grid-astar.*thrun"):
+        baseline_spec("a-stern")
