@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import ndimage
 
 from hybridnav.building.floors import Floor
 from hybridnav.building.links import Link
@@ -124,6 +123,8 @@ def check_reach(links: Sequence[Link], floors: Sequence[Floor]) -> None:
     InvalidValueError
         When an end lies in such a part.
     """
+    from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
+
     for floor in floors:
         planner = floor.planner
         grid, allowed = planner.topology.grid, planner.preset.planner.allow_unexplored

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.planner.follow import is_stale
@@ -243,6 +242,8 @@ class FloorTable:
     @cached_property
     def _boxes(self) -> Sequence[tuple[slice, ...] | None]:
         """The rows and columns of each room."""
+        from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
+
         rooms = self.floor.rooms
         assert rooms is not None  # noqa: S101 - names have been checked
         return ndimage.find_objects(rooms.label_of + 1, max_label=len(rooms.names))

@@ -3,7 +3,8 @@ from .bags import BagLog as BagLog, load_bag_map as load_bag_map
 from .bags_out import save_bag as save_bag
 from .building_files import load_building_graph as load_building_graph
 from .blocked import load_blocked as load_blocked
-from .buildings import is_building as is_building, load_building as load_building
+from .building_kind import is_building as is_building
+from .buildings import load_building as load_building
 from .carmen import CarmenLog as CarmenLog
 from .examples import example_map as example_map
 from .features_out import (

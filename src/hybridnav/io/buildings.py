@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._files import MODEL_SUFFIX
 from hybridnav.building import Building, Floor, Link, LinkEnd
 from hybridnav.building.checks import check_reach
 from hybridnav.config import load_preset
@@ -20,7 +18,7 @@ from hybridnav.grid.names import did_you_mean
 from hybridnav.io.building_entries import read_building_entries
 from hybridnav.io.maps import load
 from hybridnav.io.models import is_model
-from hybridnav.io.models.buildings import is_building_model, open_building
+from hybridnav.io.models.buildings import open_building
 from hybridnav.io.rooms_in import load_rooms
 from hybridnav.planner.landmarks import Landmarks
 from hybridnav.topology import find_rooms
@@ -33,45 +31,6 @@ if TYPE_CHECKING:
     from hybridnav.io.building_entries import EndEntry, Entries, FloorEntry, LinkEntry
     from hybridnav.planner import HybridPlanner
     from hybridnav.topology import Rooms
-
-_FLOORS = re.compile(r"^[\"']?floors[\"']?\s*:", re.MULTILINE)
-_LOOKED_AT = 2**16
-"""Bytes of a file that are searched for its floors."""
-
-
-def is_building(path: PathLike) -> bool:
-    """Return whether a file describes a building, by what it contains.
-
-    Parameters
-    ----------
-    path
-        A YAML file or a model.
-
-    Returns
-    -------
-    bool
-        False if there is no such file, or it cannot be read.
-
-    Examples
-    --------
-    >>> from hybridnav.io import is_building
-    >>> is_building("maps/office/office.yaml")
-    False
-    """
-    file = Path(path)
-    suffix = file.suffix.lower()
-    if not file.is_file():
-        return False
-    if suffix == MODEL_SUFFIX:
-        return is_building_model(file)
-    if suffix not in {".yaml", ".yml"}:
-        return False
-    try:
-        with file.open("rb") as stream:
-            text = stream.read(_LOOKED_AT).decode("utf-8-sig", errors="replace")
-    except OSError:
-        return False
-    return _FLOORS.search(text) is not None
 
 
 def load_building(
