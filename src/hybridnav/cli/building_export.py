@@ -15,7 +15,6 @@ from hybridnav.cli.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from hybridnav.building import BuildingGraph
     from hybridnav.cli.fleets import Fleet
 
 EXPORT_OPTIONS = frozenset(
@@ -41,6 +40,8 @@ def export_building(fleet: Fleet | None, given: Mapping[str, Any]) -> None:
         raise UsageError(
             f"--format {given['kind']} is for one map, and this is a building: take rmf, osm or lif"
         )
+    from hybridnav.building import align_floors  # noqa: PLC0415 - on demand
+
     seconds: dict[str, float] = {}
     building = BuildingSource.of({**given, "overrides": ()}).load(seconds)
     began = time.perf_counter()
@@ -57,7 +58,7 @@ def export_building(fleet: Fleet | None, given: Mapping[str, Any]) -> None:
     seconds["graph"] = round(time.perf_counter() - began, 6)
     out = given["out"]
     with stage(f"writing {out}", seconds, "write"):
-        left_out = fleet.write_building(_in_one_frame(graph), out)
+        left_out = fleet.write_building(align_floors(graph), out)
     figures = {
         "graph": str(out),
         "map": str(given["map_file"]),
@@ -80,10 +81,3 @@ def export_building(fleet: Fleet | None, given: Mapping[str, Any]) -> None:
     lines += [f"left out   {printable(each)}" for each in left_out]
     lines.append(f"seconds    {timings(seconds)}")
     answer("\n".join(lines) + "\n")
-
-
-def _in_one_frame(graph: BuildingGraph) -> BuildingGraph:
-    """Return the graph with all floors in one frame, as the formats of fleets have it."""
-    from hybridnav.building import align_floors  # noqa: PLC0415 - on demand
-
-    return align_floors(graph)

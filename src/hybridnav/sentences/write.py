@@ -32,7 +32,7 @@ _NOUNS = {
     "ramp": ("ramp",),
     "floor": ("floor", "level", "storey", "basement", "cellar", "attic", "roof"),
 }
-"""Nouns by which a name says what it is the name of."""
+"""Words in a name that tell what it names: "west lift" is a lift, "lobby" may be anything."""
 _WIDE_M = 2.0
 """Width from which an opening is recognised by it, in metres."""
 _FREE_M = 1.5
