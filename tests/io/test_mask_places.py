@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -116,6 +116,7 @@ def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(
     st.sampled_from(["percent", "m/s"]),
     st.floats(0.1, 5),
 )
+@example(0, 0.0, 2.225073858507203e-309, "percent", 1.0)
 @settings(max_examples=examples(300), deadline=None)
 def test_limits_are_those_of_the_speed_filter(
     value: int, base: float, multiplier: float, unit: Any, full: float

@@ -56,7 +56,8 @@ class SpeedLimits:
             is_limit &= limits <= _FULL_PERCENT
         is_limit[[0, _UNKNOWN]] = False  # no limit by the definition of the mask
         factors = np.ones(len(limits))
-        np.divide(full, limits, out=factors, where=is_limit)
+        with np.errstate(over="ignore"):  # infinite beside the least limits, then `most`
+            np.divide(full, limits, out=factors, where=is_limit)
         return np.clip(factors, 1.0, most)
 
 
