@@ -21,6 +21,7 @@ from .errors import (
     PresetNotFoundError as PresetNotFoundError,
     RoomsError as RoomsError,
     RoomsNotFoundError as RoomsNotFoundError,
+    UnsuitableMapError as UnsuitableMapError,
 )
 from .grid import (
     CellClass as CellClass,

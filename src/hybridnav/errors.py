@@ -9,6 +9,10 @@ class InvalidValueError(HybridNavError, ValueError):
     """An argument has a value that the function cannot work with."""
 
 
+class UnsuitableMapError(InvalidValueError):
+    """A method cannot take a map, by a limit of its own: the harness does not ask it there."""
+
+
 class MapError(HybridNavError, ValueError):
     """A map file, or the image that it names, cannot be read as an occupancy grid; or a file of
     closed areas cannot be read, or does not fit the map."""

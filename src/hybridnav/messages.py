@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
+MOST_ID = 2**16 - 1
+"""Greatest id of a node or an edge in the messages of Nav2's route server."""
 _NOT_UNIT = 0.01
 """Difference of the squared norm of a quaternion from 1 at which tf2 refuses it."""
 _MOST_TILT_RAD = 0.02

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.building import BuildingGraph, Link, LinkEnd, align_floors, moved_floor
+from hybridnav.building import (
+    BuildingGraph,
+    Link,
+    LinkEnd,
+    align_floors,
+    check_building_graph,
+    judge_building_graph,
+    match_graph,
+    moved_floor,
+)
 
 ANCHOR = hn.Anchor(30.2862, -97.7366, heading_deg=12)
 
@@ -60,3 +69,29 @@ def test_two_floors_survive_and_their_edges_stay_free(gdc, tmp_path, kind):
                 one.kind: one.count for one in check.findings
             }
             assert again.is_clear.all()
+
+
+@pytest.mark.parametrize("kind", ["rmf", "osm", "lif"])
+def test_the_graph_of_both_floors_is_judged_as_if_no_file_lay_between(gdc, tmp_path, kind):
+    topologies, own = gdc
+    floors = [hn.Floor(name, hn.HybridPlanner(topologies[name])) for name in ("2", "3")]
+    house = hn.Building(floors, own.links)
+    path = tmp_path / {"rmf": "a.yaml", "osm": "a.osm", "lif": "a.json"}[kind]
+    writers = {
+        "rmf": lambda graph: hn.export_rmf(graph, path),
+        "osm": lambda graph: hn.export_osm(graph, path, anchor=ANCHOR),
+        "lif": lambda graph: hn.export_lif(graph, path, vehicle_types=["A.B"]),
+    }
+    writers[kind](align_floors(own))
+    matched = match_graph(house, hn.load_building_graph(path), align=True)
+    for name, floor in matched.floors.items():
+        assert np.allclose(floor.graph.points, own.floor(name).graph.points, rtol=0, atol=1e-5)
+    check = check_building_graph(matched)
+    assert check.findings == ()
+    for checked in check.floors.values():
+        assert checked.is_free.all()
+        assert checked.is_clear.all()
+    report = judge_building_graph(matched, pairs=40)
+    assert report.contradictions == ()
+    assert set(report.counts["all"].answers) <= {"solved", "no path, right", "no node in sight"}
+    assert report.counts["two floors"].answers["solved"] > 10

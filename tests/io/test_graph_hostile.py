@@ -175,8 +175,8 @@ def test_facts_that_json_has_no_value_for_are_left_out(tmp_path):
 @pytest.mark.parametrize("name", ["a.geojson", "a.graphml", "a.tmap"])
 def test_a_million_edges_in_a_gigabyte(tmp_path, name):
     script = f"""
-        import resource
         import hybridnav as hn
+        from tests.memory import peak_kb
         n, m = 1000, 1_000_000
         with open({str(tmp_path / name)!r}, "w") as file:
             write = file.write
@@ -203,7 +203,7 @@ def test_a_million_edges_in_a_gigabyte(tmp_path, name):
                     write("node: \\n\\t%d\\n\\twaypoint:\\n\\t\\t%d,0\\n\\tedges:\\n" % (k, k))
                     write("".join("\\t\\t %d, go\\n" % (j * 7 % n) for j in range(m // n)))
         graph = hn.load_graph({str(tmp_path / name)!r})
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        peak = peak_kb()
         assert (graph.n_nodes, graph.n_edges) == (n, m), (graph.n_nodes, graph.n_edges)
         assert peak < 2**20, peak
     """

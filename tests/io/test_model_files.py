@@ -266,16 +266,17 @@ def test_a_newer_format_is_named(content: bytes, tmp_path: Path) -> None:
 
 
 _LIMITED = """
-import resource, sys
+import sys
 import hybridnav as hn
+from tests.memory import peak_kb
 hn.load(sys.argv[1]).topology
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+before = peak_kb()
 for path in sys.argv[2:]:
     try:
         hn.load(path).topology
     except hn.MapError as error:
         print(error)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+print(peak_kb() - before)
 """
 """Opens files, and prints why each is refused, and by how many kB memory grew."""
 _BOMB = 80_000_000

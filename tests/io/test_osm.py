@@ -222,7 +222,7 @@ def test_rooms_and_doors_of_simple_indoor_tagging(tmp_path):
     with pytest.raises(hn.MapError, match="it has the floors EG, 1: choose one"):
         hn.load_graph(path)
     assert hn.load_graph(path, floor="EG").n_nodes == 3
-    with pytest.raises(hn.MapError, match="no floor is named 'roof': there are EG, 1"):
+    with pytest.raises(hn.MapError, match="no floor is called 'roof': there are EG, 1"):
         hn.load_graph(path, floor="roof")
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
@@ -79,6 +80,7 @@ def test_our_maps_are_written_with_equal_pixels(name: str, tmp_path: Path) -> No
     arrays(np.float32, SHAPES, elements=st.one_of(st.floats(0, 1, width=32), st.just(np.nan))),
     thresholds(),
 )
+@example(np.array([[0.1953125]], dtype=np.float32), (0.5, 1.0))
 @settings(max_examples=examples(100))
 def test_cells_keep_their_class_and_nearly_their_occupancy(
     folder: Path, probability: np.ndarray, limits: tuple[float, float]
@@ -88,7 +90,10 @@ def test_cells_keep_their_class_and_nearly_their_occupancy(
         probability, free_threshold=low, occupied_threshold=high, robot_radius_m=0
     )
     hn.write_ros_map(grid, folder / "any.yml")
-    again = hn.load_map(folder / "any.yml", robot_radius_m=0)
+    with warnings.catch_warnings():
+        # A free cell may have the grey of unknown ones, which a reader is warned of.
+        warnings.simplefilter("ignore", hn.MapWarning)
+        again = hn.load_map(folder / "any.yml", robot_radius_m=0)
     assert np.array_equal(again.measured, grid.measured)
     known = ~np.isnan(probability)
     assert np.abs(again.probability - probability)[known].max(initial=0) < 1.01 / 255

@@ -11,7 +11,7 @@ from hybridnav.grid._line_kernels import passed_cells, polyline_length, polyline
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
 
-__all__ = ["cells_of_line", "polyline_length", "polyline_lengths"]
+__all__ = ["cells_of_line", "passed_cells", "polyline_length", "polyline_lengths"]
 
 
 def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:

@@ -56,6 +56,28 @@ def did_you_mean(name: str, known: tuple[str, ...]) -> str:
     return f": there are {shown}"
 
 
+def place_of_name(name: str, known: tuple[str, ...], what: str) -> int:
+    """Return the place of a name among those that are known.
+
+    Parameters
+    ----------
+    name
+        The name.
+    known
+        All names.
+    what
+        What they are the names of, such as "floor".
+
+    Raises
+    ------
+    InvalidValueError
+        When it is none of them; the message suggests the nearest ones.
+    """
+    if name in known:
+        return known.index(name)
+    raise InvalidValueError(f"no {what} is called {name!r:.90}{did_you_mean(str(name), known)}")
+
+
 def check_number(number: int) -> int:
     """Return the number of a door, refuse what is none."""
     if isinstance(number, bool) or not isinstance(number, int) or not 0 < number <= MAX_NUMBER:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav._files import printable
 from hybridnav.errors import HybridNavError, MapError, MapNotFoundError
+from hybridnav.io.bag_limits import TooLargeError, bound_rosbags
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -147,11 +148,14 @@ class Bag:
     def _open(self) -> Iterator[AnyReader]:
         from rosbags.highlevel import AnyReader  # noqa: PLC0415 - an extra
 
+        bound_rosbags()
         try:
             with AnyReader([self._path], default_typestore=_usual_types()) as reader:
                 yield reader
         except HybridNavError:
             raise
+        except TooLargeError as failure:
+            raise MapError(f"{self.where}: {failure}") from None
         except MemoryError:  # sizes stand in the file, and may be any number
             raise MapError(f"{self.where}: damaged, or larger than the memory") from None
         except Exception as failure:  # noqa: BLE001 - the parsers raise anything

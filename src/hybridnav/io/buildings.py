@@ -14,7 +14,7 @@ from hybridnav.building.checks import check_reach
 from hybridnav.config import load_preset
 from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, PresetError
 from hybridnav.grid import DEFAULT_MAX_CELLS
-from hybridnav.grid.names import did_you_mean
+from hybridnav.grid.names import place_of_name
 from hybridnav.io.building_entries import read_building_entries
 from hybridnav.io.maps import load
 from hybridnav.io.models import is_model
@@ -159,12 +159,10 @@ def _link(entry: LinkEntry, floors: dict[str, Floor]) -> Link:
 
 def _end(entry: EndEntry, floors: dict[str, Floor]) -> LinkEnd:
     """Return the end of a link at its point, in its room, or at its door."""
-    floor = floors.get(entry.floor)
-    if floor is None:
-        hint = did_you_mean(entry.floor, tuple(floors))
-        raise MapError(f"{entry.at}: no floor is called {entry.floor!r:.90}{hint}")
     yaw_rad = entry.yaw_rad
     with _at(entry.at):
+        place_of_name(entry.floor, tuple(floors), "floor")
+        floor = floors[entry.floor]
         if entry.point is not None:
             if entry.room is not None:
                 _check_in_room(entry.point, entry.room, floor)

@@ -15,7 +15,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.graphs import RouteGraph, WaypointGraph, build_route_graph
 from hybridnav.graphs.attach import Network
 from hybridnav.graphs.metadata import edge_metadata, node_metadata
-from hybridnav.graphs.space import free_cells_at
+from hybridnav.graphs.placed import placed_points
 from hybridnav.grid.checks import checked_type
 from hybridnav.refine import Sight
 from hybridnav.topology import TopologicalMap
@@ -24,12 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav._progress import Progress
-    from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.building import Link
     from hybridnav.topology import Door, Rooms
-
-_FRACTION = 2.0**24
-"""Parts of a cell to which positions are rounded, as exact tests of segments need it."""
 
 
 def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
@@ -208,10 +204,10 @@ def _stubs(
         return []
     grid = graph.grid
     free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
-    exact = grid.frame.positions_of(np.array([end for _, end in ends], dtype=np.float64))
-    positions = np.round(exact * _FRACTION) / _FRACTION
-    for (name, (x, y)), position in zip(ends, positions, strict=True):
-        if not _is_free(free, position):
+    points = np.array([end for _, end in ends], dtype=np.float64)
+    positions, _, is_free = placed_points(points, grid, free)
+    for (name, (x, y)), can_stand in zip(ends, is_free.tolist(), strict=True):
+        if not can_stand:
             raise InvalidValueError(
                 f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} is not free for "
                 f"a robot radius of {grid.robot_radius_m:g} m: move it"
@@ -227,12 +223,6 @@ def _stubs(
             )
         stubs.append((name, (x, y), int(nodes[offsets[at]])))
     return stubs
-
-
-def _is_free(free: BoolArray, position: FloatArray) -> bool:
-    row, col = free_cells_at(free, position[None])[0].tolist()
-    rows, cols = free.shape
-    return 0 <= row < rows and 0 <= col < cols and bool(free[row, col])
 
 
 def _lines(rooms: Rooms, doors: list[Door], floor: str) -> list[DoorLine]:

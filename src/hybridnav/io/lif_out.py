@@ -5,15 +5,14 @@ from __future__ import annotations
 import itertools
 import json
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._files import printable, replace_file
 from hybridnav._version import __version__
 from hybridnav.building import BuildingGraph, join_links
 from hybridnav.building.link_nodes import nodes_of_link
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
+from hybridnav.io.new_file import NewFile
 from hybridnav.io.rmf_out import speed_limit_of
 
 if TYPE_CHECKING:
@@ -80,10 +79,7 @@ def export_lif(
     ()
     """
     checked_type("building", building, BuildingGraph)
-    file = Path(path)
-    where = f"layout {printable(file)}"
-    if file.suffix.lower() not in {".json", ".lif"}:
-        raise MapError(f"{where}: a layout must be named .json or .lif")
+    file = NewFile.named(path, "layout", "a layout", (".json", ".lif"))
     if isinstance(vehicle_types, str) or not vehicle_types or not all(map(_is_type, vehicle_types)):
         raise InvalidValueError(
             f"vehicle_types is {vehicle_types!r:.80}, expected one or more texts, such as "
@@ -101,10 +97,7 @@ def export_lif(
     }
     head = f'{{"metaInformation": {json.dumps(meta)}, "layouts": [\n'
     text = head + ",\n".join(map(_lines, layouts)) + "\n]}\n"
-    try:
-        replace_file(file, text.encode())
-    except OSError as error:
-        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+    file.write(text.encode())
     return tuple(_left_out(building))
 
 

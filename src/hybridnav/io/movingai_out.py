@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._files import printable, replace_file
-from hybridnav.errors import MapError
 from hybridnav.grid import CellClass, OccupancyGrid
 from hybridnav.grid.checks import checked_type
+from hybridnav.io.new_file import NewFile
 
 if TYPE_CHECKING:
     from hybridnav._typing import PathLike
@@ -42,16 +40,10 @@ def write_movingai_map(grid: OccupancyGrid, path: PathLike) -> None:
     True
     """
     checked_type("grid", grid, OccupancyGrid)
-    target = Path(path)
-    where = f"map {printable(target)}"
-    if target.suffix.lower() != ".map":
-        raise MapError(f"{where}: a MovingAI map must be named .map")
+    file = NewFile.named(path, "map", "a MovingAI map", (".map",))
     rows, cols = grid.shape
     letters = np.full((rows, cols + 1), ord("@"), dtype=np.uint8)
     letters[:, :-1][grid.measured == CellClass.FREE] = ord(".")
     letters[:, -1] = ord("\n")
     head = f"type octile\nheight {rows}\nwidth {cols}\nmap\n".encode()
-    try:
-        replace_file(target, head + letters[::-1].tobytes())
-    except OSError as error:
-        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+    file.write(head + letters[::-1].tobytes())

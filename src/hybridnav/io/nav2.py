@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._files import printable, replace_file
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError
 from hybridnav.graphs import RouteGraph, WaypointGraph
 from hybridnav.graphs.metadata import edge_metadata, node_metadata
 from hybridnav.grid.checks import checked_type
 from hybridnav.io.graph_json import MOST_ID
 from hybridnav.io.nav2_given import features_of
+from hybridnav.io.new_file import NewFile
 
 if TYPE_CHECKING:
     from hybridnav._typing import PathLike
@@ -60,10 +59,7 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
         name = graph.name
     else:
         name = checked_type("graph", graph, RouteGraph).grid.name
-    target = Path(path)
-    where = f"route graph {printable(target)}"
-    if target.suffix.lower() not in {".geojson", ".json"}:
-        raise MapError(f"{where}: a route graph of Nav2 must be named .geojson or .json")
+    file = NewFile.named(path, "route graph", "a route graph of Nav2", (".geojson", ".json"))
     if not frame:
         raise InvalidValueError("frame must be the name of the map frame, got an empty text")
     if not graph.n_edges:
@@ -83,10 +79,7 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
     # One feature a line, so that people can read and compare files.
     lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
     head = f'{{"type": "FeatureCollection", "name": {json.dumps(name)}, "features": ['
-    try:
-        replace_file(target, f"{head}\n{lines}\n]}}\n".encode())
-    except OSError as error:
-        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+    file.write(f"{head}\n{lines}\n]}}\n".encode())
 
 
 def _nodes(graph: RouteGraph, frame: str) -> list[dict[str, Any]]:

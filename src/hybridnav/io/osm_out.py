@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-from hybridnav._files import printable, replace_file
 from hybridnav.building import BuildingGraph, join_links
 from hybridnav.building.link_nodes import nodes_of_link
-from hybridnav.errors import MapError
 from hybridnav.graphs.gather import number_of
 from hybridnav.grid.checks import checked_type
 from hybridnav.io.anchors import Anchor
+from hybridnav.io.new_file import NewFile
 from hybridnav.io.osm_shapes import Shapes, cabin_corners
 from hybridnav.io.rmf_out import speed_limit_of
 
@@ -91,16 +89,9 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
     """
     checked_type("building", building, BuildingGraph)
     checked_type("anchor", anchor, Anchor)
-    file = Path(path)
-    where = f"OpenStreetMap {printable(file)}"
-    if file.suffix.lower() not in {".osm", ".xml"}:
-        raise MapError(f"{where}: a file of OpenStreetMap must be named .osm or .xml")
+    file = NewFile.named(path, "OpenStreetMap", "a file of OpenStreetMap", (".osm", ".xml"))
     writer = _Writer(building, anchor)
-    text = "".join(f"{line}\n" for line in writer.lines())
-    try:
-        replace_file(file, text.encode())
-    except OSError as error:
-        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+    file.write("".join(f"{line}\n" for line in writer.lines()).encode())
     return tuple(_left_out(building))
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridnav._files import printable, replace_file
 from hybridnav.building import BuildingGraph, join_links
 from hybridnav.building.link_nodes import nodes_of_link
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError
 from hybridnav.graphs.gather import number_of
 from hybridnav.grid.checks import checked_type
+from hybridnav.io.new_file import NewFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -85,21 +84,16 @@ def export_rmf(
     ()
     """
     checked_type("building", building, BuildingGraph)
-    file = Path(path)
-    where = f"navigation graph {printable(file)}"
-    if file.suffix.lower() not in {".yaml", ".yml"}:
-        raise MapError(f"{where}: a navigation graph of Open-RMF must be named .yaml or .yml")
+    kind = "a navigation graph of Open-RMF"
+    file = NewFile.named(path, "navigation graph", kind, (".yaml", ".yml"))
     if not all(0 < side < math.inf for side in cabin_m):
         raise InvalidValueError(f"cabin_m is {cabin_m}, expected two positive numbers of metres")
     if not any(floor.graph.n_edges for floor in building.floors):
         raise InvalidValueError(f"building {building.name!r:.60} has no edge, expected lanes")
     for link in building.links:
         _check_aligned(link)
-    text = "".join(f"{line}\n" for line in _Writer(building, cabin_m, doors=doors).lines())
-    try:
-        replace_file(file, text.encode())
-    except OSError as error:
-        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+    lines = _Writer(building, cabin_m, doors=doors).lines()
+    file.write("".join(f"{line}\n" for line in lines).encode())
     return tuple(_left_out(building, doors=doors))
 
 
