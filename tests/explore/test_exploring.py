@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import networkx as nx
 import numpy as np
@@ -15,6 +16,7 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.explore import Exploration, Goals, Step, explore, laser_all_round
 from hybridnav.explore.doubts import doubtful_spots
+from hybridnav.explore.robot import Robot
 from hybridnav.mapping import SimulatedLaser, SimulatedSonars
 from tests.strategies import examples
 
@@ -197,6 +199,32 @@ def test_a_robot_with_a_noisy_laser_looks_again_before_it_ends() -> None:
     assert done.is_complete
     assert done.n_looks_again > 0
     assert done.share_known == 1.0
+
+
+def test_a_robot_that_its_map_has_shut_in_drives_back_the_way_it_came() -> None:
+    cells = np.ones((30, 80), dtype=np.float32)
+    cells[2:-2, 2:38] = cells[2:-2, 42:-2] = cells[10:20, 38:42] = 0.0
+    plan = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
+    robot = Robot(plan, (1.0, 1.5), laser_all_round(max_range_m=3.0), seed=0)
+    assert not robot.go_back()  # it has driven nowhere
+    while robot.pose[0] < 5.0:
+        goals = robot.look()
+        robot.visit(goals, int(goals.costs_m.argmin()), arrives=True)
+    driven_m = robot.driven_m
+    robot.look()
+    known = robot.topology.grid
+    x_m, y_m = known.frame.points_of(np.argwhere(np.ones(known.shape, np.bool_))).T
+    shut = known.probability.copy()
+    shut[((x_m > 3.8) & (x_m < 4.2)).reshape(shut.shape)] = 1.0
+    left = (x_m < 3.8).reshape(shut.shape)
+    assert not robot.go_back()  # all goals are in its part of the map
+    shut[left & (y_m > 2.4).reshape(shut.shape)] = np.nan
+    shut[~left & (known.classes == hn.CellClass.UNEXPLORED)] = 1.0
+    closed = replace(known, probability=shut)
+    robot.topology = hn.TopologicalMap(hn.DualGraphPyramid.build(closed))
+    assert robot.go_back()
+    assert robot.pose[0] < 3.8
+    assert robot.driven_m > driven_m + 1.0
 
 
 def test_a_robot_that_finishes_rooms_stays_while_goals_are_left() -> None:

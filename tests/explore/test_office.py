@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
+from hybridnav.explore import explore
 
 MAPS = Path(__file__).parents[2] / "maps"
 MADE = MAPS / "office-explored" / "office-explored.yaml"
@@ -24,6 +25,13 @@ def test_the_committed_map_is_what_the_robot_makes(cli: Any, tmp_path: Path) -> 
     made, committed = (hn.load_map(file, robot_radius_m=RADIUS_M) for file in (again, MADE))
     assert made.frame == committed.frame
     assert np.array_equal(made.probability, committed.probability, equal_nan=True)
+
+
+@pytest.mark.full
+def test_noise_that_closes_a_gap_behind_the_robot_does_not_end_it() -> None:
+    office = hn.example_map("office", robot_radius_m=RADIUS_M)
+    done = explore(office, (6.0, 17.2), by="frontier")  # it drives in between two shelves
+    assert done.share_known == 1.0
 
 
 def test_the_explored_office_agrees_with_the_office_off_its_walls() -> None:

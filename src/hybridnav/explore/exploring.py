@@ -106,8 +106,9 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     is there or the goal has become known from afar. An unexplored cell that stays unexplored
     although the robot stood beside it is given up.
 
-    Noise can close a door in the map. So when no goal is left, the robot takes the occupied cells
-    away whose probability is below 0.9. Where it could then go on, it drives near, scans again and
+    Noise can close a door or a gap in the map. So when no goal is left, the robot drives back the
+    way it came if that leads to a part of its map with goals. Else it takes the occupied cells away
+    whose probability is below 0.9. Where it could then go on, it drives near, scans again and
     starts anew, at most twice at a spot.
 
     Parameters
@@ -168,7 +169,7 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
             watch(Step(robot.topology, robot.pose, goals, chosen))
         if chosen >= 0:
             robot.visit(goals, chosen, arrives=by == "frontier")
-        elif not robot.look_again():
+        elif not (robot.go_back() or robot.look_again()):
             is_complete = True
             break
     return Exploration(

@@ -95,11 +95,15 @@ class Robot:
         """Visits of unexplored cells, by their row and column on the lattice."""
         self._given_up: set[tuple[int, int]] = set()
         self._spots: list[tuple[float, float]] = []
+        self._returns: Counter[tuple[int, int]] = Counter()
+        """Drives back to a cell of the lattice."""
         self._version: OnlinePyramid | None = None
         self._rooms: OnlineRooms | None = None
         self._changed: list[Area] = []
         """Areas of the scans since the last version."""
         self.points: list[tuple[float, float]] = []
+        self._track: list[FloatArray] = []
+        """Points that the robot has driven through, with the bends between its scans."""
         self.n_goals, self.driven_m = 0, 0.0
         self.seconds = dict.fromkeys(("mapping", "pyramid", "goals", "rooms", "planning"), 0.0)
         point = _widest(self._world) if start is None else start
@@ -145,11 +149,8 @@ class Robot:
         self.topology = TopologicalMap(self._version.pyramid)
         self.seconds["pyramid"] += time.perf_counter() - began
         began = time.perf_counter()
-        left_out = np.zeros(grid.shape, dtype=np.bool_)
-        for cell in self._given_up:
-            left_out[self._in_grid(grid, cell)] = True
         self._at = self._cell(grid)
-        goals = Goals.of(self.topology, self._at, left_out)
+        goals = Goals.of(self.topology, self._at, ~self._goal_cells(grid))
         self.seconds["goals"] += time.perf_counter() - began
         return goals
 
@@ -200,6 +201,40 @@ class Robot:
             return
         self._drive(points, None if arrives else beyond)
 
+    def go_back(self) -> bool:
+        """Drive back the way the robot came, to the last part of free space that has goals.
+
+        Noise can close a gap of the map behind a robot that came through it. Return whether there
+        is such a part.
+        """
+        from scipy import ndimage  # noqa: PLC0415 - half a second
+
+        if not self._track:
+            return False
+        grid = self.topology.grid
+        parts, n_parts = ndimage.label(grid.classes == CellClass.FREE)
+        leads_on = np.zeros(n_parts + 1, dtype=np.bool_)
+        leads_on[parts[ndimage.binary_dilation(self._goal_cells(grid))]] = True
+        leads_on[[0, parts[self._at]]] = False
+        track = np.concatenate(self._track)
+        cells = grid.frame.cells_of(track)
+        back = np.flatnonzero(leads_on[parts[tuple(cells.T)]])
+        if not len(back):
+            return False
+        last = self._on_lattice(grid, cells[back[-1]])
+        self._returns[last] += 1
+        if self._returns[last] > _TRIES:
+            return False
+        self._drive(track[back[-1] :][::-1], None)
+        return True
+
+    def _goal_cells(self, grid: OccupancyGrid) -> BoolArray:
+        """Return the unexplored cells that were not given up, bool (rows, cols)."""
+        cells: BoolArray = grid.classes == CellClass.UNEXPLORED
+        for cell in self._given_up:
+            cells[self._in_grid(grid, cell)] = False
+        return cells
+
     def look_again(self) -> bool:
         """Drive to the nearest spot from which doubtful cells can be seen, and scan there.
 
@@ -240,6 +275,7 @@ class Robot:
     def _drive(self, points: FloatArray, beyond: tuple[int, int] | None) -> None:
         """Drive along points, with scans on the way, until a cell is known."""
         points = np.concatenate([[self.pose[:2]], points])
+        self._track.append(points)
         steps = np.hypot(*np.diff(points, axis=0).T)
         along = np.concatenate([[0.0], np.cumsum(steps)])
         n_scans = max(1, math.ceil(along[-1] / _SCAN_EVERY_M))
@@ -250,6 +286,7 @@ class Robot:
             self.pose = x_m, y_m, math.atan2(y_m - last[1], x_m - last[0])
             self._scan()
             if beyond and self._is_known(beyond):
+                self._track[-1] = np.concatenate([points[along < at], [self.pose[:2]]])
                 self.driven_m += at
                 return
         self.driven_m += float(along[-1])
