@@ -25,7 +25,7 @@ from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.costs import files_of
-from hybridnav.graphs.edges import parts_of
+from hybridnav.graphs.checked_components import components_of
 from hybridnav.harness.tables import to_markdown
 from hybridnav.metrics import segment_faults
 
@@ -71,7 +71,8 @@ def _faults(graph: hn.RouteGraph) -> list[str]:
     rows, cols = np.minimum(graph.positions.astype(int), np.array(label.shape) - 1).T
     # A node on a lattice corner may lie beside its part: only those inside cells are compared.
     inside = (graph.positions % 1 != 0).all(axis=1)
-    parts, cells = parts_of(graph.edges, graph.n_nodes)[inside], label[rows, cols][inside]
+    part = components_of(graph.n_nodes, graph.edges, "weak")
+    parts, cells = part[inside], label[rows, cols][inside]
     pairs = {(part, cell) for part, cell in zip(parts.tolist(), cells.tolist(), strict=True)}
     if len({part for part, _ in pairs}) != len(pairs) or len({c for _, c in pairs}) != len(pairs):
         wrong.append("its parts are not those of free space")

@@ -70,6 +70,17 @@ def test_wrong_usage_ends_in_one_line(cli, tmp_path):
     assert not out.exists()
 
 
+def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
+    given = ("export", FIGURE, "-o", tmp_path / "g.geojson", *SMALL)
+    assert "ids  " not in cli(*given).out
+    monkeypatch.setattr("hybridnav.messages.MOST_ID", 20)
+    (line,) = [each for each in cli(*given).out.splitlines() if each.startswith("ids  ")]
+    features = json.loads((tmp_path / "g.geojson").read_text())["features"]
+    most = max(each["properties"]["id"] for each in features)
+    assert f"up to {most};" in line
+    assert "messages of ComputeRoute hold 20" in line
+
+
 def test_rooms_and_places_are_written_as_tables_and_features(cli, tmp_path):
     for kind, counted in (("rooms", ["rooms", "doors"]), ("places", ["places", "arcs"])):
         for ending in ("csv", "geojson"):
@@ -190,7 +201,7 @@ def test_one_floor_of_several_is_judged(cli, tmp_path):
     assert cli("check", FIGURE, graph).refuses(3, "it has the floors L1, L2: choose one")
     done = cli("check", FIGURE, graph, *SMALL[:2], "--floor", "L2", "--json")
     assert (done.answer["nodes"], done.answer["edges"]) == (2, 2)
-    assert cli("check", FIGURE, graph, "--floor", "L3").refuses(3, "no floor is named 'L3'")
+    assert cli("check", FIGURE, graph, "--floor", "L3").refuses(3, "no floor is called 'L3'")
     done = cli(
         "evaluate", FIGURE, "--graph", graph, "--floor", "L1", "--pairs", "3", "-o", tmp_path / "r"
     )

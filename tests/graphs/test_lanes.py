@@ -40,7 +40,7 @@ def lanes_of(graph):
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.7])
 def test_lanes_run_on_the_right_of_their_edge_and_apart(yaw_rad):
     here = topology_of(HOUSE, origin_m=(3.0, -2.0), yaw_rad=yaw_rad)
-    plain = hn.build_route_graph(here)
+    plain = hn.build_route_graph(here, stretch=1.02)
     graph = hn.keep_right(here, plain, apart_m=APART)
     straight = set(map(tuple, plain.edges.tolist()))
     points = graph.points

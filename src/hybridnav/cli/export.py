@@ -63,7 +63,7 @@ _ENDINGS = {
 """Endings of the file of each format."""
 _PARTS = ("rooms", "places")
 """Formats without a graph."""
-_SPACING_M, _STRETCH = 2.0, 1.02
+_SPACING_M, _STRETCH = 2.0, 1.05
 _MOST_PAIRS = 1_000_000
 
 OutOption = Annotated[
@@ -226,7 +226,7 @@ def export(
     text = json.dumps(figures | {"seconds": seconds}, allow_nan=False)
     lines = _summary(out, written, graph.grid, judged)
     lines += [f"left out   {printable(each)}" for each in left_out]
-    lines.append(f"seconds    {timings(seconds)}")
+    lines += [*(_ids_line(written) if fleet is None else []), f"seconds    {timings(seconds)}"]
     answer((text if as_json else "\n".join(lines)) + "\n")
     if plot is not None:
         from hybridnav.viz import plot_route_graph, save_figure  # noqa: PLC0415 - on demand
@@ -309,6 +309,17 @@ def _summary(
             f"nearest    {_line(judged.nearest)}",
         ]
     return lines
+
+
+def _ids_line(graph: RouteGraph | WaypointGraph) -> list[str]:
+    """Return a line if Nav2's messages cannot hold all ids of a graph."""
+    from hybridnav.messages import MOST_ID  # noqa: PLC0415 - on demand
+
+    most = graph.n_nodes + graph.n_edges - 1
+    if most <= MOST_ID:
+        return []
+    held = f"messages of ComputeRoute hold {MOST_ID:,}"
+    return [f"ids        up to {most:,}; {held}: for these, give fewer --nodes"]
 
 
 def _line(excess: Excess) -> str:

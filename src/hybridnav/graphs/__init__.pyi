@@ -1,6 +1,11 @@
 from .build import build_route_graph as build_route_graph
 from .check import GraphCheck as GraphCheck, check_graph as check_graph
-from .findings import KINDS as KINDS, Example as Example, Finding as Finding
+from .findings import (
+    BUILDING_KINDS as BUILDING_KINDS,
+    KINDS as KINDS,
+    Example as Example,
+    Finding as Finding,
+)
 from .judge import (
     Excess as Excess,
     GraphReport as GraphReport,

@@ -1,4 +1,4 @@
-"""Kernel of the free distances to the left and right of edges."""
+"""Kernels of what lies along edges: free distances to the left and right, clearance."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
+from hybridnav.grid.lines import passed_cells
 
 _STEP_CELLS = 0.5
 """Distance between the points of an edge at which its width is measured."""
@@ -71,3 +72,35 @@ def least_widths(occupied, tails, heads, reach):
             found[edge, 1] = min(found[edge, 1], right)
             found[edge, 2] = min(found[edge, 2], left + right)
     return found
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def least_along(free, values, positions, edges):
+    """Return the least value of the cells that each edge passes, and the cell in its middle.
+
+    Parameters
+    ----------
+    free
+        bool (rows, cols).
+    values
+        float (rows, cols).
+    positions
+        float64 (n, 2), the nodes, (row, col) in grid units.
+    edges
+        int64 (m, 2), tail and head of each edge.
+
+    Returns
+    -------
+    tuple
+        float64 (m,), and int64 (m, 2), (row, col).
+    """
+    least, middles = np.full(len(edges), np.inf), np.empty((len(edges), 2), np.int64)
+    line = np.empty((2, 2))
+    for edge in range(len(edges)):
+        line[0], line[1] = positions[edges[edge, 0]], positions[edges[edge, 1]]
+        cells = passed_cells(free, line)
+        for k in range(len(cells)):
+            least[edge] = min(least[edge], values[cells[k, 0], cells[k, 1]])
+        middles[edge] = cells[len(cells) // 2]
+    return least, middles

@@ -9,6 +9,8 @@ import numpy as np
 from hybridnav.graphs.gather import shown
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from hybridnav._typing import LongArray
     from hybridnav.graphs.findings import Findings
     from hybridnav.graphs.waypoint_graph import WaypointGraph
@@ -26,16 +28,13 @@ def add_components(findings: Findings, graph: WaypointGraph, component: LongArra
     component
         int64 (n,), the connected part of free space in which each node lies, -1 for none.
     """
-    weak, strong = _components(graph, "weak"), _components(graph, "strong")
+    weak = components_of(graph.n_nodes, graph.edges, "weak")
+    strong = components_of(graph.n_nodes, graph.edges, "strong")
     size = np.bincount(weak, minlength=1)
     points = graph.points.tolist()
-    for part in np.unique(component[component >= 0]).tolist():
-        nodes = np.flatnonzero((component == part) & (size[weak] > 1))
-        found, first, count = np.unique(weak[nodes], return_index=True, return_counts=True)
-        for one in np.delete(np.arange(len(found)), count.argmax() if len(count) else []):
-            node = int(nodes[first[one]])
-            where = f"{count[one]} nodes with node {shown(graph.names[node])}"
-            findings.add("components", f"{where}, apart from {count.max()}", tuple(points[node]))
+    for node, count, most in cut_off(component, weak):
+        where = f"{count} nodes with node {shown(graph.names[node])}"
+        findings.add("components", f"{where}, apart from {most}", tuple(points[node]))
     # The largest strong component of each weak one is where routes lead there and back.
     strong_size = np.bincount(strong, minlength=1)
     largest = np.zeros(len(size), dtype=np.int64)
@@ -47,12 +46,48 @@ def add_components(findings: Findings, graph: WaypointGraph, component: LongArra
         findings.add("one-way", f"node {shown(graph.names[node])}", tuple(points[node]))
 
 
-def _components(graph: WaypointGraph, kind: Literal["weak", "strong"]) -> LongArray:
-    """Return the label of each node's component, int64 (n,)."""
+def cut_off(part_of: LongArray, component: LongArray) -> Iterator[tuple[int, int, int]]:
+    """Yield the components of a graph beside the largest one in each part of free space.
+
+    Nodes without edges are left out.
+
+    Parameters
+    ----------
+    part_of
+        int64 (n,), the connected part of free space in which each node lies, -1 for none.
+    component
+        int64 (n,), the component of each node.
+
+    Yields
+    ------
+    tuple
+        The first node of a component, the number of its nodes in that part, and that of the largest
+        one there.
+    """
+    size = np.bincount(component, minlength=1)
+    for part in np.unique(part_of[part_of >= 0]).tolist():
+        nodes = np.flatnonzero((part_of == part) & (size[component] > 1))
+        _, first, count = np.unique(component[nodes], return_index=True, return_counts=True)
+        for one in np.delete(np.arange(len(count)), count.argmax() if len(count) else []):
+            yield int(nodes[first[one]]), int(count[one]), int(count.max())
+
+
+def components_of(n_nodes: int, edges: LongArray, kind: Literal["weak", "strong"]) -> LongArray:
+    """Return the component of each node of a graph, int64 (n,).
+
+    Parameters
+    ----------
+    n_nodes
+        Number of nodes.
+    edges
+        int64 (m, 2), tail and head of each edge.
+    kind
+        Whether the nodes of a component are joined whatever the directions of edges (weak), or each
+        can be reached from each (strong).
+    """
     from scipy.sparse import coo_array  # noqa: PLC0415 - on demand
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
 
-    ones = np.ones(graph.n_edges)
-    shape = (graph.n_nodes, graph.n_nodes)
-    matrix = coo_array((ones, (graph.edges[:, 0], graph.edges[:, 1])), shape=shape)
+    ones = np.ones(len(edges))
+    matrix = coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_nodes, n_nodes))
     return connected_components(matrix, directed=True, connection=kind)[1].astype(np.int64)

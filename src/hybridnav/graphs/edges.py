@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.graphs._spanner_kernels import spanner
+from hybridnav.graphs.checked_components import components_of
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, LongArray
@@ -14,17 +15,65 @@ if TYPE_CHECKING:
 
 _NEAREST = 200
 """Number of nearest nodes to which a node may have edges."""
+_MOST_NODES = 1 << 31
+"""More than any number of nodes, so that two nodes make one number."""
 _TRIED = 8
 """Nearest nodes of other parts that are tried as partners of a part without connection."""
 
 
-def sight_edges(nodes: Nodes, stretch: float, needed: LongArray) -> LongArray:
+class SightPairs:
+    """Which nodes near each other see each other; a pair is tested once, while nodes are added."""
+
+    def __init__(self, nodes: Nodes) -> None:
+        self._nodes = nodes
+        self._keys = np.empty(0, dtype=np.int64)
+        self._seen = np.empty(0, dtype=np.bool_)
+
+    def among(self, needed: LongArray) -> LongArray:
+        """Return the pairs in sight of each other among the nearest nodes of each.
+
+        Parameters
+        ----------
+        needed
+            int64 (k, 2), pairs in sight that count although others are nearer.
+
+        Returns
+        -------
+        LongArray
+            int64 (m, 2), lower node first.
+        """
+        from scipy.spatial import KDTree  # noqa: PLC0415 - most uses of the package need no graph
+
+        positions = self._nodes.positions
+        near = min(_NEAREST, len(positions) - 1)
+        heads = np.asarray(KDTree(positions).query(positions, k=list(range(2, near + 2)))[1])
+        tails = np.repeat(np.arange(len(positions)), near)
+        pairs = np.stack([tails, heads.ravel()], axis=1).astype(np.int64)
+        pairs = np.concatenate([pairs, needed])
+        # One sorted number a pair: rows take ten times as long, and unique three times.
+        keys = np.sort(pairs.min(axis=1) * _MOST_NODES + pairs.max(axis=1))
+        keys = keys[np.diff(keys, prepend=-1) > 0]
+        tails, heads = np.divmod(keys, _MOST_NODES)
+        seen = np.zeros(len(keys), dtype=np.bool_)
+        at = np.searchsorted(self._keys, keys)
+        is_known = at < len(self._keys)
+        is_known[is_known] = self._keys[at[is_known]] == keys[is_known]
+        seen[is_known] = self._seen[at[is_known]]
+        new = ~is_known
+        seen[new] = self._nodes.space.sight.clear(positions[tails[new]], positions[heads[new]])
+        self._keys, self._seen = keys, seen
+        return np.stack([tails[seen], heads[seen]], axis=1)
+
+
+def sight_edges(nodes: Nodes, known: SightPairs, stretch: float, needed: LongArray) -> LongArray:
     """Choose edges between nodes in sight of each other.
 
     Parameters
     ----------
     nodes
         The nodes.
+    known
+        The pairs of these nodes.
     stretch
         For two nodes in sight, a route over the chosen edges is at most this many times as long as
         the segment between them.
@@ -41,36 +90,15 @@ def sight_edges(nodes: Nodes, stretch: float, needed: LongArray) -> LongArray:
     I. Althöfer, G. Das, D. Dobkin, D. Joseph, J. Soares: On sparse spanners of weighted graphs,
     1993 (the greedy spanner).
     """
-    from scipy.spatial import KDTree  # noqa: PLC0415 - most uses of the package need no graph
-
     positions = nodes.positions
     if len(positions) < 2:  # noqa: PLR2004
         return np.empty((0, 2), dtype=np.int64)
-    near = min(_NEAREST, len(positions) - 1)
-    heads = np.asarray(KDTree(positions).query(positions, k=list(range(2, near + 2)))[1])
-    tails = np.repeat(np.arange(len(positions)), near)
-    pairs = np.stack([tails, heads.ravel()], axis=1).astype(np.int64)
-    pairs = np.concatenate([pairs, needed])
-    # One number a pair: sorting rows takes ten times as long.
-    pairs = np.unique(pairs.min(axis=1) * len(positions) + pairs.max(axis=1))
-    pairs = np.stack(np.divmod(pairs, len(positions)), axis=1)
-    pairs = pairs[nodes.space.sight.clear(positions[pairs[:, 0]], positions[pairs[:, 1]])]
+    pairs = known.among(needed)
     steps = positions[pairs[:, 1]] - positions[pairs[:, 0]]
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     order = np.argsort(lengths, kind="stable")
     pairs, lengths = pairs[order], lengths[order]
     found: LongArray = pairs[spanner(positions, pairs, lengths, stretch)]
-    return found
-
-
-def parts_of(edges: LongArray, n_nodes: int) -> LongArray:
-    """Return the connected part that each node belongs to, int64 (n,)."""
-    from scipy.sparse import coo_array  # noqa: PLC0415 - on demand, as above
-    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
-
-    ones = np.ones(len(edges))
-    graph = coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(n_nodes, n_nodes))
-    found: LongArray = connected_components(graph, directed=False)[1].astype(np.int64)
     return found
 
 
@@ -91,7 +119,7 @@ def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
         nearest nodes of another part, (row, col) in grid units.
     """
     positions = nodes.positions
-    part = parts_of(edges, len(positions))
+    part = components_of(len(positions), edges, "weak")
     component = nodes.space.components_at(positions)
     starts, goals = [], []
     for where in np.unique(component).tolist():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.graphs._width_kernels import least_widths
+from hybridnav.graphs._width_kernels import least_along, least_widths
 from hybridnav.graphs.route_graph import RouteGraph
 from hybridnav.grid import CellClass
 from hybridnav.grid.lines import cells_of_line
@@ -39,8 +39,7 @@ def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> Route
     rooms = topology.rooms if topology.pyramid.rooms is not None else None
     clearance = rooms.clearance_m if rooms is not None else measured_clearance_m(grid)
     free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
-    lines = [cells_of_line(free, positions[edge]) for edge in edges]
-    clearances = np.array([clearance[tuple(cells.T)].min() for cells in lines])
+    clearances, middles = least_along(free, np.ascontiguousarray(clearance), positions, edges)
     occupied = np.ascontiguousarray(grid.measured == CellClass.OCCUPIED)
     tails, heads = positions[edges[:, 0]], positions[edges[:, 1]]
     reach = FARTHEST_M / grid.resolution_m
@@ -54,8 +53,10 @@ def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> Route
         rooms=tuple(_room_of(rooms, cells)),
         doors=np.array(nodes.doors, dtype=np.int64),
         edges=edges,
-        edge_rooms=tuple(_room_of(rooms, np.array([line[len(line) // 2] for line in lines]))),
-        edge_doors=tuple(passes.passed(line) if passes else () for line in lines),
+        edge_rooms=tuple(_room_of(rooms, middles)),
+        edge_doors=tuple(
+            passes.passed(cells_of_line(free, positions[edge])) if passes else () for edge in edges
+        ),
         widths_m=sides[:, 2],
         clearances_m=clearances,
         left_m=sides[:, 0],

@@ -38,6 +38,19 @@ KINDS = {
 }
 """Kinds of findings, in the order of a report, and what each counts."""
 
+BUILDING_KINDS = {
+    "floor-missing": "floors of the building that the graph does not have",
+    "floor-unknown": "floors of the graph that the building does not have",
+    "link-missing": "links of the building that the graph does not have",
+    "link-unknown": "links of the graph that the building does not have",
+    "link-kind": "links of another kind than in the building",
+    "stop-missing": "floors at which a link stops, and that of the graph does not",
+    "stop-unknown": "floors at which a link of the graph stops, and the building's does not",
+    "stop-elsewhere": "ends of links that are not where the building has them",
+    "pieces": "pieces of the whole graph that nothing connects, though the building does",
+}
+"""Kinds of findings on the graph of a whole building, beside those of its floors."""
+
 
 @dataclass(frozen=True)
 class Example:
@@ -68,7 +81,7 @@ class Finding:
     """
 
     kind: str
-    """A key of `KINDS`."""
+    """A key of `KINDS` or `BUILDING_KINDS`."""
     count: int
     """Number of cases."""
     examples: tuple[Example, ...]
@@ -77,7 +90,7 @@ class Finding:
     @property
     def text(self) -> str:
         """What is counted."""
-        return KINDS[self.kind]
+        return (KINDS | BUILDING_KINDS)[self.kind]
 
 
 @dataclass
@@ -101,9 +114,9 @@ class Findings:
             self._examples.setdefault(found.kind, []).extend(found.examples)
 
     def collected(self) -> tuple[Finding, ...]:
-        """Return all findings, in the order of `KINDS`."""
+        """Return all findings, in the order of `KINDS` and `BUILDING_KINDS`."""
         return tuple(
             Finding(kind, self._counts[kind], tuple(self._examples[kind]))
-            for kind in KINDS
+            for kind in KINDS | BUILDING_KINDS
             if kind in self._counts
         )

@@ -62,16 +62,10 @@ class PlacedGraph:
         along_lines
             Whether edges run along their lines, instead of straight.
         """
-        positions = _rounded(grid, graph.points)
+        positions, cells, is_free = placed_points(graph.points, grid, free)
         lines = graph.lines if along_lines else {}
-        within = (positions >= 0) & (positions <= free.shape)
-        inside = np.asarray(within.all(axis=1), dtype=np.bool_)
-        cells = np.full(positions.shape, -1, dtype=np.int64)
-        cells[inside] = np.minimum(free_cells_at(free, positions[inside]), np.array(free.shape) - 1)
-        is_free = inside.copy()
-        is_free[inside] = free[tuple(cells[inside].T)]
         along = {edge: _rounded(grid, line) for edge, line in lines.items()}
-        return cls(graph.edges, positions, cells, inside, is_free, along, free)
+        return cls(graph.edges, positions, cells, cells[:, 0] >= 0, is_free, along, free)
 
     def clear_edges(self, sight: Sight) -> BoolArray:
         """Return which edges stay in free space, bool (m,), by exact tests.
@@ -113,6 +107,36 @@ class PlacedGraph:
             int64 (k, 2), the edges to use.
         """
         return Network.of(sight, self.positions, edges, np.flatnonzero(self.is_free))
+
+
+def placed_points(
+    points: FloatArray, grid: OccupancyGrid, free: BoolArray
+) -> tuple[FloatArray, LongArray, BoolArray]:
+    """Place points on a map.
+
+    Parameters
+    ----------
+    points
+        float64 (n, 2), `(x, y)` in metres.
+    grid
+        The map.
+    free
+        bool (rows, cols), the cells that may be entered.
+
+    Returns
+    -------
+    tuple
+        float64 (n, 2) positions, rounded; int64 (n, 2) a cell whose closed square contains each, a
+        free one if there is one, -1 outside the map; bool (n,), whether it is free.
+    """
+    positions = _rounded(grid, points)
+    within = (positions >= 0) & (positions <= free.shape)
+    inside = np.asarray(within.all(axis=1), dtype=np.bool_)
+    cells = np.full(positions.shape, -1, dtype=np.int64)
+    cells[inside] = np.minimum(free_cells_at(free, positions[inside]), np.array(free.shape) - 1)
+    is_free = inside.copy()
+    is_free[inside] = free[tuple(cells[inside].T)]
+    return positions, cells, is_free
 
 
 def _rounded(grid: OccupancyGrid, points: FloatArray) -> FloatArray:

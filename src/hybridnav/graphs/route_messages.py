@@ -11,14 +11,11 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.graphs.route_graph import RouteGraph
 from hybridnav.grid.checks import checked_type
-from hybridnav.messages import header_message, path_message
+from hybridnav.messages import MOST_ID, header_message, path_message
 from hybridnav.poses import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-_MOST_ID = 2**16 - 1
-"""Messages hold ids of nodes and edges in 16 bits."""
 
 
 def route_messages(
@@ -73,10 +70,10 @@ def route_messages(
         raise InvalidValueError("a route needs at least one node, got none")
     edges = [_edge_of(graph, *pair) for pair in pairwise(passed)]
     ids = [graph.n_nodes + edge for edge in edges]
-    if max([*passed, *ids]) > _MOST_ID:
+    if max([*passed, *ids]) > MOST_ID:
         raise InvalidValueError(
             f"the route has the id {max([*passed, *ids])}, and messages of Nav2 hold at most "
-            f"{_MOST_ID}: build the graph with fewer nodes"
+            f"{MOST_ID}: build the graph with fewer nodes"
         )
     points = graph.points[passed]
     places = [{"x": x, "y": y, "z": 0.0} for x, y in points.tolist()]

@@ -77,7 +77,19 @@ class FreeSpace:
         left = ~(self.free[row - 1, col - 1] & self.free[row, col - 1])
         off = np.stack([np.where(below, 1.0, -1.0), np.where(left, 1.0, -1.0)], axis=1)
         moved = np.clip(bends + away_cells * off, 0.0, self.free.shape)
-        return np.where(self.sight.clear(bends, moved)[:, None], moved, bends)
+        fits = self.sight.clear(bends, moved) & ~self._is_pinched(moved)
+        return np.where(fits[:, None], moved, bends)
+
+    def _is_pinched(self, positions: FloatArray) -> BoolArray:
+        """Return which positions are lattice corners at which two blocked cells meet: no path leads
+        through, though free cells on both sides see them."""
+        row, col = positions.astype(np.int64).T
+        padded = np.pad(self.free, 1)
+        low, right = padded[row, col], padded[row, col + 1]
+        left, high = padded[row + 1, col], padded[row + 1, col + 1]
+        is_corner = (positions % 1 == 0).all(axis=1)
+        found: BoolArray = is_corner & (low == high) & (left == right) & (low != left)
+        return found
 
     def components_at(self, positions: FloatArray) -> IntArray:
         """Return the connected part of free space that each position lies in, int32 (n,)."""
@@ -152,57 +164,6 @@ def free_cells_at(free: BoolArray, positions: FloatArray) -> LongArray:
         found[fits] = tried[fits]
         missing &= ~fits
     return found
-
-
-def pairs_round_corners(
-    space: FreeSpace,
-    draws: tuple[int, int],
-    rng: np.random.Generator,
-    reach_cells: tuple[float, float],
-) -> tuple[FloatArray, FloatArray]:
-    """Draw pairs of centres of free cells near a corner of obstacles that do not see each other.
-
-    Random pairs of a whole map are far apart; these are near each other, where one detour counts.
-
-    Parameters
-    ----------
-    space
-        Free space.
-    draws
-        Least number of draws at each lattice corner with one blocked cell of four, and of all.
-    rng
-        Source of random numbers.
-    reach_cells
-        The least and the greatest half side, in cells, of the square round the corner from which
-        both ends are drawn; its logarithm is uniform.
-
-    Returns
-    -------
-    tuple
-        float64 (n, 2) starts and goals, each pair in one part of free space.
-    """
-    free = space.free
-    blocked_beside = sum(
-        (~free[row : row + free.shape[0] - 1, col : col + free.shape[1] - 1]).astype(np.int64)
-        for row in (0, 1)
-        for col in (0, 1)
-    )
-    corners = np.argwhere(blocked_beside == 1) + 1
-    per_corner = max(draws[0], -(-draws[1] // max(len(corners), 1)))
-    corners = np.repeat(corners, per_corner, axis=0)
-    low, high = np.log(reach_cells)
-    half = np.exp(rng.uniform(low, high, size=(len(corners), 1)))
-    ends = [
-        np.floor(corners + half * rng.uniform(-1.0, 1.0, corners.shape)).astype(np.int64)
-        for _ in range(2)
-    ]
-    inside = [((end >= 0) & (end < free.shape)).all(axis=1) for end in ends]
-    one, other = (end[inside[0] & inside[1]] for end in ends)
-    part = space.component_of[tuple(one.T)]
-    fits = (part >= 0) & (part == space.component_of[tuple(other.T)])
-    starts, goals = one[fits] + 0.5, other[fits] + 0.5
-    hidden = ~space.sight.clear(starts, goals)
-    return starts[hidden], goals[hidden]
 
 
 def checked_position(space: FreeSpace, point: tuple[float, float]) -> FloatArray | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.refine._sight_kernels import apart, clear_segments
+from hybridnav.refine._sight_kernels import apart, clear_segments, reaches, shared
 from hybridnav.refine._taut_kernels import marks_of
 
 if TYPE_CHECKING:
@@ -76,4 +76,46 @@ class Sight:
         """
         both = np.concatenate([taken, candidates])
         found: BoolArray = apart(self._marks, both, len(taken), spacing_cells, most)[len(taken) :]
+        return found
+
+    def reaches(self, corners: FloatArray, steps: FloatArray, farthest: float) -> FloatArray:
+        """Return about how far rays from lattice corners run through free cells.
+
+        Parameters
+        ----------
+        corners
+            float64 (n, 2), (row, col) in grid units.
+        steps
+            float64 (n, 2), steps of length 1 along the rays.
+        farthest
+            Distance in cells at which rays end.
+
+        Returns
+        -------
+        FloatArray
+            float64 (n,), in cells, up to a step of half a cell.
+        """
+        found: FloatArray = reaches(self._marks, corners, steps, farthest)
+        return found
+
+    def shared(
+        self, starts: FloatArray, goals: FloatArray, limits: FloatArray, positions: FloatArray
+    ) -> BoolArray:
+        """Return which pairs see a common position over which the way is short enough.
+
+        Parameters
+        ----------
+        starts, goals
+            float64 (n, 2), as in `clear`.
+        limits
+            float64 (n,), lengths in cells up to which a way is short enough.
+        positions
+            float64 (k, 2), as in `clear`.
+
+        Returns
+        -------
+        BoolArray
+            bool (n,).
+        """
+        found: BoolArray = shared(self._marks, starts, goals, limits, positions)
         return found
