@@ -168,8 +168,10 @@ def test_floors_and_links_that_do_not_fit_are_refused(change, words):
 
 
 def test_a_floor_that_is_not_there():
-    with pytest.raises(hn.InvalidValueError, match="no floor is named '3': there are 1, 2"):
+    with pytest.raises(hn.InvalidValueError, match="no floor is called '3': there are 1, 2"):
         BuildingGraph(name="b", floors=(floor("1"), floor("2"))).floor("3")
+    with pytest.raises(hn.InvalidValueError, match=r"'grond': did you mean ground\?"):
+        BuildingGraph(name="b", floors=(floor("ground"), floor("1"))).floor("grond")
 
 
 def test_stairs_count_where_no_lift_leads_to_the_floor():

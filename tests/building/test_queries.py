@@ -99,10 +99,31 @@ def test_alternatives_are_the_cheapest_of_each_sequence_of_links(seed: int) -> N
     assert [plan.cost for plan in found] == sorted(plan.cost for plan in found)
     best = building.plan(scene.named(start), scene.named(goal))
     assert {plan.lower_bound for plan in found} == {best.lower_bound}
+    assert (found.complete, len(found)) == (True, len(costs))
+    assert found.note.startswith(f"{len(costs)} of 30: no other sequence of links")
     near = building.alternatives(scene.named(start), scene.named(goal), 30, max_stretch=1.5)
     assert [plan.cost for plan in near] == [
         plan.cost for plan in found if plan.cost <= 1.5 * best.cost * (1 + 1e-12)
     ]
+
+
+def test_a_search_that_stops_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    building = office()
+    query = ("1", (1.5, 4.5)), ("2", (1.5, 4.5))
+    two = building.alternatives(*query, 2, max_stretch=99.0)
+    assert (len(two), two.complete, two.note) == (2, True, "")
+    three = building.alternatives(*query, 3, max_stretch=99.0)
+    assert (len(three), three.complete) == (2, True)
+    assert (
+        three.note == "2 of 3: no other sequence of links is at most 99 times as dear as the first"
+    )
+    monkeypatch.setattr("hybridnav.building.search._MOST_LABELS", 4)
+    stopped = building.alternatives(*query, 3, max_stretch=99.0)
+    assert (len(stopped), stopped.complete) == (2, False)
+    assert stopped.note == "the search stopped after 2 of 3 routes: there may be more"
+    assert [plan.cost for plan in stopped] == [plan.cost for plan in two]
+    none = building.alternatives(*query, 3, closed_links=["west lift", "B"])
+    assert (len(none), none.complete, none.note) == (1, True, "no route was planned: no path")
 
 
 def cheapest_by(

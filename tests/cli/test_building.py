@@ -66,6 +66,7 @@ def test_links_and_doors_are_closed(cli: Any, file: Path) -> None:
     both = cli("plan", file, *QUERY, "--alternatives", "3", "--max-stretch", "9").out
     assert "route 1    cost" in both
     assert both.count(", by ") == 2
+    assert "routes     2 of 3: no other sequence of links is at most 9 times as dear" in both
 
 
 @pytest.mark.parametrize(

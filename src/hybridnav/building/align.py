@@ -59,7 +59,7 @@ def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
         raise InvalidValueError(f"pose is {pose!r:.80}, expected (x, y, yaw), finite numbers")
     graph = floor.graph
     doors = [
-        replace(door, ends=(_point(door.ends[0], pose), _point(door.ends[1], pose)))
+        replace(door, ends=(moved_point(door.ends[0], pose), moved_point(door.ends[1], pose)))
         for door in floor.doors
     ]
     return replace(
@@ -117,7 +117,7 @@ def align_floors(building: BuildingGraph) -> BuildingGraph:
         best = max(pairs, key=lambda name: len(pairs[name]), default=None)
         if best is None or not pairs[best]:
             break
-        poses[best] = _fitted(*(np.array(points) for points in zip(*pairs[best], strict=True)))
+        poses[best] = fitted_pose(*(np.array(points) for points in zip(*pairs[best], strict=True)))
     floors = [
         moved_floor(floor, poses[floor.name]) if floor.name in poses else floor
         for floor in building.floors
@@ -136,7 +136,7 @@ def _pairs(
     found = []
     for link in links:
         end = link.end_on(floor)
-        placed = [_point(e.position_m, poses[e.floor]) for e in link.ends if e.floor in poses]
+        placed = [moved_point(e.position_m, poses[e.floor]) for e in link.ends if e.floor in poses]
         if end is not None and placed:
             x, y = np.mean(placed, axis=0).tolist()
             found.append((link.kind == "lift", (end.position_m, (x, y))))
@@ -144,21 +144,22 @@ def _pairs(
     return [pair for is_lift, pair in found if is_lift or not has_lift]
 
 
-def _fitted(own: FloatArray, wanted: FloatArray) -> Pose:
-    """Return the pose that brings points nearest to others."""
+def fitted_pose(own: FloatArray, wanted: FloatArray) -> Pose:
+    """Return the pose that brings points nearest to others, by least squares."""
     middle, there = own.mean(axis=0), wanted.mean(axis=0)
     (x, y), (u, v) = (own - middle).T, (wanted - there).T
     yaw = math.atan2(float(x @ v - y @ u), float(x @ u + y @ v))
-    turned_x, turned_y = _point((float(middle[0]), float(middle[1])), (0.0, 0.0, yaw))
+    turned_x, turned_y = moved_point((float(middle[0]), float(middle[1])), (0.0, 0.0, yaw))
     return float(there[0]) - turned_x, float(there[1]) - turned_y, yaw
 
 
 def _end(end: LinkEnd, poses: dict[str, Pose]) -> LinkEnd:
     known = poses.get(end.floor)
-    return end if known is None else LinkEnd(end.floor, _point(end.position_m, known))
+    return end if known is None else LinkEnd(end.floor, moved_point(end.position_m, known))
 
 
-def _point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
+def moved_point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
+    """Return a point in another frame."""
     x, y, yaw = pose
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return x + cosine * point[0] - sine * point[1], y + sine * point[0] + cosine * point[1]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._progress import no_progress
+from hybridnav.building.alternatives import BuildingAlternatives
 from hybridnav.building.answers import Answers
 from hybridnav.building.checks import check_floors, check_links, check_speed
 from hybridnav.building.endpoints import endpoint_of, refusal_of
@@ -15,7 +16,7 @@ from hybridnav.building.floors import FloorTable
 from hybridnav.building.network import LinkNetwork
 from hybridnav.building.search import LinkSearch
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.names import did_you_mean
+from hybridnav.grid.names import place_of_name
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -116,11 +117,8 @@ class Building:
         InvalidValueError
             When there is none; the message suggests the nearest ones.
         """
-        for link in self.links:
-            if link.name == name:
-                return link
         known = tuple(link.name for link in self.links)
-        raise InvalidValueError(f"no link is called {name!r:.90}{did_you_mean(str(name), known)}")
+        return self.links[place_of_name(name, known, "link")]
 
     def plan(  # noqa: PLR0913 - start, goal, and conditions with defaults
         self,
@@ -173,7 +171,7 @@ class Building:
         closed_links: Collection[str] = (),
         stairs: bool = True,
         at: At = "anywhere",
-    ) -> tuple[BuildingPlan, ...]:
+    ) -> BuildingAlternatives:
         """Plan routes by different links, the cheapest first.
 
         Two routes differ if the sequences of their links do; no route takes a link twice. The lower
@@ -191,8 +189,9 @@ class Building:
 
         Returns
         -------
-        tuple of BuildingPlan
-            Fewer than `count` where there are no more; one unsolved plan if there is no route.
+        BuildingAlternatives
+            Plans. There are fewer than `count` where there are no more, or where the search stopped
+            before (its `complete` is False then); one unsolved plan if there is no route.
 
         Raises
         ------
@@ -238,10 +237,7 @@ class Building:
         ]
 
     def _floor_index(self, name: str) -> int:
-        if name in self._index_of:
-            return self._index_of[name]
-        known = tuple(self._index_of)
-        raise InvalidValueError(f"no floor is called {name!r:.90}{did_you_mean(str(name), known)}")
+        return place_of_name(name, tuple(self._index_of), "floor")
 
     def _current(self) -> list[FloorTable]:
         """Return the tables, new ones for floors whose maps or costs have changed."""
@@ -278,7 +274,7 @@ class Building:
         usable: tuple[Collection[str], bool],
         at: At,
         limits: tuple[int, float],
-    ) -> tuple[BuildingPlan, ...]:
+    ) -> BuildingAlternatives:
         """Plan as many routes as are wanted; again where a map changes meanwhile."""
         began = time.perf_counter()
         network = self._network(*usable)
@@ -296,7 +292,7 @@ class Building:
                 refused = refusal_of(endpoints, self.floors, closed)
                 found = found if refused is None else (answers.refused(refused, endpoints),)
             if all(table.is_current for table in tables):
-                return found
+                return BuildingAlternatives.of(found, limits, complete=search.is_complete)
 
     def _closed(self, blocked: Mapping[str, Closable] | None) -> dict[int, ClosedCells]:
         """Return the closed cells of floors, by index."""

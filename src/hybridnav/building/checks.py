@@ -17,6 +17,7 @@ from hybridnav.grid.names import did_you_mean
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from hybridnav._typing import LongArray
     from hybridnav.building.links import LinkEnd
 
 
@@ -123,28 +124,43 @@ def check_reach(links: Sequence[Link], floors: Sequence[Floor]) -> None:
     InvalidValueError
         When an end lies in such a part.
     """
-    from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
-
     for floor in floors:
-        planner = floor.planner
-        grid, allowed = planner.topology.grid, planner.preset.planner.allow_unexplored
-        part_of, _ = ndimage.label(grid.enterable(allow_unexplored=allowed))
-        cells_in = np.bincount(part_of.ravel())[1:]
+        grid = floor.planner.topology.grid
+        allowed = floor.planner.preset.planner.allow_unexplored
+        part_of = parts_of(floor, allow_unexplored=allowed)
+        cells_in = np.bincount(part_of[part_of >= 0])
         for link in links:
             end = link.end_on(floor.name)
             if end is None or not link.admits(grid.robot_radius_m):
                 continue
             part = int(part_of[grid.frame.cell_of(*end.position_m)])
-            if cells_in[part - 1] < _LEAST_PART * cells_in.max():
+            if cells_in[part] < _LEAST_PART * cells_in.max():
                 x, y = end.position_m
-                here, most = (
-                    n * grid.resolution_m**2 for n in (cells_in[part - 1], cells_in.max())
-                )
+                here, most = (n * grid.resolution_m**2 for n in (cells_in[part], cells_in.max()))
                 raise InvalidValueError(
                     f"link {link.name}: its end ({x:g}, {y:g}) on floor {floor.name} lies in a "
                     f"part of {here:.3g} m² that is cut off from the rest, {most:.3g} m²: give a "
                     "point from which the robot can drive away"
                 )
+
+
+def parts_of(floor: Floor, *, allow_unexplored: bool = False) -> LongArray:
+    """Return the connected part that each cell of a floor lies in, int64 (rows, cols), -1 where the
+    robot may not be.
+
+    Parameters
+    ----------
+    floor
+        The floor.
+    allow_unexplored
+        Whether the robot enters unexplored cells.
+    """
+    from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
+
+    grid = floor.planner.topology.grid
+    labels, _ = ndimage.label(grid.enterable(allow_unexplored=allow_unexplored))
+    found: LongArray = labels.astype(np.int64) - 1
+    return found
 
 
 def check_speed(speed_m_s: float) -> float:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hybridnav.building.search import Endpoint
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid.names import did_you_mean
+from hybridnav.grid.names import did_you_mean, place_of_name
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point
 from hybridnav.planner.named import check_names
 from hybridnav.result import PlanStatus
@@ -45,10 +45,7 @@ def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
         index, waypoint = _floor_of_name(given, floors), given
     elif isinstance(given, tuple | list) and len(given) == 2 and isinstance(given[0], str):  # noqa: PLR2004
         names = tuple(floor.name for floor in floors)
-        if given[0] not in names:
-            hint = did_you_mean(given[0], names)
-            raise InvalidValueError(f"{what}: no floor is called {given[0]!r:.90}{hint}")
-        index, waypoint = names.index(given[0]), given[1]
+        index, waypoint = place_of_name(given[0], names, "floor"), given[1]
     else:
         raise InvalidValueError(
             f"{what} must be a floor and a point or name on it, such as ('3', (1.5, 2.0)), or a "

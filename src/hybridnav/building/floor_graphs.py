@@ -9,6 +9,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.building.links import Link
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
+from hybridnav.grid.names import place_of_name
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
@@ -146,10 +147,7 @@ class BuildingGraph:
         Raises
         ------
         InvalidValueError
-            When there is none; the message lists the names.
+            When there is none; the message suggests the nearest ones.
         """
-        found = next((floor for floor in self.floors if floor.name == name), None)
-        if found is None:
-            known = ", ".join(floor.name for floor in self.floors)
-            raise InvalidValueError(f"no floor is named {name!r:.60}: there are {known[:200]}")
-        return found
+        known = tuple(floor.name for floor in self.floors)
+        return self.floors[place_of_name(name, known, "floor")]

@@ -153,7 +153,7 @@ def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:
     stubs
         The ends, and the nodes that they are joined to.
     """
-    n, m = graph.n_nodes, graph.n_edges
+    n = graph.n_nodes
     points = np.concatenate([graph.points, [end for _, end, _ in stubs]])
     pairs = [pair for at, (_, _, to) in enumerate(stubs) for pair in ((to, n + at), (n + at, to))]
     edges = np.concatenate([graph.edges, np.array(pairs, dtype=np.int64)])
@@ -174,5 +174,4 @@ def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:
         edges=frozen(edges),
         costs=frozen(np.concatenate([graph.costs, np.full(len(pairs), np.nan)])),
         node_facts=graph.node_facts | facts,
-        edge_facts={edge: facts for edge, facts in graph.edge_facts.items() if edge < m},
     )

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 START, GOAL = -1, -2
 """Where the first part of a route begins, and where its last one ends."""
 _MOST_LABELS = 20_000
-"""Labels after which the search for further routes ends."""
+"""Labels after which the search for one more route ends."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,8 @@ class LinkSearch:
         """The plans of parts that were asked for."""
         self.planned: list[PlanDraft] = []
         """Those made for this query."""
+        self.is_complete = True
+        """Whether `ranked` has looked at all routes that keep to the limit."""
         self._lower: dict[Part, float] = {}
         self._cost: dict[Part, float] = {}
         start, goal = endpoints
@@ -283,6 +285,7 @@ class LinkSearch:
                         passed = (*parts, part)
                         label = total + ahead[other], total, other, (*links, link), passed
                         heapq.heappush(heap, label)
+        self.is_complete = not heap
         return None
 
     def _to_goal(self) -> dict[int, float]:

@@ -13,13 +13,14 @@ from hybridnav.cli.blocked import parsed_closing
 from hybridnav.cli.common import answer, load_numba, progress_bar, read_settings, stage, timings
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.rendering import in_metric, rounded_bound
-from hybridnav.grid.names import did_you_mean, read_point
+from hybridnav.grid.names import place_of_name, read_point
 from hybridnav.sentences import check_language
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
     from pathlib import Path
 
+    from hybridnav.building import BuildingAlternatives
     from hybridnav.planner.named import At
 
 PLAN_OPTIONS = frozenset(
@@ -183,11 +184,13 @@ class BuildingRequest:
         spent: dict[str, float] = {}
         with stage("planning", spent, "plan"):
             if self.count == 1:
-                plans: tuple[hn.BuildingPlan, ...] = (building.plan(start, goal, **how),)
+                plans: Sequence[hn.BuildingPlan] = (building.plan(start, goal, **how),)
+                others = None
             else:
                 stretch = 2.0 if self.max_stretch is None else self.max_stretch
-                plans = building.alternatives(start, goal, self.count, max_stretch=stretch, **how)
-        figures = self._figures(plans)
+                others = building.alternatives(start, goal, self.count, max_stretch=stretch, **how)
+                plans = others
+        figures = self._figures(plans[0], others)
         figures["seconds"] = seconds | figures["seconds"]
         whole = json.dumps(figures, allow_nan=False) + "\n" if self.as_json else None
         answer(whole or self._summary(building, figures))
@@ -220,19 +223,23 @@ class BuildingRequest:
                 blocked[name] = closed
         return links, blocked
 
-    def _figures(self, plans: Sequence[hn.BuildingPlan]) -> dict[str, Any]:
+    def _figures(
+        self, plan: hn.BuildingPlan, others: BuildingAlternatives | None
+    ) -> dict[str, Any]:
         """Return the figures of the first plan, and those of all if more were asked for."""
-        figures = plans[0].to_dict() | {
+        figures = plan.to_dict() | {
             "building": str(self.source.file),
-            "words": plans[0].words(self.language),
+            "words": plan.words(self.language),
             "query": f"{self.waypoints[0]} to {self.waypoints[1]}",
             "blocked": [printable(text) for text in self.blocked] or None,
         }
-        if self.count > 1:
-            solved = [plan for plan in plans if plan.solved]
+        if others is not None:
+            solved = [other for other in others if other.solved]
             figures["alternatives"] = [
-                plan.to_dict() | {"words": plan.words(self.language)} for plan in solved
+                other.to_dict() | {"words": other.words(self.language)} for other in solved
             ]
+            figures["alternatives_complete"] = others.complete
+            figures["alternatives_note"] = others.note
         return figures
 
     def _summary(self, building: hn.Building, figures: dict[str, Any]) -> str:
@@ -251,6 +258,8 @@ class BuildingRequest:
             by = ", ".join(ride["link"] for ride in other["rides"]) or "no link"
             cost = f"cost {other['cost']:.2f} m, {other['travel_s']:.0f} s"
             lines.append(f"route {number:<4} {cost}, by {by}")
+        if figures.get("alternatives_note"):
+            lines.append(f"routes     {figures['alternatives_note']}")
         lines.append(f"seconds    {timings(figures['seconds'])}")
         return "\n".join(lines) + "\n"
 
@@ -290,7 +299,7 @@ def _endpoint(text: str, building: hn.Building) -> Any:
         )
     floor, colon, _ = text.partition(":")
     if colon:
-        raise UsageError(f"no floor is called {floor!r:.90}{did_you_mean(floor, floors)}")
+        place_of_name(floor, floors, "floor")
     return text
 
 

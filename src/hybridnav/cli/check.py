@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable, replace_file
+from hybridnav._files import printable
+from hybridnav.cli.building import check_options, is_building_file, refused_options
+from hybridnav.cli.building_check import (
+    CHECK_OPTIONS,
+    ONLY_BUILDINGS,
+    AlignOption,
+    BuildingOptions,
+    MatchOption,
+    NoStairsOption,
+    PairsOption,
+    check_building,
+)
 from hybridnav.cli.common import (
     Reading,
     answer,
@@ -23,6 +34,7 @@ from hybridnav.cli.common import (
     timings,
 )
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
+from hybridnav.cli.findings import found_figures, found_lines, write_page
 from hybridnav.cli.options import (
     FreeOption,
     GraphFloorOption,
@@ -40,9 +52,6 @@ from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
     from hybridnav.graphs import Finding, GraphCheck
-
-_SHOWN = 5
-"""Cases of a kind in the summary."""
 
 GraphArgument = Annotated[
     Path,
@@ -71,6 +80,7 @@ IgnoreOption = Annotated[
 
 
 def check(
+    ctx: typer.Context,
     map_file: MapArgument,
     graph_file: GraphArgument,
     out: PageOption = None,
@@ -84,21 +94,32 @@ def check(
     occupied_threshold: OccupiedOption = None,
     least_island_m2: LeastIslandOption = 0.0,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
+    align: AlignOption = False,
+    match: MatchOption = None,
+    pairs: PairsOption = 400,
+    no_stairs: NoStairsOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
     """Find what is wrong with GRAPH on MAP: edges through walls, nodes in walls, parts that are not
-    connected, doors that no edge passes, damaged entries.
+    connected, doors that no edge passes, damaged entries. On a building, find that on all floors
+    and links, and compare routes over all floors with the shortest ones.
 
     Exits with 1 when something is wrong.
     """
-    from hybridnav.graphs import KINDS  # noqa: PLC0415 - loads numpy
-
-    unknown = [kind for kind in ignore or () if kind not in KINDS]
-    if unknown:
-        raise UsageError(f"--ignore must be one of {', '.join(KINDS)}, got {unknown[0]!r:.80}")
     check_output(out, "--out", (".html",))
     check_picture(plot)
+    if is_building_file(map_file):
+        _check_kinds(ignore, is_building=True)
+        check_options(refused_options(ctx, CHECK_OPTIONS))
+        how = BuildingOptions(align, match or (), pairs, stairs=not no_stairs)
+        if not check_building(ctx.params, how):
+            raise typer.Exit(EXIT_NOT_SOLVED)
+        return
+    _check_kinds(ignore, is_building=False)
+    given = refused_options(ctx, [name for name in ctx.params if name not in ONLY_BUILDINGS])
+    if given:
+        raise UsageError(f"{given[0]} is for a building, and this is one map: leave it out")
     settings = read_settings(preset, None, robot_radius_m, None, map_file=map_file)
     seconds: dict[str, float] = {}
     with stage(f"reading {graph_file}", seconds, "graph"):
@@ -113,35 +134,32 @@ def check(
     lines = [*_summary(found, wrong), f"seconds    {timings(seconds)}"]
     whole = json.dumps(_figures(found, wrong) | {"seconds": seconds}, allow_nan=False)
     answer((whole if as_json else "\n".join(lines)) + "\n")
-    _write(found, out, plot)
-    if wrong:
-        raise typer.Exit(EXIT_NOT_SOLVED)
-
-
-def _write(found: GraphCheck, out: Path | None, plot: Path | None) -> None:
     if out is not None:
         from hybridnav.harness.check_page import render_check  # noqa: PLC0415 - on demand
 
-        try:
-            replace_file(out, render_check(found).encode())
-        except OSError as error:
-            raise UsageError(f"--out: cannot write {str(out)!r}: {error.strerror}") from None
+        write_page(render_check(found), out)
     if plot is not None:
         from hybridnav.viz import plot_graph_check, save_figure  # noqa: PLC0415 - on demand
 
         save_figure(plot_graph_check(found), plot)
+    if wrong:
+        raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _check_kinds(ignored: list[str] | None, *, is_building: bool) -> None:
+    from hybridnav.graphs import BUILDING_KINDS, KINDS  # noqa: PLC0415 - loads numpy
+
+    known = KINDS | BUILDING_KINDS if is_building else KINDS
+    unknown = [kind for kind in ignored or () if kind not in known]
+    if unknown:
+        raise UsageError(f"--ignore must be one of {', '.join(known)}, got {unknown[0]!r:.80}")
 
 
 def _summary(found: GraphCheck, wrong: list[Finding]) -> list[str]:
     from hybridnav.harness.check_page import check_facts  # noqa: PLC0415 - on demand
 
     lines = [f"{name:<10} {printable(text)}" for name, text in check_facts(found)]
-    for each in wrong:
-        lines.append(f"found      {each.count:,} {each.text} ({each.kind})")
-        lines += [f"           {printable(example.where)}" for example in each.examples[:_SHOWN]]
-        if each.count > _SHOWN:
-            lines.append(f"           and {each.count - _SHOWN:,} more")
-    return lines if wrong else [*lines, "found      nothing"]
+    return [*lines, *found_lines(wrong)] if wrong else [*lines, "found      nothing"]
 
 
 def _figures(found: GraphCheck, wrong: list[Finding]) -> dict[str, Any]:
@@ -158,14 +176,5 @@ def _figures(found: GraphCheck, wrong: list[Finding]) -> dict[str, Any]:
         "in_sight": found.in_sight,
         "doors": {"passed": found.doors[0], "all": found.doors[1]},
         "rooms": {"with_node": found.rooms[0], "all": found.rooms[1]},
-        "findings": {
-            each.kind: {
-                "count": each.count,
-                "text": each.text,
-                "cases": [
-                    {"where": example.where, "points": example.points} for example in each.examples
-                ],
-            }
-            for each in wrong
-        },
+        "findings": found_figures(wrong),
     }

@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, cast
+from functools import partial
+from typing import TYPE_CHECKING
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.areas import box_of_area
-from hybridnav.planner.batch import plan_many
-from hybridnav.planner.cell_planner import Carried, CellQuery, Updatable
-from hybridnav.planner.closed import ClosedCells, Closures
+from hybridnav.planner.cell_planner import Carried, Updatable
 from hybridnav.planner.costs import PlannerCosts
-from hybridnav.planner.drafts import PlanDraft, draft_on_mesh
-from hybridnav.planner.endpoints import cells_of_endpoints, read_end, read_point, read_points
-from hybridnav.planner.finish import Finish, Smooth
-from hybridnav.planner.follow import MapChange, change_of, followed, is_stale
-from hybridnav.planner.outcome import Outcomes
+from hybridnav.planner.endpoints import read_points
+from hybridnav.planner.follow import MapChange, change_of, followed
+from hybridnav.planner.queries import Queries
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
-from hybridnav.result import PlanStatus
 from hybridnav.search.turns import Turns
 
 if TYPE_CHECKING:
@@ -34,14 +27,16 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from hybridnav._progress import Progress
-    from hybridnav._typing import FloatArray, PathLike
+    from hybridnav._typing import PathLike
     from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
     from hybridnav.grid.areas import Box
     from hybridnav.planner.blocked import Closable
-    from hybridnav.planner.cell_planner import CellPlan, CellPlanner, Prepared
+    from hybridnav.planner.cell_planner import CellPlanner, Prepared
+    from hybridnav.planner.closed import ClosedCells
+    from hybridnav.planner.drafts import PlanDraft
+    from hybridnav.planner.finish import Smooth
     from hybridnav.planner.itinerary import Guide
-    from hybridnav.planner.mesh_plans import OverMesh
     from hybridnav.planner.named import At
     from hybridnav.planner.ompl_plans import OmplPlanner
     from hybridnav.result import PlanBatch, PlanResult
@@ -101,26 +96,20 @@ class HybridPlanner:
         settings = self.preset.planner
         self._costs = PlannerCosts(topology.grid, self.preset, costs)
         self._cells = cell_planner(topology, settings, prepared, self.costs)
-        self._closures = Closures(topology)
         self._turns = Turns()
         self._begun: Callable[[], None] | None = None
         """The update that has begun and not ended; an interrupt leaves it here."""
         self._preparing = Turns()
-        self._make_answers()
         self._ompl: OmplPlanner | None = None
         if settings.refine == "ompl":
             # Loads modules for these presets only, or reports which one to install.
             from hybridnav.planner.ompl_plans import ompl_planner  # noqa: PLC0415
 
             self._ompl = ompl_planner(topology, self._cells, settings)
+        self._queries = self._made_queries()
 
-    def _make_answers(self) -> None:
-        """Make what turns the paths of `_cells` into results, by the costs of now."""
-        grid = self.topology.grid
-        self._outcomes = Outcomes(self.topology, self.preset, self.costs)
-        self._finish = Finish(
-            grid, self._cells, self._outcomes, self.preset.planner, costs=self.costs
-        )
+    def _made_queries(self) -> Queries:
+        return Queries(self.topology, self.preset, self._cells, self.costs, self._ompl)
 
     @property
     def costs(self) -> CostLayer | None:
@@ -134,20 +123,15 @@ class HybridPlanner:
         costs."""
         return self._cells.prepared
 
-    @cached_property
+    @property
     def guide(self) -> Guide | None:
         """The source of descriptions for a person; None on a map without rooms."""
-        if is_stale(self.topology) or self.topology.pyramid.rooms is None:
-            return None
-        # Loads modules that plans without rooms do not need.
-        from hybridnav.planner.itinerary import Guide  # noqa: PLC0415
-
-        return Guide(self.topology.rooms)
+        return self._queries.guide
 
     @property
     def needs_headings(self) -> bool:
         """Whether endpoints are `(x, y, yaw)`, as with OMPL in a space with headings."""
-        return self._ompl is not None and self._ompl.ompl.has_heading
+        return self._queries.needs_headings
 
     def plan(
         self,
@@ -192,89 +176,13 @@ class HybridPlanner:
             the map.
         """
         with self._query():
-            return self._plan(start, goal, smooth, blocked, at)
+            return self._queries.plan(start, goal, smooth, blocked, at)
 
     def _query(self) -> AbstractContextManager[bool]:
-        """Return the lock to hold while the costs must stay as they are."""
+        """Return the lock to hold while the map and the costs must stay as they are."""
         if self._begun is not None:
             self._turns.alone(self._complete)
         return self._turns.shared()
-
-    def _plan(
-        self,
-        start: ArrayLike | str,
-        goal: ArrayLike | str,
-        smooth: Smooth | None,
-        blocked: Closable | ClosedCells | None,
-        at: At,
-    ) -> PlanResult:
-        """Plan a path while the costs stay as they are; see `plan`."""
-        began = time.perf_counter()
-        waypoint = goal
-        if isinstance(start, str) or isinstance(goal, str):
-            from hybridnav.planner.named import check_names, points_of_waypoints  # noqa: PLC0415 - on demand
-
-            check_names(self.topology, [start, goal])
-            blocked = self.closed(blocked)
-            start, goal = points_of_waypoints(
-                self.topology,
-                self.preset.planner,
-                [start, goal],
-                at=at,
-                closed=self.closed_for_all(blocked),
-                costs=self.costs,
-            )
-        headings = None if self._ompl is None else self.needs_headings
-        read = partial(read_end, needs_heading=headings)
-        poses = read("start", start), read("goal", goal)
-        finish = self._finish.checked(smooth, self.preset.planner.smooth)
-        result = self._between(poses, finish, self.closed(blocked), began)
-        return self._described(result, poses, waypoint)
-
-    def _described(
-        self, result: PlanResult, poses: tuple[FloatArray, FloatArray], waypoint: ArrayLike | str
-    ) -> PlanResult:
-        """Return a result with what its instructions are found from."""
-        if result.path is None or not result.solved or self.guide is None:
-            return result
-        source = self.guide.of(result.path, waypoint, poses[0].tolist())
-        return replace(result, instruction_source=source)
-
-    def _between(
-        self,
-        poses: tuple[FloatArray, FloatArray],
-        finish: Smooth,
-        closed: ClosedCells | None,
-        began: float,
-    ) -> PlanResult:
-        """Plan between two points, or poses."""
-        query = self._query_of(poses, closed)
-        if isinstance(query, PlanStatus):
-            return self._outcomes.answer(query, poses)
-        endpoints, plan = query.points, self._cells.plan(query)
-        if plan.cells is None:
-            return self._outcomes.no_path(plan, poses, self._cells.metric)
-        if self._ompl is not None:
-            now, flat = time.perf_counter(), None if closed is None else closed.flat
-            found = self._ompl.plan(plan.cells, poses, flat, spent_s=now - began)
-            plan.stats.seconds["ompl"] = time.perf_counter() - now
-            bound = self._cells.bound(plan, endpoints)
-            return self._outcomes.by_ompl(found, plan, poses, bound)
-        return self._finish.result(plan, poses, finish, closed)
-
-    def _query_of(
-        self, poses: tuple[FloatArray, FloatArray], closed: ClosedCells | None
-    ) -> CellQuery | PlanStatus:
-        """Return the query between two points, or the status that refuses one of them."""
-        endpoints = poses[0][:2], poses[1][:2]
-        grid, allowed = self.topology.grid, self.preset.planner.allow_unexplored
-        cells = cells_of_endpoints(grid, endpoints, allow_unexplored=allowed)
-        if isinstance(cells, PlanStatus):
-            return cells
-        shut = self.closed_for_all(closed)
-        if shut is not None and (refused := shut.refusal(cells, grid.shape)):
-            return refused
-        return CellQuery(cells, endpoints, closed)
 
     def draft(
         self,
@@ -293,23 +201,8 @@ class HybridPlanner:
         start, goal, blocked, at
             As in `plan`.
         """
-        named = isinstance(start, str) or isinstance(goal, str)
         with self._query():
-            if named or self._ompl is not None or self.preset.planner.coarse != "mesh":
-                return PlanDraft.of(self._plan(start, goal, None, blocked, at))
-            poses = read_point("start", start), read_point("goal", goal)
-            closed = self.closed(blocked)
-            query = self._query_of(poses, closed)
-            if isinstance(query, PlanStatus):
-                return PlanDraft.of(self._outcomes.answer(query, poses))
-            finish, outcomes, metric = self._finish, self._outcomes, self._cells.metric
-
-            def result_of(plan: CellPlan) -> PlanResult:
-                if plan.cells is None:
-                    return outcomes.no_path(plan, poses, metric)
-                return self._described(finish.result(plan, poses, "none", closed), poses, goal)
-
-            return draft_on_mesh(cast("OverMesh", self._cells), query, result_of)
+            return self._queries.draft(start, goal, blocked, at)
 
     def plan_many(
         self,
@@ -345,15 +238,7 @@ class HybridPlanner:
                 "give each start its goal"
             )
         with self._query():
-            finish = self._finish.checked(smooth, self.preset.planner.smooth)
-            closed = self.closed(blocked)
-            is_kept = finish == "none" or self._cells.metric == "any-angle"
-            at_once = self._cells if self._ompl is None and is_kept else None
-
-            def alone(start: FloatArray, goal: FloatArray) -> PlanResult:
-                return self._plan(start, goal, finish, closed, "anywhere")
-
-            return plan_many(self.topology.grid, at_once, (first, last), closed, alone)
+            return self._queries.plan_many((first, last), smooth, blocked)
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures for queries now: mesh and graph of corners, jump-point graph,
@@ -441,9 +326,7 @@ class HybridPlanner:
         self.topology, self._cells, self._costs = topology, cells, costs
         if isinstance(cells, Carried):
             cells.catch_up()
-        self._closures = Closures(topology)
-        self.__dict__.pop("guide", None)
-        self._make_answers()
+        self._queries = self._made_queries()
 
     def _update(self, costs: CostLayer, box: Box) -> None:
         self._turns.alone(self._complete)
@@ -462,7 +345,7 @@ class HybridPlanner:
             self._cells.update(layer, box)
         else:
             self._cells = cell_planner(self.topology, self.preset.planner, None, layer)
-        self._make_answers()
+        self._queries.take(self._cells, self.costs)
 
     def close(self) -> None:
         """End the OMPL process of a preset; the next query waits for another one."""
@@ -471,10 +354,8 @@ class HybridPlanner:
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
         """Return the cells of a closure, None for no closure."""
-        if blocked is None or isinstance(blocked, ClosedCells):
-            return blocked
-        return self._closures.of(blocked)
+        return self._queries.closed(blocked)
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
-        return self._finish.with_closed(closed)
+        return self._queries.closed_for_all(closed)
