@@ -8,7 +8,7 @@ import pytest
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, baseline_spec
-from hybridnav.harness.names import NamedMethod, read_methods
+from hybridnav.harness.names import NamedMethod, class_of, read_methods, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
@@ -103,6 +103,36 @@ def test_a_class_that_was_mended_is_run_again(settings, tmp_path):
     assert study.of_method("HPA* of mine")[0].preparation["source"] == sources[0]
 
 
+def test_a_class_is_another_one_when_a_file_that_it_imports_was_mended(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    package = tmp_path / "planners_of_mine"
+    (package / "parts").mkdir(parents=True)
+    for folder in (package, package / "parts"):
+        (folder / "__init__.py").write_text("")
+    (package / "method.py").write_text(
+        "import json\nimport hybridnav\nfrom planners_of_mine.parts import deep\n"
+        "class Mine:\n    pass\n"
+    )
+    (package / "parts" / "deep.py").write_text("from planners_of_mine.parts.deeper import LIMIT, f")
+    deeper = package / "parts" / "deeper.py"
+    deeper.write_text("LIMIT = 3\ndef f():\n    return LIMIT\n")
+    (package / "other.py").write_text("x = 1")
+    class_of("planners_of_mine.method:Mine")
+    before = source_hash("planners_of_mine.method:Mine")
+    (package / "other.py").write_text("x = 2")  # nobody imports it
+    assert source_hash("planners_of_mine.method:Mine") == before
+    deeper.write_text("LIMIT = 4\ndef f():\n    return LIMIT\n")
+    assert source_hash("planners_of_mine.method:Mine") != before
+    # Modules side by side, without a package.
+    (tmp_path / "alone.py").write_text("from beside_it import f\nclass Mine:\n    pass\n")
+    (tmp_path / "beside_it.py").write_text("def f():\n    return 1\n")
+    class_of("alone:Mine")
+    before = source_hash("alone:Mine")
+    (tmp_path / "beside_it.py").write_text("def f():\n    return 2\n")
+    assert source_hash("alone:Mine") != before
+    assert source_hash("builtins:object") == ""
+
+
 def test_a_file_of_methods_names_and_sets_them(settings, tmp_path):
     file = tmp_path / "methods.yaml"
     file.write_text(
@@ -163,6 +193,11 @@ def test_a_class_that_fails_costs_no_reference(settings, tmp_path):
         ("methods: [{preset: paper, settings: 3}]", "settings must be keys with values"),
         ("methods: [{preset: paper, settings: {a: 2020-01-01}}]", "must be numbers and texts"),
         ("methods: [{preset: paper}, {preset: paper}]", "two are called paper"),
+        ("methods: [{preset: paper, grid: 3}]", "entry 1: grid has the keys robot_radius_m"),
+        ("methods: [{preset: paper, grid: {radius: 3}}]", "grid has the keys"),
+        ("methods: [{preset: paper, grid: {robot_radius_m: -1}}]", "number of metres, got -1"),
+        ("methods: [{preset: paper, grid: {robot_radius_m: .nan}}]", "number of metres, got nan"),
+        ("methods: [{preset: paper, grid: {corner_cutting: 1}}]", "true or false, got 1"),
         ("methods: [", "methods .*yaml"),
     ],
 )

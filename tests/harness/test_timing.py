@@ -2,11 +2,13 @@
 
 import json
 import statistics
+import time
 from collections import Counter
 from dataclasses import replace
 
 import pytest
 
+from hybridnav.baselines.grid import GridAstar as Baseline
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.methods import baseline_spec
@@ -180,3 +182,39 @@ def test_without_repeats_the_report_says_how_times_were_taken(settings, tmp_path
     assert "of single queries, one method after the other" in report
     with pytest.raises(InvalidValueError, match="repeats are at least 0, got -1"):
         evaluate(replace(settings, repeat=-1), tmp_path / "run")
+
+
+@pytest.mark.usefixtures("here")
+def test_a_slow_method_is_asked_once_for_all_pairs_but_the_first_two(
+    settings, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("hybridnav.harness.timing.LONG_S", 0.0)
+    evaluate(settings, tmp_path / "run")
+    pairs = [record for record in timed(tmp_path / "run") if record["type"] == "timed pair"]
+    counts = [{len(times) for times in record["times"].values()} for record in pairs]
+    assert counts == [{REPEAT}] * 2 + [{1}] * (ANSWERS - 2)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_first_query_that_prepares_is_no_long_one(settings, tmp_path):
+    class_ = replace(settings, baselines=(name_of(Lazy),))
+    evaluate(class_, tmp_path / "run")
+    pairs = [record for record in timed(tmp_path / "run") if record["type"] == "timed pair"]
+    assert {len(times) for record in pairs for times in record["times"].values()} == {REPEAT}
+    _, outcome = load_study(tmp_path / "run").outcomes
+    assert outcome.seconds.max() < 0.05
+
+
+class Lazy(Baseline):
+    """A method that prepares in front of its first query."""
+
+    def __init__(self, grid):
+        super().__init__(grid)
+        self.is_ready = False
+
+    def solve(self, start, goal):
+        """Plan between two free cells."""
+        if not self.is_ready:
+            self.is_ready = True
+            time.sleep(0.2)
+        return super().solve(start, goal)

@@ -117,6 +117,10 @@ class MethodResult:
 class Method(Protocol):
     """One method prepared for one map.
 
+    A method that cannot take a map, by a limit of its own, raises `UnsuitableMapError` in its
+    construction: it is then not asked there. Its texts `version` and `settings`, if there are any,
+    are shown in the table of methods.
+
     Its construction prepares it; its `close`, if there is one, is called after the last query. If
     its constructor has a parameter `costs`, it is called with `costs=layer` in a run with costs,
     where cells that the layer closes are occupied. Other methods are made as in any run, and what

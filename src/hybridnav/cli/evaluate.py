@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 import hybridnav as hn
+from hybridnav._files import printable
+from hybridnav.cli.building import is_building_file
 from hybridnav.cli.common import answer, complain, progress_bar, read_settings
 from hybridnav.cli.costs import parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
@@ -15,6 +17,7 @@ from hybridnav.cli.options import GraphFloorOption, MaxCellsOption
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
+    from hybridnav.harness.analysis import Study
     from hybridnav.harness.run import RunSettings
     from hybridnav.harness.yardstick import Yardstick
 
@@ -110,6 +113,12 @@ CornersOption = Annotated[
 TimeoutOption = Annotated[
     float, typer.Option("--timeout", metavar="S", help="Longest silence of a process, seconds.")
 ]
+LimitOption = Annotated[
+    float | None,
+    typer.Option(
+        "--limit", metavar="S", help="Seconds for a method on a map; pairs left are not asked."
+    ),
+]
 MetricOption = Annotated[
     str,
     typer.Option(
@@ -157,6 +166,7 @@ def evaluate(
     costs: EvaluateCostsOption = None,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     timeout_s: TimeoutOption = 600.0,
+    limit_s: LimitOption = None,
     metric: MetricOption = "both",
 ) -> None:
     """Measure consistency, loss and efficiency of methods on maps, pair by pair.
@@ -184,6 +194,7 @@ def evaluate(
         raise UsageError("--clear-edges goes with --graph: name the graph, or leave it out")
     if floor is not None and not graph:
         raise UsageError("--floor goes with --graph: name the graph, or leave it out")
+    _check_maps(map_files)
     others = baseline or graph or methods
     names = preset if preset is not None else ([] if others else ["shortest"])
     settings = RunSettings(
@@ -206,6 +217,7 @@ def evaluate(
         workers=workers,
         scheduler=scheduler,
         timeout_s=timeout_s,
+        limit_s=limit_s,
     )
     _run(settings, out)
     study = write_outputs(out, metric=yardstick)
@@ -214,15 +226,33 @@ def evaluate(
     unmade = [
         f"{found.map_name}, {found.label}: {found.preparation.get('error', 'lost')}"
         for found in study.outcomes
-        if found.preparation["status"] != "ready"
+        if found.is_asked and found.preparation["status"] != "ready"
     ]
     for what, found in (("counter-examples", faults), ("methods without answers", unmade)):
         if found:
             complain(f"{what}: {len(found)}, the first: {found[0]}")
     if not study.checks and not unmade:
-        complain("nothing was checked: the maps have no such pairs of free cells")
+        complain(f"nothing was checked: {_why_nothing(study)}")
     if faults or unmade or not study.checks:
         raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _check_maps(files: list[Path]) -> None:
+    """Refuse buildings, whose routes over floors are no pairs of cells of one map."""
+    for file in files:
+        if is_building_file(file):
+            raise UsageError(
+                f"{printable(file)} is a building, and methods are measured on maps: `hybridnav "
+                "check BUILDING GRAPH` compares the routes of a graph over all floors"
+            )
+
+
+def _why_nothing(study: Study) -> str:
+    """Return the reason for a run without answers."""
+    for found in study.outcomes:
+        if not found.is_asked:
+            return f"{found.map_name}, {found.label}: {found.preparation['error']}"
+    return "the maps have no such pairs of free cells"
 
 
 def _graph(file: Path, floor: str | None) -> str | hn.WaypointGraph:

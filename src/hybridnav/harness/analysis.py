@@ -26,10 +26,20 @@ if TYPE_CHECKING:
     from hybridnav.harness.yardstick import Yardstick
 
 
+def not_everywhere(outcomes: Iterable[Outcome]) -> set[str]:
+    """Return the labels of methods that were not asked on some of the maps, by their own limits."""
+    return {outcome.label for outcome in outcomes if not outcome.is_asked}
+
+
 def pairs_in_common(outcomes: Iterable[Outcome]) -> set[MapQuery]:
-    """Return the pairs that all methods solved; methods without a solved pair are left out."""
+    """Return the pairs that all methods solved; methods without a solved pair are left out, and
+    those that were not asked on each of the maps."""
     solved: dict[str, set[MapQuery]] = {}
-    for outcome in outcomes:
+    given = list(outcomes)
+    partly = not_everywhere(given)
+    for outcome in given:
+        if outcome.label in partly:
+            continue
         solved.setdefault(outcome.label, set()).update(outcome.solved_keys)
     known = [pairs for pairs in solved.values() if pairs]
     return set.intersection(*known) if known else set()
@@ -64,6 +74,11 @@ class Study:
     def labels(self) -> list[str]:
         """Labels of the methods."""
         return list(dict.fromkeys(outcome.label for outcome in self.outcomes))
+
+    @property
+    def presets(self) -> set[str]:
+        """Labels of the methods that are presets."""
+        return {o.label for o in self.outcomes if o.preparation.get("preset") is not None}
 
     def of_map(self, name: str) -> list[Outcome]:
         """Return the outcomes on one map."""

@@ -59,6 +59,12 @@ def shown(column: str) -> str:
 MEANINGS: dict[str, str] = {
     "method": "name of the method",
     "maps": "number of maps",
+    "kind": "what the method is: a preset of this package, a baseline of it, a planner of others, "
+    "a class, or a graph",
+    "version": "version of the package that plans, or the hash of the file of a class",
+    "settings": "settings that differ from the usual ones",
+    "not asked": "maps that the method cannot take by a limit of its own, and the reason; they are "
+    "no fault, and it is in no table of theirs",
     "metric": "metric of its paths: octile, paths of cells; any-angle, paths of points; weighted "
     "and any-angle-weighted, the same, planned by costs",
     "solved %": "share of the pairs of two joined cells for which it found a path of its own "
@@ -100,7 +106,7 @@ MEANINGS: dict[str, str] = {
     "what a robot saves that asks them all",
     "preparation s": "mean over the maps of the seconds from the loaded map to the first query",
     "memory MB": "mean over the maps of the arrays that the prepared method holds, without those "
-    "of OMPL's process",
+    "of OMPL's process and those inside packages of others",
     "break-even queries": "queries after which the longer preparation has paid off, by mean times; "
     "never without a gain",
     "regions": "contradictions in checks of a map: every region is connected, and regions are "

@@ -20,6 +20,9 @@ ARC_SLACK = 1e-5
 ANSWERED = ("solved", "no path")
 """Statuses of records that hold an answer."""
 
+NOT_ASKED = "not asked"
+"""Status of all records of a method that cannot take the map, by a limit of its own."""
+
 
 Kind = Literal["regions", "plan to path", "path to plan", "paths", "no path", "bounds"]
 """What a contradiction is about: the regions of a map; a plan without a path; a path without a

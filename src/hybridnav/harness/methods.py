@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import inspect
 import json
 import time
@@ -10,12 +11,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.baselines.rivals import needed_package
+from hybridnav.baselines.packages import needed_package
 from hybridnav.config import Preset, load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.graph_method import GraphMethod
 from hybridnav.harness.hybrid_method import HybridMethod
 from hybridnav.harness.names import baseline_name, class_of, source_hash
+from hybridnav.harness.own_grid import OnOwnGrid
 from hybridnav.io import load_graph
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
@@ -51,11 +53,22 @@ BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
 as `module:class`."""
 
 RIVALS: dict[str, tuple[str, dict[str, Any]]] = {
+    "extremitypathfinder": ("hybridnav.baselines.rivals_any_angle:ExtremityPathfinder", {}),
+    "nano-astar": ("hybridnav.baselines.rivals:NanoAstar", {}),
     "networkx": ("hybridnav.baselines.rivals:Networkx", {}),
+    "ompl-whole": ("hybridnav.baselines.rivals_any_angle:OmplWhole", {}),
+    "ompl-whole-prmstar": (
+        "hybridnav.baselines.rivals_any_angle:OmplWhole",
+        {"planner": "PRMstar"},
+    ),
     "pyastar2d": ("hybridnav.baselines.rivals:Pyastar2d", {}),
+    "pyroutingkit": ("hybridnav.baselines.rivals:RoutingKit", {}),
     "tcod": ("hybridnav.baselines.rivals:Tcod", {}),
 }
-"""Planners of others by the package that each needs; named like baselines."""
+"""Planners of others, named like baselines."""
+
+_PACKAGES = {"nano-astar": "nano_astar"}
+"""Packages of rivals that have another name than the rival."""
 
 ON_PLACES = frozenset({"simple-graph", "exact-overlay"})
 
@@ -81,6 +94,8 @@ class MethodSpec:
     """The baseline, or the class as `module:class`, that makes it; empty for that of its name."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Keyword arguments of its class."""
+    grid: dict[str, Any] = field(default_factory=dict)
+    """Settings of a grid of its own; empty for that of the run."""
     source: str = ""
     """Hash of the file of a class of others: a class that was mended is another method."""
 
@@ -118,6 +133,8 @@ class MethodSpec:
             parts += [self.graph.digest, self.clear_edges_only]
         if self.factory or self.settings or self.source:
             parts += [self.factory, self.settings, self.source]
+        if self.grid:
+            parts.append(self.grid)
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -196,16 +213,34 @@ def baseline_spec(
     if ":" not in name:
         name = baseline_name(name, _KNOWN)
     if name in RIVALS:
-        needed_package(name)
+        _require(name)
     class_of(_KNOWN.get(name, (name, {}))[0])
     spec = MethodSpec(name, None, source="" if name in _KNOWN else source_hash(name))
-    if named is not None and (named.name or named.settings):
+    if named is not None and (named.name or named.settings or named.grid):
         settings = named.settings
         spec = replace(spec, name=named.name or name, factory=name, settings=settings)
     if name not in ON_PLACES:
         return spec
     pyramid = Preset().pyramid.model_dump(exclude={"robot_radius_m"})
     return replace(spec, pyramid=pyramid | _given(merge_distance_m, seed))
+
+
+def rival_version(name: str) -> str:
+    """Return package and version of a planner of others; empty for other methods."""
+    if name not in RIVALS:
+        return ""
+    package = "ompl" if name.startswith("ompl") else name
+    return f"{package} {importlib.metadata.version(package)}"
+
+
+def _require(rival: str) -> None:
+    """Refuse to continue without the package of a rival."""
+    if rival.startswith("ompl"):
+        from hybridnav.refine.ompl import require_ompl  # noqa: PLC0415 - as above
+
+        require_ompl()
+    else:
+        needed_package(_PACKAGES.get(rival, rival))
 
 
 def named_spec(
@@ -218,8 +253,14 @@ def named_spec(
     InvalidValueError
         When there is no such baseline or class, or settings do not go with the source.
     """
+    if method.grid and by_costs:
+        raise InvalidValueError(
+            f"method {method.name or method.source}: a grid of its own goes not with costs: "
+            "leave out one of them"
+        )
     if method.kind in {"baseline", "class"}:
-        return baseline_spec(method.source, merge_distance_m=merge_distance_m, named=method)
+        spec = baseline_spec(method.source, merge_distance_m=merge_distance_m, named=method)
+        return replace(spec, grid=method.grid)
     if method.kind == "preset":
         overrides = [f"{key}={json.dumps(value)}" for key, value in method.settings.items()]
         preset = load_preset(method.source, overrides=overrides)
@@ -228,7 +269,7 @@ def named_spec(
         if method.settings:
             raise InvalidValueError(f"a graph has no settings, got {sorted(method.settings)}")
         spec = graph_spec(load_graph(method.source), clear_edges_only=clear_edges_only)
-    return replace(spec, name=method.name or spec.name)
+    return replace(spec, name=method.name or spec.name, grid=method.grid)
 
 
 def graph_spec(graph: WaypointGraph, *, clear_edges_only: bool = False) -> MethodSpec:
@@ -267,6 +308,8 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     """Build a method for a map, with the costs of its cells if it can plan by them."""
     began = time.perf_counter()
     topology = None
+    if spec.grid:
+        grid = replace(grid, **spec.grid)
     if spec.pyramid:
         topology = TopologicalMap(DualGraphPyramid.build(grid, **spec.pyramid))
     built = time.perf_counter()
@@ -291,6 +334,8 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
             options = {"name": spec.name} | options
         method = made_of(grid if topology is None else topology, **options)
     by_costs = costs is not None
+    if spec.grid:
+        method, topology = OnOwnGrid(method, grid), None
     seconds = built - began, time.perf_counter() - built
     is_named = spec.is_named or not spec.source
     return Prepared(method, topology, *seconds, by_costs, is_named)

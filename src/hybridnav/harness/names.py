@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import importlib
+import inspect
 import json
 import sys
 from dataclasses import dataclass, field
@@ -14,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.own_grid import checked_grid
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from types import ModuleType
 
     from hybridnav._typing import PathLike
 
@@ -32,10 +35,10 @@ ALIASES = {
 """Other names of baselines, as the literature writes them, in small letters, "-" for blanks and
 "-star" for "*"."""
 
-_KEYS = ("name", "baseline", "class", "preset", "graph", "settings")
+_KEYS = ("name", "baseline", "class", "preset", "graph", "settings", "grid")
 _SOURCES = _KEYS[1:5]
 _HASH_DIGITS = 12
-_MOST_LETTERS = 60
+_MOST_LETTERS, _MOST_LETTERS_OF_SETTINGS = 60, 200
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,9 @@ class NamedMethod:
     """Name in tables; empty for that of the source."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Keyword arguments of the class; of a preset, values by dotted key."""
+    grid: dict[str, Any] = field(default_factory=dict)
+    """Grid of its own, `robot_radius_m` and `corner_cutting`; empty for that of the run. Paths are
+    judged on that of the run."""
 
 
 def baseline_name(name: str, known: Iterable[str]) -> str:
@@ -95,19 +101,58 @@ def class_of(path: str) -> Any:
 
 
 def source_hash(path: str) -> str:
-    """Return a short hash of the file of a module `module:class`, as it is on the disk now; empty
-    for a module without a file."""
-    module = sys.modules.get(path.partition(":")[0])
-    file = getattr(module, "__file__", None)
-    if file is None or not Path(file).is_file():
+    """Return a short hash of the files of a class `module:class`, as they are on the disk now.
+
+    They are that of its module, and those that it imports from the same folder or the same package,
+    and these in turn. Imports inside functions are not seen. Empty for a module without a file.
+    """
+    files = _files_of(sys.modules.get(path.partition(":")[0]))
+    if not files:
         return ""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:_HASH_DIGITS]
+    # By content alone: a clone elsewhere has the same hash.
+    parts = sorted(hashlib.sha256(file.read_bytes()).hexdigest() for file in files)
+    whole = parts[0] if len(parts) == 1 else hashlib.sha256("".join(parts).encode()).hexdigest()
+    return whole[:_HASH_DIGITS]
+
+
+def _files_of(module: ModuleType | None) -> set[Path]:
+    """Return the files of a module, and of those beside it and in its package that it imports."""
+    files: set[Path] = set()
+    waiting, seen = [module], {module}
+    while waiting:
+        one = waiting.pop()
+        file = getattr(one, "__file__", None)
+        if one is None or file is None or not Path(file).is_file():
+            continue
+        files.add(Path(file))
+        for value in vars(one).values():
+            name = getattr(value, "__name__" if inspect.ismodule(value) else "__module__", None)
+            other = sys.modules.get(name) if isinstance(name, str) else None
+            if other is not None and other not in seen and _is_beside(other, one):
+                seen.add(other)
+                waiting.append(other)
+    return files
+
+
+def _is_beside(other: ModuleType, module: ModuleType) -> bool:
+    """Return whether two modules are of one package, or lie in one folder."""
+    package = module.__name__.partition(".")[0]
+    if "." in module.__name__ and other.__name__.partition(".")[0] == package:
+        return True
+    files = [getattr(one, "__file__", None) for one in (other, module)]
+    return all(files) and Path(str(files[0])).parent == Path(str(files[1])).parent
 
 
 def own_name(method: Any) -> str:
     """Return the name that a method gives itself, on one line; empty for none."""
     name = getattr(method, "name", "")
     return " ".join(name.split())[:_MOST_LETTERS] if isinstance(name, str) else ""
+
+
+def own_settings(method: Any) -> str:
+    """Return the settings that a method states in its `settings`, on one line; empty for none."""
+    words = getattr(method, "settings", "")
+    return " ".join(words.split())[:_MOST_LETTERS_OF_SETTINGS] if isinstance(words, str) else ""
 
 
 def read_methods(path: PathLike) -> tuple[NamedMethod, ...]:
@@ -177,4 +222,8 @@ def _entry(entry: Any, where: str) -> NamedMethod:
         json.dumps(settings, sort_keys=True)
     except TypeError as error:
         raise InvalidValueError(f"{where}: settings must be numbers and texts: {error}") from None
-    return NamedMethod(kinds[0], source, " ".join(name.split())[:_MOST_LETTERS], settings)
+    try:
+        grid = checked_grid(entry.get("grid") or {})
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{where}: {error}") from None
+    return NamedMethod(kinds[0], source, " ".join(name.split())[:_MOST_LETTERS], settings, grid)

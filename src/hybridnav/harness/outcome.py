@@ -12,6 +12,7 @@ import numpy as np
 from hybridnav.harness.contradictions import (
     ANSWERED,
     ANY_ANGLE_SLACK,
+    NOT_ASKED,
     SLACK,
     contradiction,
     is_any_angle,
@@ -33,7 +34,7 @@ EXPANSIONS = {
 }
 """Fields of records that count things taken from the queue of a search, and their columns."""
 
-_FINE = ("ready", *ANSWERED)
+_FINE = ("ready", NOT_ASKED, *ANSWERED)
 
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]
 MapQuery = tuple[str, QueryKey]
@@ -63,6 +64,11 @@ class Outcome:
     yardstick: Yardstick = "both"
     """What `losses` refer to."""
 
+    @property
+    def is_asked(self) -> bool:
+        """Whether the method was asked on this map, which it may refuse by a limit of its own."""
+        return bool(self.preparation["status"] != NOT_ASKED)
+
     @cached_property
     def _matched(self) -> list[Record | None]:
         own = {query_key(record): record for record in self.records}
@@ -71,7 +77,7 @@ class Outcome:
     @cached_property
     def references(self) -> list[Record]:
         """The reference's records of the pairs in the arrays."""
-        asked = {query_key(record) for record in self.records}
+        asked = {query_key(record) for record in self.records if self.is_asked}
         return [
             record
             for key, record in self.optimum.items()
@@ -345,7 +351,7 @@ class Outcome:
     @property
     def failures(self) -> int:
         """Queries without an answer: errors, time-outs, lost workers."""
-        return sum(record["status"] not in ANSWERED for record in self.records)
+        return sum(record["status"] not in (NOT_ASKED, *ANSWERED) for record in self.records)
 
 
 def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hybridnav._files import replace_file
+from hybridnav.harness.ahead import ahead_of_presets
 from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.columns import EFFICIENCY_COLUMNS, OPTIMA, YARDSTICKS, loss_columns, shown
 from hybridnav.harness.kinds import CONSISTENCY_COLUMNS
+from hybridnav.harness.method_table import METHOD_COLUMNS, rows_of_methods
 from hybridnav.harness.report import render_report
 from hybridnav.harness.rows import rows_of_map, rows_of_study
 from hybridnav.harness.sections import failures_of, report_of, with_values
@@ -73,6 +75,7 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
         f"{study.failures} queries without an answer.\n\n"
         f"{_table(overall, CONSISTENCY_COLUMNS)}\n"
     )
+    text += f"## Methods\n\n{_table(rows_of_methods(study), METHOD_COLUMNS)}\n"
     failures = failures_of(study)
     if failures:
         text += "## Methods without answers\n\n"
@@ -81,10 +84,20 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
     for optimum in YARDSTICKS[study.metric]:
         rows = with_values(overall, f"{optimum} loss mean %")
         if rows:
-            text += f"## Loss over {OPTIMA[optimum]}\n\n{_table(rows, loss_columns(optimum))}\n"
+            columns = loss_columns(optimum)
+            text += f"## Loss over {OPTIMA[optimum]}\n\n{_table(rows, columns)}\n"
+            text += _note(rows, columns, study)
     text += "".join(f"{warning}\n\n" for warning in study.circumstances.warnings)
     timed = any(with_values(overall, column) for column in EFFICIENCY_COLUMNS)
-    return text + (f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}" if timed else "")
+    if timed:
+        text += f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}\n"
+        text += _note(overall, EFFICIENCY_COLUMNS, study)
+    return text.rstrip("\n") + "\n"
+
+
+def _note(rows: Sequence[Row], columns: Sequence[str], study: Study) -> str:
+    note = ahead_of_presets(rows, columns, study.presets)
+    return f"{note}\n\n" if note else ""
 
 
 def _table(rows: Sequence[Row], columns: Sequence[str]) -> str:

@@ -29,6 +29,8 @@ class Table:
     caption: str
     numeric: frozenset[int] = frozenset()
     """Indices of the columns that are aligned to the right."""
+    note: str = ""
+    """A sentence below it."""
 
     def __post_init__(self) -> None:
         for row in self.rows:
@@ -88,6 +90,8 @@ class ReportData:
     maps: list[MapSection]
     n_faults: int = 0
     """Counter-examples found."""
+    methods: Table | None = None
+    """The table of methods: versions and settings."""
     overall: list[Table] = field(default_factory=list)
     """Tables of all maps together, none for one map."""
     failures: list[tuple[str, str]] = field(default_factory=list)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.analysis import pairs_in_common
-from hybridnav.harness.columns import OPTIMA
+from hybridnav.harness.analysis import not_everywhere, pairs_in_common
+from hybridnav.harness.columns import EFFICIENCY_COLUMNS, OPTIMA
 from hybridnav.harness.kinds import consistency_row
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile
@@ -52,8 +52,10 @@ def figures(
     by_grid = int(sum(fallbacks)) if fallbacks else math.nan
     solved, pairs = int(np.isfinite(lengths).sum()), len(lengths)
     by_costs = any(outcome.costs for outcome in outcomes)
+    # A method that was not asked on a map says nothing of its metric there.
+    asked = [outcome for outcome in outcomes if outcome.is_asked] or outcomes
     row: Row = {
-        "metric": outcomes[0].metric if outcomes else "",
+        "metric": asked[0].metric if asked else "",
         "pairs": pairs,
         "solved": solved,
         "solved %": 100 * solved / pairs if pairs else math.nan,
@@ -185,8 +187,8 @@ def _pooled(parts: list[FloatArray]) -> FloatArray:
 
 
 def rows_of_map(study: Study, name: str) -> list[Row]:
-    """Return one row for each method on a map."""
-    outcomes = study.of_map(name)
+    """Return one row for each method on a map that was asked there."""
+    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
     reference = [outcome for outcome in outcomes if outcome.label == REFERENCE]
     common = pairs_in_common(outcomes)
     return [
@@ -196,21 +198,32 @@ def rows_of_map(study: Study, name: str) -> list[Row]:
 
 
 def rows_of_study(study: Study) -> list[Row]:
-    """Return one row for each method, over all of its maps."""
+    """Return one row for each method, over all of its maps.
+
+    One that was not asked on some of them has no losses and times here: they would be those of
+    other pairs. The rows of the maps have them.
+    """
     references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
-    common = study.common
+    partly = not_everywhere(study.outcomes)
     rows = []
     for label in study.labels:
-        outcomes = study.of_method(label)
+        outcomes = [outcome for outcome in study.of_method(label) if outcome.is_asked]
+        if not outcomes:
+            continue
+        common = set() if label in partly else study.common
         there = [references[o.map_name] for o in outcomes if o.map_name in references]
-        rows.append({"method": label, "maps": len(outcomes), **figures(outcomes, there, common)})
+        row: Row = {"method": label, "maps": len(outcomes)}
+        row |= figures(outcomes, there, common)
+        if label in partly:
+            row |= dict.fromkeys(EFFICIENCY_COLUMNS, math.nan)
+        rows.append(row)
     return rows
 
 
 def rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[Row]:
     """Return the mean loss over an optimum in per cent by the length of the octile optimum, one row
     for each method on a map, over the pairs that all methods solved."""
-    outcomes = study.of_map(name)
+    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
     common = pairs_in_common(outcomes)
     rows = []
     for outcome in outcomes:

@@ -42,7 +42,7 @@ from hybridnav.harness.scenes import (
     read_scene,
     text_of_costs,
 )
-from hybridnav.harness.task import Task
+from hybridnav.harness.task import TOO_SLOW, Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.io import load_graph
@@ -95,8 +95,9 @@ class RunSettings:
     all."""
     lattice_step_m: float | None = None
     """Instead of sampled pairs: all pairs of free cells on a lattice."""
-    scenarios: str | None = None
-    """Instead of sampled pairs: a MovingAI scenario file; there must be one map."""
+    scenarios: str | tuple[str, ...] | None = None
+    """Instead of sampled pairs: a MovingAI scenario file, which goes with one map, or one for each
+    map, an empty text for sampled pairs."""
     seed: int = 0
     """Seed of the sampler."""
     repeat: int = 0
@@ -118,6 +119,9 @@ class RunSettings:
     """Address of a dask.distributed scheduler, instead of processes of this machine."""
     timeout_s: float = 600.0
     """Longest silence of a worker: one query, or a preparation."""
+    limit_s: float | None = None
+    """Seconds that a method may take on a map, for its preparation and all answers; the pairs that
+    are left then are recorded as "too slow", and the timing pass leaves it out. None: no limit."""
 
 
 def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no_progress) -> int:
@@ -162,12 +166,19 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     path = Path(folder)
     if settings.repeat < 0:
         raise InvalidValueError(f"repeats are at least 0, got {settings.repeat}")
+    if settings.limit_s is not None and not settings.limit_s > 0:
+        raise InvalidValueError(f"the limit must be positive, got {settings.limit_s} s")
     clear_scenes()  # a file may have changed since the last run of this process
     if settings.graphs and len(settings.maps) != 1:
         raise InvalidValueError(
             f"a graph goes with one map, got {len(settings.maps)} maps: evaluate each by itself"
         )
-    tasks = [task for name in settings.maps for task in _tasks_of(settings, name)]
+    files = _scenario_files(settings)
+    tasks = [
+        task
+        for name, scenarios in zip(settings.maps, files, strict=True)
+        for task in _tasks_of(settings, name, scenarios)
+    ]
     try:
         path.mkdir(parents=True, exist_ok=True)
         if any(path.iterdir()) and not (path / RECORDS_FILE).exists():
@@ -189,7 +200,7 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
                     progress(done, total)
             timing = _timing_tasks(settings, tasks, records, path)
             total += sum(len(task.ids) for task in timing)
-            alone = replace(settings, workers=1)
+            alone = replace(settings, workers=1, timeout_s=_silence_s(settings, timing))
             left = [part for one in timing if (part := _missing(one, records.ids)) is not None]
             for batch in _run(alone, left):
                 done += len(batch)
@@ -198,6 +209,12 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
             return len(records.ids) - before
     except OSError as error:
         raise InvalidValueError(f"folder {folder}: {error.strerror}") from None
+
+
+def _silence_s(settings: RunSettings, timing: Sequence[TimingTask]) -> float:
+    """Return the longest silence of the timing pass, which prepares all methods of a map before its
+    first record."""
+    return settings.timeout_s * max((len(task.methods) for task in timing), default=1)
 
 
 def _check_costs(settings: RunSettings, records: RecordFile) -> None:
@@ -246,11 +263,14 @@ def _timing_tasks(
     those queries that had no answer."""
     if settings.repeat == 0:
         return []
-    answered = {r["id"] for r in read_records(folder) if r["status"] in ANSWERED}
+    records_there = read_records(folder)
+    answered = {r["id"] for r in records_there if r["status"] in ANSWERED}
+    slow = {(r["map_sha"], r["method_sha"]) for r in records_there if r["status"] == TOO_SLOW}
     found = []
     for sha in dict.fromkeys(task.map_sha for task in tasks):
         own = [task for task in tasks if task.map_sha == sha]
-        made = [task for task in own if (sha, task.method.digest) not in records.failed]
+        left_out = records.failed | slow
+        made = [task for task in own if (sha, task.method.digest) not in left_out]
         methods = {task.method.digest: task.method for task in made}
         without = {
             (task.method.digest, pair.key)
@@ -284,7 +304,18 @@ def _new_ids(task: Task, there: set[str]) -> set[str]:
     return {name for name in task.ids if name not in there}
 
 
-def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
+def _scenario_files(settings: RunSettings) -> tuple[str, ...]:
+    """Return the scenario file of each map, an empty text for none."""
+    given = settings.scenarios
+    files = (given,) if isinstance(given, str) else given or ("",) * len(settings.maps)
+    if len(files) != len(settings.maps):
+        raise InvalidValueError(
+            f"a scenario file goes with one map, got {len(files)} for {len(settings.maps)} maps"
+        )
+    return files
+
+
+def _tasks_of(settings: RunSettings, name: str, scenarios: str) -> list[Task]:
     """Return the tasks of one map, the reference's first."""
     suffix = Path(name).suffix.lower()
     ros = suffix != ".map"
@@ -300,13 +331,13 @@ def _tasks_of(settings: RunSettings, name: str) -> list[Task]:
     spec = MapSpec(file, radius_m, settings.corner_cutting, settings.max_cells, settings.costs)
     scene = read_scene(spec)
     digest = scene.digest
-    pairs = _pairs_of(settings, scene.grid)
+    pairs = _pairs_of(settings, scene.grid, scenarios)
     parts = [
         tuple(pairs[at : at + _PAIRS_PER_TASK])
         for at in range(0, max(len(pairs), 1), _PAIRS_PER_TASK)
     ]
     return [
-        Task(spec, digest, method, part, frozenset(part[:_SAMPLE]))
+        Task(spec, digest, method, part, frozenset(part[:_SAMPLE]), limit_s=settings.limit_s)
         for method in methods_of(settings, merge_distance_m)
         for part in parts
     ]
@@ -349,13 +380,9 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
     return list({spec.digest: spec for spec in specs}.values())
 
 
-def _pairs_of(settings: RunSettings, grid: OccupancyGrid) -> list[Pair]:
-    if settings.scenarios is not None:
-        if len(settings.maps) != 1:
-            raise InvalidValueError(
-                f"a scenario file goes with one map, got {len(settings.maps)} maps"
-            )
-        pairs = scenario_pairs(grid, read_scenarios(settings.scenarios))
+def _pairs_of(settings: RunSettings, grid: OccupancyGrid, scenarios: str) -> list[Pair]:
+    if scenarios:
+        pairs = scenario_pairs(grid, read_scenarios(scenarios))
         return evenly_spread(pairs, settings.pairs or len(pairs))
     if settings.lattice_step_m is not None:
         return lattice_pairs(grid, settings.lattice_step_m)

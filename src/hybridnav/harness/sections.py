@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.harness.ahead import ahead_of_presets
 from hybridnav.harness.cases import cases_of, counter_examples
 from hybridnav.harness.columns import (
     EFFICIENCY_COLUMNS,
@@ -17,6 +18,7 @@ from hybridnav.harness.columns import (
     shown,
 )
 from hybridnav.harness.kinds import CONSISTENCY_COLUMNS, DEFINITION
+from hybridnav.harness.method_table import METHOD_COLUMNS, rows_of_methods
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, nanquantile
 from hybridnav.harness.report import MapSection, ReportData, Table
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.tables import Row
     from hybridnav.harness.yardstick import Yardstick
 
-_WORDS = ("method", "map", "metric")
+_WORDS = ("method", "map", "metric", *METHOD_COLUMNS)
 """Columns that hold no numbers."""
 
 REFERS_TO: dict[Yardstick, str] = {
@@ -48,7 +50,12 @@ _BY_DISTANCE = "Mean loss over {} in per cent, by length of the octile optimum (
 
 
 def report_of(
-    study: Study, title: str, overall: Sequence[Row], by_map: dict[str, list[Row]]
+    study: Study,
+    title: str,
+    overall: Sequence[Row],
+    by_map: dict[str, list[Row]],
+    *,
+    first: int = 1,
 ) -> ReportData:
     """Return the contents of the report.
 
@@ -60,6 +67,8 @@ def report_of(
         Title of the report.
     overall, by_map
         Rows of all maps together, and of each map.
+    first
+        Number of the first section, in a report that has sections of other studies before it.
 
     Returns
     -------
@@ -69,9 +78,10 @@ def report_of(
     drawn: dict[CaseKey, str] = {}
     maps = [
         _section(study, name, by_map[name], number, drawn)
-        for number, name in enumerate(study.maps, start=1)
+        for number, name in enumerate(study.maps, start=first)
     ]
     together = _tables(study, overall) if len(maps) > 1 else []
+    methods = _table(rows_of_methods(study), METHOD_COLUMNS, "Versions and settings")
     facts = [
         *_machines(study).items(),
         ("maps", str(len(study.maps))),
@@ -86,7 +96,7 @@ def report_of(
     several = labels if together else {}
     used = dict.fromkeys(
         column
-        for table in [*together, *(t for m in maps for t in m.tables)]
+        for table in [methods, *together, *(t for m in maps for t in m.tables)]
         for column in table.columns
     )
     return ReportData(
@@ -95,6 +105,7 @@ def report_of(
         faults=counter_examples(study, drawn),
         n_faults=len(study.faults),
         checks=study.checks,
+        methods=methods,
         overall=together,
         maps=maps,
         failures=failures_of(study),
@@ -146,10 +157,6 @@ def _machines(study: Study) -> dict[str, str]:
     for outcome in study.outcomes:
         for key, value in outcome.preparation.get("environment", {}).items():
             found.setdefault(key, {})[value] = None
-    for outcome in study.outcomes:
-        version = outcome.preparation.get("version")
-        if version:
-            found.setdefault("planners of others", {})[version] = None
     return {key: ", ".join(values) for key, values in found.items()}
 
 
@@ -160,16 +167,22 @@ def with_values(rows: Sequence[Row], column: str) -> list[Row]:
 
 def _tables(study: Study, rows: Sequence[Row]) -> list[Table]:
     """Return the tables of Thrun's three criteria: one of losses over each optimum."""
+    presets = study.presets
     tables = [_table(rows, CONSISTENCY_COLUMNS, "Consistency")]
     for optimum in YARDSTICKS[study.metric]:
         known = with_values(rows, f"{optimum} loss mean %")
         if known:
-            tables.append(_table(known, loss_columns(optimum), f"Loss over {OPTIMA[optimum]}"))
+            columns = loss_columns(optimum)
+            note = ahead_of_presets(known, columns, presets)
+            tables.append(_table(known, columns, f"Loss over {OPTIMA[optimum]}", note))
     timed = any(with_values(rows, column) for column in EFFICIENCY_COLUMNS)
-    return [*tables, *([_table(rows, EFFICIENCY_COLUMNS, "Efficiency")] if timed else [])]
+    if timed:
+        note = ahead_of_presets(rows, EFFICIENCY_COLUMNS, presets)
+        tables.append(_table(rows, EFFICIENCY_COLUMNS, "Efficiency", note))
+    return tables
 
 
-def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
+def _table(rows: Sequence[Row], columns: Sequence[str], caption: str, note: str = "") -> Table:
     """Return a table without columns that are empty."""
     kept = ["method", *(column for column in columns if with_values(rows, column))]
     return Table(
@@ -177,6 +190,7 @@ def _table(rows: Sequence[Row], columns: Sequence[str], caption: str) -> Table:
         rows=[[text_of(row.get(column, "")) for column in kept] for row in rows],
         caption=caption,
         numeric=frozenset(at for at, column in enumerate(kept) if column not in _WORDS),
+        note=note,
     )
 
 
@@ -185,7 +199,7 @@ def _section(
 ) -> MapSection:
     """Return the section of a map; the anchors of its pictures are added to `drawn`."""
     outcomes = study.of_map(name)
-    charted = _drawn(study, outcomes)
+    charted = [outcome for outcome in _drawn(study, outcomes) if outcome.is_asked]
     first = outcomes[0].preparation
     shape = first.get("shape", [0, 0])
     tables = _tables(study, rows)

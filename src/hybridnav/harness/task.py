@@ -5,20 +5,20 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybridnav.costs import CostLayer
-from hybridnav.errors import HybridNavError, InvalidValueError
+from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
 from hybridnav.grid import CellClass
 from hybridnav.grid.worlds import figure1_world
-from hybridnav.harness.contradictions import Fault
+from hybridnav.harness.contradictions import NOT_ASKED, Fault
 from hybridnav.harness.judging import Judge
-from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
-from hybridnav.harness.names import own_name
+from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare, rival_version
+from hybridnav.harness.names import own_name, own_settings
 from hybridnav.harness.pairs import SAMPLER_VERSION
 from hybridnav.harness.paths import encode_path
 from hybridnav.harness.records import environment, map_digest, pair_id, preparation_id
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
     from hybridnav.harness.scenes import MapSpec, Scene
+
+
+TOO_SLOW = "too slow"
+"""Status of a query that is not asked, because the time of its method on the map is spent."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,8 @@ class Task:
 
     attempt: int = 0
     """Number of times that the task was lost before it began."""
+    limit_s: float | None = None
+    """Seconds that the method may take, for its preparation and all answers; None for any."""
 
     @cached_property
     def ids(self) -> tuple[str, ...]:
@@ -106,16 +112,36 @@ def run_task(task: Task) -> Iterator[Record]:
     try:
         prepared, judge = _ready(scene, task)
     except Exception as error:  # noqa: BLE001 - a method that cannot be made is a result
-        reason = _reason(error)
-        why = {"error": reason, "traceback": _traceback_of(error)}
-        yield {**head, "status": "error", **why, **_about(scene, task)}
+        status, why = _of_refusal(error)
+        yield {**head, "status": status, **why, **_about(scene, task)}
+        why = {"status": status, "error": why["error"], "faults": []}
         for name, pair in zip(task.ids[1:], task.pairs, strict=True):
-            yield {**_of_pair(name, pair, common), "status": "error", "error": reason, "faults": []}
+            yield {**_of_pair(name, pair, common), **why}
         return
     with closing(prepared):
         yield {**head, "status": "ready", **_about(scene, task), **_of_preparation(prepared, judge)}
-        for name, pair in zip(task.ids[1:], task.pairs, strict=True):
-            yield {**_of_pair(name, pair, common), **_answer(prepared, judge, pair)}
+        spent = prepared.pyramid_seconds + prepared.method_seconds
+        for done, (name, pair) in enumerate(zip(task.ids[1:], task.pairs, strict=True)):
+            if task.limit_s is not None and spent > task.limit_s:
+                answer = _too_slow(spent, task.limit_s, f"{done} of {len(task.pairs)} queries")
+            else:
+                answer = _answer(prepared, judge, pair)
+                spent += answer.get("seconds", 0.0)
+            yield {**_of_pair(name, pair, common), **answer}
+
+
+def _too_slow(spent: float, limit_s: float, done: str) -> Record:
+    """Return the answer to a query that a method was too slow to be asked."""
+    why = f"not asked after {spent:.1f} s for its preparation and {done}, at most {limit_s:g} s"
+    return {"status": TOO_SLOW, "error": why, "faults": []}
+
+
+def _of_refusal(error: Exception) -> tuple[str, Record]:
+    """Return status and fields of the preparation of a method that could not be made."""
+    reason = {"error": _reason(error)}
+    if isinstance(error, UnsuitableMapError):
+        return NOT_ASKED, reason
+    return "error", {**reason, "traceback": _traceback_of(error)}
 
 
 def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
@@ -124,6 +150,7 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     return {
         **({"label": label} if label else {}),
         **({"version": str(version)} if (version := getattr(method, "version", "")) else {}),
+        **({"settings_text": words} if (words := own_settings(method)) else {}),
         **({"by_costs": True} if prepared.by_costs else {}),
         "pyramid_seconds": prepared.pyramid_seconds,
         "method_seconds": prepared.method_seconds,
@@ -161,6 +188,10 @@ def _about(scene: Scene, task: Task) -> Record:
         "corner_cutting": grid.corner_cutting,
         "free_cells": int((grid.classes == CellClass.FREE).sum()),
         "metric": task.method.metric,
+        "made_by": task.method.made_by,
+        **({"version": version} if (version := rival_version(task.method.made_by)) else {}),
+        **({"settings": task.method.settings} if task.method.settings else {}),
+        **({"grid": task.method.grid} if task.method.grid else {}),
         "preset": None if task.method.preset is None else _plain(task.method.preset),
         "pyramid": _plain(task.method.pyramid),
         "environment": environment(),
@@ -327,12 +358,15 @@ def _plan_steps(answer: MethodResult) -> int | None:
 
 
 def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
-    """Compile or load the kernels of a method on a small map, so that no time includes it."""
+    """Compile or load the kernels of a method on a small map, so that no time includes it.
+
+    A method that cannot take that map may yet take those of the run.
+    """
     if (spec.digest, by_costs) in _WARM:
         return
     grid = figure1_world().grid(robot_radius_m=0)
     layer = CostLayer.clearance(grid) if by_costs else None
-    with closing(prepare(spec, grid, layer)) as prepared:
+    with suppress(UnsuitableMapError), closing(prepare(spec, grid, layer)) as prepared:
         Judge(grid, prepared, reference=False, costs=layer)
         for goal in ((2, 2), (grid.shape[0] - 3, 12)):
             prepared.method.solve((2, 2), goal)
