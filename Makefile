@@ -1,5 +1,6 @@
 # `make route` plans the demonstration route, `make test` passes all checks, `make docs` builds the
-# documentation, `make site` with executed notebooks; all set up by themselves.
+# documentation, `make site` with executed notebooks, `make study` measures all methods on public maps; all set up by
+# themselves.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -8,7 +9,11 @@ READY := $(VENV)/.ready
 SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env
 NOJIT_TESTS := tests/pyramid/test_blocks.py tests/pyramid/test_invariants.py tests/search/test_search.py
 
-.PHONY: route test test-full lint docs site unit nojit full setup maps lock clean
+# quarter or whole; the folder of the maps.
+STUDY ?= quarter
+HYBRIDNAV_DATA ?= $(wildcard ../shared/data)
+
+.PHONY: route test test-full lint docs site study unit nojit full setup maps lock clean
 
 route: setup
 	mkdir -p out
@@ -37,6 +42,12 @@ docs: setup
 site: setup
 	$(SPHINX) -D nb_execution_mode=cache docs out/site
 
+# Thrun's questions on 28 public maps: out/study, docs/study.md and every figure that is quoted from it. A run that was
+# stopped goes on. Planners of others are asked if they can be installed.
+study: setup
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --editable '.[bench]'
+	HYBRIDNAV_DATA='$(HYBRIDNAV_DATA)' $(BIN)/python -m benchmarks.study --study $(STUDY)
+
 # On all cores, a file of tests to each in turn.
 unit: setup
 	$(BIN)/python -m pytest -m "not full" -n auto --dist loadfile
@@ -45,8 +56,8 @@ unit: setup
 nojit: setup
 	NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
 
-# Four times as many random examples as `unit` tries. Bounds checks need a cache of their own: cached code ignores
-# the setting.
+# Four times as many examples as `unit` tries, new ones each time. Bounds checks need a cache of their own: cached code
+# ignores the setting.
 full: setup
 	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-bounds $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)

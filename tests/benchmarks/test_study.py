@@ -1,0 +1,338 @@
+"""The study on two maps of our own: its figures, its page, its PDF, its archive."""
+
+import copy
+import hashlib
+import json
+import re
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybridnav as hn
+from benchmarks import study
+from benchmarks._study_archive import write_archive
+from benchmarks._study_data import collect
+from benchmarks._study_maps import StudyMap
+from benchmarks._study_page import page
+from benchmarks._study_pdf import MOST_PAGES, charts_of, sheets_of
+from benchmarks._study_run import PLANS, Part, Plan, parts_of, read_note, rivals, run
+from benchmarks._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
+from hybridnav.config import load_preset
+from hybridnav.errors import InvalidValueError
+from hybridnav.harness.methods import BASELINES, RIVALS
+from tests.benchmarks.recomputed import REFERENCE, Recomputed
+from tests.harness.small_runs import run_here
+
+MAPS = Path(__file__).parents[2] / "maps"
+NAMES = ("office/office", "figure1/figure1")
+PLAN = Plan("small", pairs=6, ompl_pairs=3, repeat=3, limit_s=300.0)
+PARTS = (
+    Part("lengths", ("octile", "paper", "shortest"), ("hpa-star", "networkx"), 6, 3),
+    Part("costs", ("robot", "shortest"), (), 6, 3, ("clearance",)),
+    Part("ompl", (load_preset("portals", overrides=["planner.smooth=line-of-sight"]),), (), 3, 0),
+)
+KINDS = dict.fromkeys(NAMES, "ROS")
+FIGURES = ("lengths", "costs", "ompl")
+
+
+def own_maps():
+    return [StudyMap(MAPS / f"{name}.yaml", "ROS") for name in NAMES]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A study of all parts."""
+    made = tmp_path_factory.mktemp("study")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hybridnav.harness.run.run_local", run_here)
+        run(own_maps(), made, PLAN, PARTS)
+    return made
+
+
+@pytest.fixture(scope="module")
+def data(folder):
+    """Its figures, after all its outputs were written."""
+    study.write_all(folder, MAPS, KINDS, folder / "docs")
+    return json.loads((folder / "docs" / "data" / "study.json").read_text(encoding="utf-8"))
+
+
+# --- figures ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("part", FIGURES)
+def test_the_figures_are_those_of_the_records(folder, data, part):
+    known, figures = Recomputed(folder / part), data["parts"][part]
+    assert figures["pairs"] == len(known.asked) > 0
+    assert figures["pairs in common"] == len(known.common) > 0
+    assert [row["method"] for row in figures["methods"]] != []
+    assert {row["method"] for row in figures["methods"]} == set(known.whole)
+    assert {r["method"] for r in figures["others"]} == set(known.methods) - set(known.whole)
+    optima = ("weighted",) if part == "costs" else ("any-angle", "octile")
+    for row in [*figures["methods"], *figures["others"]]:
+        name = row["method"]
+        expected = known.counts(name) | known.efficiency(name) | known.gaps(name)
+        for optimum in optima:
+            expected |= known.loss_figures(name, optimum)
+        assert len(expected) > 14
+        for column, value in expected.items():
+            assert row[column] == pytest.approx(value, rel=1e-5, abs=1e-9), (name, column)
+
+
+@pytest.mark.parametrize("part", FIGURES)
+def test_consistency_is_that_of_the_records(folder, data, part):
+    known = Recomputed(folder / part)
+    answered = 0
+    for row in data["parts"][part]["consistency"]:
+        found, rightly, own = known.checked(row["method"])
+        answered += own
+        for kind, count in found.items():
+            assert row[kind] == (f"0 of {count}" if count else ""), (row["method"], kind)
+        assert row['"no path", right'] == rightly
+    assert data["parts"][part]["checks"] == answered
+    assert data["parts"][part]["contradictions"] == 0
+
+
+def test_a_longer_path_in_the_records_is_a_larger_loss(folder, data, tmp_path):
+    made = tmp_path / "study"
+    made.mkdir()
+    for file in folder.glob("*/r*.jsonl"):
+        lines = file.read_text(encoding="utf-8").splitlines()
+        if file.parent.name == "lengths" and file.name == "records.jsonl":
+            records = [json.loads(line) for line in lines]
+            for record in records:
+                if record["method"] == "paper" and record["status"] == "solved":
+                    record["length_m"] *= 2
+            lines = [json.dumps(record) for record in records]
+        (made / file.parent.name).mkdir(exist_ok=True)
+        (made / file.parent.name / file.name).write_text("\n".join([*lines, ""]))
+    (made / "study-run.json").write_bytes((folder / "study-run.json").read_bytes())
+    changed = collect(made, MAPS, KINDS)
+    (before,) = [r for r in data["parts"]["lengths"]["methods"] if r["method"] == "paper"]
+    (after,) = [r for r in changed["parts"]["lengths"]["methods"] if r["method"] == "paper"]
+    column = "octile loss mean %"
+    assert after[column] == pytest.approx(2 * before[column] + 100, rel=1e-4)
+    assert page(changed) != page(data)
+
+
+def test_a_method_that_one_map_is_too_large_for_takes_no_pairs_from_the_others(data):
+    lengths = data["parts"]["lengths"]
+    (networkx,) = lengths["others"]
+    assert (networkx["method"], networkx["maps"]) == ("networkx", 1)
+    assert networkx["pairs in common"] < lengths["pairs in common"] == lengths["pairs"]
+    assert networkx["octile loss mean %"] == 0
+    assert networkx["speed-up of octile"] > 0
+    (missing,) = lengths["unanswered"]
+    assert missing["maps"] == ["office/office"]
+    assert "up to 100,000 free cells" in missing["first"]
+    text = page(data)
+    assert re.search(r"\| Lengths \| networkx \| not (made|asked) \|", text)
+    assert "up to 100,000 free cells" in text
+
+
+def test_no_name_of_the_machine_and_no_path_of_it_is_published(folder, data):
+    text = (folder / "docs" / "data" / "study.json").read_text(encoding="utf-8") + page(data)
+    first = json.loads((folder / "lengths" / "records.jsonl").read_text().splitlines()[0])
+    assert first["environment"]["host"] not in re.findall(r"[\w.-]+", text)
+    assert str(MAPS) not in text
+    assert str(folder) not in text
+
+
+# --- page ---------------------------------------------------------------------------------------
+
+
+def test_the_page_is_that_of_its_figures(folder, data):
+    text = (folder / "docs" / "study.md").read_text(encoding="utf-8")
+    assert text == page(data)
+    for part in data["parts"].values():
+        for row in [*part["methods"], *part["others"]]:
+            assert f"| {row['method']} |" in text
+    for picture in re.findall(r"\]\((images/.+?)\)", text):
+        assert (folder / "docs" / picture).read_text(encoding="utf-8").startswith("<?xml")
+    stale = copy.deepcopy(data)
+    stale["parts"]["lengths"]["methods"][1]["query ms, median"] *= 1.5
+    assert page(stale) != text
+
+
+def test_a_contradiction_stands_on_the_page(data):
+    wrong = copy.deepcopy(data)
+    wrong["parts"]["lengths"] |= {"contradictions": 3, "first contradictions": ["office: a wall"]}
+    text = page(wrong)
+    assert "* Contradictions: 3 in " in text
+    assert "3 contradictions" in text
+    assert "office: a wall" in text
+
+
+# --- PDF ----------------------------------------------------------------------------------------
+
+
+def test_the_pdf_is_short_legible_and_shows_no_map(folder, data):
+    raw = (folder / "study.pdf").read_bytes()
+    count = len(re.findall(rb"/Type /Page\b", raw))
+    assert 1 <= count <= MOST_PAGES
+    assert b"/Subtype /Image" not in raw
+    assert b"/CreationDate" not in raw
+    sheets = sheets_of(data, charts_of(folder, MAPS))
+    assert len(sheets.pages) == count
+    for sheet in sheets.pages:
+        assert sheet.get_size_inches().tolist() == [WIDTH_IN, HEIGHT_IN]
+        sheet.draw_without_rendering()
+        for text in _texts(sheet):
+            assert text.get_fontsize() >= 8, text.get_text()
+            box = text.get_window_extent().transformed(sheet.dpi_scale_trans.inverted())
+            assert box.x0 >= 0.2, text.get_text()
+            assert box.x1 <= WIDTH_IN - 0.2, text.get_text()
+            assert box.y0 >= 0.2, text.get_text()
+
+
+def test_texts_of_the_pdf_do_not_overlap(folder, data):
+    for sheet in sheets_of(data, charts_of(folder, MAPS)).pages:
+        sheet.draw_without_rendering()
+        boxes = np.array([text.get_window_extent().extents for text in sheet.texts])
+        low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
+        high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
+        both = np.triu(((high - low) > 0.5).all(axis=2), 1)
+        pairs = [
+            (sheet.texts[i].get_text(), sheet.texts[j].get_text()) for i, j in np.argwhere(both)
+        ]
+        assert pairs == []
+
+
+def _texts(sheet):
+    own = list(sheet.texts)
+    for axes in sheet.axes:
+        legend = axes.get_legend()
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            own += [axis.label]
+            own += [t.label1 for t in axis.get_major_ticks() if low <= t.get_loc() <= high]
+        own += legend.get_texts() if legend else []
+    return [text for text in own if text.get_text() and text.get_visible()]
+
+
+def test_a_table_goes_on_on_the_next_page_and_a_wide_one_is_refused():
+    sheets = Sheets("foot")
+    sheets.table("many", ("method", "n"), [(f"m{at}", f"{at}") for at in range(120)])
+    assert len(sheets.pages) == 2
+    heads = [sum(text.get_text() == "method" for text in page.texts) for page in sheets.pages]
+    assert heads == [1, 1]
+    shown = {text.get_text() for page in sheets.pages for text in page.texts}
+    assert {f"m{at}" for at in range(120)} <= shown
+    wide = [[f"{at}" * 12 for at in range(1, 10)]]
+    with pytest.raises(InvalidValueError, match="does not fit"):
+        sheets.table("wide", [f"column {at}" for at in range(9)], wide)
+
+
+def test_lines_are_no_wider_than_asked_for():
+    text = "a line of words and averyveryveryverylongwordwithoutablank at its end"
+    lines = wrapped(text, 1.0, 9.0)
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
+    assert all(width_of(line, 9.0) <= 1.0 + 1e-6 for line in lines)
+
+
+# --- report and archive -------------------------------------------------------------------------
+
+
+def test_the_report_has_all_parts_and_needs_no_network(folder):
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert re.findall(r"(?:src|href)=\"(?!data:|#)[^\"]*\"", text) == []
+    for words in ("Lengths: Loss over the any-angle optimum", "Costs: ", "OMPL: ", "(costs)"):
+        assert words in text
+    ids = re.findall(r"id=\"(case-\d+-\d+)\"", text)
+    assert len(ids) == len(set(ids)) > 0
+
+
+def test_the_archive_has_equal_bytes_and_a_checksum(folder, data, tmp_path):
+    archive = folder / "study-records.zip"
+    digest = hashlib.sha256(archive.read_bytes()).hexdigest()
+    beside = archive.with_name("study-records.zip.sha256").read_text()
+    assert beside == f"{digest}  study-records.zip\n"
+    with zipfile.ZipFile(archive) as opened:
+        names = opened.namelist()
+        assert json.loads(opened.read("study.json")) == data
+        assert opened.read("costs/records.jsonl") == (folder / "costs/records.jsonl").read_bytes()
+    again = write_archive(tmp_path / "again.zip", folder, [folder / name for name in names[::-1]])
+    assert again == digest
+
+
+# --- runs ---------------------------------------------------------------------------------------
+
+
+def test_a_second_run_asks_nothing_again(folder, monkeypatch):
+    asked = []
+
+    def ask(tasks, **_):
+        asked.extend(tasks)
+        return iter(())
+
+    monkeypatch.setattr("hybridnav.harness.run.run_local", ask)
+    run(own_maps(), folder, PLAN, PARTS)
+    assert asked == []
+
+
+def test_a_run_that_is_stopped_goes_on_and_its_time_counts(tmp_path, monkeypatch):
+    monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
+    monkeypatch.setattr("benchmarks._study_run._SPEAK_S", 0.0)
+    part = Part("lengths", ("octile",), (), 4, 0)
+    figure = [StudyMap(MAPS / "figure1/figure1.yaml", "ROS")]
+
+    def stopped(tasks, **_):
+        for count, batch in enumerate(run_here(tasks)):
+            if count == 1:
+                raise KeyboardInterrupt
+            yield batch
+
+    with monkeypatch.context() as patch:
+        patch.setattr("hybridnav.harness.run.run_local", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            run(figure, tmp_path, PLAN, [part])
+    records = tmp_path / "lengths" / "records.jsonl"
+    first, before = records.read_text(), read_note(tmp_path)["seconds"]["lengths"]
+    run(figure, tmp_path, PLAN, [part])
+    assert first != records.read_text()
+    assert records.read_text().startswith(first)
+    assert read_note(tmp_path)["seconds"]["lengths"] > before > 0
+
+
+def test_a_folder_holds_one_study(folder):
+    with pytest.raises(InvalidValueError, match=r"6 pairs a map \(small\), this one has 16"):
+        run(own_maps(), folder, PLANS["quarter"], PARTS)
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_every_method_is_in_a_part_or_said_to_be_left_out(name):
+    lengths, costs, ompl = parts_of(PLANS[name])
+    asked = {*lengths.baselines, *ompl.baselines, *lengths.presets, *ompl.presets, *costs.presets}
+    there, missing = rivals()
+    known = {*BASELINES, *there, *hn.preset_names()} - {REFERENCE}
+    assert known - asked == set(PLANS[name].without)
+    assert missing.keys() == RIVALS.keys() - set(there)
+    assert {"octile", "paper", "portals", "shortest"} <= set(lengths.presets)
+    assert {"hpa-star", "thrun", "weighted-astar", "networkx"} <= set(lengths.baselines)
+    assert REFERENCE in lengths.baselines
+    assert {"robot", "portals", "shortest"} <= set(costs.presets)
+    assert costs.costs == ("clearance",)
+    names = [preset for preset in ompl.presets if isinstance(preset, str)]
+    assert {"ompl-rrtconnect", "ompl-bitstar", "shortest"} <= set(names)
+
+
+def test_a_quarter_asks_a_quarter_of_the_pairs():
+    quarter, whole = PLANS["quarter"], PLANS["whole"]
+    assert (4 * quarter.pairs, 4 * quarter.ompl_pairs) == (whole.pairs, whole.ompl_pairs)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        ((), 2, "HYBRIDNAV_DATA"),
+        (("--data", "nowhere"), 1, "is not in"),
+        (("--data", str(MAPS)), 1, "of the study is not in"),
+    ],
+)
+def test_what_cannot_be_run_is_said_in_one_line(arguments, code, words, monkeypatch, capsys):
+    monkeypatch.delenv("HYBRIDNAV_DATA", raising=False)
+    assert study.main(list(arguments)) == code
+    err = capsys.readouterr().err
+    assert words in err
+    assert err.count("\n") == 1
