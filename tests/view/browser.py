@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-_PATIENCE_S = 30
+WINDOW: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}, "color_scheme": "light"}
+_PATIENCE_S = 90
 
 
 def browser_path() -> str:
@@ -46,6 +47,7 @@ class Shown:
         self.errors: list[str] = []
         self.requests: list[str] = []
         self.page = context.new_page()
+        self.page.set_default_timeout(1000 * _PATIENCE_S)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(address)

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 pytest.importorskip("uvicorn", reason="the page needs the extra view")
 pytest.importorskip("starlette", reason="the page needs the extra view")
 
-from tests.view.server import folder_in, served, session_of
+from tests.view.browser import browsing
+from tests.view.server import (
+    building_session_of,
+    folder_in,
+    served,
+    session_of,
+    write_building,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
     from tests.view.server import Client
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A browser for all tests of a file."""
+    with browsing() as browser:
+        yield browser
 
 
 @pytest.fixture
@@ -28,4 +42,12 @@ def folder(tmp_path: Path) -> Path:
 def client(folder: Path) -> Iterator[Client]:
     """A client of a server of the page."""
     with served(session_of(folder / "four.yaml"), folder) as client:
+        yield client
+
+
+@pytest.fixture
+def building(folder: Path) -> Iterator[Client]:
+    """A client of a server of a building of two floors."""
+    session = building_session_of(write_building(folder))
+    with served(session, folder) as client:
         yield client

@@ -14,7 +14,8 @@ import numpy as np
 import uvicorn
 
 import hybridnav as hn
-from hybridnav.view import Session
+from hybridnav.cli.view_building import building_session
+from hybridnav.view import BuildingSession, Session
 from hybridnav.view.app import make_app
 from hybridnav.view.rooms_file import RoomsFile
 
@@ -39,19 +40,55 @@ MAP = """\
 """
 """Four rooms in a ring; a letter is a square metre."""
 FINE = 4
+FRAME = hn.Frame(resolution_m=0.25, origin_m=(-3.0, 2.0), yaw_rad=0.3)
 
 
-def write_map(folder: Path) -> Path:
+def write_map(
+    folder: Path,
+    name: str = "four",
+    rooms: tuple[str, str, str, str] = ("a", "b", "c", "d"),
+    rooms_file: str = "rooms.yaml",
+    frame: hn.Frame = FRAME,
+) -> Path:
     """Write the map of four rooms, turned and off the origin, and its rooms with names."""
     walls = np.array([[letter == "#" for letter in line] for line in MAP.split()], dtype=float)
     probability = np.kron(walls, np.ones((FINE, FINE)))[::-1]
-    frame = hn.Frame(resolution_m=0.25, origin_m=(-3.0, 2.0), yaw_rad=0.3)
     grid = hn.OccupancyGrid(probability, frame=frame, robot_radius_m=0.2)
-    hn.write_ros_map(grid, folder / "four.yaml")
+    hn.write_ros_map(grid, folder / f"{name}.yaml")
     rows, cols = np.indices(grid.shape)
     labels = 2 * (rows < grid.shape[0] // 2 - 2) + (cols >= 9 * FINE + 2)
-    hn.save_rooms(folder / "rooms.yaml", hn.RoomLabels(("a", "b", "c", "d"), labels), grid)
-    return folder / "four.yaml"
+    hn.save_rooms(folder / rooms_file, hn.RoomLabels(rooms, labels), grid)
+    return folder / f"{name}.yaml"
+
+
+BUILDING = """\
+speed_m_s: 0.5
+floors:
+- {name: ground, map: four.yaml, rooms: rooms.yaml}
+- {name: "2: upper", map: upper.yaml, rooms: more/rooms-2.yaml, elevation_m: 3.0}
+links:
+- name: lift
+  kind: lift
+  wait_s: 10
+  ends: [{floor: ground, room: a}, {floor: "2: upper", room: e}]
+- name: stairs
+  kind: stairs
+  cost_m: 4
+  ends: [{floor: ground, room: d}, {floor: "2: upper", door: 3, room: f}]
+- name: hatch
+  kind: ramp
+  max_radius_m: 0.1
+  ends: [{floor: ground, room: b}, {floor: "2: upper", room: h}]
+"""
+
+
+def write_building(folder: Path) -> Path:
+    """Write a building of two floors in a folder with the map of four rooms."""
+    (folder / "more").mkdir()
+    frame = hn.Frame(resolution_m=0.25, origin_m=(10.0, -4.0), yaw_rad=-0.7)
+    write_map(folder, "upper", ("e", "f", "g", "h"), "more/rooms-2.yaml", frame)
+    (folder / "building.yaml").write_text(BUILDING, encoding="utf-8")
+    return folder / "building.yaml"
 
 
 def folder_in(above: Path) -> Path:
@@ -92,7 +129,8 @@ class Client:
     """A client of one server."""
 
     port: int
-    session: Session
+    session: Any
+    """What it shows."""
 
     @property
     def address(self) -> str:
@@ -126,8 +164,14 @@ class Client:
         return self.send("POST", f"/{TOKEN}/{name}", json.dumps(value).encode(), kind | headers)
 
 
+def building_session_of(file: Path) -> BuildingSession:
+    """Return what the command would show of a building."""
+    given = {"map_file": file, "preset": None, "overrides": None}
+    return building_session(given | {"robot_radius_m": 0.2, "max_cells": 10**6})
+
+
 @contextmanager
-def served(session: Session, folder: Path) -> Iterator[Client]:
+def served(session: Any, folder: Path) -> Iterator[Client]:
     """Serve a session until the end of the block."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as listening:
         listening.bind(("127.0.0.1", 0))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import signal
 import subprocess
 import sys
+import time
 from http.client import HTTPConnection
 from typing import TYPE_CHECKING, Any
 
@@ -93,20 +95,35 @@ def test_a_full_disk_loses_neither_the_file_nor_the_names(
     assert "kitchen" in (folder / "rooms.yaml").read_text(encoding="utf-8")
 
 
+def _asked(host: str, method: str, path: str, body: bytes | None = None) -> tuple[int, bytes]:
+    connection = HTTPConnection(host, timeout=60)
+    connection.request(method, path, body, {"content-type": "application/json"})
+    response = connection.getresponse()
+    found = response.status, response.read()
+    connection.close()
+    return found
+
+
+def _wait_until_ready(host: str, token: str) -> None:
+    ends_at = time.monotonic() + 60
+    while not json.loads(_asked(host, "GET", f"/{token}/state.json")[1])["ready"]:
+        assert time.monotonic() < ends_at
+        time.sleep(0.05)
+
+
 def test_a_killed_server_loses_no_names(folder: Path) -> None:
     command = [sys.executable, "-m", "hybridnav", "view", str(folder / "four.yaml")]
     settings = ["--no-browser", "--robot-radius", "0.2"]
     with subprocess.Popen([*command, *settings], stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout is not None
-        address = server.stdout.readline().split()[1]
-        host, token = address.removeprefix("http://").rstrip("/").split("/")
-        connection = HTTPConnection(host, timeout=60)
-        body = b'{"version": 0, "change": {"op": "rename", "room": "a", "name": "kitchen"}}'
-        kind = {"content-type": "application/json"}
-        connection.request("POST", f"/{token}/edit", body, kind)
-        assert connection.getresponse().status == 200
-        connection.close()
-        server.send_signal(signal.SIGKILL)
+        try:
+            assert server.stdout is not None
+            address = server.stdout.readline().split()[1]
+            host, token = address.removeprefix("http://").rstrip("/").split("/")
+            _wait_until_ready(host, token)
+            body = b'{"version": 0, "change": {"op": "rename", "room": "a", "name": "kitchen"}}'
+            assert _asked(host, "POST", f"/{token}/edit", body)[0] == 200
+        finally:
+            server.send_signal(signal.SIGKILL)
     session = session_of(folder / "four.yaml")
     assert session.rooms.names == ("kitchen", "b", "c", "d")
     assert session.notice == "unsaved changes of rooms are back: 1"

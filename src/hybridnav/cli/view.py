@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridnav._files import printable
+from hybridnav.cli.building import check_options, is_building_file, refused_options
 from hybridnav.cli.common import (
     Reading,
     answer,
     check_output,
     check_room_to_be,
-    grow_topology,
     load_model,
     overridden,
     read_settings,
@@ -33,12 +33,15 @@ from hybridnav.cli.options import (
     SeedOption,
     SetOption,
 )
+from hybridnav.cli.view_building import VIEW_OPTIONS, building_session, save_building
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import hybridnav as hn
-    from hybridnav.view import Session
+    from hybridnav.view import BuildingSession, Opening, Session
     from hybridnav.view.requests import PlanQuery
 
 _ROOMS = "rooms.yaml"
@@ -53,7 +56,10 @@ SaveOption = Annotated[
 RouteOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--route", metavar="X,Y:X,Y", help="A route of the saved page, in metres; may be repeated."
+        "--route",
+        metavar="X,Y:X,Y",
+        help="A route of the saved page, in metres; FLOOR:X,Y:FLOOR:X,Y in a building. May be "
+        "repeated.",
     ),
 ]
 PortOption = Annotated[
@@ -66,6 +72,7 @@ BrowserOption = Annotated[
 
 
 def view(
+    ctx: typer.Context,
     map_file: MapArgument,
     save: SaveOption = None,
     routes: RouteOption = None,
@@ -82,25 +89,44 @@ def view(
     least_island_m2: LeastIslandOption = 0.0,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
 ) -> None:
-    """Open MAP as a page on 127.0.0.1: click routes, close doors, name rooms. Ctrl-C ends it."""
+    """Open MAP as a page on 127.0.0.1: click routes, close doors, name rooms. Ctrl-C ends it.
+
+    MAP may be a building: the page then has its floors.
+    """
     check_output(save, "--save", (".html",))
     if routes and save is None:
         raise UsageError("--route is for a saved page: add --save FILE, or leave it out")
+    if is_building_file(map_file):
+        check_options(refused_options(ctx, VIEW_OPTIONS))
+        building = building_session(ctx.params)
+        if save is not None:
+            save_building(building, save, routes or ())
+        else:
+            _serve(building, map_file.parent, port, browser=browser)
+        return
     pairs = [_endpoints(text) for text in routes or ()]
     given = parsed_costs(costs)
     settings = read_settings(
         PRESET if preset is None and given else preset, None, None, None, map_file=map_file
     )
     settings = overridden(settings, [*given.overrides, *(overrides or ())], robot_radius_m, seed)
-    seconds: dict[str, float] = {}
     reading = Reading(free_threshold, occupied_threshold, least_island_m2, max_cells)
-    model = load_model(map_file, settings, seconds, reading)
+    model = load_model(map_file, settings, {}, reading)
     check_room_to_be(model.grid, allow_unexplored=settings.planner.allow_unexplored)
     rooms_path = map_file.parent / _ROOMS if rooms_file is None else rooms_file
-    session = _session(model, settings, rooms_path, given.read(model.grid))
+    make = _maker(model, settings, rooms_path, given.read(model.grid))
     if save is not None:
-        _save(session, save, pairs, settings.name)
+        _save(make(lambda _: None), save, pairs, settings.name)
         return
+    from hybridnav.view import Opening  # noqa: PLC0415 - loads numba and matplotlib
+
+    _serve(Opening(model.grid, make), rooms_path.parent, port, browser=browser)
+
+
+def _serve(
+    shown: Session | Opening | BuildingSession, folder: Path, port: int, *, browser: bool
+) -> None:
+    """Serve a page until Ctrl-C, and print its address."""
     from hybridnav.view import serve  # noqa: PLC0415 - loads numba and matplotlib
 
     def ready(address: str) -> None:
@@ -110,20 +136,31 @@ def view(
 
             webbrowser.open(address)
 
-    serve(session, rooms_path.parent, port=port, ready=ready)
+    serve(shown, folder, port=port, ready=ready)
 
 
-def _session(
+def _maker(
     model: hn.Model, settings: hn.Preset, rooms_path: Path, costs: hn.CostLayer | None
-) -> Session:
+) -> Callable[[Callable[[str], None]], Session]:
+    """Return what makes the session of a map, in a thread; the file of rooms is read now."""
     # These load numba and matplotlib, which help and wrong usage can do without.
+    import hybridnav as hn  # noqa: PLC0415
     from hybridnav.view import Session  # noqa: PLC0415
     from hybridnav.view.rooms_file import RoomsFile  # noqa: PLC0415
 
-    rooms = rooms_path if rooms_path.exists() else None
     file = RoomsFile(rooms_path.parent, rooms_path.name)
-    topology = grow_topology(model, settings, {}, rooms_file=rooms, find_rooms=True)
-    return Session(model, topology, settings, costs=costs, file=file)
+    given = hn.load_rooms(rooms_path, model.grid) if rooms_path.exists() else model.rooms
+
+    def make(tell: Callable[[str], None]) -> Session:
+        rooms = given
+        if rooms is None:
+            tell("finding rooms")
+            rooms = hn.find_rooms(model.grid)
+        tell("building places")
+        topology = model.grown(settings.pyramid, rooms)
+        return Session(model, topology, settings, costs=costs, file=file)
+
+    return make
 
 
 def _endpoints(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:

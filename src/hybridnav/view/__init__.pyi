@@ -1,3 +1,5 @@
+from .floors import BuildingSession as BuildingSession
+from .opening import Opening as Opening
 from .saved import save_page as save_page
 from .serving import serve as serve
 from .session import Session as Session

@@ -12,12 +12,18 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
-from hybridnav.view.export import KINDS, exported
+from hybridnav.view.export import KINDS, exported, exported_building
+from hybridnav.view.floors import BuildingSession
+from hybridnav.view.opening import Opening, PreparingError
 from hybridnav.view.page import ASSETS, POLICY, asset, live_page
 from hybridnav.view.requests import (
     AlternativesQuery,
     At,
     Edit,
+    FloorsAlternativesQuery,
+    FloorsPathQuery,
+    FloorsPlanQuery,
+    FloorsQuery,
     PathQuery,
     PlanQuery,
     Save,
@@ -30,6 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from pydantic import BaseModel
     from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -46,7 +53,9 @@ _HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"x-frame-options", b"DENY"),
 )
-_FORBIDDEN, _TOO_LARGE, _WRONG_KIND, _UNPROCESSABLE, _CONFLICT, _FULL = 403, 413, 415, 422, 409, 507
+_FORBIDDEN, _TOO_LARGE, _WRONG_KIND, _UNPROCESSABLE, _CONFLICT, _FULL, _NOT_YET = (
+    *(403, 413, 415, 422, 409, 507, 503),
+)
 
 
 class Guard:
@@ -97,13 +106,15 @@ class Guard:
         return None
 
 
-def make_app(session: Session, *, token: str, port: int, folder: Path) -> ASGIApp:
+def make_app(
+    shown: Session | Opening | BuildingSession, *, token: str, port: int, folder: Path
+) -> ASGIApp:
     """Return the application of a page.
 
     Parameters
     ----------
-    session
-        What it shows.
+    shown
+        What it shows: a map, one that is still being prepared, or a building.
     token
         The first part of every path.
     port
@@ -111,74 +122,129 @@ def make_app(session: Session, *, token: str, port: int, folder: Path) -> ASGIAp
     folder
         The only folder in which anything is written.
     """
-    answers = _Answers(session, folder)
     at = f"/{token}"
-    posts: dict[str, Callable[[Any], Any]] = {
-        "plan": answers.plan,
-        "optimum": answers.optimum,
-        "alternatives": answers.alternatives,
-        "at": answers.at,
-        "edit": answers.edit,
-        "undo": answers.undo,
-        "save": answers.save,
-    }
-    gets: dict[str, Callable[[Request], Any]] = {
-        "map.json": lambda _: session.describe(),
-        "rooms.json": lambda _: session.describe_rooms(),
-        "outlines.json": lambda _: session.outlines(),
-        "graph/{level}.json": lambda request: session.graph(request.path_params["level"]),
-        "costs/{preset}.json": lambda request: session.costs(request.path_params["preset"]),
-    }
     routes = [
         Route(f"{at}/", _get(lambda _: live_page(), "text/html")),
         *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in ASSETS),
-        Route(f"{at}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png", _get(answers.tile, "image/png")),
-        Route(f"{at}/export/{{kind}}", _post_file(answers), methods=["POST"]),
-        *(Route(f"{at}/{name}", _get_json(answer)) for name, answer in gets.items()),
-        *(Route(f"{at}/{name}", _post(act), methods=["POST"]) for name, act in posts.items()),
     ]
+    if isinstance(shown, BuildingSession):
+        on_floor = _OnMap(lambda request: shown.floor(request.path_params["floor"]), folder)
+        routes += _OverFloors(shown, folder).routes(at) + on_floor.routes(f"{at}/floor/{{floor}}")
+    else:
+        routes += _OnMap(lambda _: shown, folder).routes(at)
     return Guard(Starlette(routes=routes), token, port)
 
 
-class _Answers:
-    """What each request does."""
+class _OnMap:
+    """What each request about one map does.
 
-    def __init__(self, session: Session, folder: Path) -> None:
-        self.session, self.folder = session, folder
+    Parameters
+    ----------
+    of
+        Returns what a request is about.
+    folder
+        Where temporary files are written.
+    """
 
-    def plan(self, value: Any) -> dict[str, Any]:
-        return self.session.planning.plan(checked(PlanQuery, value))
+    def __init__(self, of: Callable[[Request], Session | Opening], folder: Path) -> None:
+        self._of, self._folder = of, folder
 
-    def optimum(self, value: Any) -> dict[str, Any]:
-        return self.session.planning.optimum(checked(PathQuery, value))
+    def routes(self, at: str) -> list[Route]:
+        """Return the routes below a path."""
+        gets: dict[str, Callable[[Request], Any]] = {
+            "map.json": lambda request: self._of(request).describe(),
+            "state.json": lambda request: self._of(request).state(),
+            "rooms.json": lambda request: self._session(request).describe_rooms(),
+            "outlines.json": lambda request: self._session(request).outlines(),
+            "graph/{level}.json": lambda request: self._session(request).graph(
+                request.path_params["level"]
+            ),
+            "costs/{preset}.json": lambda request: self._session(request).costs(
+                request.path_params["preset"]
+            ),
+        }
+        acts: dict[str, tuple[type[BaseModel], Callable[[Session, Any], Any]]] = {
+            "plan": (PlanQuery, lambda session, query: session.planning.plan(query)),
+            "optimum": (PathQuery, lambda session, query: session.planning.optimum(query)),
+            "alternatives": (
+                AlternativesQuery,
+                lambda session, query: session.planning.alternatives(query),
+            ),
+            "at": (At, lambda session, asked: {"room": session.room_at(asked.point)}),
+            "edit": (Edit, lambda session, asked: session.edit(asked)),
+            "undo": (Undo, lambda session, asked: session.undo(asked.version)),
+            "save": (Save, lambda session, asked: session.save(asked)),
+        }
+        tile = f"{at}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
+        return [
+            Route(tile, _get(self._tile, "image/png")),
+            Route(f"{at}/export/{{kind}}", _post_file(self._export), methods=["POST"]),
+            *(Route(f"{at}/{name}", _get_json(answer)) for name, answer in gets.items()),
+            *(
+                Route(f"{at}/{name}", _post(self._act(kind, act)), methods=["POST"])
+                for name, (kind, act) in acts.items()
+            ),
+        ]
 
-    def alternatives(self, value: Any) -> dict[str, Any]:
-        return self.session.planning.alternatives(checked(AlternativesQuery, value))
+    def _session(self, request: Request) -> Session:
+        """Return the session, once it is there."""
+        shown = self._of(request)
+        return shown.session if isinstance(shown, Opening) else shown
 
-    def at(self, value: Any) -> dict[str, Any]:
-        return {"room": self.session.room_at(checked(At, value).point)}
+    def _act(
+        self, kind: type[BaseModel], act: Callable[[Session, Any], Any]
+    ) -> Callable[[Request, Any], Any]:
+        return lambda request, value: act(self._session(request), checked(kind, value))
 
-    def edit(self, value: Any) -> dict[str, Any]:
-        return self.session.edit(checked(Edit, value))
-
-    def undo(self, value: Any) -> dict[str, Any]:
-        return self.session.undo(checked(Undo, value).version)
-
-    def save(self, value: Any) -> dict[str, Any]:
-        return self.session.save(checked(Save, value))
-
-    def export(self, kind: str, value: Any) -> bytes:
+    def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
+        kind = request.path_params["kind"]
         query = checked(PathQuery, value) if value else None
-        return exported(self.session.planning, kind, query, self.folder)
+        return KINDS.get(kind, ""), exported(
+            self._session(request).planning, kind, query, self._folder
+        )
 
-    def tile(self, request: Request) -> bytes:
+    def _tile(self, request: Request) -> bytes:
         place = request.path_params
         numbers = [place[name] for name in ("zoom", "row", "col")]
         if not all(n.isascii() and n.isdigit() and len(n) < 8 for n in numbers):  # noqa: PLR2004
             raise InvalidValueError("a tile has three whole numbers")
         zoom, row, col = map(int, numbers)
         theme: Theme = "dark" if request.query_params.get("theme") == "dark" else "light"
-        return self.session.layer(place["layer"]).png(zoom, row, col, theme)
+        return self._of(request).layer(place["layer"]).png(zoom, row, col, theme)
+
+
+class _OverFloors:
+    """What each request about a whole building does."""
+
+    def __init__(self, building: BuildingSession, folder: Path) -> None:
+        self._building, self._folder = building, folder
+
+    def routes(self, at: str) -> list[Route]:
+        """Return the routes below a path."""
+        building = self._building
+        acts: dict[str, tuple[type[BaseModel], Callable[[Any], Any]]] = {
+            "plan": (FloorsPlanQuery, building.plan),
+            "optimum": (FloorsQuery, building.optimum),
+            "alternatives": (FloorsAlternativesQuery, building.alternatives),
+        }
+        return [
+            Route(f"{at}/map.json", _get_json(lambda _: building.describe())),
+            Route(f"{at}/export/{{kind}}", _post_file(self._export), methods=["POST"]),
+            *(
+                Route(f"{at}/{name}", _post(self._act(kind, act)), methods=["POST"])
+                for name, (kind, act) in acts.items()
+            ),
+        ]
+
+    def _act(
+        self, kind: type[BaseModel], act: Callable[[Any], Any]
+    ) -> Callable[[Request, Any], Any]:
+        return lambda _, value: act(checked(kind, value))
+
+    def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
+        kind = request.path_params["kind"]
+        query = checked(FloorsPathQuery, value) if value else None
+        return exported_building(self._building, kind, query, self._folder)
 
 
 def _error(message: str, code: int) -> JSONResponse:
@@ -191,6 +257,8 @@ async def _done(work: Callable[[], Any]) -> Any:
         return await run_in_threadpool(work)
     except ConflictError as error:
         return _error(str(error), _CONFLICT)
+    except PreparingError as error:
+        return _error(str(error), _NOT_YET)
     except MapError as error:
         return _error(str(error), _FULL)
     except HybridNavError as error:
@@ -220,25 +288,30 @@ def _get_json(read: Callable[[Any], Any]) -> Any:
     return answer
 
 
-def _post(act: Callable[[Any], Any]) -> Any:
+def _post(act: Callable[[Request, Any], Any]) -> Any:
     async def answer(request: Request) -> Response:
         value = await _body(request)
-        return value if isinstance(value, Response) else _json(await _done(lambda: act(value)))
+        if isinstance(value, Response):
+            return value
+        return _json(await _done(lambda: act(request, value)))
 
     return answer
 
 
-def _post_file(answers: _Answers) -> Any:
+def _post_file(read: Callable[[Request, Any], tuple[str, bytes]]) -> Any:
     async def answer(request: Request) -> Response:
-        value, kind = await _body(request), request.path_params["kind"]
+        value = await _body(request)
         if isinstance(value, Response):
             return value
-        found = await _done(lambda: answers.export(kind, value))
+        found = await _done(lambda: read(request, value))
         if isinstance(found, Response):
             return found
-        named = f'attachment; filename="{KINDS[kind]}"'
-        headers = {"content-disposition": named, "cache-control": "no-store"}
-        return Response(found, media_type="application/octet-stream", headers=headers)
+        name, content = found
+        headers = {
+            "content-disposition": f'attachment; filename="{name}"',
+            "cache-control": "no-store",
+        }
+        return Response(content, media_type="application/octet-stream", headers=headers)
 
     return answer
 

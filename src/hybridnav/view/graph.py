@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav.grid import CellClass
-from hybridnav.io.room_measures import measures_of
 from hybridnav.viz.places import Places
 
 if TYPE_CHECKING:
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import BoolArray, FloatArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.pyramid import Level
     from hybridnav.topology import Door, Rooms
 
@@ -87,6 +86,29 @@ def _lines(lines: list[FloatArray], grid: OccupancyGrid) -> list[Any]:
     return in_grid(np.stack(lines), grid) if lines else []
 
 
+def map_facts(grid: OccupancyGrid, n_zooms: int) -> dict[str, Any]:
+    """Return what a page needs to know of a map before it draws its cells.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    n_zooms
+        Number of sizes of its tiles.
+    """
+    up, along = grid.frame.axes_m.tolist()
+    return {
+        "name": grid.name,
+        "rows": grid.shape[0],
+        "cols": grid.shape[1],
+        "resolution_m": grid.resolution_m,
+        "robot_radius_m": grid.robot_radius_m,
+        "frame": {"origin": list(grid.frame.origin_m), "up": up, "along": along},
+        "known": known_box(grid),
+        "zooms": n_zooms,
+    }
+
+
 def room_facts(rooms: Rooms) -> dict[str, Any]:
     """Return names, areas and positions of rooms, and their doors without gaps."""
     grid = rooms.grid
@@ -96,18 +118,32 @@ def room_facts(rooms: Rooms) -> dict[str, Any]:
                 "name": name,
                 "area_m2": round(area, 2),
                 "fits": fits,
-                "at": in_grid(_middle(rooms, name, facts.centre_m), grid),
+                "at": in_grid(_middle(rooms, name, centre), grid),
             }
-            for name, area, fits, facts in zip(
+            for name, area, fits, centre in zip(
                 rooms.names,
                 rooms.areas_m2.tolist(),
                 rooms.fits.tolist(),
-                measures_of(rooms.labels, grid),
+                _centres_m(rooms.labels, grid),
                 strict=True,
             )
         ],
         "doors": [_door(door, grid) for door in rooms.doors if not door.is_gap],
     }
+
+
+def _centres_m(labels: RoomLabels, grid: OccupancyGrid) -> list[tuple[float, float]]:
+    """Return the centre of the free cells of each room, `(x, y)` in metres.
+
+    Sums of rows and columns: a tenth of the time that sorting the cells takes on 16 M of them.
+    """
+    rows, cols = np.nonzero((grid.measured == CellClass.FREE) & (labels.label_of >= 0))
+    of, n_rooms = labels.label_of[rows, cols], len(labels.names)
+    counts = np.maximum(np.bincount(of, minlength=n_rooms), 1)
+    sums = [np.bincount(of, weights=at, minlength=n_rooms) for at in (rows, cols)]
+    middles = np.stack(sums, axis=1) / counts[:, None] + 0.5
+    points: list[list[float]] = grid.frame.points_of_grid(middles).tolist()
+    return [(x, y) for x, y in points]
 
 
 def _middle(rooms: Rooms, name: str, centre_m: tuple[float, float]) -> tuple[float, float]:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 from importlib.resources import files
 
-_NAMES = ("scene.js", "draw.js", "link.js", "route.js", "names.js", "main.js")
+_NAMES = (
+    *("scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js", "names.js"),
+    "main.js",
+)
 """The modules of the page."""
 ASSETS = (("page.css", "text/css"), *((name, "text/javascript") for name in _NAMES))
 """Names and kinds of the files beside the page."""

@@ -60,6 +60,12 @@ class Planning:
         first = self._settings.name
         return [first, *(name for name in preset_names() if name != first)]
 
+    def adopt(self, planner: HybridPlanner) -> None:
+        """Take a planner over that is there already, with what it has prepared, unless the rooms
+        have changed."""
+        if planner.topology is self.topology:
+            self._planners[planner.preset.name] = planner
+
     def planner(self, name: str) -> HybridPlanner:
         """Return the planner of a preset.
 
@@ -84,7 +90,7 @@ class Planning:
     def plan(self, query: PlanQuery) -> dict[str, Any]:
         """Return a plan with its certificate; unless it is brief, with rooms, doors and words."""
         planner, points = self.planner(query.preset), self._points(query)
-        closed = self._blocked(query.closed)
+        closed = self.blocked(query.closed)
         if query.brief:
             return self._facts(planner.plan(*points, blocked=closed))
         tour = plan_tour(planner, points, blocked=closed)
@@ -92,7 +98,7 @@ class Planning:
 
     def outcome(self, query: PathQuery) -> PlanResult:
         """Return the plan itself, to be written."""
-        closed = self._blocked(query.closed)
+        closed = self.blocked(query.closed)
         return self.planner(query.preset).plan(*self._points(query), blocked=closed)
 
     def optimum(self, query: PathQuery) -> dict[str, Any]:
@@ -109,7 +115,7 @@ class Planning:
             goal,
             query.count,
             by=query.by,
-            blocked=self._blocked(query.closed),
+            blocked=self.blocked(query.closed),
         )
         routes = [
             self._facts(each.result)
@@ -126,7 +132,14 @@ class Planning:
         yaw = math.atan2(goal[1] - start[1], goal[0] - start[0])
         return (*start, yaw), (*goal, yaw)
 
-    def _blocked(self, closed: Closed) -> Blocked | None:
+    def blocked(self, closed: Closed) -> Blocked | None:
+        """Return what is closed, in metres; None for nothing.
+
+        Raises
+        ------
+        InvalidValueError
+            When the corners of an area make no polygon.
+        """
         if not closed:
             return None
         areas: list[list[tuple[float, float]]] = [
@@ -154,7 +167,7 @@ class Planning:
             "metric": result.metric,
             "line": line,
             "seconds": round(sum(result.stats.seconds.values()), 6),
-        } | {name: _finite(value) for name, value in figures.items()}
+        } | {name: finite(value) for name, value in figures.items()}
 
     def _itinerary(self, tour: Tour) -> dict[str, Any]:
         """Return rooms, doors and words of a plan, and the places that it passes."""
@@ -172,5 +185,6 @@ class Planning:
         }
 
 
-def _finite(value: float | None) -> float | None:
+def finite(value: float | None) -> float | None:
+    """Return a number, None for what JSON cannot hold."""
     return value if value is not None and math.isfinite(value) else None

@@ -13,6 +13,7 @@ _FAR = 1e7
 
 Number = Annotated[float, Field(ge=-_FAR, le=_FAR, allow_inf_nan=False)]
 Point = Annotated[list[Number], Field(min_length=2, max_length=2)]
+FloorNumber = Annotated[int, Field(ge=0, lt=100)]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 _PresetName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,60}$")]
 
@@ -55,6 +56,54 @@ class AlternativesQuery(PathQuery):
 
     count: Annotated[int, Field(ge=2, le=5)] = 3
     by: Literal["doors", "homotopy"] = "doors"
+
+
+class FloorPoint(_Strict):
+    """A point in grid units of a floor of a building, by the number of the floor."""
+
+    floor: FloorNumber
+    point: Point
+
+
+class FloorClosed(Closed):
+    """What is closed on a floor."""
+
+    floor: FloorNumber
+
+
+class BuildingClosed(_Strict):
+    """What is closed in a building: links by name, and the rest by floor."""
+
+    links: Annotated[list[Name], Field(max_length=10_000)] = []
+    floors: Annotated[list[FloorClosed], Field(max_length=100)] = []
+
+
+class FloorsQuery(_Strict):
+    """A query between two points on any floors of a building."""
+
+    start: FloorPoint
+    goal: FloorPoint
+    preset: _PresetName
+    closed: BuildingClosed = BuildingClosed()
+    stairs: bool = True
+
+
+class FloorsPlanQuery(FloorsQuery):
+    """A plan over floors; brief while an end is dragged."""
+
+    brief: bool = False
+
+
+class FloorsAlternativesQuery(FloorsQuery):
+    """Some routes by different links."""
+
+    count: Annotated[int, Field(ge=2, le=5)] = 3
+
+
+class FloorsPathQuery(FloorsQuery):
+    """The part of a route on one floor, to be written."""
+
+    floor: FloorNumber
 
 
 class At(_Strict):

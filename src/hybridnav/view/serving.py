@@ -7,27 +7,29 @@ import socket
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.view.opening import Opening
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from hybridnav.view.floors import BuildingSession
     from hybridnav.view.session import Session
 
 
 def serve(
-    session: Session,
+    shown: Session | Opening | BuildingSession,
     folder: Path,
     *,
     port: int = 0,
     ready: Callable[[str], object] | None = None,
 ) -> None:
-    """Serve the page of a session on 127.0.0.1 until Ctrl-C.
+    """Serve a page on 127.0.0.1 until Ctrl-C.
 
     Parameters
     ----------
-    session
-        What the page shows.
+    shown
+        What the page shows: a map, one that is prepared meanwhile, or a building.
     folder
         The only folder in which anything is written.
     port
@@ -39,6 +41,8 @@ def serve(
     ------
     InvalidValueError
         When the port is taken, or the extra `view` is not installed.
+    HybridNavError
+        When the map cannot be prepared.
 
     Examples
     --------
@@ -75,7 +79,7 @@ def serve(
             raise InvalidValueError(f"port {port} cannot be used: {error.strerror}") from None
         listening.listen(64)
         port = listening.getsockname()[1]
-        app = make_app(session, token=token, port=port, folder=folder)
+        app = make_app(shown, token=token, port=port, folder=folder)
         config = uvicorn.Config(
             app,
             lifespan="off",
@@ -85,6 +89,11 @@ def serve(
             server_header=False,
         )
         server = uvicorn.Server(config)
+        opening = shown if isinstance(shown, Opening) else None
+        if opening is not None:
+            opening.begin(on_failure=lambda: setattr(server, "should_exit", True))
         if ready is not None:
             ready(f"http://127.0.0.1:{port}/{token}/")
         server.run(sockets=[listening])
+    if opening is not None and opening.problem is not None:
+        raise opening.problem

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.view.edits import changed, rings_of
-from hybridnav.view.graph import in_metres, known_box, level_graph, room_facts
+from hybridnav.view.graph import in_metres, level_graph, map_facts, room_facts
 from hybridnav.view.planning import Planning
 from hybridnav.view.requests import checked_change
 from hybridnav.view.tiles import costs_layer, hex_colours, level_layer, map_layer, rooms_layer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from hybridnav.config import Preset
     from hybridnav.costs import CostLayer
     from hybridnav.grid import RoomLabels
     from hybridnav.io import Model
-    from hybridnav.topology import TopologicalMap
+    from hybridnav.topology import Rooms, TopologicalMap
     from hybridnav.view.requests import Change, Edit, Save
     from hybridnav.view.rooms_file import RoomsFile
     from hybridnav.view.tiles import Layer
@@ -78,6 +78,8 @@ class Session:
         """Changes that are not saved, each with the rooms before it."""
         self.version = 0
         self.notice = ""
+        self.caution: Callable[[Rooms], str] = lambda _: ""
+        """Returns what to mind about rooms that have been saved, an empty text for nothing."""
         self._use(topology)
         self._restore()
 
@@ -116,18 +118,9 @@ class Session:
     def describe(self) -> dict[str, Any]:
         """Return what a page needs to know of the map before it draws anything."""
         grid, pyramid = self.grid, self.planning.topology.pyramid
-        top = grid.frame.axes_m.tolist()
         names = {pyramid.place_level: "places", pyramid.room_level: "rooms"}
-        return {
-            "name": grid.name,
-            "floors": [grid.name],
-            "rows": grid.shape[0],
-            "cols": grid.shape[1],
-            "resolution_m": grid.resolution_m,
-            "robot_radius_m": grid.robot_radius_m,
-            "frame": {"origin": list(grid.frame.origin_m), "up": top[0], "along": top[1]},
-            "known": known_box(grid),
-            "zooms": self.layer("map").n_zooms,
+        return map_facts(grid, self.layer("map").n_zooms) | {
+            "ready": True,
             "levels": [
                 {"vertices": size.vertices, "arcs": size.arcs, "name": names.get(at, "")}
                 for at, size in enumerate(pyramid.stats.sizes)
@@ -140,6 +133,10 @@ class Session:
             "file": "" if self._file is None else self._file.path.name,
             "rooms": self.describe_rooms(),
         }
+
+    def state(self) -> dict[str, Any]:
+        """Return that everything is there; see `Opening.state`."""
+        return {"ready": True, "stage": ""}
 
     def describe_rooms(self) -> dict[str, Any]:
         """Return the rooms, their doors, and the state of their file."""
@@ -261,7 +258,8 @@ class Session:
                 )
             self._file.save(self.rooms, self.grid)
             self._changes.clear()
-            self.notice = f"saved to {self._file.path.name}"
+            caution = self.caution(self.planning.topology.rooms)
+            self.notice = f"saved to {self._file.path.name}" + (f"; {caution}" if caution else "")
             return self.describe_rooms()
 
     def _check_version(self, version: int) -> None:

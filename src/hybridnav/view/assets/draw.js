@@ -6,9 +6,9 @@ export const ROUTE_COLOURS = {
 };
 const INKS = {
   light: { ink: "#1a1a1a", halo: "#ffffff", free: "#5c5c5c", rim: "#868686", unexplored: "#a6a6a6",
-    loop: "#cc3311", closed: "#7b3294", door: "#1a1a1a", dot: "#8c8c8c" },
+    loop: "#cc3311", closed: "#7b3294", door: "#1a1a1a", dot: "#8c8c8c", link: "#0b5cad" },
   dark: { ink: "#f2f4f5", halo: "#14181b", free: "#c3cad0", rim: "#8d979f", unexplored: "#6b757d",
-    loop: "#ff9a80", closed: "#d79bea", door: "#f2f4f5", dot: "#7d8790" },
+    loop: "#ff9a80", closed: "#d79bea", door: "#f2f4f5", dot: "#7d8790", link: "#6bb0f5" },
 };
 const FONT = "system-ui, 'Segoe UI', 'Noto Sans', 'DejaVu Sans', sans-serif";
 
@@ -77,6 +77,50 @@ export function paintDoors(scene, doors) {
   }
 }
 
+const SHAPES = {
+  lift: [[-1, -1], [1, -1], [1, 1], [-1, 1]],
+  stairs: [[-1.1, 0.9], [1.1, 0.9], [0, -1.1]],
+  ramp: [[0, -1.25], [1.25, 0], [0, 1.25], [-1.25, 0]],
+};
+
+// The outline of the mark of a link, for the legend.
+export function linkOutline(kind, x, y, half) {
+  return SHAPES[kind].map(([dx, dy]) => `${x + dx * half},${y + dy * half}`).join(" ");
+}
+
+// Mark where links begin: filled where the route takes one, and then with the floor it leads to.
+export function paintLinks(scene, marks) {
+  const { context } = scene;
+  const inks = inksOf(scene);
+  for (const { kind, at, text, isTaken, fits } of marks) {
+    const [x, y] = scene.toScreen(at);
+    const half = 8;
+    context.beginPath();
+    SHAPES[kind].forEach(([dx, dy], n) => (n ? context.lineTo(x + dx * half, y + dy * half) : context.moveTo(x + dx * half, y + dy * half)));
+    context.closePath();
+    Object.assign(context, { fillStyle: isTaken ? inks.link : inks.halo, strokeStyle: inks.link, lineWidth: 2.5, lineJoin: "round" });
+    context.setLineDash(fits ? [] : [3, 2]);
+    context.fill();
+    context.stroke();
+    context.setLineDash([]);
+    context.font = `600 13px ${FONT}`;
+    const wide = context.measureText(text).width;
+    const isLeft = x + 14 + wide > scene.width;
+    Object.assign(context, { textAlign: isLeft ? "right" : "left", textBaseline: "middle", strokeStyle: inks.halo, lineWidth: 4, fillStyle: inks.link });
+    const from = isLeft ? x - 14 : x + 14;
+    context.strokeText(text, from, y);
+    context.fillText(text, from, y);
+  }
+}
+
+// The room on the screen that a mark of a link takes.
+export function linkBox(scene, { at, text }) {
+  const [x, y] = scene.toScreen(at);
+  scene.context.font = `600 13px ${FONT}`;
+  const wide = scene.context.measureText(text).width + 18;
+  return x + wide > scene.width ? [x - wide, y - 11, x + 12, y + 11] : [x - 12, y - 11, x + wide, y + 11];
+}
+
 // Write names where they do not hide one another, those of large rooms first.
 export function paintNames(scene, rooms, taken, chosen) {
   const { context } = scene;
@@ -102,22 +146,30 @@ export function paintNames(scene, rooms, taken, chosen) {
   }
 }
 
-export function paintRoutes(scene, routes, chosen) {
+// The lines of a route on one floor; those on a map are all of it.
+function linesOf(route, floor) {
+  const lines = route.parts ? route.parts.filter((part) => part.floor === floor).map((part) => part.line) : [route.line];
+  return lines.filter((line) => line?.length);
+}
+
+export function paintRoutes(scene, routes, chosen, floor) {
   const inks = inksOf(scene);
   const order = routes.map((route, at) => [route, at]).sort((a, b) => (a[1] === chosen) - (b[1] === chosen));
   for (const [route, at] of order) {
-    if (!route.line.length) continue;
+    const lines = linesOf(route, floor);
+    if (!lines.length) continue;
     const width = at === chosen ? 4 : 2.75;
-    stroked(scene, [route.line], inks.halo, width + 2.5);
-    stroked(scene, [route.line], ROUTE_COLOURS[scene.theme][at % 5], width);
+    stroked(scene, lines, inks.halo, width + 2.5);
+    stroked(scene, lines, ROUTE_COLOURS[scene.theme][at % 5], width);
   }
 }
 
-export function paintDashed(scene, line) {
-  if (!line?.length) return;
+export function paintDashed(scene, route, floor) {
+  const lines = route ? linesOf(route, floor) : [];
+  if (!lines.length) return;
   const inks = inksOf(scene);
-  stroked(scene, [line], inks.halo, 4.5);
-  stroked(scene, [line], inks.free, 2.25, [7, 6]);
+  stroked(scene, lines, inks.halo, 4.5);
+  stroked(scene, lines, inks.free, 2.25, [7, 6]);
 }
 
 // Letters say which end is which where colours do not.
@@ -161,6 +213,7 @@ export function paintClosed(scene, closed, map, draft) {
   }
   map.rooms.doors.filter((door) => closed.doors.includes(door.number)).forEach((door) => cross(door.at));
   map.rooms.rooms.filter((room) => closed.rooms.includes(room.name)).forEach((room) => cross(room.at));
+  closed.ends.forEach(cross);
   if (draft.length) {
     stroked(scene, [draft], inks.closed, 2, [5, 4]);
     dots(scene, draft, inks.closed, 4);

@@ -9,6 +9,7 @@ export class Failure extends Error {
 
 export class LiveLink {
   isLive = true;
+  base = ""; // before the names of what is about one floor of a building
 
   async #fetched(path, options) {
     let response;
@@ -23,8 +24,8 @@ export class LiveLink {
     throw new Failure(answer.error ?? `error ${response.status}`, response.status);
   }
 
-  async get(name) {
-    return (await this.#fetched(`${name}.json`)).json();
+  async get(name, base = this.base) {
+    return (await this.#fetched(`${base}${name}.json`)).json();
   }
 
   #posted(name, body) {
@@ -32,12 +33,12 @@ export class LiveLink {
     return this.#fetched(name, { method: "POST", headers, body: JSON.stringify(body) });
   }
 
-  async post(name, body) {
-    return (await this.#posted(name, body)).json();
+  async post(name, body, base = this.base) {
+    return (await this.#posted(base + name, body)).json();
   }
 
-  async file(kind, body) {
-    return (await this.#posted(`export/${kind}`, body)).blob();
+  async file(kind, body, base = this.base) {
+    return (await this.#posted(`${base}export/${kind}`, body)).blob();
   }
 
   firstZoom() {
@@ -45,29 +46,35 @@ export class LiveLink {
   }
 
   tileAddress(layer, { zoom, row, col, theme, version }) {
-    return `tile/${layer}/${zoom}/${row}/${col}.png?theme=${theme}&version=${version}`;
+    return `${this.base}tile/${layer}/${zoom}/${row}/${col}.png?theme=${theme}&version=${version}`;
   }
 }
 
 export class SavedLink {
   isLive = false;
 
+  base = "";
+
   constructor(data) {
     this.data = data;
   }
 
-  async get(name) {
-    if (name === "map") return this.data.map;
-    if (name.startsWith("graph/")) return this.data.graph;
+  #about(base) {
+    return base ? this.data.floors[Number(base.split("/")[1])] : this.data;
+  }
+
+  async get(name, base = this.base) {
+    if (name === "map") return this.#about(base).map;
+    if (name.startsWith("graph/")) return this.#about(base).graph;
     throw new Failure("not in this file", 404);
   }
 
   firstZoom(layer) {
-    return this.data.tiles[layer]?.first ?? 0;
+    return this.#about(this.base).tiles[layer]?.first ?? 0;
   }
 
   tileAddress(layer, { zoom, row, col, theme }) {
-    return this.data.tiles[layer]?.found[`${theme}/${zoom}/${row}/${col}`];
+    return this.#about(this.base).tiles[layer]?.found[`${theme}/${zoom}/${row}/${col}`];
   }
 }
 

@@ -75,6 +75,15 @@ export class Names {
     return this.edit({ op: "move", room: this.chosen, corner: held.from, to: point });
   }
 
+  // Begin anew on another floor.
+  reset() {
+    Object.assign(this, { chosen: "", rings: [], tool: "", line: [] });
+    this.#isReplacing = false;
+    this.byId("room-name").value = "";
+    this.list();
+    this.show();
+  }
+
   // --- changes
 
   async edit(change, after = this.chosen) {
@@ -136,7 +145,7 @@ export class Names {
     this.page.map.rooms = rooms;
     this.rings = [];
     this.page.scene.version = rooms.version;
-    this.page.routes.forget(rooms);
+    this.page.closures.forget(rooms);
     this.list();
     await this.choose(rooms.rooms.some((room) => room.name === chosen) ? chosen : "");
     await this.page.changed();
@@ -182,7 +191,9 @@ export class Names {
     for (const id of ["split", "corners", "merge"]) this.byId(id).disabled = !this.chosen;
     const { unsaved, notice } = this.rooms;
     const count = unsaved === 1 ? "1 change is not saved" : `${unsaved} changes are not saved`;
-    this.byId("unsaved").textContent = [unsaved ? count : "", notice].filter(Boolean).join("; ");
+    const isLost = unsaved && !this.page.map.can_save && this.page.floors.isBuilding;
+    const advice = isLost ? "to save them, give this floor rooms: FILE in the file of the building, inside its folder" : "";
+    this.byId("unsaved").textContent = [unsaved ? count : "", notice, advice].filter(Boolean).join("; ");
     this.byId("names-undo").disabled = !unsaved;
     this.byId("save").disabled = !this.page.map.can_save;
     this.byId("save").textContent = this.page.map.file ? `Save ${this.page.map.file}` : "Save";

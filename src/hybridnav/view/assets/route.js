@@ -1,4 +1,4 @@
-// Routes: two ends, a plan with its certificate, alternatives, and what is closed.
+// Routes: two ends, a plan with its certificate, and alternatives.
 
 import { ROUTE_COLOURS } from "./draw.js";
 
@@ -21,18 +21,23 @@ export function picture(content) {
   return holder.firstChild;
 }
 
+// What routes are compared by: with rides, which have no length, the cost.
+const amountOf = (route) => (route.rides?.length ? route.cost : route.length_m);
+
+function passagesOf(route) {
+  if (route.rides) return route.rides.length ? `by ${route.rides.map((ride) => ride.link).join(", ")}` : "on one floor";
+  const doors = (route.legs ?? []).filter((leg) => leg.door).map((leg) => leg.door).join(", ");
+  return doors ? `doors ${doors}` : "no doors";
+}
+
 const metres = (value) => (value === null ? "none" : `${value.toFixed(2)} m`);
 
 export class Routes {
-  start = null;
-  goal = null;
+  ends = { start: null, goal: null }; // each { floor, point }
   routes = []; // the plan, or the plan and its alternatives
   chosen = 0;
   open = null; // the plan without closures, while something is closed
   grid = null; // the optimum on the grid
-  closed = { doors: [], rooms: [], polygons: [] };
-  draft = []; // corners of an area that is being drawn
-  #before = []; // closures to go back to
   #wanted = null;
   #underWay = 0;
   #asked = 0;
@@ -45,40 +50,60 @@ export class Routes {
     this.byId = (id) => document.getElementById(id);
   }
 
-  get isClosed() {
-    return Object.values(this.closed).some((list) => list.length);
+  get hasEnds() {
+    return Boolean(this.ends.start && this.ends.goal);
+  }
+
+  // The point of an end if it lies on the floor that is shown.
+  here(which) {
+    const end = this.ends[which];
+    return end?.floor === this.page.floors.at ? end.point : null;
   }
 
   query(more = {}) {
-    const { start, goal, closed } = this;
-    return { start, goal, preset: this.byId("preset").value, closed, ...more };
+    const { floors, closures } = this.page;
+    const preset = this.byId("preset").value;
+    if (floors.isBuilding) return { ...this.ends, preset, closed: closures.asked, stairs: this.byId("stairs").checked, ...more };
+    return { start: this.ends.start.point, goal: this.ends.goal.point, preset, closed: closures.asked, ...more };
+  }
+
+  // Plans are about all floors: their names have nothing before them.
+  #post(name, asked) {
+    return this.page.link.post(name, asked, "");
   }
 
   // --- ends
 
   setEnd(which, point, isBrief = false) {
-    this[which] = this.page.scene.rounded(point);
-    this.byId(which).value = this.page.scene.textOf(point);
-    this.page.scene.draw();
+    const { scene, floors } = this.page;
+    this.ends[which] = { floor: floors.at, point: scene.rounded(point) };
+    this.byId(which).value = this.#textOf(floors.at, scene.textOf(point));
+    scene.draw();
     return this.plan(isBrief);
   }
 
-  clicked(point) {
-    if (this.start && this.goal) {
-      this.clear();
-    }
-    return this.setEnd(this.start ? "goal" : "start", point);
+  #textOf(floor, text) {
+    const { floors } = this.page;
+    return floors.isBuilding ? `${floors.nameOf(floor)}: ${text}` : text;
   }
 
-  typed() {
+  clicked(point) {
+    if (this.hasEnds) this.clear();
+    return this.setEnd(this.ends.start ? "goal" : "start", point);
+  }
+
+  async typed() {
     for (const which of ["start", "goal"]) {
-      const numbers = this.byId(which).value.split(/[,;\s]+/).filter(Boolean).map(Number);
-      if (numbers.length !== 2 || !numbers.every(Number.isFinite)) {
-        this.page.say(`Expected two numbers of metres for the ${which}, such as 1.5, 2`, true);
+      const [floor, text] = this.page.floors.split(this.byId(which).value);
+      const numbers = text.split(/[,;\s]+/).filter(Boolean).map(Number);
+      if (floor < 0 || numbers.length !== 2 || !numbers.every(Number.isFinite)) {
+        const before = floor < 0 ? "the name of a floor, a colon, and " : "";
+        this.page.say(`Expected ${before}two numbers of metres for the ${which}, such as 1.5, 2`, true);
         this.byId(which).focus();
         return null;
       }
-      this[which] = this.page.scene.fromMetres(numbers);
+      this.ends[which] = { floor, point: this.page.scene.fromMetres(numbers, await this.page.floors.map(floor)) };
+      this.byId(which).value = this.#textOf(floor, text.trim());
     }
     return this.plan();
   }
@@ -86,7 +111,7 @@ export class Routes {
   clear() {
     this.#asked += 1;
     this.#answered = this.#asked; // what is still under way is about other ends
-    Object.assign(this, { start: null, goal: null, routes: [], open: null, grid: null, chosen: 0 });
+    Object.assign(this, { ends: { start: null, goal: null }, routes: [], open: null, grid: null, chosen: 0 });
     for (const id of ["start", "goal"]) this.byId(id).value = "";
     this.show();
   }
@@ -96,7 +121,7 @@ export class Routes {
   // A few requests at a time, so that none waits for the way of another; of those that come
   // meanwhile only the last is sent, and an answer older than the one shown is dropped.
   async plan(isBrief = false) {
-    if (!this.start || !this.goal) {
+    if (!this.hasEnds) {
       this.show();
       return;
     }
@@ -116,8 +141,8 @@ export class Routes {
   async #planned(asked, number) {
     let [found, open, problem] = [[], null, null];
     try {
-      found = [await this.page.link.post("plan", asked)];
-      if (this.isClosed && !asked.brief) open = await this.#planOpen(asked);
+      found = [await this.#post("plan", asked)];
+      if (this.page.closures.list.length && !asked.brief) open = await this.#planOpen(asked);
     } catch (error) {
       problem = error;
     }
@@ -130,24 +155,23 @@ export class Routes {
   }
 
   #planOpen(asked) {
-    const closed = { doors: [], rooms: [], polygons: [] };
-    return this.page.link.post("plan", { ...asked, closed, brief: true });
+    return this.#post("plan", { ...asked, closed: this.page.closures.nothing, brief: true });
   }
 
   async optimum() {
-    if (!this.start || !this.goal) return;
-    this.grid = await this.page.link.post("optimum", this.query());
+    if (!this.hasEnds) return;
+    this.grid = await this.#post("optimum", this.query());
     this.show();
   }
 
   async alternatives() {
-    if (!this.start || !this.goal) {
+    if (!this.hasEnds) {
       this.page.say("Set a start and a goal first", true);
       return;
     }
     this.page.say("Looking for routes…");
-    const more = { count: Number(this.byId("count").value), by: this.byId("by").value };
-    const found = await this.page.link.post("alternatives", this.query(more));
+    const by = this.page.floors.isBuilding ? {} : { by: this.byId("by").value };
+    const found = await this.#post("alternatives", this.query({ count: Number(this.byId("count").value), ...by }));
     Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null });
     this.show();
     this.byId("others-note").textContent = found.note;
@@ -155,81 +179,20 @@ export class Routes {
 
   choose(at) {
     this.chosen = at;
-    const { start, goal } = this.routes[at]; // routes of a saved page have ends of their own
-    if (start) Object.assign(this, { start, goal });
+    this.#takeEnds();
     this.show();
     this.byId("others").children[at]?.focus();
   }
 
-  // --- closures
-
-  close(kind, what) {
-    this.#before.push(structuredClone(this.closed));
-    const list = this.closed[kind];
-    const at = kind === "polygons" ? -1 : list.indexOf(what);
-    if (at < 0) list.push(what);
-    else list.splice(at, 1);
-    return this.#closedChanged();
+  // Routes of a saved page have ends of their own.
+  #takeEnds() {
+    const { start, goal } = this.routes[this.chosen] ?? {};
+    if (start) this.ends = start.point ? { start, goal } : { start: { floor: 0, point: start }, goal: { floor: 0, point: goal } };
   }
 
-  undoClosed() {
-    if (this.#before.length) this.closed = this.#before.pop();
-    return this.#closedChanged();
-  }
-
-  openAll() {
-    if (this.isClosed) this.#before.push(structuredClone(this.closed));
-    this.closed = { doors: [], rooms: [], polygons: [] };
-    return this.#closedChanged();
-  }
-
-  #open(kind, at) {
-    this.#before.push(structuredClone(this.closed));
-    this.closed[kind].splice(at, 1);
-    return this.#closedChanged();
-  }
-
-  #closedChanged() {
-    this.showClosed();
-    this.page.scene.draw();
-    return this.plan();
-  }
-
-  // Drop what no room or door stands behind any more.
-  forget(rooms) {
-    const doors = rooms.doors.map((door) => door.number);
-    const names = rooms.rooms.map((room) => room.name);
-    this.closed.doors = this.closed.doors.filter((number) => doors.includes(number));
-    this.closed.rooms = this.closed.rooms.filter((name) => names.includes(name));
-    this.#before = [];
-    this.showClosed();
-  }
-
-  addCorner(point) {
-    this.draft.push(point);
-    this.byId("area-done").hidden = this.draft.length < 3;
-    this.page.scene.draw();
-  }
-
-  endArea(isKept) {
-    const corners = this.draft;
-    this.draft = [];
-    this.byId("area-done").hidden = true;
-    this.page.scene.draw();
-    if (isKept && corners.length >= 3) this.close("polygons", corners);
-  }
-
-  showClosed() {
-    const names = { doors: (n) => `door ${n}`, rooms: (n) => n, polygons: (_, at) => `area ${at + 1}` };
-    const items = Object.entries(names).flatMap(([kind, name]) =>
-      this.closed[kind].map((what, at) => {
-        const text = name(what, at);
-        const button = element("button", { onclick: () => this.#open(kind, at), ariaLabel: `Open ${text}` }, "Open");
-        return element("li", {}, text, button);
-      }));
-    this.byId("closed").replaceChildren(...items);
-    this.byId("close-undo").disabled = !this.#before.length;
-    this.byId("close-clear").disabled = !this.isClosed;
+  take(routes) {
+    this.routes = routes;
+    this.#takeEnds();
   }
 
   // --- the panel
@@ -241,25 +204,28 @@ export class Routes {
     canvas.dataset.length = route?.length_m ?? "";
     scene.draw();
     this.#showFigures(route);
-    for (const id of ["optimum", "clear"]) this.byId(id).disabled = !(this.start && this.goal);
+    for (const id of ["optimum", "clear"]) this.byId(id).disabled = !this.hasEnds;
     if (isBrief) return; // words and lists follow when the end is dropped
     this.#showWay(route);
     this.#showCards();
     this.byId("others-note").textContent = "";
+    if (this.page.floors.isBuilding) this.page.floors.note();
     if (route) this.page.say(route.solved ? "" : `No route: ${route.status}`, !route.solved);
   }
 
   #showFigures(route) {
     const rows = [];
     if (route?.solved) {
+      const isDearer = route.metric === "weighted" || route.rides?.length > 0; // a cost, not a length
       rows.push(["length", `${metres(route.length_m)} ${route.metric === "weighted" ? "" : METRICS[route.metric] ?? ""}`]);
-      if (route.metric === "weighted") rows.push(["cost", metres(route.cost)]);
+      rows.push(...this.#ridesOf(route));
+      if (isDearer) rows.push(["cost", metres(route.cost)]);
       const isOptimal = route.gap !== null && route.gap < 1e-9;
-      rows.push(["bound", `${metres(route.lower_bound)}: nothing is ${route.metric === "weighted" ? "cheaper" : "shorter"}`]);
+      rows.push(["bound", `${metres(route.lower_bound)}: nothing is ${isDearer ? "cheaper" : "shorter"}`]);
       rows.push(["gap", isOptimal ? "0 %, proved optimal" : `${(100 * route.gap).toFixed(2)} %`]);
-      if (this.open?.solved) rows.push(["detour", `${metres(route.length_m - this.open.length_m)} more than ${metres(this.open.length_m)}`]);
-      if (this.grid?.solved) rows.push(["grid", `${metres(this.grid.length_m)} on the cells of the whole grid`]);
-      rows.push(["time", `${(1000 * route.seconds).toFixed(1)} ms`]);
+      if (this.open?.solved) rows.push(["detour", `${metres(amountOf(route) - amountOf(this.open))} more than ${metres(amountOf(this.open))}`]);
+      if (this.grid?.solved) rows.push(["grid", `${metres(amountOf(this.grid))} on the cells of the whole grid`]);
+      rows.push(["time", `${(1000 * route.seconds).toFixed(1)} ms to plan`]);
     }
     const text = JSON.stringify(rows);
     if (text === this.#last) return;
@@ -268,9 +234,19 @@ export class Routes {
       ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
   }
 
+  #ridesOf(route) {
+    const { floors } = this.page;
+    const rides = (route.rides ?? []).map((ride) => ["ride", `${ride.link}, floor ${floors.nameOf(ride.from)} to ${floors.nameOf(ride.to)}: ${Math.round(ride.seconds)} s, charged ${metres(ride.charge_m)}`]);
+    return route.travel_s === undefined ? rides : [...rides, ["travel", `${Math.round(route.travel_s)} s`]];
+  }
+
   #showWay(route) {
     const legs = route?.legs ?? [];
     const parts = legs.map((leg) => leg.room + (leg.door ? ` → door ${leg.door}` : ""));
+    for (const [at, part] of (route?.parts ?? []).entries()) {
+      const ride = route.rides[at];
+      parts.push(`floor ${this.page.floors.nameOf(part.floor)}${ride ? ` → ${ride.link}` : ""}`);
+    }
     this.byId("way").textContent = parts.join(" → ");
     this.byId("words").replaceChildren(...(route?.words ?? []).map((line) => element("li", {}, line)));
   }
@@ -280,12 +256,11 @@ export class Routes {
     const cards = this.routes.length < 2 ? [] : this.routes.map((route, at) => {
       const colour = ROUTE_COLOURS[this.page.scene.theme][at % 5];
       const isOther = at && !route.start && route.solved && shortest.solved; // between the same ends
-      const more = isOther ? `, ${metres(route.length_m - shortest.length_m)} more` : "";
-      const text = route.solved ? metres(route.length_m) + more : `no route: ${route.status}`;
-      const doors = (route.legs ?? []).filter((leg) => leg.door).map((leg) => leg.door).join(", ");
+      const more = isOther ? `, ${metres(amountOf(route) - amountOf(shortest))} more` : "";
+      const text = route.solved ? metres(amountOf(route)) + more : `no route: ${route.status}`;
       const line = picture(`<path d="M2 4h22" stroke="${colour}" stroke-width="4" stroke-linecap="round"/>`);
       return element("button", { className: "route-card", ariaPressed: String(at === this.chosen), onclick: () => this.choose(at) },
-        line, element("span", {}, text), element("small", {}, doors ? `doors ${doors}` : "no doors"));
+        line, element("span", {}, text), element("small", {}, passagesOf(route)));
     });
     this.byId("others").replaceChildren(...cards);
   }

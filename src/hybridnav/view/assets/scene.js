@@ -13,6 +13,9 @@ export class Scene {
   height = 0;
   painters = [];
   #tiles = new Map();
+  #ground = document.createElement("canvas");
+  #seen = ""; // what the ground shows
+  #arrived = 0; // tiles
   #isDue = false;
 
   constructor(canvas, map, link) {
@@ -36,6 +39,19 @@ export class Scene {
     this.height = this.canvas.clientHeight;
     this.canvas.width = Math.round(this.width * ratio);
     this.canvas.height = Math.round(this.height * ratio);
+    this.draw();
+  }
+
+  get place() {
+    return { middle: this.middle, scale: this.scale };
+  }
+
+  // Show another map, all of it or as it was seen last.
+  show(map, place) {
+    this.map = map;
+    this.version = map.rooms.version;
+    if (place) Object.assign(this, place);
+    else this.fit();
     this.draw();
   }
 
@@ -70,8 +86,8 @@ export class Scene {
     return [origin[0] + x * along[0] + y * up[0], origin[1] + x * along[1] + y * up[1]];
   }
 
-  fromMetres([x, y]) {
-    const { origin, along, up } = this.map.frame;
+  fromMetres([x, y], map = this.map) {
+    const { origin, along, up } = map.frame;
     const area = along[0] * up[1] - along[1] * up[0];
     const [dx, dy] = [x - origin[0], y - origin[1]];
     return [(dx * up[1] - dy * up[0]) / area, (dy * along[0] - dx * along[1]) / area];
@@ -112,34 +128,45 @@ export class Scene {
 
   paint() {
     const { context, ratio } = this;
+    this.#paintGround();
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    context.save();
-    const [left, top] = this.toScreen([0, this.map.rows]).map((v) => Math.round(v * ratio));
-    const [right, bottom] = this.toScreen([this.map.cols, 0]).map((v) => Math.round(v * ratio));
-    context.beginPath();
-    context.rect(left, top, right - left, bottom - top);
-    context.clip();
-    this.#paintTiles(this.layer, true);
-    if (this.overlay) this.#paintTiles(this.overlay, false);
-    context.restore();
+    context.drawImage(this.#ground, 0, 0);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     for (const painter of this.painters) painter(this);
     this.canvas.dataset.view = [...this.middle, this.scale].join(" ");
     this.canvas.dataset.waiting = [...this.#tiles.values()].filter((t) => !t.isReady).length;
   }
 
-  #paintTiles(layer, isOpaque) {
+  // The tiles, kept as one picture while nothing of them changes: a dragged route moves over them.
+  #paintGround() {
+    const { ratio } = this;
+    const { width, height } = this.canvas;
+    const seen = [...this.middle, this.scale, width, height, this.layer, this.overlay, this.theme, this.version, this.link.base, this.#arrived].join(" ");
+    if (seen === this.#seen) return;
+    this.#seen = seen;
+    Object.assign(this.#ground, { width, height }); // also clears it
+    const ground = this.#ground.getContext("2d");
+    const [left, top] = this.toScreen([0, this.map.rows]).map((v) => Math.round(v * ratio));
+    const [right, bottom] = this.toScreen([this.map.cols, 0]).map((v) => Math.round(v * ratio));
+    ground.beginPath();
+    ground.rect(left, top, right - left, bottom - top);
+    ground.clip();
+    this.#paintTiles(ground, this.layer, true);
+    if (this.overlay) this.#paintTiles(ground, this.overlay, false);
+  }
+
+  #paintTiles(ground, layer, isOpaque) {
     const last = this.map.zooms - 1;
     const first = this.link.firstZoom(layer);
     const wanted = Math.floor(-Math.log2(this.scale * this.ratio));
     const zoom = Math.max(first, Math.min(Math.max(last, first), wanted));
-    if (isOpaque && zoom < last) this.#paintZoom(layer, last); // seen until finer tiles arrive
-    this.#paintZoom(layer, zoom);
+    if (isOpaque && zoom < last) this.#paintZoom(ground, layer, last); // seen until finer tiles arrive
+    this.#paintZoom(ground, layer, zoom);
   }
 
-  #paintZoom(layer, zoom) {
-    const { context, ratio } = this;
+  #paintZoom(context, layer, zoom) {
+    const { ratio } = this;
     const side = TILE * 2 ** zoom;
     const [west, north] = this.toGrid([0, 0]);
     const [east, south] = this.toGrid([this.width, this.height]);
@@ -171,7 +198,7 @@ export class Scene {
       this.#tiles.delete(address); // the last used stands last
     } else {
       tile = { image: new Image(), isReady: false };
-      tile.image.onload = () => { tile.isReady = true; this.draw(); };
+      tile.image.onload = () => { tile.isReady = true; this.#arrived += 1; this.draw(); };
       tile.image.onerror = () => { this.#tiles.delete(address); };
       tile.image.src = address;
     }
