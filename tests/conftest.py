@@ -13,8 +13,9 @@ from hypothesis import settings
 
 from tests.portal_memory import remember_portals
 
-# Time is for benchmarks: a first call that imports or compiles is no failure. `make test` tries the same examples each
-# time, so that it says something about the change; `make test-full` asks for more of them and hunts with new ones.
+# Time is for benchmarks: a first call that imports or compiles is no failure. `make test` tries the
+# same examples each time, so that it says something about the change; `make test-full` asks for
+# more of them and hunts with new ones.
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("new", deadline=None, print_blob=True)
 settings.load_profile("new" if "HYBRIDNAV_EXAMPLES" in os.environ else "same")
