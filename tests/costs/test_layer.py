@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from typing import Any
@@ -251,6 +252,47 @@ def test_a_changed_layer_differs_in_the_box_alone() -> None:
     for row, col in ((-1, 0), (5, 0), (0, 6), (0, -1)):
         with pytest.raises(hn.InvalidValueError, match="do not lie inside costs of 8 x 6 cells"):
             old.changed(part, row, col)
+
+
+@pytest.mark.parametrize(
+    "box",
+    [
+        *("", "0123", None, 3, 1.5, math.nan, object(), slice(0, 10**30), {}, itertools.count()),
+        *((), (0, 1, 0), (0, 1, 0, 1, 1), ("0", "1", "0", "1"), (0.0, 1.0, 0.0, 1.0)),
+        *((0, None, 0, 1), (slice(2), slice(2), 0, 1), np.ones((2, 2), dtype=np.int64)),
+        *((0, 7, 0, 1), (0, 1, 0, 9), (-1, 1, 0, 1), (1, 1, 0, 1), (2, 1, 0, 1), (0, 1, 3, 2)),
+        *((0, 10**30, 0, 1), (0, 1, 0, 10**5000), (-(10**5000), 1, 0, 1)),
+    ],
+    ids=lambda box: f"{type(box).__name__}",
+)
+def test_a_part_that_is_no_box_is_refused_in_one_line(box: Any) -> None:
+    with pytest.raises(hn.InvalidValueError, match="inside costs of 8 x 6 cells") as raised:
+        layer_of(np.ones((6, 8))).part(box)
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 250
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        *((None, 0), ("0", 0), (0, 1.0), (0, math.nan), (object(), 0), (slice(10**30), 0)),
+        *(([0], 0), (0, np.zeros(2, dtype=np.int64)), (10**30, 0), (0, -(10**5000)), (10**5000, 0)),
+    ],
+    ids=lambda where: f"{type(where[0]).__name__}-{type(where[1]).__name__}",
+)
+def test_a_change_at_no_cell_of_the_layer_is_refused_in_one_line(where: Any) -> None:
+    layer = layer_of(np.ones((6, 8)))
+    with pytest.raises(hn.InvalidValueError, match=r"two whole|do not lie") as raised:
+        layer.changed(layer_of(np.ones((1, 1))), *where)
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 250
+
+
+@pytest.mark.parametrize("part", [None, "layer", 1.5, np.ones((1, 1)), [[1.0]], 10**5000], ids=type)
+def test_a_change_to_no_layer_is_refused_in_one_line(part: Any) -> None:
+    with pytest.raises(hn.InvalidValueError, match="expected a CostLayer") as raised:
+        layer_of(np.ones((6, 8))).changed(part, 0, 0)
+    assert "\n" not in str(raised.value)
 
 
 def test_sources_do_not_grow_with_every_change() -> None:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+import operator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav.costs.inflation import HIGHEST
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import brief
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from hybridnav._typing import AnyArray
+    from hybridnav.grid.areas import Box
 
 UNIT_BITS = 14
 """Factors are whole multiples of 2^-14."""
@@ -76,3 +79,24 @@ def checked_multiplier(multiplier: float) -> float:
             f"{MOST_FACTOR:g}, got {multiplier:g}"
         )
     return multiplier
+
+
+def checked_box(box: Any, shape: tuple[int, int]) -> Box:
+    """Return a box of cells of a layer that has a number of rows and columns.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is not four whole numbers, has no cell, or reaches beyond the layer.
+    """
+    rows, cols = shape
+    try:
+        top, bottom, left, right = map(operator.index, box)
+    except (TypeError, ValueError):
+        top = bottom = left = right = -1
+    if not (0 <= top < bottom <= rows and 0 <= left < right <= cols):
+        raise InvalidValueError(
+            f"box is {brief(box)}, expected (first row, last row + 1, first column, last column + "
+            f"1) of cells inside costs of {cols} x {rows} cells: give four whole numbers"
+        )
+    return top, bottom, left, right

@@ -15,13 +15,16 @@ from hybridnav.costs import masks
 from hybridnav.costs.checks import (
     MOST_FACTOR,
     UNIT_BITS,
+    checked_box,
     checked_factors,
     checked_multiplier,
     checked_setting,
     rounded,
 )
 from hybridnav.costs.inflation import HIGHEST, inflated_costs
+from hybridnav.costs.sources import changed_source, joined_source
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import brief, checked_cell, checked_type
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -29,9 +32,6 @@ if TYPE_CHECKING:
     from hybridnav._typing import AnyArray, BoolArray, LongArray
     from hybridnav.grid import Frame, OccupancyGrid
     from hybridnav.grid.areas import Box
-
-_MOST_SOURCES = 8
-"""Sources that a layer names after changes."""
 
 
 @copies_alike
@@ -309,8 +309,14 @@ class CostLayer:
         ----------
         box
             First row, last row + 1, first column, last column + 1, inside the layer; not empty.
+
+        Raises
+        ------
+        InvalidValueError
+            When the box is not such four whole numbers.
         """
-        inside = slice(*box[:2]), slice(*box[2:])
+        top, bottom, left, right = checked_box(box, self.shape)
+        inside = slice(top, bottom), slice(left, right)
         closed = None if self.closed is None else self.closed[inside]
         return CostLayer(self.factors[inside], closed, self.source)
 
@@ -327,7 +333,7 @@ class CostLayer:
         Raises
         ------
         InvalidValueError
-            When the box is not inside the layer.
+            When the part is no layer, or the box is not inside the layer.
 
         Examples
         --------
@@ -335,11 +341,12 @@ class CostLayer:
         >>> layer.changed(hn.CostLayer(np.full((1, 2), 3.0)), 0, 1).factors
         array([[1., 3., 3., 1.]], dtype=float32)
         """
-        rows, cols = part.shape
+        rows, cols = checked_type("part", part, CostLayer).shape
+        row, col = checked_cell("first cell", (row, col))
         if not (0 <= row <= self.shape[0] - rows and 0 <= col <= self.shape[1] - cols):
             raise InvalidValueError(
-                f"{cols} x {rows} cells at row {row}, column {col} do not lie inside costs of "
-                f"{self.shape[1]} x {self.shape[0]} cells: give a box of this map"
+                f"{cols} x {rows} cells at row {brief(row)}, column {brief(col)} do not lie inside "
+                f"costs of {self.shape[1]} x {self.shape[0]} cells: give a box of this map"
             )
         inside = slice(row, row + rows), slice(col, col + cols)
         factors, closed = self.factors.copy(), None
@@ -352,7 +359,7 @@ class CostLayer:
         object.__setattr__(layer, "factors", frozen(factors))
         kept = None if closed is None or not closed.any() else frozen(closed)
         object.__setattr__(layer, "closed", kept)
-        object.__setattr__(layer, "source", _changed_source(self.source, part.source))
+        object.__setattr__(layer, "source", changed_source(self.source, part.source))
         return layer
 
     def __or__(self, other: CostLayer) -> CostLayer:
@@ -374,23 +381,5 @@ class CostLayer:
         first, second = self.factors.astype(np.float64), other.factors.astype(np.float64)
         factors = np.maximum(first, second) if how == "maximum" else first * second
         closed = [each.closed for each in (self, other) if each.closed is not None]
-        parts = [
-            part
-            for each in (self, other)
-            for part in (each.source["of"] if each.source["kind"] == how else [each.source])
-        ]
         union = np.logical_or.reduce(closed) if closed else None
-        return CostLayer(rounded(factors), union, {"kind": how, "of": parts})
-
-
-def _changed_source(before: dict[str, Any], part: dict[str, Any]) -> dict[str, Any]:
-    """Return the source of a layer with a changed part; it does not grow with every change."""
-    is_changed = before["kind"] == "changed"
-    sources = before["of"] if is_changed else [before]
-    left_out = before.get("left_out", 0) if is_changed else 0
-    if part not in sources:
-        sources = [*sources, part]
-    if len(sources) > _MOST_SOURCES:
-        sources, left_out = [sources[0], *sources[2:]], left_out + 1
-    source = {"kind": "changed", "of": sources}
-    return source | {"left_out": left_out} if left_out else source
+        return CostLayer(rounded(factors), union, joined_source(self.source, other.source, how))

@@ -12,6 +12,14 @@ from hybridnav.errors import InvalidValueError
 _T = TypeVar("_T")
 
 
+def brief(value: Any) -> str:
+    """Return the begin of the text of a value, on one line."""
+    try:
+        return " ".join(f"{value!r:.60}".split())
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        return f"a huge {type(value).__name__}"
+
+
 def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
     """Return a value of a type.
 
@@ -31,11 +39,10 @@ def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
     """
     if isinstance(value, kind):
         return value
-    text = " ".join(f"{value!r:.60}".split())
     article = "an" if kind.__name__[0] in "AEIOU" else "a"
     raise InvalidValueError(
-        f"{name} is {text} of type {type(value).__name__}, expected {article} {kind.__name__}: "
-        "make one"
+        f"{name} is {brief(value)} of type {type(value).__name__}, expected {article} "
+        f"{kind.__name__}: make one"
     )
 
 
@@ -58,9 +65,8 @@ def checked_cell(name: str, cell: Any) -> tuple[int, int]:
         row, col = cell
         return operator.index(row), operator.index(col)
     except (TypeError, ValueError):
-        text = " ".join(f"{cell!r:.60}".split())
         raise InvalidValueError(
-            f"{name} is {text}, expected a cell (row, col): give two whole numbers"
+            f"{name} is {brief(cell)}, expected a cell (row, col): give two whole numbers"
         ) from None
 
 
@@ -83,7 +89,7 @@ def checked_between(name: str, value: Any, low: float, high: float) -> float:
     """
     if isinstance(value, int | float | np.number) and low <= value <= high:
         return float(value)
-    text = " ".join(f"{value!r:.60}".split())
     raise InvalidValueError(
-        f"{name} is {text}, expected a number from {low:,g} to {high:,g}: choose another one"
+        f"{name} is {brief(value)}, expected a number from {low:,g} to {high:,g}: choose another "
+        "one"
     )
