@@ -1,4 +1,4 @@
-"""Results of a planner: statuses, routes, paths, bounds."""
+"""Results of a planner: statuses, routes, bounds."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 import numpy as np
 
-from hybridnav._copies import copies_alike
 from hybridnav.errors import PlanError
-from hybridnav.messages import path_message
-from hybridnav.poses import Motion
 from hybridnav.sentences import sentences
 
 if TYPE_CHECKING:
-    from hybridnav._typing import AnyArray, FloatArray, LongArray, SignArray
+    from hybridnav._typing import AnyArray, FloatArray, LongArray
+    from hybridnav.result.path import Path
     from hybridnav.sentences import Instruction
 
 Metric = Literal[
@@ -57,146 +55,6 @@ class PlanStatus(StrEnum):
     """A sampling-based planner came near the goal but did not reach it."""
     TIMEOUT = "timeout"
     """A sampling-based planner found nothing in its time."""
-
-
-@copies_alike
-@dataclass(frozen=True, eq=False)
-class Path:
-    """A path through the grid, between the centres of two cells, or at any angle between two
-    points.
-
-    Examples
-    --------
-    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> path = hn.HybridPlanner(topology).plan((0.5, 0.5), (2.0, 2.5)).path
-    >>> path.points
-    array([[0.5, 0.5],
-           [1.3, 1.2],
-           [1.4, 1.4],
-           [1.6, 1.9],
-           [2. , 2.5]])
-    >>> len(path.poses(spacing_m=0.25))
-    13
-    """
-
-    cells: LongArray
-    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A path
-    shortened by line of sight keeps the cells of the original path."""
-    points: FloatArray
-    """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
-    where an any-angle path turns."""
-    length_m: float
-    """Length in metres; for a cell path it is counted as a + b sqrt 2 cells from the moves."""
-    headings_rad: FloatArray | None = None
-    """float64 (m,), heading at each point, counter-clockwise from the x axis; None if the state
-    space has none."""
-    is_curved: bool = False
-    """Whether the robot drives an arc of a circle from each point to the next, as in the spaces
-    `dubins` and `reeds-shepp`; else a straight line."""
-
-    def __post_init__(self) -> None:
-        self.cells.flags.writeable = False
-        self.points.flags.writeable = False
-        if self.headings_rad is not None:
-            self.headings_rad.flags.writeable = False
-
-    @cached_property
-    def _motion(self) -> Motion:
-        return Motion(self.points, self.headings_rad, self.is_curved)
-
-    @property
-    def headings_at_points(self) -> FloatArray:
-        """float64 (m,), `headings_rad`, or the direction of travel after each point, before the
-        last one; 0 without motion."""
-        return self._motion.headings_at_points
-
-    def poses(self, spacing_m: float = 0.05) -> FloatArray:
-        """Return poses along the path for a controller, evenly spaced between the points where it
-        bends.
-
-        Parameters
-        ----------
-        spacing_m
-            Most metres from one pose to the next; every straight line or arc is divided into as few
-            equal parts as possible.
-
-        Returns
-        -------
-        FloatArray
-            float64 (n, 3), `(x, y, yaw)`, metres and radians in [-pi, pi), map frame, from first to
-            last point. Without `headings_rad` the yaw is the direction of travel: at a bend the one
-            after it, at the end the one before it, 0 without motion. With `headings_rad` it is the
-            heading of the robot, as it turns along the path; a turn on the spot is two poses at one
-            point.
-
-        Raises
-        ------
-        InvalidValueError
-            When the spacing is not positive, or so small that there would be more than ten million
-            poses.
-        """
-        return self._motion.spread(spacing_m)[0]
-
-    def directions(self, spacing_m: float = 0.05) -> SignArray:
-        """Return the direction, ahead or backwards, in which the robot leaves each of the `poses`.
-
-        Parameters
-        ----------
-        spacing_m
-            As in `poses`.
-
-        Returns
-        -------
-        SignArray
-            int8 (n,), 1 for ahead, -1 for backwards, which is more than 90 degrees off the heading;
-            the last one is that of the step before.
-        """
-        return self._motion.spread(spacing_m)[1]
-
-    def to_message(
-        self, frame_id: str = "map", *, spacing_m: float = 0.05, stamp_ns: int = 0
-    ) -> dict[str, Any]:
-        """Return the `poses` as a `nav_msgs/Path` of ROS 2, in plain dictionaries and lists, which
-        `hybridnav.messages.fill_message` puts into a message.
-
-        Parameters
-        ----------
-        frame_id
-            Name of the map frame.
-        spacing_m
-            As in `poses`.
-        stamp_ns
-            Time in nanoseconds since 1970, of the path and of each pose.
-
-        Raises
-        ------
-        InvalidValueError
-            As for `poses`, or when the frame has no name or the time is out of range.
-
-        Examples
-        --------
-        >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-        >>> path = hn.HybridPlanner(topology).plan((0.5, 0.5), (1.5, 0.5)).path
-        >>> path.to_message(spacing_m=1.0)["poses"][1]["pose"]["position"]
-        {'x': 1.5, 'y': 0.5, 'z': 0.0}
-        """
-        return path_message(self.poses(spacing_m), frame_id, stamp_ns)
-
-    @property
-    def spot_turns(self) -> LongArray:
-        """int64, indices of points at which the robot turns on the spot: bends of straight lines,
-        and points that differ from the next one in heading alone."""
-        return self._motion.spot_turns
-
-    @property
-    def max_curvature_per_m(self) -> float:
-        """Largest curvature, 1 / the least radius of an arc, 1 / m; 0 for straight lines."""
-        return self._motion.max_curvature_per_m
-
-    @property
-    def reversals(self) -> LongArray:
-        """int64, indices of the points where the robot changes between ahead and backwards."""
-        return np.flatnonzero(np.diff(self._motion.directions)) + 1
 
 
 @dataclass(frozen=True)
