@@ -3,11 +3,13 @@ round and round."""
 
 import gc
 import math
+import time
 import weakref
 from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,7 +18,13 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.grid import CellClass
-from hybridnav.homotopy import AlternativeSearch, alternative_search
+from hybridnav.homotopy import (
+    AlternativeSearch,
+    _class_kernels,
+    _tree_kernels,
+    alternative_search,
+    search,
+)
 from hybridnav.metrics import judge_path
 from hybridnav.route import RouteFinder
 from tests.oracle.rays import Rays
@@ -117,6 +125,36 @@ def test_a_search_stops_in_time_with_a_shortest_path(monkeypatch):
     assert 1 <= len(late) < 20
     for other, known in zip(late, whole, strict=False):
         assert other.path.length_m == pytest.approx(known.path.length_m)
+
+
+def test_no_time_limit_counts_the_compilation_of_kernels(monkeypatch):
+    """Each kernel has met the types of its arguments before the clock is looked at."""
+    clocks = ("hybridnav.planner.by_classes", "hybridnav.homotopy.search")
+    names = {
+        _class_kernels: ("begin", "find_classes", "path_to"),
+        _tree_kernels: ("word_at",),
+        search: ("field_distances", "legal_moves"),
+    }
+    ready, late = set(), set()
+
+    def noted(kernel, name):
+        def call(*arguments):
+            call_types = (name, *map(numba.typeof, arguments))
+            (late if clock else ready).add(call_types)
+            return kernel(*arguments)
+
+        return call
+
+    clock = []
+    planner = planner_of(TWO_DOORS)
+    for module, of_module in names.items():
+        for name in of_module:
+            monkeypatch.setattr(module, name, noted(getattr(module, name), name))
+    for module in clocks:
+        monkeypatch.setattr(f"{module}.perf_counter", lambda: clock.append(1) or time.monotonic())
+    assert len(by_homotopy(planner, (1.5, 1.5), (12.5, 2.5), 3)) == 2
+    assert {name for name, *_ in late} == {name for each in names.values() for name in each}
+    assert late <= ready
 
 
 @pytest.mark.parametrize("most_states", [0, -1, 1 << 27])

@@ -163,6 +163,7 @@ class AlternativeSearch:
         )
         self._enterable = np.ascontiguousarray(self.classes.enterable_cells)
         self._dead_ends: DeadEnds | None = None
+        self._compile()
 
     def paths(  # noqa: PLR0913 - independent limits of one search
         self,
@@ -189,7 +190,8 @@ class AlternativeSearch:
             Pairs of a cell and a word that are looked at before the search gives up, from 1 to
             2^26; each takes 85 bytes while the search runs.
         time_limit_s
-            Seconds before the search gives up; infinite for no limit.
+            Seconds before the search gives up; infinite for no limit. Kernels are compiled before,
+            when the search on a map is made.
 
         Raises
         ------
@@ -198,11 +200,21 @@ class AlternativeSearch:
         """
         check_limits(most_states, time_limit_s)
         until = perf_counter() + time_limit_s
-        cols = self._enterable.shape[1]
         enterable = self._enterable
         if closed is not None:
             enterable = enterable.copy()
             enterable.ravel()[closed] = False
+        plane, shortest = self._plane(enterable, start, goal)
+        first = start[0] * plane.cols + start[1]
+        found, reason = _search(plane, first, count, most_states, until)
+        is_whole = reason in {_class_kernels.FOUND, _class_kernels.EXHAUSTED}
+        return ClassPaths(found, is_whole, shortest, is_late=reason == _class_kernels.PAUSED)
+
+    def _plane(
+        self, enterable: BoolArray, start: Cell, goal: Cell
+    ) -> tuple[_class_kernels.Plane, float]:
+        """Return what a search works on, and the octile length of a shortest path."""
+        cols = enterable.shape[1]
         first, last = start[0] * cols + start[1], goal[0] * cols + goal[1]
         label = np.where(enterable, np.int32(0), np.int32(-1)).ravel()
         left = field_distances(enterable.astype(np.uint8), label, np.array([last]))
@@ -212,23 +224,12 @@ class AlternativeSearch:
         moves = legal_moves(self._dead_ends_of(enterable, apart).left(start, goal), False).ravel()
         of_edge = self.classes.cell_words.of_edge
         plane = _class_kernels.Plane(moves, cols, left, of_edge, self._letters, last, apart)
-        states = _class_kernels.States.of_room(most_states)
-        tree = _tree_kernels.Tree.of_room(most_states)
-        waiting = _class_kernels.Open.of_room(enterable.size, most_states, count)
-        _class_kernels.begin(plane, states, waiting, first)
-        reason, is_late = _class_kernels.PAUSED, False
-        while reason == _class_kernels.PAUSED and not is_late:
-            reason = _class_kernels.find_classes(plane, states, tree, waiting, _SLICE)
-            is_late = reason == _class_kernels.PAUSED and perf_counter() >= until
-        found = []
-        for state in waiting.goals[: waiting.used[_class_kernels.GOALS]].tolist():
-            flat = _class_kernels.path_to(states, state)
-            word = tuple(_tree_kernels.word_at(tree, states.word[state]).tolist())
-            length = float(length_in_cells(states.cost[[state]])[0])
-            cells = np.stack(np.divmod(flat, cols), axis=1)
-            found.append(ClassPath(cells, word, length))
-        is_whole = reason in {_class_kernels.FOUND, _class_kernels.EXHAUSTED}
-        return ClassPaths(tuple(found), is_whole, shortest, is_late)
+        return plane, shortest
+
+    def _compile(self) -> None:
+        """Compile all kernels, which no time limit counts, by a search on one cell."""
+        plane, _ = self._plane(np.ones((1, 1), dtype=np.bool_), (0, 0), (0, 0))
+        _search(plane, 0, 1, 64, math.inf)
 
     def _dead_ends_of(self, enterable: BoolArray, apart: int) -> DeadEnds:
         """Return the dead ends: cells that no shortest path of a class enters. They are kept while
@@ -239,6 +240,39 @@ class AlternativeSearch:
         if dead_ends is None or dead_ends.reach != apart:
             self._dead_ends = dead_ends = DeadEnds(enterable, apart)
         return dead_ends
+
+
+def _search(
+    plane: _class_kernels.Plane, first: int, count: int, most_states: int, until: float
+) -> tuple[tuple[ClassPath, ...], int]:
+    """Return the paths found, and why the search ended: `PAUSED` if its time was over.
+
+    Parameters
+    ----------
+    plane
+        The map of the search, and its goal.
+    first
+        Flat cell of the start.
+    count, most_states
+        As in `AlternativeSearch.paths`.
+    until
+        Time of `perf_counter` at which the search gives up.
+    """
+    states = _class_kernels.States.of_room(most_states)
+    tree = _tree_kernels.Tree.of_room(most_states)
+    waiting = _class_kernels.Open.of_room(plane.left.size, most_states, count)
+    _class_kernels.begin(plane, states, waiting, first)
+    reason, is_late = _class_kernels.PAUSED, False
+    while reason == _class_kernels.PAUSED and not is_late:
+        reason = _class_kernels.find_classes(plane, states, tree, waiting, _SLICE)
+        is_late = reason == _class_kernels.PAUSED and perf_counter() >= until
+    found = []
+    for state in waiting.goals[: waiting.used[_class_kernels.GOALS]].tolist():
+        flat = _class_kernels.path_to(states, state)
+        word = tuple(_tree_kernels.word_at(tree, states.word[state]).tolist())
+        length = float(length_in_cells(states.cost[[state]])[0])
+        found.append(ClassPath(np.stack(np.divmod(flat, plane.cols), axis=1), word, length))
+    return tuple(found), reason
 
 
 def check_limits(most_states: int, time_limit_s: float) -> None:
