@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import os
-import time
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +23,7 @@ import numpy as np
 
 import hybridnav as hn
 from hybridnav.mapping import Mapper
-from hybridnav.online import OnlineRegions, OnlineRooms, ReplayFigures, grids_of_scans, replay
-from hybridnav.online.figures import Identities, faults_of
-from hybridnav.online.flips import Numbered, flips_between
+from hybridnav.online import OnlineRooms, ReplayFigures, grids_of_scans, replay
 
 LOGS = {
     "Intel": "radish_logs/intel-corrected.log.gz",
@@ -51,39 +48,18 @@ def agreement(rooms: OnlineRooms) -> float:
 
 def followed(log: Path, every: int, rooms_every: int, scans: int | None) -> dict[str, Any]:
     """Return the figures of a replay."""
-    figures, agreed = ReplayFigures(), 0.0
+    figures, step = ReplayFigures(), None
     read = itertools.islice(hn.CarmenLog(log), scans)
     mapper = Mapper(resolution_m=RESOLUTION_M)
     grids = grids_of_scans(read, mapper, every=every, robot_radius_m=RADIUS_M)
-    step = regions = None
-    of_regions = Identities()
-    for step in replay(grids, rooms_every=rooms_every):
+    for step in replay(grids, rooms_every=rooms_every, most_cells=MOST_CELLS):
         figures.add(step)
-        if regions is None:
-            regions = OnlineRegions.of(step.places, MOST_CELLS)
-            continue
-        began = time.perf_counter()
-        update = regions.update(step.places)
-        seconds = time.perf_counter() - began
-        flips = flips_between(numbered(regions), numbered(update.version))
-        of_regions.add(update, flips, seconds)
-        regions = update.version
-    found = {**figures.figures(), "scans": mapper.n_scans, "regions": of_regions.figures()}
-    if step is not None and regions is not None:
-        agreed = agreement(step.rooms)
+    found = {**figures.figures(), "scans": mapper.n_scans, "agreement": 0.0}
+    if step is not None:
+        found["agreement"] = agreement(step.rooms)
         fresh = hn.DualGraphPyramid.build(step.places.grid).with_regions(MOST_CELLS)
-        found["n_regions"] = regions.n_regions
         found["fresh"] = [fresh[at].n_vertices for at in (fresh.place_level, fresh.region_level)]
-        above = regions.pyramid[regions.pyramid.place_level + 1 :]
-        found["levels"] += len(above)
-        found["faults"] += faults_of(above)
-    return {**found, "agreement": agreed}
-
-
-def numbered(regions: OnlineRegions) -> Numbered:
-    """Return the cells of a version of regions with their numbers."""
-    grid = regions.places.grid
-    return Numbered(grid, grid.classes, regions.number_of)
+    return found
 
 
 def show(name: str, kind: str, found: dict[str, Any]) -> None:

@@ -35,7 +35,7 @@ def test_maps_are_replayed_one_after_the_other(cli: Any, tmp_path: Path) -> None
     lines = done.out.splitlines()
     assert lines[0] == "maps       2, the last of 25 x 12 cells"
     assert lines[1].endswith("2 rooms, 0 doors")
-    assert "doors      0 born, 1 died" in lines
+    assert "doors      0 born, 1 died, 0 changed, 0 split" in lines
     assert lines[-1].startswith("check      ")
     assert lines[-1].endswith("each boundary of their fields is one arc")
 
@@ -51,6 +51,28 @@ def test_a_log_is_replayed_scan_by_scan_and_drawn(cli: Any, tmp_path: Path) -> N
     with Image.open(picture) as image:
         assert image.n_frames in {3, 4}  # type: ignore[attr-defined]
         assert image.width == 1100
+
+
+def test_regions_and_names_are_followed_if_asked(cli: Any, tmp_path: Path) -> None:
+    first, second = two_maps(tmp_path)
+    grid = hn.load_map(second, robot_radius_m=0)
+    labels = np.zeros(grid.shape, np.int32)
+    labels[:, 12:] = 1
+    rooms = tmp_path / "named.yaml"
+    hn.save_rooms(rooms, hn.RoomLabels(("kitchen", "hall"), labels), grid)
+    gone = tmp_path / "gone.yaml"
+    probability = np.where(np.arange(25) > 11, 1.0, grid.probability)
+    hn.write_ros_map(hn.OccupancyGrid(probability, grid.frame, robot_radius_m=0), gone)
+    options = "--robot-radius", "0", "--rooms-every", "1", "--regions", "50"
+    done = cli("replay", first, second, gone, *options, "--rooms", rooms)
+    assert (done.code, done.err) == (0, "")
+    lines = done.out.splitlines()
+    assert " regions, 1 rooms, 0 doors" in lines[1]
+    assert any(line.startswith("regions    2 updates") for line in lines)
+    assert "names      lost with their rooms: hall" in lines
+    found = json.loads(cli("replay", first, second, *options, "--json").out)
+    assert found["regions"]["updates"] == 1
+    assert (found["lost_names"], found["faults"]) == ([], [])
 
 
 def test_few_scans_of_a_log_are_read_if_asked(cli: Any, tmp_path: Path) -> None:
@@ -74,6 +96,8 @@ def test_scans_that_need_too_many_cells_are_counted(cli: Any, tmp_path: Path) ->
         (["a.yaml", "b.log"], [], "replay a log alone"),
         (["a.log", "b.log"], [], "got 2 logs"),
         (["a.yaml"], ["--every", "2"], "are for a log"),
+        (["a.log"], ["--rooms", "rooms.yaml"], "--rooms is for map files"),
+        (["a.yaml"], ["--regions", "0"], "--regions"),
         (["a.log"], ["--plot", "a.png"], "--plot must end in .gif"),
         (["a.log"], ["--every", "0"], "--every"),
     ],
@@ -101,6 +125,7 @@ def test_input_that_cannot_be_replayed_ends_in_one_line(cli: Any, tmp_path: Path
         ([first, other], "does not cover"),
         ([room_log(tmp_path / "room.log"), "--resolution", "nan"], "resolution"),
         ([first, "--merge-distance", "0"], "merge"),
+        ([first, "--rooms", tmp_path / "none.yaml"], "none.yaml"),
     ):
         done = cli("replay", *arguments)
         assert done.code != 0

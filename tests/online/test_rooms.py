@@ -316,6 +316,7 @@ def agreement(version):
         (lambda rooms: rooms.update(grid_of(np.ones((30, 30), int), resolution_m=1)), "anew"),
         (lambda rooms: rooms.update(rooms.grid).closed_doors([7]), "there was no door 7"),
         (lambda rooms: OnlineRooms.of(grid_of(np.ones((3, 3), int)), rooms.labels), "this map"),
+        (lambda rooms: OnlineRooms.of(rooms.grid, "rooms.yaml"), "labels is 'rooms.yaml'"),
         (lambda rooms: OnlineRooms.of(rooms.grid, least_area_m2=-1), "least area"),
     ],
 )

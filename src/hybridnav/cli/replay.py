@@ -1,7 +1,8 @@
-"""`hybridnav replay`: follow a map that changes, and print how stable its places and rooms are."""
+"""`hybridnav replay`: follow a map that changes, and print how stable its identities are."""
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -52,12 +53,27 @@ RoomsEveryOption = Annotated[
         "--rooms-every", metavar="N", min=1, help="Maps from one update of the rooms to the next."
     ),
 ]
+RoomsFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--rooms",
+        metavar="FILE",
+        help="Rooms of the first map as YAML, whose names are followed.",
+        show_default="found",
+    ),
+]
+RegionsOption = Annotated[
+    int | None,
+    typer.Option("--regions", metavar="N", min=1, help="Follow regions of at most N cells, too."),
+]
 MergeOption = Annotated[
     float, typer.Option("--merge-distance", metavar="D", help="Size of places, U_d, in metres.")
 ]
 AnimationOption = Annotated[
     Path | None,
-    typer.Option("--plot", metavar="FILE", help="Write an animation of places and rooms: .gif."),
+    typer.Option(
+        "--plot", metavar="FILE", help="Write an animation of places, rooms and doors: .gif."
+    ),
 ]
 FramesOption = Annotated[
     int, typer.Option("--frames", metavar="N", min=2, help="Most frames of the animation.")
@@ -72,6 +88,8 @@ def replay(
     robot_radius_m: RadiusOption = None,
     merge_distance_m: MergeOption = 4.0,
     rooms_every: RoomsEveryOption = 10,
+    rooms_file: RoomsFileOption = None,
+    regions: RegionsOption = None,
     max_cells: MaxCellsOption = DEFAULT_MAX_CELLS,
     plot: AnimationOption = None,
     frames: FramesOption = 60,
@@ -82,6 +100,8 @@ def replay(
     is_log = _is_log(files)
     if not is_log and (scans is not None or every != 1 or resolution_m is not None):
         raise UsageError("--every, --scans and --resolution are for a log, got map files")
+    if is_log and rooms_file is not None:
+        raise UsageError("--rooms is for map files, got a log: its rooms are found")
     load_numba()
     from hybridnav.online import ReplayFigures  # noqa: PLC0415 - loads numba
     from hybridnav.online import replay as follow  # noqa: PLC0415
@@ -98,7 +118,14 @@ def replay(
         else:
             side_m = 0.05 if resolution_m is None else resolution_m
             grids = log.grids(side_m, every, robot_radius_m, advance)
-        for step in follow(grids, merge_distance_m=merge_distance_m, rooms_every=rooms_every):
+        rooms, grids = _with_rooms(grids, rooms_file)
+        for step in follow(
+            grids,
+            merge_distance_m=merge_distance_m,
+            rooms_every=rooms_every,
+            rooms=rooms,
+            most_cells=regions,
+        ):
             figures.add(step)
             if animation is not None:
                 animation.add(step)
@@ -129,6 +156,16 @@ def _read(
     for at, file in enumerate(files):
         yield hn.load_map(file, robot_radius_m=robot_radius_m, max_cells=max_cells)
         advance(at + 1, len(files))
+
+
+def _with_rooms(
+    grids: Iterator[hn.OccupancyGrid], rooms_file: Path | None
+) -> tuple[hn.RoomLabels | None, Iterator[hn.OccupancyGrid]]:
+    """Return the rooms that a file states for the first map, None without one, and all maps."""
+    if rooms_file is None:
+        return None, grids
+    first = next(grids)
+    return hn.load_rooms(rooms_file, first), itertools.chain([first], grids)
 
 
 class _Log:
@@ -182,16 +219,15 @@ class _Log:
 def _summary(found: dict[str, Any]) -> str:
     rows, cols = found["cells"]
     doors = found["doors"]
+    counted = [kind for kind in ("places", "regions", "rooms", "doors") if kind in found]
     lines = [
         f"maps       {found['maps']:,}, the last of {cols} x {rows} cells",
-        (
-            f"now        {found['n_places']:,} places, {found['n_rooms']:,} rooms, "
-            f"{found['n_doors']:,} doors"
-        ),
-        *_identities("places", found["places"]),
-        *_identities("rooms", found["rooms"]),
-        f"doors      {doors['born']:,} born, {doors['died']:,} died",
+        "now        " + ", ".join(f"{found[f'n_{kind}']:,} {kind}" for kind in counted),
+        *(line for kind in counted[:-1] for line in _identities(kind, found[kind])),
+        "doors      " + ", ".join(f"{count:,} {event}" for event, count in doors.items()),
     ]
+    if found["lost_names"]:
+        lines.append(f"names      lost with their rooms: {', '.join(found['lost_names'])}")
     if "log" in found:
         lines.append(f"log        {found['log']}")
     n_levels, faults = found["levels"], found["faults"]
@@ -202,7 +238,7 @@ def _summary(found: dict[str, Any]) -> str:
 
 
 def _identities(kind: str, found: dict[str, Any]) -> list[str]:
-    """Return lines on the updates of places or rooms."""
+    """Return lines on the updates of places, regions or rooms."""
     if not found["updates"]:
         return [f"{kind:<10} no update"]
     events = ", ".join(f"{found[event]:,} {event}" for event in ("born", "died", "merged", "split"))

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import Level
 
 _EVENTS = ("born", "died", "merged", "split")
+_OF_DOORS = ("born", "died", "changed", "split")
 
 
 class Identities:
@@ -81,7 +82,7 @@ class _Flipped:
 
 
 class ReplayFigures:
-    """What a replay did: times, what became of places and rooms, flips of their numbers.
+    """What a replay did: times, what became of places, regions, rooms and doors, flips of numbers.
 
     Examples
     --------
@@ -97,9 +98,10 @@ class ReplayFigures:
     """
 
     def __init__(self) -> None:
-        self._places, self._rooms = Identities(), Identities()
+        self._places, self._regions, self._rooms = Identities(), Identities(), Identities()
         self._last: ReplayStep | None = None
         self._n_doors: Counter[str] = Counter()
+        self._lost_names: list[str] = []
 
     def add(self, step: ReplayStep) -> None:
         """Count a step."""
@@ -108,8 +110,11 @@ class ReplayFigures:
             self._places.add(step.update, step.place_flips, step.seconds)
         if step.rooms_update is not None and step.room_flips is not None:
             self._rooms.add(step.rooms_update, step.room_flips, step.rooms_seconds)
-            self._n_doors["born"] += len(step.rooms_update.doors.born)
-            self._n_doors["died"] += len(step.rooms_update.doors.died)
+            for event in _OF_DOORS:
+                self._n_doors[event] += len(getattr(step.rooms_update.doors, event))
+            self._lost_names += step.rooms_update.lost_names.values()
+        if step.region_flips is not None:
+            self._regions.add(step.regions_update, step.region_flips, step.regions_seconds)
 
     def figures(self) -> dict[str, Any]:
         """Return the figures as plain values for JSON.
@@ -122,21 +127,27 @@ class ReplayFigures:
             free, and the shares of them that flip by merging and by cutting off; for the places
             that are `untouched`, `apart` and `far` in some update (see `Flips`) how many there are,
             how many of them flip then, the number of flips, and the share that flips in an update;
-            `doors` with events; counts of the last map; `faults` of its levels, see `faults_of`.
+            `regions` with the same, if they are followed; `doors` with events, and `lost_names` of
+            rooms that died; counts of the last map; `faults` of its levels, see `faults_of`.
         """
         last = self._last
         if last is None:
             return {}
-        pyramid = last.places.pyramid
+        regions = last.regions
+        pyramid = last.places.pyramid if regions is None else regions.pyramid
+        of_regions = {} if regions is None else {"regions": self._regions.figures()}
         return {
             "maps": last.number + 1,
             "cells": list(last.places.grid.shape),
             "n_places": last.places.n_places,
+            "n_regions": None if regions is None else regions.n_regions,
             "n_rooms": len(last.rooms.numbers),
             "n_doors": sum(not door.is_gap for door in last.rooms.doors.values()),
             "places": self._places.figures(),
+            **of_regions,
             "rooms": self._rooms.figures(),
-            "doors": {"born": self._n_doors["born"], "died": self._n_doors["died"]},
+            "doors": {event: self._n_doors[event] for event in _OF_DOORS},
+            "lost_names": list(self._lost_names),
             "levels": len(pyramid),
             "faults": faults_of(pyramid),
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -13,6 +13,7 @@ from hybridnav.grid import OccupancyGrid
 from hybridnav.grid.checks import checked_type
 from hybridnav.online.flips import Flips, Numbered, flips_between
 from hybridnav.online.pyramid import OnlinePyramid
+from hybridnav.online.regions import OnlineRegions
 from hybridnav.online.room_versions import OnlineRooms
 from hybridnav.online.shift import shift_of
 from hybridnav.pyramid import DualGraphPyramid
@@ -21,14 +22,16 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from hybridnav._typing import BoolArray
+    from hybridnav.grid import RoomLabels
     from hybridnav.mapping import LaserScan, Mapper
     from hybridnav.online.pyramid import Update
+    from hybridnav.online.regions import RegionsUpdate
     from hybridnav.online.room_versions import RoomsUpdate
 
 
 @dataclass(frozen=True, eq=False)
 class ReplayStep:
-    """A map of a replay, with its places and rooms.
+    """A map of a replay, with its places, its rooms and, if asked for, its regions.
 
     Examples
     --------
@@ -57,12 +60,25 @@ class ReplayStep:
     """Flips of places; None for the first map."""
     room_flips: Flips | None
     """Flips of rooms; None where they were not brought up to date."""
+    regions: OnlineRegions | None = None
+    """The regions, those of `places`; None if they are not followed."""
+    regions_update: RegionsUpdate | None = None
+    """What became of the regions; None for the first map, and if they are not followed."""
+    regions_seconds: float = 0.0
+    """Time of the update of the regions; that of a build for the first map."""
+    region_flips: Flips | None = None
+    """Flips of regions; None for the first map, and if they are not followed."""
 
 
 def replay(
-    grids: Iterable[OccupancyGrid], *, merge_distance_m: float = 4.0, rooms_every: int = 1
+    grids: Iterable[OccupancyGrid],
+    *,
+    merge_distance_m: float = 4.0,
+    rooms_every: int = 1,
+    rooms: RoomLabels | None = None,
+    most_cells: int | None = None,
 ) -> Iterator[ReplayStep]:
-    """Follow a sequence of maps with places and rooms.
+    """Follow a sequence of maps with places, rooms and doors, and with regions if asked to.
 
     Parameters
     ----------
@@ -72,6 +88,10 @@ def replay(
         U_d of the places.
     rooms_every
         Maps after which rooms are brought up to date, at least 1; the last map always counts.
+    rooms
+        Rooms of the first map, whose names and numbers of doors are followed; None to find them.
+    most_cells
+        Most cells of a region, >= 1, as in `OnlineRegions.of`; None to follow no regions.
 
     Yields
     ------
@@ -81,7 +101,8 @@ def replay(
     Raises
     ------
     InvalidValueError
-        When there is no map, a map does not cover the one before, or a number is out of range.
+        When there is no map, a map does not cover the one before, the rooms are not those of the
+        first map, or a number is out of range.
 
     Examples
     --------
@@ -90,18 +111,19 @@ def replay(
     >>> door_open = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
     >>> cells[4, 10] = 1.0
     >>> post = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
-    >>> [step.places.n_places for step in replay([door_open, post])]
-    [1, 1]
+    >>> steps = list(replay([door_open, post], most_cells=100))
+    >>> [(step.places.n_places, step.regions.n_regions) for step in steps]
+    [(1, 1), (1, 1)]
     """
-    if not rooms_every >= 1:  # NaN too
-        raise InvalidValueError(f"rooms_every is {rooms_every}, expected 1 or more maps")
+    _check_every("rooms_every", rooms_every, "maps")
     step: ReplayStep | None = None
     for number, grid, is_last in _with_last(grids):
         checked_type("a map of the replay", grid, OccupancyGrid)
         if step is None:
-            step = _first(grid, merge_distance_m)
+            step = _with_first_regions(_first(grid, merge_distance_m, rooms), most_cells)
         else:
-            step = _next(step, grid, with_rooms=is_last or number % rooms_every == 0)
+            following = _next(step, grid, with_rooms=is_last or number % rooms_every == 0)
+            step = _with_next_regions(following, step.regions)
         yield step
     if step is None:
         raise InvalidValueError("there is no map to replay, expected one or more")
@@ -136,7 +158,7 @@ def grids_of_scans(
     Raises
     ------
     InvalidValueError
-        When `every` is below 1.
+        When `every` is no whole number of 1 or more.
 
     Examples
     --------
@@ -147,8 +169,7 @@ def grids_of_scans(
     >>> [grid.shape[1] for grid in grids_of_scans(scans, Mapper(resolution_m=0.5))]
     [5, 7]
     """
-    if every < 1:
-        raise InvalidValueError(f"every is {every}, expected 1 or more scans")
+    _check_every("every", every, "scans")
     n_waiting = 0
     for scan in scans:
         n_waiting += bool(mapper.add(scan))
@@ -157,6 +178,13 @@ def grids_of_scans(
             n_waiting = 0
     if n_waiting and mapper.has_cells:
         yield mapper.to_grid(robot_radius_m=robot_radius_m)
+
+
+def _check_every(name: str, every: int, what: str) -> None:
+    if not isinstance(every, int | np.integer) or every < 1:
+        raise InvalidValueError(
+            f"{name} is {every!r:.40}, expected a whole number of {what}, 1 or more"
+        )
 
 
 def _with_last(grids: Iterable[OccupancyGrid]) -> Iterator[tuple[int, OccupancyGrid, bool]]:
@@ -170,14 +198,38 @@ def _with_last(grids: Iterable[OccupancyGrid]) -> Iterator[tuple[int, OccupancyG
         yield number, cast("OccupancyGrid", waiting), True
 
 
-def _first(grid: OccupancyGrid, merge_distance_m: float) -> ReplayStep:
+def _first(grid: OccupancyGrid, merge_distance_m: float, labels: RoomLabels | None) -> ReplayStep:
     began = time.perf_counter()
     pyramid = DualGraphPyramid.build(grid, merge_distance_m=merge_distance_m)
     places = OnlinePyramid.of(pyramid)
     built = time.perf_counter()
-    rooms = OnlineRooms.of(grid)
+    rooms = OnlineRooms.of(grid, labels)
     found = time.perf_counter()
     return ReplayStep(0, places, rooms, None, None, built - began, found - built, None, None)
+
+
+def _with_first_regions(step: ReplayStep, most_cells: int | None) -> ReplayStep:
+    if most_cells is None:
+        return step
+    began = time.perf_counter()
+    regions = OnlineRegions.of(step.places, most_cells)
+    return replace(step, regions=regions, regions_seconds=time.perf_counter() - began)
+
+
+def _with_next_regions(step: ReplayStep, before: OnlineRegions | None) -> ReplayStep:
+    """Return a step with the regions after those of the step before."""
+    if before is None:
+        return step
+    began = time.perf_counter()
+    update = before.update(step.places)
+    seconds = time.perf_counter() - began
+    return replace(
+        step,
+        regions=update.version,
+        regions_update=update,
+        regions_seconds=seconds,
+        region_flips=flips_between(_numbered(before), _numbered(update.version)),
+    )
 
 
 def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayStep:
@@ -221,8 +273,8 @@ def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
     return changed
 
 
-def _numbered(version: OnlinePyramid | OnlineRooms) -> Numbered:
+def _numbered(version: OnlinePyramid | OnlineRegions | OnlineRooms) -> Numbered:
     """Return the cells of a version; rooms know no robot."""
-    grid = version.grid
+    grid = version.places.grid if isinstance(version, OnlineRegions) else version.grid
     is_rooms = isinstance(version, OnlineRooms)
     return Numbered(grid, grid.measured if is_rooms else grid.classes, version.number_of)

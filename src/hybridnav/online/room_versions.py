@@ -106,6 +106,7 @@ class OnlineRooms:
         checked_type("grid", grid, OccupancyGrid)
         if labels is None:
             labels = find_rooms(grid, least_area_m2=least_area_m2)
+        checked_type("labels", labels, RoomLabels)
         if labels.label_of.shape != grid.shape:
             raise InvalidValueError(
                 f"rooms are labels of {labels.label_of.shape} cells, expected those of the grid, "

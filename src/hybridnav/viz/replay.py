@@ -1,4 +1,4 @@
-"""Animations of replays: the map with its places and rooms, growing together."""
+"""Animations of replays: the map with its places, regions, rooms and doors, growing together."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.lines import Line2D
 from PIL import Image
 
 from hybridnav._files import replace_file
@@ -15,6 +16,8 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view, new_figure
+from hybridnav.viz.room_map import DOOR_POINTS
+from hybridnav.viz.room_names import RoomWriter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
 _MARGINS_IN = (0.65, 0.5, 0.12, 0.3)
 """Left, below, right and above each map: its axes, their names, its title."""
 _WIDE = 1.6
-"""Width over height of a map from which on places and rooms lie one below the other."""
+"""Width over height of a map from which on places, regions and rooms lie one below the other."""
 _LAST_PAUSE = 8
 """Frames for which the last one stays."""
 _DPI = 100
@@ -39,14 +42,26 @@ class _Frame(NamedTuple):
     number: int
     grid: OccupancyGrid
     place_of: IntArray
+    region_of: IntArray | None
     rooms: OnlineRooms
+
+
+class _Panel(NamedTuple):
+    """One of the maps of a frame."""
+
+    title: str
+    colours: _Colours
+    grid: OccupancyGrid
+    number_of: IntArray
 
 
 class ReplayAnimation:
     """Frames of a replay, to be written as a GIF.
 
-    A place or a room has one colour as long as it has its number; when it is born it takes the
-    colour that is the least common beside it. All frames have the extents of the last one.
+    A place, a region or a room has one colour as long as it has its number; when it is born it
+    takes the colour that is the least common beside it. Rooms have their names, doors that are no
+    gaps are dots with their numbers; both are left out where there is no space for them. All
+    frames have the extents of the last one.
 
     Parameters
     ----------
@@ -92,15 +107,18 @@ class ReplayAnimation:
         self._frames: list[_Frame] = []
         self._last: _Frame | None = None
         self._every = 1
-        self._colours = _Colours(), _Colours()
+        self._of_places, self._of_regions, self._of_rooms = _Colours(), _Colours(), _Colours()
 
     def add(self, step: ReplayStep) -> None:
         """Add a step of a replay, in order."""
-        frame = _Frame(step.number, step.places.grid, step.places.number_of, step.rooms)
+        region_of = None if step.regions is None else step.regions.number_of
+        frame = _Frame(step.number, step.places.grid, step.places.number_of, region_of, step.rooms)
         self._last = frame
-        self._colours[0].learn(frame.place_of)
+        self._of_places.learn(frame.place_of)
+        if region_of is not None:
+            self._of_regions.learn(region_of)
         if step.rooms_update is not None or step.update is None:
-            self._colours[1].learn(step.rooms.number_of)
+            self._of_rooms.learn(step.rooms.number_of)
         if step.number % self._every:
             return
         if len(self._frames) == self._most - 1:
@@ -143,42 +161,74 @@ class ReplayAnimation:
         except OSError as error:
             raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
 
+    def _panels(self, frame: _Frame) -> list[_Panel]:
+        """Return the maps of a frame, that of the rooms last."""
+        grid, rooms = frame.grid, frame.rooms
+        is_free = grid.classes == CellClass.FREE
+        n_places = len(np.unique(frame.place_of[is_free]))
+        title = f"map {frame.number + 1}: {n_places:,} free places"
+        panels = [_Panel(title, self._of_places, grid, frame.place_of)]
+        if frame.region_of is not None:
+            title = f"{len(np.unique(frame.region_of[is_free])):,} free regions"
+            panels.append(_Panel(title, self._of_regions, grid, frame.region_of))
+        n_doors = sum(not door.is_gap for door in rooms.doors.values())
+        title = f"{len(rooms.numbers):,} rooms, {n_doors:,} doors"
+        return [*panels, _Panel(title, self._of_rooms, rooms.grid, rooms.number_of)]
+
     def _drawn(self, frame: _Frame, view: View) -> Figure:
-        """Draw places and rooms, one beside the other, or below it where the map is wide."""
+        """Draw all maps of a frame, one beside the other, or below it where the map is wide."""
+        panels = self._panels(frame)
         left, below, right, above = _MARGINS_IN
         is_wide = view.size[0] > _WIDE * view.size[1]
-        wide_in = self._width_in if is_wide else self._width_in / 2
+        wide_in = self._width_in if is_wide else self._width_in / len(panels)
         map_in = wide_in - left - right
         map_high_in = map_in * float(view.size[1] / view.size[0])
         high_in = map_high_in + below + above
-        tall_in = 2 * high_in if is_wide else high_in
+        tall_in = len(panels) * high_in if is_wide else high_in
         figure = new_figure(self._width_in, tall_in / self._width_in)
-        places, rooms = self._colours
-        n_places = len(np.unique(frame.place_of[frame.grid.classes == CellClass.FREE]))
-        parts = (
-            (
-                f"map {frame.number + 1}: {n_places:,} free places",
-                places,
-                frame.grid,
-                frame.place_of,
-            ),
-            (f"{len(frame.rooms.numbers):,} rooms", rooms, frame.rooms.grid, frame.rooms.number_of),
-        )
-        for at, (title, colours, grid, number_of) in enumerate(parts):
+        for at, panel in enumerate(panels):
             x_in = left + (0 if is_wide else at * wide_in)
-            y_in = below + ((1 - at) * high_in if is_wide else 0)
+            y_in = below + ((len(panels) - 1 - at) * high_in if is_wide else 0)
             size = map_in / self._width_in, map_high_in / tall_in
             ax = figure.add_axes((x_in / self._width_in, y_in / tall_in, *size))
             canvas = Canvas.opened(ax, self._width_in, view)
-            is_free = grid.measured == CellClass.FREE
-            dense, table = colours.table(np.where(is_free, number_of, np.int32(-1)))
-            draw_cells(canvas, grid, dense, table)
-            ax.set_facecolor(style.UNEXPLORED)
-            ax.set_title(title, fontsize=9, loc="left", pad=4)
-            ax.set_xlabel("x in metres", fontsize=8, labelpad=2)
-            ax.set_ylabel("y in metres", fontsize=8, labelpad=2)
-            ax.tick_params(labelsize=8)
+            _draw_panel(canvas, panel)
+            if at == len(panels) - 1:
+                _write_rooms(canvas, frame.rooms)
         return figure
+
+
+def _draw_panel(canvas: Canvas, panel: _Panel) -> None:
+    """Draw the cells of a map in the colours of their numbers, with axes and a title."""
+    is_free = panel.grid.measured == CellClass.FREE
+    dense, table = panel.colours.table(np.where(is_free, panel.number_of, np.int32(-1)))
+    draw_cells(canvas, panel.grid, dense, table)
+    ax = canvas.ax
+    ax.set_facecolor(style.UNEXPLORED)
+    ax.set_title(panel.title, fontsize=9, loc="left", pad=4)
+    ax.set_xlabel("x in metres", fontsize=8, labelpad=2)
+    ax.set_ylabel("y in metres", fontsize=8, labelpad=2)
+    ax.tick_params(labelsize=8)
+
+
+def _write_rooms(canvas: Canvas, rooms: OnlineRooms) -> None:
+    """Write the names of rooms, and draw doors as dots with their numbers."""
+    doors = [door for door in rooms.doors.values() if not door.is_gap]
+    dots = Line2D(
+        [door.position[0] for door in doors],
+        [door.position[1] for door in doors],
+        color=style.PATH,
+        marker="o",
+        markersize=2 * DOOR_POINTS * canvas.sizes.line,
+        linestyle="none",
+        zorder=8,
+    )
+    dots.set_gid("doors")
+    canvas.ax.add_line(dots)
+    writer = RoomWriter(canvas, rooms.grid, rooms.labels)
+    writer.labels.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
+    writer.write_names()
+    writer.number_doors(sorted(doors, key=lambda door: -door.width_m))
 
 
 class _Colours:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.grid import OccupancyGrid, RoomLabels
+    from hybridnav.online import OnlineDoor
     from hybridnav.topology import Door
     from hybridnav.viz.canvas import Canvas
 
@@ -58,7 +59,7 @@ class RoomWriter:
         self.unnamed: list[int] = []
         """Rooms whose names did not fit, the largest first."""
 
-    def number_doors(self, doors: Sequence[Door], *, always: bool = False) -> None:
+    def number_doors(self, doors: Sequence[Door | OnlineDoor], *, always: bool = False) -> None:
         """Write the numbers of doors beside their dots.
 
         Parameters
