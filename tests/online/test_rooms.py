@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import Phase, settings
@@ -23,6 +25,7 @@ from hybridnav.online import OnlineRooms
 from hybridnav.topology.segmentation import reaching
 from tests.strategies import examples
 
+WRONG: Any = "rooms.yaml"
 RESOLUTION_M = 0.25
 SIDE = 9
 """Cells between two walls."""
@@ -316,7 +319,7 @@ def agreement(version):
         (lambda rooms: rooms.update(grid_of(np.ones((30, 30), int), resolution_m=1)), "anew"),
         (lambda rooms: rooms.update(rooms.grid).closed_doors([7]), "there was no door 7"),
         (lambda rooms: OnlineRooms.of(grid_of(np.ones((3, 3), int)), rooms.labels), "this map"),
-        (lambda rooms: OnlineRooms.of(rooms.grid, "rooms.yaml"), "labels is 'rooms.yaml'"),
+        (lambda rooms: OnlineRooms.of(rooms.grid, WRONG), "labels is 'rooms.yaml'"),
         (lambda rooms: OnlineRooms.of(rooms.grid, least_area_m2=-1), "least area"),
     ],
 )
