@@ -168,6 +168,27 @@ def test_another_map_is_refused_and_changes_nothing(change: dict[str, Any], mess
         planner.update(grid=other, topology=topology_of(grid))
 
 
+@pytest.mark.parametrize("preset", FOLLOWING)
+@pytest.mark.parametrize("kind", ["mask", "box"])
+def test_changes_outside_the_stated_area_are_refused(preset: str, kind: str) -> None:
+    probability = np.zeros((20, 30), np.float32)
+    probability[:, 15], probability[10, 15] = 1.0, 0.0
+    grid = hn.OccupancyGrid(probability, robot_radius_m=0)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    before = planner.plan((4.5, 4.5), (24.5, 4.5)).cost
+    probability[[10, 3], 15] = 1.0, 0.0  # the door closes, another one opens
+    now = hn.OccupancyGrid(probability, robot_radius_m=0)
+    for area in ((15.0, 3.0, 16.0, 4.0), (40.0, 40.0, 50.0, 50.0)):
+        cells = np.zeros(grid.shape, np.bool_)
+        cells[3, 15] = area[0] < 40
+        with pytest.raises(hn.InvalidValueError, match="cells changed outside") as error:
+            planner.update(grid=now, changed=cells if kind == "mask" else area)
+        assert "\n" not in str(error.value)
+        assert planner.plan((4.5, 4.5), (24.5, 4.5)).cost == before
+    planner.update(grid=now, changed=(15.0, 3.0, 16.0, 11.0))
+    assert planner.plan((4.5, 4.5), (24.5, 4.5)).cost < before
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [

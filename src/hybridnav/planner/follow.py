@@ -161,7 +161,7 @@ def changed_cells(before: OccupancyGrid, now: OccupancyGrid, box: Box) -> LongAr
     Raises
     ------
     InvalidValueError
-        When the grids differ in shape, frame, or in what is legal.
+        When the grids differ in shape, frame, or in what is legal, or outside the box.
     """
     for what, old, new in (
         ("a shape of cells", before.shape, now.shape),
@@ -172,15 +172,21 @@ def changed_cells(before: OccupancyGrid, now: OccupancyGrid, box: Box) -> LongAr
             raise InvalidValueError(
                 f"the grid has {what} {new}, expected {old}: make a new planner for another map"
             )
-    is_same_reach = class_rules(before) == class_rules(now) and now.least_island_m2 == 0
-    part: tuple[slice, slice] = slice(None), slice(None)
-    low_row = low_col = 0
-    if is_same_reach:
-        reach = class_reach(now)
-        low_row, low_col = max(box[0] - reach, 0), max(box[2] - reach, 0)
-        part = slice(low_row, box[1] + reach), slice(low_col, box[3] + reach)
-        if box[0] >= box[1] or box[2] >= box[3]:
-            return np.empty((0, 2), np.int64)
-    found = np.argwhere(before.classes[part] != now.classes[part])
-    cells: LongArray = found + np.array([low_row, low_col])
+    flat = np.flatnonzero(before.classes != now.classes)  # argwhere takes 15 times as long
+    cells: LongArray = np.stack(np.divmod(flat, now.shape[1]), axis=1)
+    if class_rules(before) == class_rules(now) and now.least_island_m2 == 0:
+        _check_inside(cells, box, class_reach(now))
     return cells
+
+
+def _check_inside(cells: LongArray, box: Box, reach: int) -> None:
+    """Refuse changed cells beyond what a box of measurements reaches: proofs need all of them."""
+    is_box = box[0] < box[1] and box[2] < box[3]
+    low, high = np.array(box[::2]) - reach, np.array(box[1::2]) + reach
+    outside = ~((cells >= low) & (cells < high)).all(axis=1) | (not is_box)
+    if outside.any():
+        row, col = cells[outside][0].tolist()
+        raise InvalidValueError(
+            f"{int(outside.sum())} cells changed outside what changed states, the first at row "
+            f"{row}, column {col}: pass changed=None to compare all cells"
+        )

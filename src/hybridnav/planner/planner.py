@@ -284,17 +284,17 @@ class HybridPlanner:
         topology
             The places of the map now; its grid is taken if no `grid` is given.
         changed
-            The area outside of which nothing is read, and nothing has changed: a shapely geometry
-            in metres, map frame, whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a
-            mask, bool (rows, cols); None for the whole map. For a grid it holds the changed
-            measurements; the robot's radius is added.
+            The area outside of which nothing has changed: a shapely geometry in metres, map frame,
+            whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a mask, bool (rows, cols);
+            None for the whole map. Costs outside of it stay as they were. For a grid it holds the
+            changed measurements; the robot's radius is added.
 
         Raises
         ------
         InvalidValueError
             When nothing is given, the preset cannot plan by costs, costs or grid are those of
-            another map, the preset needs places, or the area is not described like that; then
-            nothing has changed.
+            another map, the preset needs places, cells of the grid changed outside the area, or the
+            area is not described like that; then nothing has changed.
 
         Examples
         --------
