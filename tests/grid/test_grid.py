@@ -92,6 +92,13 @@ def test_a_frame_needs_finite_values(arguments, word):
         Frame(*arguments)
 
 
+@pytest.mark.parametrize("probability", [[["wall"]], [[None, {}]], [[0.0], [0.0, 1.0]]])
+def test_probabilities_that_are_no_numbers_are_refused_in_one_line(probability):
+    with pytest.raises(InvalidValueError, match="occupancy probabilities are") as error:
+        OccupancyGrid(probability)
+    assert "\n" not in str(error.value)
+
+
 def test_points_must_be_finite():
     with pytest.raises(InvalidValueError, match="finite"):
         Frame().cells_of([0.0, math.nan])

@@ -223,6 +223,17 @@ def test_portals_follow_regions():
     assert planner.plan(*ends).cost == pytest.approx(exact.plan(*ends).cost)
 
 
+def test_regions_follow_the_places_of_any_version_of_their_map():
+    classes = np.ones((9, 20), np.uint8)
+    first = version_of(classes, merge_distance_m=4.0)
+    classes[:, 10] = 0
+    second = first.update(occupancy_grid(classes)).version
+    regions = OnlineRegions.of(second, np.int64(30))
+    back = regions.update(first)
+    check_events(regions, back, (0, 0))
+    check_partition(back.version)
+
+
 @pytest.mark.parametrize(
     ("ask", "message"),
     [

@@ -25,6 +25,7 @@ from hybridnav.online import OnlineRooms
 from hybridnav.topology.segmentation import reaching
 from tests.strategies import examples
 
+NOTHING: Any = None
 WRONG: Any = "rooms.yaml"
 RESOLUTION_M = 0.25
 SIDE = 9
@@ -321,6 +322,12 @@ def agreement(version):
         (lambda rooms: OnlineRooms.of(grid_of(np.ones((3, 3), int)), rooms.labels), "this map"),
         (lambda rooms: OnlineRooms.of(rooms.grid, WRONG), "labels is 'rooms.yaml'"),
         (lambda rooms: OnlineRooms.of(rooms.grid, least_area_m2=-1), "least area"),
+        (lambda rooms: OnlineRooms.of(rooms.grid, rooms.labels, least_area_m2=-1), "least area"),
+        (lambda rooms: OnlineRooms.of(rooms.grid, least_area_m2=WRONG), "got 'rooms.yaml'"),
+        (lambda rooms: rooms.update(rooms.grid).closed_doors(WRONG), "there was no door 'r'"),
+        (lambda rooms: rooms.update(rooms.grid).closed_doors(NOTHING), "closed is None"),
+        (lambda rooms: rooms.update(rooms.grid).closed_doors([1, "x"]), "no door 'x'"),
+        (lambda rooms: rooms.update(rooms.grid).closed_doors([[1]]), r"no door \[1\]"),
     ],
 )
 def test_wrong_arguments_end_in_one_line(ask, message):

@@ -337,6 +337,7 @@ def test_cells_that_changed_elsewhere_are_reported():
         pytest.param(np.zeros((5, 5)), (1, 2), "changed is", id="half a box"),
         pytest.param(np.zeros((5, 5)), np.zeros((4, 5), dtype=bool), "mask of shape", id="mask"),
         pytest.param(np.zeros((5, 5)), (3, 3, 1, 1), "changed is", id="inverted"),
+        pytest.param(np.zeros((5, 5)), np.ones((5, 5), int), "or a mask, bool", id="whole numbers"),
     ],
 )
 def test_wrong_arguments_end_in_one_line(grid, changed, message):
@@ -391,5 +392,20 @@ def test_a_pyramid_of_another_linkage_is_refused(linkage):
 
 
 def test_a_number_that_is_no_place_is_refused():
-    with pytest.raises(InvalidValueError, match="no place 7"):
-        version_of(np.ones((4, 4), np.uint8)).receptive_field(7)
+    version = version_of(np.ones((4, 4), np.uint8))
+    for number in (7, -1, 10**30, None):
+        with pytest.raises(InvalidValueError, match=f"no place {number}"):
+            version.receptive_field(number)
+
+
+def test_cells_that_an_area_left_out_are_found_by_a_later_update():
+    classes = np.ones((5, 5), np.uint8)
+    version = version_of(classes)
+    classes[4, 4] = 0
+    grid = occupancy_grid(classes)
+    after = version.update(grid, changed=(0, 0, 2, 2)).version
+    assert after.place_at((4, 4)) == 0
+    update = after.update(grid)
+    assert update.cells.tolist() == [[4, 4]]
+    assert update.version.place_at((4, 4)) == -1
+    check_version(update.version)

@@ -89,7 +89,7 @@ def _box_of_bounds(changed: Any, frame: Frame, shape: tuple[int, int]) -> Box:
         what = " ".join(f"{changed!r:.80}".split())
         raise InvalidValueError(
             f"changed is {what}, expected an area in metres: give a shapely geometry that is not "
-            "empty, (x_min, y_min, x_max, y_max), or a mask of the cells"
+            "empty, (x_min, y_min, x_max, y_max), or a mask, bool (rows, cols)"
         )
     corners = [frame.position_of(x, y) for x in (x_min, x_max) for y in (y_min, y_max)]
     first_row, high_row = _cells_over([row for row, _ in corners], shape[0])

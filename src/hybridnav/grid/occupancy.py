@@ -111,7 +111,13 @@ class OccupancyGrid:
     """Islands left out by `least_island_m2`; None when that is 0."""
 
     def __post_init__(self) -> None:
-        probability = np.array(self.probability, dtype=np.float32, order="C")
+        try:
+            probability = np.array(self.probability, dtype=np.float32, order="C")
+        except (TypeError, ValueError):
+            what = " ".join(f"{self.probability!r:.60}".split())
+            raise InvalidValueError(
+                f"occupancy probabilities are {what}, expected numbers, float32 (rows, cols)"
+            ) from None
         _check_probability(probability)
         given = self.__dict__["robot_radius_m"]
         kept = self.radius_is_default and given == DEFAULT_ROBOT_RADIUS_M

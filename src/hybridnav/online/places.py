@@ -72,7 +72,7 @@ class PlaceTable:
 
     def has(self, place: int) -> bool:
         """Return whether there is such a place."""
-        return len(self.known([place])) > 0
+        return 0 <= place < _NONE and len(self.known([place])) > 0
 
     def known(self, places: Iterable[int]) -> list[int]:
         """Return those of some numbers that are places."""

@@ -126,8 +126,9 @@ class OnlinePyramid:
             The area where measurements changed, as in `HybridPlanner.update`: a shapely geometry
             in metres, map frame, whose bounds are taken, or `(x_min, y_min, x_max, y_max)`, or a
             mask, bool (rows, cols) of the new grid. The robot's radius is added on all sides, and
-            cells by which the map grew always count. Only there are cells compared. None compares
-            all cells, as do grids with another radius or other thresholds.
+            cells by which the map grew always count. Only there are cells compared: others stay as
+            they were until an update states them, and `pyramid` refuses such a version. None
+            compares all cells, as do grids with another radius or other thresholds.
 
         Returns
         -------

@@ -84,6 +84,8 @@ class OnlineRegions:
         InvalidValueError
             When the number is not a whole number >= 1.
         """
+        if isinstance(most_cells, np.integer):
+            most_cells = int(most_cells)
         pyramid = checked_type("places", places, OnlinePyramid).pyramid.with_regions(most_cells)
         regions = pyramid[pyramid.region_level]
         region = regions.field_of[tuple(pyramid[pyramid.place_level].cells.T)]
@@ -101,7 +103,7 @@ class OnlineRegions:
         )
 
     def update(self, places: OnlinePyramid) -> RegionsUpdate:
-        """Return the next version, that of later places.
+        """Return the next version, that of other places, most often later ones.
 
         Regions that hold a changed place are contracted again with new places and with the regions
         beside them, which take part whole. They are dissolved into places only where these do not
@@ -111,7 +113,8 @@ class OnlineRegions:
         Parameters
         ----------
         places
-            A later version of the places; updates in between may be left out.
+            Another version of the places, most often a later one; updates in between may be left
+            out.
 
         Returns
         -------
@@ -121,7 +124,8 @@ class OnlineRegions:
         Raises
         ------
         InvalidValueError
-            When they are no later version of the places of this one.
+            When their map does not cover that of this version, cell on cell, or their versions did
+            not begin on the same map.
         """
         before = self.places
         checked_type("places", places, OnlinePyramid)

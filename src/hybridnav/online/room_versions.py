@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -26,10 +27,10 @@ from hybridnav.online.rooms_window import (
 )
 from hybridnav.online.shift import placed, shift_of
 from hybridnav.online.tiles import Box
-from hybridnav.topology.segmentation import find_rooms, outside_of
+from hybridnav.topology.segmentation import check_least_area, find_rooms, outside_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from hybridnav._typing import BoolArray, IntArray
     from hybridnav.grid.room_labels import Point
@@ -101,9 +102,10 @@ class OnlineRooms:
         Raises
         ------
         InvalidValueError
-            When the labels are those of another grid, or the area is out of range.
+            When the labels are no `RoomLabels` of the grid, or the area is out of range.
         """
         checked_type("grid", grid, OccupancyGrid)
+        check_least_area(least_area_m2)
         if labels is None:
             labels = find_rooms(grid, least_area_m2=least_area_m2)
         checked_type("labels", labels, RoomLabels)
@@ -354,15 +356,16 @@ class RoomsUpdate:
         >>> rooms.update(hn.OccupancyGrid(wall, robot_radius_m=0)).closed_doors([1])
         ((), (1,))
         """
-        asked = sorted(set(closed))
+        given = list(checked_type("closed", closed, Iterable))
         born, died, _, split = self.doors
         had = (set(self.version.doors) - set(born)) | set(died)
-        unknown = [number for number in asked if number not in had]
-        if unknown:
-            raise InvalidValueError(
-                f"there was no door {unknown[0]!r:.40}, expected numbers of doors of the version "
-                "before: take them from its doors"
-            )
+        for number in given:
+            if not isinstance(number, int | np.integer) or number not in had:
+                raise InvalidValueError(
+                    f"there was no door {number!r:.40}, expected numbers of doors of the version "
+                    "before: take them from its doors"
+                )
+        asked = sorted({int(number) for number in given})
         now = {part for number in asked for part in split.get(number, (number,))}
         gone = set(died) - set(split)
         return tuple(sorted(now - gone)), tuple(n for n in asked if n in gone)

@@ -95,11 +95,7 @@ def find_rooms(
         raise InvalidValueError(
             f"method must be one of {', '.join(get_args(Segmentation))}, got {method!r:.80}"
         )
-    if not 0 < least_area_m2 <= _LARGEST_LEAST_M2:
-        raise InvalidValueError(
-            "least area must be a positive number of square metres, at most "
-            f"{_LARGEST_LEAST_M2:g}, got {least_area_m2}"
-        )
+    check_least_area(least_area_m2)
     found = _judged if method == "judged" else _convex
     least = least_cells(least_area_m2, grid.resolution_m**2)
     labels = _in_reading_order(found(grid, method, least_area_m2), least)
@@ -111,6 +107,16 @@ def find_rooms(
         )
     names = tuple(f"room-{number}" for number in range(1, n_rooms + 1))
     return RoomLabels(names, reaching(labels, grid))
+
+
+def check_least_area(least_area_m2: float) -> None:
+    """Raise `InvalidValueError` if the least area of a room is out of range, or no number."""
+    is_number = isinstance(least_area_m2, int | float | np.number)
+    if not is_number or not 0 < least_area_m2 <= _LARGEST_LEAST_M2:
+        raise InvalidValueError(
+            "least area must be a positive number of square metres, at most "
+            f"{_LARGEST_LEAST_M2:g}, got {least_area_m2!r:.40}"
+        )
 
 
 def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
