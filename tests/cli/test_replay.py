@@ -35,7 +35,7 @@ def test_maps_are_replayed_one_after_the_other(cli: Any, tmp_path: Path) -> None
     lines = done.out.splitlines()
     assert lines[0] == "maps       2, the last of 25 x 12 cells"
     assert lines[1].endswith("2 rooms, 0 doors")
-    assert "doors      0 born, 1 died, 0 changed, 0 split" in lines
+    assert "doors      0 born, 1 died, 0 merged, 0 split, 0 changed" in lines
     assert lines[-1].startswith("check      ")
     assert lines[-1].endswith("each boundary of their fields is one arc")
 

@@ -112,13 +112,19 @@ def check_update(before, update, shift):
     kept = {n: name for n, name in before.names.items() if n in has}
     assert after.names == kept
     assert update.lost_names == {n: name for n, name in before.names.items() if n not in has}
-    born, died, changed, _ = update.doors
+    born, died, changed, split, merged = update.doors
     assert set(died) == set(before.doors) - set(after.doors)
     assert set(born) == set(after.doors) - set(before.doors)
     for number in set(before.doors) & set(after.doors) - set(changed):
         one, other = before.doors[number], after.doors[number]
         assert one.rooms == other.rooms
         assert np.array_equal(one.cracks, other.cracks)
+    owner_of = {int(crack): n for n, door in after.doors.items() for crack in door.cracks}
+    for number, door in before.doors.items():
+        owners = {owner_of[int(crack)] for crack in door.cracks if int(crack) in owner_of}
+        assert split.get(number, ()) == (tuple(sorted(owners)) if len(owners) > 1 else ())
+        is_part = number not in after.doors and len(owners) == 1
+        assert merged.get(number) == (owners.pop() if is_part else None)
 
 
 class Building(RuleBasedStateMachine):
@@ -259,6 +265,18 @@ def test_a_closed_door_that_a_post_parts_stays_closed_on_both_sides():
     kept, lost = update.closed_doors([1])
     assert kept == update.doors.split[1] == tuple(update.version.doors)
     assert (len(kept), lost) == (2, ())
+
+
+def test_a_closed_door_that_becomes_part_of_a_wider_one_is_returned_with_that():
+    classes, door, _ = two_rooms()
+    classes[door[0].start + 1, door[1].start] = 0
+    version = OnlineRooms.of(grid_of(classes))
+    assert len(version.doors) == 2
+    classes[door] = 1
+    update = version.update(grid_of(classes))
+    (died,), (left,) = update.doors.died, update.version.doors
+    assert update.doors.merged == {died: left}
+    assert update.closed_doors(version.doors) == ((left,), (died,))
 
 
 def test_closed_doors_are_closed_for_planners_by_the_same_numbers():

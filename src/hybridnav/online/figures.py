@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import Level
 
 _EVENTS = ("born", "died", "merged", "split")
-_OF_DOORS = ("born", "died", "changed", "split")
+_OF_DOORS = (*_EVENTS, "changed")
 
 
 class Identities:

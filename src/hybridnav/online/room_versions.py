@@ -183,7 +183,7 @@ class OnlineRooms:
             differs |= new & beside_rooms(number_of, grid)
         moved = replace(self, grid=grid, number_of=frozen(number_of), low=low, _outside=outside)
         if not differs.any():
-            return RoomsUpdate(moved, (), (), {}, {}, (), DoorEvents((), (), (), {}), {})
+            return RoomsUpdate(moved, (), (), {}, {}, (), DoorEvents((), (), (), {}, {}), {})
         before = RoomCells(number_of, (measured == CellClass.FREE) & ~was_outside)
         found = renew(before, grid, outside, differs, (self.least_area_m2, self._next[0]))
         events = found.events
@@ -340,7 +340,8 @@ class RoomsUpdate:
         -------
         tuple of tuple of int
             The doors to close now, ascending: those that are left, and all parts of one that fell
-            into several. Then the closed doors that are no more.
+            into several. Then the closed doors that are no more, also those that are part of a
+            wider one now: `doors.merged` states which.
 
         Raises
         ------
@@ -357,7 +358,7 @@ class RoomsUpdate:
         ((), (1,))
         """
         given = list(checked_type("closed", closed, Iterable))
-        born, died, _, split = self.doors
+        born, died, _, split, _ = self.doors
         had = (set(self.version.doors) - set(born)) | set(died)
         for number in given:
             if not isinstance(number, int | np.integer) or number not in had:

@@ -77,6 +77,8 @@ class DoorEvents(NamedTuple):
     """Doors that kept their number, but have other cells or rooms."""
     split: dict[int, tuple[int, ...]]
     """Doors of which several are left, with these: the one that kept the number among them."""
+    merged: dict[int, int]
+    """Doors that died and are part of one other door now, wider or moved, with that door."""
 
 
 def doors_of(
@@ -158,25 +160,27 @@ def follow_doors(
     )
     died = tuple(n for n in sorted(gone) if n not in doors)
     fresh = [doors[n] for n in (*born, *changed)]
-    events = DoorEvents(tuple(born), died, changed, _split([gone[n] for n in sorted(gone)], fresh))
-    return dict(sorted(doors.items())), events
+    parts = _parts([gone[n] for n in sorted(gone)], fresh)
+    split = {n: tuple(sorted(owners)) for n, owners in parts.items() if len(owners) > 1}
+    merged = {n: owners[0] for n, owners in parts.items() if n not in doors and n not in split}
+    return dict(sorted(doors.items())), DoorEvents(tuple(born), died, changed, split, merged)
 
 
 def _same(one: OnlineDoor, other: OnlineDoor) -> bool:
     return one.rooms == other.rooms and np.array_equal(one.cracks, other.cracks)
 
 
-def _split(old: list[OnlineDoor], new: list[OnlineDoor]) -> dict[int, tuple[int, ...]]:
-    """Return the old doors of whose cracks several new doors have some, with these."""
+def _parts(old: list[OnlineDoor], new: list[OnlineDoor]) -> dict[int, list[int]]:
+    """Return the new doors that have cracks of each old door, for those with any."""
     if not old or not new:
         return {}
     cracks = np.concatenate([door.cracks for door in new])
     owner = np.repeat([door.number for door in new], [len(door.cracks) for door in new])
     order = np.argsort(cracks)
-    split = {}
+    parts: dict[int, list[int]] = {}
     for door in old:
         at = np.minimum(np.searchsorted(cracks[order], door.cracks), len(cracks) - 1)
-        parts = np.unique(owner[order][at[cracks[order][at] == door.cracks]])
-        if len(parts) > 1:
-            split[door.number] = tuple(parts.tolist())
-    return split
+        owners = np.unique(owner[order][at[cracks[order][at] == door.cracks]])
+        if len(owners):
+            parts[door.number] = owners.tolist()
+    return parts
