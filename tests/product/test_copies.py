@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 import weakref
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -24,6 +25,7 @@ from hybridnav.baselines.hpa import HpaStar
 from hybridnav.baselines.overlay import ExactOverlay
 from hybridnav.baselines.simple_graph import SimpleGraphPyramid
 from hybridnav.baselines.thrun import ThrunMap
+from hybridnav.online import OnlinePyramid, OnlineRegions, OnlineRooms
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.pool import Pool
 from tests.strategies import Scene, examples, scenes
@@ -87,12 +89,44 @@ def things() -> dict[str, Any]:
         "hpa": HpaStar(topo.grid),
         "thrun": ThrunMap(topo.grid),
     }
+    found |= followed(topo.grid)
     for name in QUICK:
         found[f"planner {name}"] = planner(name)
         found[f"result {name}"] = planner(name).plan(START, GOAL).raise_for_status()
         found[f"line {name}"] = planner(name).plan(START, GOAL, smooth="line-of-sight")
         found[f"batch {name}"] = planner(name).plan_many([START], [GOAL])
     return found
+
+
+def followed(grid: hn.OccupancyGrid) -> dict[str, Any]:
+    """Versions of places, regions and rooms, and what became of them by an update."""
+    places = OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
+    regions = OnlineRegions.of(places, most_cells=200)
+    rooms = OnlineRooms.of(grid, topology().rooms.labels).with_name(1, "first")
+    probability = grid.probability.copy()
+    probability[5:8, 5:14] = 1.0
+    update = places.update(replace(grid, probability=probability))
+    now = update.version.pyramid.grid  # levels are found lazily
+    return {
+        "places": update,
+        "regions update": regions.update(update.version),
+        "rooms update": rooms.update(now),
+    }
+
+
+@WAYS
+def test_copies_of_versions_follow_a_map_alike(copied: Any) -> None:
+    grid = topology().grid
+    for name, update in followed(grid).items():
+        version, other = update.version, copied(update).version
+        if name == "regions update":
+            places = version.places.update(grid).version
+            after = [each.update(places) for each in (version, other)]
+        else:
+            after = [each.update(grid) for each in (version, other)]
+        one, two = after
+        np.testing.assert_array_equal(one.version.number_of, two.version.number_of)
+        assert (one.born, one.died, one.merged) == (two.born, two.died, two.merged)
 
 
 def assert_alike(one: Any, other: Any, done: set[int]) -> None:

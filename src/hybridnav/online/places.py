@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import frozen
+from hybridnav._copies import copies_alike, frozen
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -32,6 +32,7 @@ _SPACE = 256
 """Rows that a copy of the table has to spare."""
 
 
+@copies_alike
 class PlaceTable:
     """Places by number. A number is never used again.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import frozen
+from hybridnav._copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import OccupancyGrid
 from hybridnav.grid.areas import box_of_area, class_reach, class_rules
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import Linkage
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class OnlinePyramid:
     """One version of a pyramid that follows its map: the places and all levels below them.
@@ -246,6 +247,7 @@ class OnlinePyramid:
         return Box(0, 0, *self.grid.shape).moved(*self.low)
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class Update:
     """A new version, and what became of the places of the one before, by number.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._copies import frozen
+from hybridnav._copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
 from hybridnav.online.identities import Overlap, events_of, heirs_of
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from hybridnav.pyramid import DualGraphPyramid
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class OnlineRegions:
     """One version of the regions of a map that changes, the level above its places.

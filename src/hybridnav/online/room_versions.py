@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav._copies import frozen
+from hybridnav._copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.grid.checks import checked_type
@@ -41,6 +41,7 @@ _AROUND = 2
 """Cells round rooms in which their doors lie."""
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class OnlineRooms:
     """One version of the rooms and doors of a map that changes.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._copies import frozen
+from hybridnav._copies import copies_alike, frozen
 from hybridnav.grid import NO_ROOM, RoomLabels
 from hybridnav.topology.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
 
@@ -22,6 +22,7 @@ _BIAS = 1 << 20
 """Added to rows and columns so that none is negative."""
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class OnlineDoor:
     """A boundary between two rooms of a map that changes, with a number that lasts.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridnav._copies import frozen
+from hybridnav._copies import copies_alike, frozen
 from hybridnav.online import _tile_kernels
 
 if TYPE_CHECKING:
@@ -141,6 +141,7 @@ _EMPTY = Tile(
 """A tile of cells that are no vertices, as is all that lies outside the tiles."""
 
 
+@copies_alike
 class Tiles:
     """The tiles of a version, and those of the next one while it is made.
 
