@@ -228,7 +228,8 @@ def test_regions_follow_the_places_of_any_version_of_their_map():
     first = version_of(classes, merge_distance_m=4.0)
     classes[:, 10] = 0
     second = first.update(occupancy_grid(classes)).version
-    regions = OnlineRegions.of(second, np.int64(30))
+    most_cells: Any = np.int64(30)
+    regions = OnlineRegions.of(second, most_cells)
     back = regions.update(first)
     check_events(regions, back, (0, 0))
     check_partition(back.version)

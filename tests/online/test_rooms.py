@@ -343,7 +343,7 @@ def agreement(version):
         (lambda rooms: OnlineRooms.of(rooms.grid, rooms.labels, least_area_m2=-1), "least area"),
         (lambda rooms: OnlineRooms.of(rooms.grid, least_area_m2=WRONG), "got 'rooms.yaml'"),
         (lambda rooms: rooms.update(rooms.grid).closed_doors(WRONG), "there was no door 'r'"),
-        (lambda rooms: rooms.update(rooms.grid).closed_doors(NOTHING), "closed is None"),
+        (lambda rooms: rooms.update(rooms.grid).closed_doors(NOTHING), "no door None"),
         (lambda rooms: rooms.update(rooms.grid).closed_doors([1, "x"]), "no door 'x'"),
         (lambda rooms: rooms.update(rooms.grid).closed_doors([[1]]), r"no door \[1\]"),
     ],

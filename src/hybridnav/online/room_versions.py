@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from hybridnav.online.tiles import Box
 from hybridnav.topology.segmentation import check_least_area, find_rooms, outside_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from hybridnav._typing import BoolArray, IntArray
     from hybridnav.grid.room_labels import Point
@@ -358,7 +357,7 @@ class RoomsUpdate:
         >>> rooms.update(hn.OccupancyGrid(wall, robot_radius_m=0)).closed_doors([1])
         ((), (1,))
         """
-        given = list(checked_type("closed", closed, Iterable))
+        given: list[Any] = list(closed) if np.iterable(closed) else [closed]
         born, died, _, split, _ = self.doors
         had = (set(self.version.doors) - set(born)) | set(died)
         for number in given:
