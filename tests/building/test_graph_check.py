@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
-import numpy as np
 import pytest
 
 import hybridnav as hn
@@ -20,14 +19,13 @@ from hybridnav.building import (
     match_graph,
 )
 from hybridnav.graphs import BUILDING_KINDS
+from tests.houses import LIFT, STAIRS, two_rooms
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-INK = ("#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#########")
 NODES = {"a": (1.5, 1.5), "b": (2.5, 2.5), "c": (4.5, 2.5), "d": (6.5, 2.5), "e": (7.5, 4.5)}
 EDGES = [("a", "b"), ("b", "c"), ("c", "d"), ("d", "e")]
-LIFT, STAIRS = (1.5, 1.5), (7.5, 4.5)
 
 
 def link(name: str, kind: Any, *ends: tuple[str, Any], **more: Any) -> hn.Link:
@@ -44,11 +42,9 @@ LINKS = {
 def house() -> hn.Building:
     """Three floors of two rooms, a lift from 1 to 2 and stairs from 2 to 3."""
     floors = []
-    occupied = np.array([[ink == "#" for ink in row] for row in INK])[::-1]
     for name in ("1", "2", "3"):
-        grid = hn.OccupancyGrid(occupied.astype(np.float32), name=name, robot_radius_m=0.0)
-        topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
-        floors.append(hn.Floor(name, hn.HybridPlanner(topology)))
+        pyramid = hn.DualGraphPyramid.build(two_rooms(name), merge_distance_m=2.0)
+        floors.append(hn.Floor(name, hn.HybridPlanner(hn.TopologicalMap(pyramid))))
     return hn.Building(floors, list(LINKS.values()))
 
 
@@ -181,6 +177,24 @@ def test_a_planted_fault_is_found(house: hn.Building, name: str) -> None:
     assert check.count > 0
     texts = judge_building_graph(matched, pairs=200).contradictions
     assert any(contradiction in text for text in texts) if contradiction else not texts
+
+
+def test_routes_there_and_back_may_lead_over_other_floors(house: hn.Building) -> None:
+    second = link("C", "lift", ("1", STAIRS), ("2", STAIRS))
+    building = hn.Building(house.floors, [*house.links, second])
+    plain: nx.DiGraph[str] = nx.DiGraph()
+    plain.add_nodes_from((node, {"x": x, "y": y}) for node, (x, y) in NODES.items())
+    plain.add_edges_from(EDGES)
+    one_way = FloorGraph(name="2", graph=hn.WaypointGraph.from_networkx(plain))
+    whole = drawn(C=second)
+    loop = replace(whole, floors=(whole.floors[0], one_way, whole.floors[2]))
+    assert found(check_building_graph(match_graph(building, loop))) == {}
+    # Without the second lift nothing leads back to the first: not from floor 3 either.
+    broken = replace(loop, links=loop.links[:-1])
+    assert found(check_building_graph(match_graph(house, broken))) == {
+        "one-way 2": ["4"],
+        "one-way 3": ["5"],
+    }
 
 
 def test_what_no_robot_can_follow_may_be_left_out(house: hn.Building) -> None:

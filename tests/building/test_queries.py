@@ -23,23 +23,10 @@ from tests.building.scenes import (
     random_building,
     usable,
 )
+from tests.houses import LIFT, STAIRS, two_rooms
 from tests.plans import PLAIN
 
 SEEDS = st.integers(0, 10**6)
-INK = (
-    "#########",
-    "#...#...#",
-    "#...#...#",
-    "#.......#",
-    "#...#...#",
-    "#########",
-)
-
-
-def two_rooms(name: str = "map") -> hn.OccupancyGrid:
-    """A map of two rooms of 3 x 4 m with a door between them."""
-    occupied = np.array([[ink == "#" for ink in row] for row in INK])[::-1]
-    return hn.OccupancyGrid(occupied.astype(np.float32), name=name, robot_radius_m=0.0)
 
 
 def floor_of(name: str, names: tuple[str, str], **how: Any) -> hn.Floor:
@@ -57,14 +44,14 @@ def office(**how: Any) -> hn.Building:
     lift = hn.Link(
         name="west lift",
         kind="lift",
-        ends=(hn.LinkEnd("1", (1.5, 1.5), 0.0), hn.LinkEnd("2", (1.5, 1.5), 0.0)),
+        ends=(hn.LinkEnd("1", LIFT, 0.0), hn.LinkEnd("2", LIFT, 0.0)),
         wait_s=2,
         max_radius_m=0.4,
     )
     stairs = hn.Link(
         name="B",
         kind="stairs",
-        ends=(hn.LinkEnd("1", (7.5, 4.5)), hn.LinkEnd("2", (7.5, 4.5))),
+        ends=(hn.LinkEnd("1", STAIRS), hn.LinkEnd("2", STAIRS)),
         cost_m=3,
     )
     return hn.Building(floors, [lift, stairs])

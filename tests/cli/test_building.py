@@ -3,30 +3,21 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import hybridnav as hn
+from tests.houses import FIGURE, write_house
 
-MAPS = Path(__file__).parents[2] / "maps"
-MAP = MAPS / "figure1" / "figure1.yaml"
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """Two floors of one little map, with a lift and stairs."""
-    found = tmp_path / "house.yaml"
-    ends = "[{floor: 1, at: [0.5, 0.5]}, {floor: 2, at: [0.5, 2.5]}]"
-    ladder = "[{floor: 1, at: [1.5, 0.5]}, {floor: 2, at: [1.5, 0.5]}]"
-    found.write_text(
-        f"floors: [{{name: 1, map: {MAP}}}, {{name: 2, map: {MAP}, find_rooms: true}}]\n"
-        f"links:\n- {{name: lift, kind: lift, wait_s: 4, ends: {ends}}}\n"
-        f"- {{name: ladder, kind: stairs, cost_m: 1, ends: {ladder}}}\n",
-        encoding="utf-8",
-    )
-    return found
+    return write_house(tmp_path)
 
 
 QUERY = "--start", "1:1.5,0.6", "--goal", "2:0.5,0.5", "--robot-radius", "0"
@@ -96,7 +87,7 @@ def test_wrong_usage_is_one_line(
 
 
 def test_options_of_buildings_mean_nothing_on_one_map(cli: Any) -> None:
-    query = "plan", MAP, "--goal", "2.0,2.5", "--robot-radius", "0"
+    query = "plan", FIGURE, "--goal", "2.0,2.5", "--robot-radius", "0"
     ran = cli(*query, "--start", "0.5,0.5", "--no-stairs")
     assert (ran.code, "--no-stairs is for a building" in ran.err) == (2, True)
     ran = cli(*query, "--start", "1:0.5,0.5")
@@ -107,7 +98,7 @@ def test_an_unreadable_building_is_no_usage(cli: Any, file: Path) -> None:
     file.write_text(file.read_text(encoding="utf-8").replace("kind: lift", "kind: rope"))
     ran = cli("plan", file, *QUERY)
     assert ran.code == 3
-    assert "line 3: link lift: kind must be lift, stairs, ramp, got 'rope'" in ran.err
+    assert "line 5: link lift: kind must be lift, stairs, ramp, got 'rope'" in ran.err
     assert ran.err.count("\n") == 1
 
 

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
+import hybridnav as hn
+from tests.houses import FIGURE, write_house
+
 POINT = ("--robot-radius", "0")
 
 
 @pytest.fixture
 def house(tmp_path):
     """Two floors of one map, whose lift stops at other points of each."""
-    path = tmp_path / "house.yaml"
-    path.write_text(f"""
-floors:
-- {{name: "1", map: {FIGURE}}}
-- {{name: "2", map: {FIGURE}, elevation_m: 3}}
-links:
-- {{name: lift, kind: lift, ends: [{{floor: "1", at: [0.5, 0.5]}}, {{floor: "2", at: [1.5, 2.5]}}]}}
-""")
-    return path
+    return write_house(tmp_path, links=("lift",))
 
 
 @pytest.fixture
@@ -48,7 +40,8 @@ def test_a_sound_graph_in_a_frame_of_its_own(cli, house, graph, tmp_path):
     figures = cli("check", house, graph, *POINT, "--align", "--pairs", "8", "--json").answer
     assert figures["links"] == {"lift": "lift"}
     assert figures["routes"]["all"]["answers"] == {"solved": 8}
-    assert figures["floors"]["2"]["nodes"] == figures["floors"]["1"]["nodes"]
+    drawn = {floor.name: floor.graph.n_nodes for floor in hn.load_building_graph(graph).floors}
+    assert {name: one["nodes"] for name, one in figures["floors"].items()} == drawn
     assert figures["findings"] == {}
 
 
@@ -117,4 +110,5 @@ def test_options_of_buildings_mean_nothing_on_one_map(cli, graph):
 
 def test_evaluate_names_the_command_for_buildings(cli, house, graph, tmp_path):
     done = cli("evaluate", house, "--graph", graph, "-o", tmp_path / "run")
-    assert done.refuses(2, "is a building, and methods are measured on maps: `hybridnav check")
+    words = "is a building, and methods are measured on maps: give the maps of its floors"
+    assert done.refuses(2, words, "`hybridnav check BUILDING GRAPH`")

@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 import hybridnav as hn
-
-FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
+from tests.houses import write_house
 
 
 @pytest.fixture
 def house(tmp_path):
     """Two floors of one map, a lift, and stairs that lead sideways."""
-    path = tmp_path / "house.yaml"
-    path.write_text(f"""
-floors:
-- {{name: "1", map: {FIGURE}}}
-- {{name: "2", map: {FIGURE}, elevation_m: 3}}
-links:
-- {{name: lift, kind: lift, ends: [{{floor: "1", at: [0.5, 0.5]}}, {{floor: "2", at: [1.5, 2.5]}}]}}
-- {{name: up, kind: stairs, ends: [{{floor: "1", at: [1.5, 0.5]}}, {{floor: "2", at: [2.0, 2.5]}}]}}
-""")
-    return path
+    return write_house(tmp_path)
 
 
 @pytest.mark.parametrize(
     ("more", "links"),
     [
         (("rmf", "-o", "a.yaml"), {"lift"}),
-        (("osm", "-o", "a.osm", "--anchor", "48.15,11.57"), {"lift", "up"}),
-        (("lif", "-o", "a.json", "--vehicle", "A.B"), {"lift", "up"}),
+        (("osm", "-o", "a.osm", "--anchor", "48.15,11.57"), {"lift", "ladder"}),
+        (("lif", "-o", "a.json", "--vehicle", "A.B"), {"lift", "ladder"}),
     ],
 )
 def test_floors_and_links_are_read_back(cli, house, more, links, monkeypatch):
@@ -50,7 +38,7 @@ def test_floors_and_links_are_read_back(cli, house, more, links, monkeypatch):
     ends = [end.position_m for end in lift.ends]
     assert ends[0] == pytest.approx(ends[1], abs=0.02)
     shown = cli("export", house, *given).out
-    assert "links      lift, up\n" in shown
+    assert "links      lift, ladder\n" in shown
     assert ("Open-RMF knows lifts only" in shown) == ("rmf" in more)
 
 
@@ -66,4 +54,4 @@ def test_a_link_that_the_robot_does_not_fit_in_is_left_out(house):
     text = house.read_text().replace("kind: lift,", "kind: lift, max_radius_m: 0.05,")
     house.write_text(text)
     building = hn.load_building(house, robot_radius_m=0.1)
-    assert [link.name for link in hn.building_graph(building, nodes=10).links] == ["up"]
+    assert [link.name for link in hn.building_graph(building, nodes=10).links] == ["ladder"]

@@ -66,11 +66,11 @@ def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
         floor,
         graph=replace(
             graph,
-            points=_moved(graph.points, pose),
-            lines={edge: _moved(line, pose) for edge, line in graph.lines.items()},
+            points=moved_points(graph.points, pose),
+            lines={edge: moved_points(line, pose) for edge, line in graph.lines.items()},
         ),
         doors=tuple(doors),
-        areas=tuple(FloorArea(a.name, a.kind, _moved(a.outline, pose)) for a in floor.areas),
+        areas=tuple(FloorArea(a.name, a.kind, moved_points(a.outline, pose)) for a in floor.areas),
     )
 
 
@@ -165,7 +165,8 @@ def moved_point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
     return x + cosine * point[0] - sine * point[1], y + sine * point[0] + cosine * point[1]
 
 
-def _moved(points: FloatArray, pose: Pose) -> FloatArray:
+def moved_points(points: FloatArray, pose: Pose) -> FloatArray:
+    """Return points in another frame, float64 (n, 2)."""
     x, y, yaw = pose
     cosine, sine = math.cos(yaw), math.sin(yaw)
     turned: FloatArray = points @ np.array([[cosine, sine], [-sine, cosine]])

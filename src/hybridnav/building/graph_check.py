@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,12 @@ from hybridnav.building.checks import parts_of
 from hybridnav.building.graph_match import MatchedGraph
 from hybridnav.building.graph_network import BuildingNetwork
 from hybridnav.graphs.check import GraphCheck, check_graph
-from hybridnav.graphs.checked_components import components_of, cut_off
+from hybridnav.graphs.checked_components import (
+    add_one_way,
+    components_of,
+    cut_off,
+    one_way_nodes,
+)
 from hybridnav.graphs.findings import Findings
 from hybridnav.graphs.gather import shown
 from hybridnav.grid.checks import checked_type
@@ -54,7 +59,8 @@ class BuildingGraphCheck:
 def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
     """Find what is wrong with the graph of a building.
 
-    Each floor is checked as by `check_graph`. `graphs.BUILDING_KINDS` lists what is found beside
+    Each floor is checked as by `check_graph`, but a node is `one-way` only if routes over other
+    floors cannot reach and leave it either. `graphs.BUILDING_KINDS` lists what is found beside
     that. The graph need not have links that the robot does not fit in.
 
     Parameters
@@ -84,10 +90,6 @@ def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
     """
     checked_type("matched", matched, MatchedGraph)
     building = matched.building
-    floors = {
-        name: check_graph(building.floor(name).planner.topology, floor.graph)
-        for name, floor in matched.floors.items()
-    }
     findings = Findings()
     for floor in building.floors:
         if floor.name not in matched.floors:
@@ -97,7 +99,25 @@ def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
     network = BuildingNetwork(matched)
     _add_links(findings, matched, network)
     _add_pieces(findings, network)
-    return BuildingGraphCheck(matched, floors, findings.collected())
+    return BuildingGraphCheck(matched, _checked_floors(network), findings.collected())
+
+
+def _checked_floors(network: BuildingNetwork) -> dict[str, GraphCheck]:
+    """Return what is wrong on each floor, by its name: routes there and back may lead over others.
+
+    Of the links, those count that the graph has and this robot fits in.
+    """
+    one_way = one_way_nodes(network.n_nodes, network.edges())
+    checks = {}
+    for floor in network.floors.values():
+        graph = floor.graph.graph
+        check = check_graph(network.building.floor(floor.name).planner.topology, graph)
+        findings = Findings()
+        findings.add_all(found for found in check.findings if found.kind != "one-way")
+        here = one_way - floor.base
+        add_one_way(findings, graph, here[(here >= 0) & (here < graph.n_nodes)])
+        checks[floor.name] = replace(check, findings=findings.collected())
+    return checks
 
 
 def _add_links(findings: Findings, matched: MatchedGraph, network: BuildingNetwork) -> None:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import frozen
-from hybridnav.building.align import fitted_pose, moved_floor, moved_point
+from hybridnav.building.align import moved_floor, moved_point
 from hybridnav.building.building import Building
+from hybridnav.building.fitted import placed_pose
 from hybridnav.building.floor_graphs import BuildingGraph, FloorGraph
 from hybridnav.building.link_nodes import join_links
 from hybridnav.errors import InvalidValueError
@@ -116,7 +117,8 @@ def match_graph(
         Whether the frame of each floor of the graph is another one than that of its map. The floor
         is then moved so that the ends of links lie at those of the building's links of the same
         names: shifted where one link stops, by the rigid motion with the least sum of squared
-        distances where several do. Floors at which no such link stops stay as they are.
+        distances where several do. Links that are drawn in another place than the others, and the
+        walls, suggest are not followed. Floors at which no such link stops stay as they are.
 
     Returns
     -------
@@ -212,7 +214,10 @@ def _poses(building: Building, graph: BuildingGraph, own_name: dict[str, str]) -
         ]
         if pairs:
             theirs, ours = (np.array(points) for points in zip(*pairs, strict=True))
-            poses[name] = fitted_pose(theirs, ours)
+            drawn, grid = graph.floor(name).graph, building.floor(own).planner.topology.grid
+            middles = drawn.points[drawn.edges].mean(axis=1)
+            points = np.concatenate([drawn.points, middles])
+            poses[name] = placed_pose(theirs, ours, points, grid)
     if not poses:
         names = ", ".join(link.name for link in graph.links) or "none"
         raise InvalidValueError(

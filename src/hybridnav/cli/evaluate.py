@@ -242,8 +242,9 @@ def _check_maps(files: list[Path]) -> None:
     for file in files:
         if is_building_file(file):
             raise UsageError(
-                f"{printable(file)} is a building, and methods are measured on maps: `hybridnav "
-                "check BUILDING GRAPH` compares the routes of a graph over all floors"
+                f"{printable(file)} is a building, and methods are measured on maps: give the "
+                "maps of its floors, or compare the routes of a graph over all of them by "
+                "`hybridnav check BUILDING GRAPH`"
             )
 
 

@@ -29,21 +29,41 @@ def add_components(findings: Findings, graph: WaypointGraph, component: LongArra
         int64 (n,), the connected part of free space in which each node lies, -1 for none.
     """
     weak = components_of(graph.n_nodes, graph.edges, "weak")
-    strong = components_of(graph.n_nodes, graph.edges, "strong")
-    size = np.bincount(weak, minlength=1)
     points = graph.points.tolist()
     for node, count, most in cut_off(component, weak):
         where = f"{count} nodes with node {shown(graph.names[node])}"
         findings.add("components", f"{where}, apart from {most}", tuple(points[node]))
-    # The largest strong component of each weak one is where routes lead there and back.
-    strong_size = np.bincount(strong, minlength=1)
+    add_one_way(findings, graph, one_way_nodes(graph.n_nodes, graph.edges))
+
+
+def add_one_way(findings: Findings, graph: WaypointGraph, nodes: LongArray) -> None:
+    """Add nodes of a graph that cannot be both reached and left."""
+    points = graph.points.tolist()
+    for node in nodes.tolist():
+        findings.add("one-way", f"node {shown(graph.names[node])}", tuple(points[node]))
+
+
+def one_way_nodes(n_nodes: int, edges: LongArray) -> LongArray:
+    """Return the nodes without a route there and back, int64.
+
+    Routes lead from and to the largest strong component of each weak one.
+
+    Parameters
+    ----------
+    n_nodes
+        Number of nodes.
+    edges
+        int64 (m, 2), tail and head of each edge.
+    """
+    weak = components_of(n_nodes, edges, "weak")
+    strong = components_of(n_nodes, edges, "strong")
+    size, strong_size = np.bincount(weak, minlength=1), np.bincount(strong, minlength=1)
     largest = np.zeros(len(size), dtype=np.int64)
     np.maximum.at(largest, weak, strong_size[strong])
     leader = np.full(len(size), -1, dtype=np.int64)
     is_largest = strong_size[strong] == largest[weak]
     leader[weak[is_largest][::-1]] = strong[is_largest][::-1]
-    for node in np.flatnonzero((size[weak] > 1) & (strong != leader[weak])).tolist():
-        findings.add("one-way", f"node {shown(graph.names[node])}", tuple(points[node]))
+    return np.flatnonzero((size[weak] > 1) & (strong != leader[weak]))
 
 
 def cut_off(part_of: LongArray, component: LongArray) -> Iterator[tuple[int, int, int]]:
