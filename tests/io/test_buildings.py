@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import time
 from pathlib import Path
@@ -136,12 +137,20 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "unknown door": (with_end(floor="2", door=7), "no door has the number 7: there are 1"),
     "wrong room": (with_end(floor="2", at=[1.2, 1.2], room="hall"), "lies in room lab, expected"),
     "in a wall": (with_end(floor="2", at=[0.2, 0.2]), "(0.2, 0.2) on floor 2 lies in an occupied"),
+    "two links of a name": (
+        description(links=description()["links"] + description()["links"]),
+        "link lift: the name is given twice",
+    ),
     "outside": (with_end(floor="2", at=[99, 0]), "(99, 0) on floor 2 lies outside the map"),
     "anchors": ("floors: &a [*a]\n", "anchors and aliases are not supported"),
     "tags": ("floors: !!python/object:os.system {}\n", "tags are not supported"),
     "deep": ("floors: " + "[" * 60 + "]" * 60, "nested more than 32 deep"),
     "key twice": ("floors: []\nfloors: []\n", "key 'floors' is given twice"),
 }
+
+
+WHOLE = {"empty", "list", "no floors", "floors no list", "unknown key", "speed"}
+"""What is wrong with the file as a whole; all else stands in a line."""
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -152,6 +161,7 @@ def test_what_is_wrong_is_one_line(folder: Path, name: str) -> None:
     text = str(refused.value)
     assert message in text
     assert text.startswith(f"building {folder / 'building.yaml'}")
+    assert name in WHOLE or re.search(r"line \d+", text)
     assert "\n" not in text
     assert len(text) < 500 + len(str(folder)) * 2
 
@@ -165,7 +175,10 @@ def test_an_end_that_is_cut_off_is_refused(folder: Path) -> None:
     ends = [{"floor": "1", "at": [1.2, 1.2]}, {"floor": "2", "at": [1.2, 0.7]}]
     tree = with_link(ends=ends)
     tree["floors"][1] |= {"map": "wing.yaml", "rooms": None}
-    with pytest.raises(hn.MapError, match=r"lies in a part of 3 m² that is cut off from the rest"):
+    with pytest.raises(
+        hn.MapError,
+        match=r"line \d+: link lift: .* lies in a part of 3 m² that is cut off from the rest",
+    ):
         loaded(folder, tree)
     ends[1]["at"] = [17.0, 2.0]  # a wing of its own
     assert loaded(folder, tree).plan(("1", (1.2, 1.2)), ("2", (16.0, 1.0))).solved
@@ -176,6 +189,16 @@ def test_a_link_that_is_too_narrow_needs_no_free_ends(folder: Path) -> None:
     narrow["links"][0]["max_radius_m"] = 0.1
     file = written(folder, narrow)
     building = hn.load_building(file, robot_radius_m=0.2)
+    assert not building.plan(("1", (1.2, 1.2)), ("2", (1.2, 1.2))).solved
+    # Nor does one whose door has no free cell for the robot.
+    by_door = with_end(floor="2", door=1, room="hall")
+    by_door["links"][0]["max_radius_m"] = 0.7
+    with pytest.raises(hn.MapError, match=r"door 1 has no free cell for a robot radius of 0\.6 m"):
+        hn.load_building(written(folder, by_door), robot_radius_m=0.6)
+    by_door["links"][0]["max_radius_m"] = 0.3
+    building = hn.load_building(written(folder, by_door), robot_radius_m=0.6)
+    door = building.floor("2").planner.topology.rooms.door(1)
+    assert building.link("lift").ends[1].position_m == door.position
     assert not building.plan(("1", (1.2, 1.2)), ("2", (1.2, 1.2))).solved
 
 

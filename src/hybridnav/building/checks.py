@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from hybridnav.grid.checks import checked_type
 from hybridnav.grid.names import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from hybridnav._typing import LongArray
     from hybridnav.building.links import LinkEnd
@@ -85,14 +85,25 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
         if link.name in seen:
             raise InvalidValueError(f"link {link.name}: the name is given twice")
         seen.add(link.name)
-        for end in link.ends:
-            if end.floor not in known:
-                raise InvalidValueError(
-                    f"link {link.name}: no floor is called {end.floor!r:.90}"
-                    f"{did_you_mean(end.floor, tuple(known))}"
-                )
-            if link.admits(known[end.floor].planner.topology.grid.robot_radius_m):
-                _check_free(link, end, known[end.floor])
+        check_ends(link, known)
+
+
+def check_ends(link: Link, floors: Mapping[str, Floor]) -> None:
+    """Refuse a link that stops at no floor of a name, or where this robot cannot stand.
+
+    Raises
+    ------
+    InvalidValueError
+        When an end is refused.
+    """
+    for end in link.ends:
+        if end.floor not in floors:
+            raise InvalidValueError(
+                f"link {link.name}: no floor is called {end.floor!r:.90}"
+                f"{did_you_mean(end.floor, tuple(floors))}"
+            )
+        if link.admits(floors[end.floor].planner.topology.grid.robot_radius_m):
+            _check_free(link, end, floors[end.floor])
 
 
 def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
@@ -113,35 +124,55 @@ def _check_free(link: Link, end: LinkEnd, floor: Floor) -> None:
     raise InvalidValueError(f"{at} {why}: give a point where the robot can stand")
 
 
-def check_reach(links: Sequence[Link], floors: Sequence[Floor]) -> None:
-    """Refuse ends of links from which the robot does not reach the rest of the floor.
+class FloorParts(NamedTuple):
+    """The connected parts of a floor that the robot may be in."""
+
+    of_cell: LongArray
+    """int64 (rows, cols), the part that each cell lies in, -1 where the robot may not be."""
+    sizes: LongArray
+    """int64 (n,), cells of each part."""
+
+    @classmethod
+    def of(cls, floor: Floor) -> FloorParts:
+        """Find the parts of a floor."""
+        found = parts_of(floor, allow_unexplored=floor.planner.preset.planner.allow_unexplored)
+        return cls(found, np.bincount(found[found >= 0]))
+
+
+def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, FloorParts]) -> None:
+    """Refuse a link if the robot does not reach the rest of a floor from its end there.
 
     A floor may consist of several parts, as two wings without a passage do, but an end lies in none
     that is smaller than a twentieth of the largest.
+
+    Parameters
+    ----------
+    link
+        The link, whose ends have been checked.
+    floors
+        The floors of the building, by their names.
+    parts
+        The parts of each floor.
 
     Raises
     ------
     InvalidValueError
         When an end lies in such a part.
     """
-    for floor in floors:
-        grid = floor.planner.topology.grid
-        allowed = floor.planner.preset.planner.allow_unexplored
-        part_of = parts_of(floor, allow_unexplored=allowed)
-        cells_in = np.bincount(part_of[part_of >= 0])
-        for link in links:
-            end = link.end_on(floor.name)
-            if end is None or not link.admits(grid.robot_radius_m):
-                continue
-            part = int(part_of[grid.frame.cell_of(*end.position_m)])
-            if cells_in[part] < _LEAST_PART * cells_in.max():
-                x, y = end.position_m
-                here, most = (n * grid.resolution_m**2 for n in (cells_in[part], cells_in.max()))
-                raise InvalidValueError(
-                    f"link {link.name}: its end ({x:g}, {y:g}) on floor {floor.name} lies in a "
-                    f"part of {here:.3g} m² that is cut off from the rest, {most:.3g} m²: give a "
-                    "point from which the robot can drive away"
-                )
+    for end in link.ends:
+        grid = floors[end.floor].planner.topology.grid
+        if not link.admits(grid.robot_radius_m):
+            continue
+        of_cell, sizes = parts[end.floor]
+        cells = sizes[of_cell[grid.frame.cell_of(*end.position_m)]]
+        if cells < _LEAST_PART * sizes.max():
+            x, y = end.position_m
+            here, most = (n * grid.resolution_m**2 for n in (cells, sizes.max()))
+            raise InvalidValueError(
+                f"link {link.name}: its end ({x:g}, {y:g}) on floor {end.floor} lies in a "
+                f"part of {here:.3g} m² that is cut off from the rest, {most:.3g} m²: give a "
+                "point from which the robot can drive away"
+            )
 
 
 def parts_of(floor: Floor, *, allow_unexplored: bool = False) -> LongArray:

@@ -13,6 +13,8 @@ from hybridnav.config.yaml_file import Limits, Marked, read_marked
 from hybridnav.errors import MapError, MapNotFoundError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from hybridnav._typing import PathLike
 
 MOST_FLOORS = 99
@@ -98,12 +100,24 @@ def read_building_entries(path: PathLike) -> Entries:
     if not floors:
         raise MapError(f"{where}: floors is empty, expected at least one floor")
     links = values.list_of("links", _MOST_LINKS)
-    return Entries(
+    found = Entries(
         where,
         tuple(_floor(item, _at(marked, where, "floors", i)) for i, item in enumerate(floors)),
         tuple(_link(marked, where, item, i) for i, item in enumerate(links)),
         values.number("speed_m_s"),
     )
+    _check_names("floor", found.floors)
+    _check_names("link", found.links)
+    return found
+
+
+def _check_names(what: str, entries: Sequence[FloorEntry | LinkEntry]) -> None:
+    """Refuse a name that occurs twice, with the line of the second."""
+    seen = set()
+    for entry in entries:
+        if entry.name in seen:
+            raise MapError(f"{entry.at}: {what} {entry.name}: the name is given twice")
+        seen.add(entry.name)
 
 
 def _at(marked: Marked, where: str, *keys: str | int) -> str:

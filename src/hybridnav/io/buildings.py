@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.building import Building, Floor, Link, LinkEnd
-from hybridnav.building.checks import check_reach
+from hybridnav.building.checks import FloorParts, check_ends, check_reach
 from hybridnav.config import load_preset
 from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, PresetError
 from hybridnav.grid import DEFAULT_MAX_CELLS
@@ -144,20 +144,25 @@ def _joined(entries: Entries, floors: list[Floor]) -> Building:
     """Return the building of floors and links."""
     by_name = {floor.name: floor for floor in floors}
     links = [_link(entry, by_name) for entry in entries.links]
+    stops = {end.floor for link in links for end in link.ends}
+    parts = {name: FloorParts.of(floor) for name, floor in by_name.items() if name in stops}
+    for entry, link in zip(entries.links, links, strict=True):
+        with _at(entry.at):
+            check_ends(link, by_name)
+            check_reach(link, by_name, parts)
     speed = {} if entries.speed_m_s is None else {"speed_m_s": entries.speed_m_s}
     with _at(entries.where):
-        building = Building(floors, links, **speed)
-        check_reach(building.links, building.floors)
-    return building
+        return Building(floors, links, **speed)
 
 
 def _link(entry: LinkEntry, floors: dict[str, Floor]) -> Link:
-    ends = tuple(_end(end, floors) for end in entry.ends)
+    most_m = entry.numbers.get("max_radius_m", math.inf)
+    ends = tuple(_end(end, floors, most_m) for end in entry.ends)
     with _at(entry.at):
         return Link(name=entry.name, kind=entry.kind, ends=ends, **entry.numbers)
 
 
-def _end(entry: EndEntry, floors: dict[str, Floor]) -> LinkEnd:
+def _end(entry: EndEntry, floors: dict[str, Floor], max_radius_m: float) -> LinkEnd:
     """Return the end of a link at its point, in its room, or at its door."""
     yaw_rad = entry.yaw_rad
     with _at(entry.at):
@@ -173,7 +178,7 @@ def _end(entry: EndEntry, floors: dict[str, Floor]) -> LinkEnd:
             if entry.room not in rooms.labels.points:
                 rooms.labels.index(entry.room)
             return LinkEnd(entry.floor, rooms.point_of(entry.room), yaw_rad)
-        point, out_rad = _at_door(rooms, entry.door, entry.room)
+        point, out_rad = _at_door(rooms, entry.door, entry.room, max_radius_m)
         return LinkEnd(entry.floor, point, out_rad if yaw_rad is None else yaw_rad)
 
 
@@ -187,10 +192,11 @@ def _check_in_room(point: tuple[float, float], room: str, floor: Floor) -> None:
 
 
 def _at_door(
-    rooms: Rooms, number: int, room: str | None
+    rooms: Rooms, number: int, room: str | None, max_radius_m: float
 ) -> tuple[tuple[float, float], float | None]:
     """Return the free point nearest to the middle of a door, on the side of a room if one is named,
-    and the direction in which one enters that room."""
+    and the direction in which one enters that room; the middle where the robot does not fit in the
+    link, and finds no free point."""
     door, grid = rooms.door(number), rooms.grid
     rows, cols = np.divmod(rooms.cells_beside(number), grid.shape[1])
     kept = grid.enterable()[rows, cols]
@@ -202,6 +208,8 @@ def _at_door(
             raise MapError(f"door {number} joins {joined}, not {room}")
         way_rad = Landmarks(rooms).way_out_rad(door, is_forward=door.rooms[1] == room)
         yaw_rad = math.remainder(way_rad, math.tau) if math.isfinite(way_rad) else None
+    if not kept.any() and grid.robot_radius_m > max_radius_m:
+        return door.position, yaw_rad
     if not kept.any():
         raise MapError(
             f"door {number} has no free cell for a robot radius of {grid.robot_radius_m:g} m: give "
