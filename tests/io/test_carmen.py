@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -147,6 +148,22 @@ def test_a_damaged_line_is_left_out_and_counted(tmp_path: Path, line: str, fault
     assert log.skipped == {fault: 1}
 
 
+FIRST = {
+    "pose jumps": flaser(GOOD, (500.0, 0, 0), 1.0),
+    "time runs back": flaser(GOOD, time=900.0),
+    "other number of beams": flaser([1.0], time=1.0),
+}
+
+
+@pytest.mark.parametrize(("fault", "line"), FIRST.items())
+def test_a_wrong_first_scan_is_left_out(tmp_path: Path, fault: str, line: str) -> None:
+    good = [flaser(GOOD, time=time) for time in (2.0, 3.0, 4.0)]
+    log = log_of(tmp_path, line, *good)
+    assert [scan.time_s for scan in log] == [2.0, 3.0, 4.0]
+    assert log.summary() == f"left out 1 of 4 scans: 1 {fault}"
+    assert len(list(log_of(tmp_path, line))) == 1  # nothing speaks against it
+
+
 def test_readings_that_are_no_lengths_are_counted_and_mark_no_cell(tmp_path: Path) -> None:
     bad = ["nan", "inf", "-inf", -1.0, "1e999", 0.0]
     log = log_of(tmp_path, flaser([2.0, *bad]), flaser([2.0, *[0.0] * len(bad)], time=8))
@@ -163,16 +180,40 @@ def test_a_packed_log_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) 
     path = tmp_path / "a.log.gz"
     rng = np.random.default_rng(0)
     lines = [flaser(rng.random(50).tolist(), time=k) for k in range(400)]
-    whole = gzip.compress("".join(lines).encode())
-    path.write_bytes(whole[: len(whole) // 2])
+    text = "".join(lines).encode()
+    whole = gzip.compress(text)
+    packed = whole[: len(whole) // 2]
+    path.write_bytes(packed)
     log = hn.CarmenLog(path)
     n_read = len(list(log))
-    assert 100 < n_read < 300
-    assert log.skipped["rest of the file damaged"] == 1
+    there = zlib.decompressobj(31).decompress(packed)
+    assert n_read == there.count(b"\n")
+    assert log.summary() == (
+        f"left out 1 of {n_read + 1} scans: 1 line cut off; the rest of the file is damaged"
+    )
     damaged = bytearray(whole)
     damaged[len(whole) // 2 :] = rng.bytes(len(whole) - len(whole) // 2)
     path.write_bytes(bytes(damaged))
     assert len(list(log)) >= 100
+
+
+@pytest.mark.parametrize("cut", [1, 4, 8, -10])
+def test_damage_behind_the_last_scan_leaves_out_none(tmp_path: Path, cut: int) -> None:
+    packed = gzip.compress("".join(flaser(GOOD, time=k) for k in range(5)).encode())
+    path = tmp_path / "a.log.gz"
+    path.write_bytes(packed[:-cut] if cut > 0 else packed + b"more bytes")
+    log = hn.CarmenLog(path)
+    assert len(list(log)) == 5
+    assert log.summary() == "left out 0 of 5 scans; the rest of the file is damaged"
+
+
+@pytest.mark.parametrize("line", [flaser([1.0, 2.0, 3.0]), robotlaser(3)])
+def test_a_log_may_be_cut_off_anywhere_in_its_last_line(tmp_path: Path, line: str) -> None:
+    for cut in range(1, len(line)):
+        log = log_of(tmp_path, line, line[:cut])
+        n_read = len(list(log))
+        assert n_read + log.skipped.total() == 2, line[:cut]
+        assert n_read == 1 or cut > line.index("host") + len("host "), line[:cut]
 
 
 @given(noise=st.binary(max_size=300), at=st.integers(0, 200), packed=st.booleans())

@@ -6,9 +6,10 @@ Formats: CARMEN, the Carnegie Mellon Robot Navigation Toolkit, messages FLASER a
 from __future__ import annotations
 
 import gzip
+import io
 import math
 import zlib
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from hybridnav.mapping import LaserScan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from typing_extensions import Buffer
 
     from hybridnav._typing import FloatArray, PathLike
 
@@ -79,8 +82,9 @@ class CarmenLog(ScanLog):
         with self._open() as file:
             super().__init__(path, file.seek(0, 2))
 
-    def _open(self) -> BinaryIO:
-        return open_file(self._path, what="log", error=MapError, missing=MapNotFoundError)
+    def _open(self) -> io.BufferedReader:
+        file = open_file(self._path, what="log", error=MapError, missing=MapNotFoundError)
+        return cast("io.BufferedReader", file)
 
     def _read(self) -> Iterator[LaserScan | str]:
         reader = _LineReader()
@@ -94,23 +98,44 @@ class CarmenLog(ScanLog):
                 if scan is not None:
                     yield scan
 
-    def _lines(self, file: BinaryIO) -> Iterator[bytes]:
+    def _lines(self, file: io.BufferedReader) -> Iterator[bytes]:
         """Yield the lines of the log, an empty one for each that is too long."""
         is_packed = file.read(2) == _GZIP
         file.seek(0)
-        stream: BinaryIO = gzip.GzipFile(fileobj=file) if is_packed else file  # type: ignore[assignment]
-        try:
-            while line := stream.readline(_MOST_BYTES):
-                self.bytes_read = file.tell()
-                if len(line) < _MOST_BYTES or line.endswith(b"\n"):
-                    yield line
-                    continue
-                self.skipped["line too long"] += 1
-                while line and not line.endswith(b"\n"):
-                    line = stream.readline(_MOST_BYTES)
-        except (EOFError, OSError, zlib.error):
-            self.skipped["rest of the file damaged"] += 1
+        readable = _Readable(gzip.GzipFile(fileobj=file) if is_packed else file)
+        stream = io.BufferedReader(readable)
+        while line := stream.readline(_MOST_BYTES):
+            self.bytes_read = file.tell()
+            if len(line) < _MOST_BYTES or line.endswith(b"\n"):
+                yield line
+                continue
+            self.skipped["line too long"] += 1
+            while line and not line.endswith(b"\n"):
+                line = stream.readline(_MOST_BYTES)
+        if readable.is_damaged:
+            self.notes.append("the rest of the file is damaged")
         self.bytes_read = self.size_bytes
+
+
+class _Readable(io.RawIOBase):
+    """The bytes of a file as far as they can be read."""
+
+    def __init__(self, file: io.BufferedReader | gzip.GzipFile) -> None:
+        self._file = file
+        self.is_damaged = False
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Buffer) -> int:
+        """Fill a buffer; return the number of bytes, 0 at the end and where damage begins."""
+        there = memoryview(buffer)
+        try:
+            some = self._file.read1(len(there))  # what is there before damage, too
+        except (EOFError, OSError, zlib.error):
+            self.is_damaged, some = True, b""
+        there[: len(some)] = some
+        return len(some)
 
 
 class _LineReader:
@@ -128,6 +153,8 @@ class _LineReader:
         if words[0] == b"PARAM":
             self._read_parameter(words)
         if words[0] not in _READERS:
+            if not line.endswith(b"\n") and any(kind.startswith(line) for kind in _READERS):
+                raise _DamagedLineError(_CUT_OFF)
             return None
         if self._kind is not None and words[0] != self._kind:
             return None

@@ -65,13 +65,8 @@ class ScanLog(ABC):
     def __iter__(self) -> Iterator[LaserScan]:
         """Yield the scans; a second iteration reads the log again."""
         self._start()
-        sequence = ScanSequence()
         time_s = np.nan
-        for scan in self._read():
-            fault = scan if isinstance(scan, str) else sequence.fault_of(scan)
-            if fault is not None or isinstance(scan, str):
-                self.skipped[str(fault)] += 1
-                continue
+        for scan in self._followed():
             self.n_scans += 1
             readings = scan.ranges_m
             self.n_no_readings += int((~np.isfinite(readings) | (readings < 0)).sum())
@@ -79,6 +74,31 @@ class ScanLog(ABC):
                 self.duration_s += scan.time_s - time_s
             time_s = scan.time_s
             yield scan
+
+    def _followed(self) -> Iterator[LaserScan]:
+        """Yield the scans that follow from each other; count those that do not.
+
+        The first scan waits for one that follows from it: it may be the wrong one.
+        """
+        sequence = ScanSequence()
+        has_begun = False
+        first: LaserScan | None = None
+        refused: LaserScan | None = None
+        for scan in self._read():
+            fault = scan if isinstance(scan, str) else sequence.fault_of(scan)
+            if isinstance(scan, str) or fault is not None:
+                self.skipped[str(fault)] += 1
+                refused = refused if isinstance(scan, str) else scan
+            elif not has_begun:
+                first, has_begun = scan, True
+            else:
+                if first is not None:
+                    # If it follows from the refused one, that was a new beginning.
+                    yield first if refused is None or _follows(first, scan) else refused
+                    first = None
+                yield scan
+        if first is not None:
+            yield first
 
     def leave_out(self, fault: str) -> None:
         """Count the scan that was yielded last among those that were left out.
@@ -104,3 +124,9 @@ class ScanLog(ABC):
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({printable(self._path)!r})"
+
+
+def _follows(before: LaserScan, after: LaserScan) -> bool:
+    sequence = ScanSequence()
+    sequence.fault_of(before)
+    return sequence.fault_of(after) is None
