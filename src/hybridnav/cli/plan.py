@@ -8,6 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hybridnav.cli.alternatives import (
+    AlternativesOption,
+    ByOption,
+    InsideOption,
+    LeastHoleOption,
+    OverlapOption,
+    StretchOption,
+    check_refiner,
+    wanted_of,
+)
 from hybridnav.cli.blocked import BlockedOption, parsed_closing
 from hybridnav.cli.building import (
     PLAN_OPTIONS,
@@ -34,14 +44,13 @@ from hybridnav.cli.options import (
     SetOption,
     SmoothOption,
 )
-from hybridnav.cli.request import Request, Wanted
+from hybridnav.cli.request import Request
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 from hybridnav.sentences import check_language, languages
 
 if TYPE_CHECKING:
     from hybridnav.cli.rendering import Waypoint
-    from hybridnav.planner.alternative_options import By
     from hybridnav.planner.named import At
 
 Point = tuple[float, ...]
@@ -94,66 +103,8 @@ AtOption = Annotated[
         help="Where in a room: anywhere (the nearest cell), or its point.",
     ),
 ]
-AlternativesOption = Annotated[
-    int,
-    typer.Option(
-        "--alternatives",
-        metavar="N",
-        min=1,
-        max=20,
-        help="Up to N routes by other doors, the plain plan first.",
-    ),
-]
-ByOption = Annotated[
-    str | None,
-    typer.Option(
-        "--by",
-        metavar="WHAT",
-        help="What makes alternatives differ: doors, or homotopy (sides of obstacles, exact).",
-        show_default="doors",
-    ),
-]
-OverlapOption = Annotated[
-    float | None,
-    typer.Option(
-        "--max-overlap",
-        metavar="SHARE",
-        min=0,
-        max=1,
-        help="Share that an alternative by doors may have in common with a shorter one.",
-        show_default="0.8",
-    ),
-]
-StretchOption = Annotated[
-    float | None,
-    typer.Option(
-        "--max-stretch",
-        metavar="FACTOR",
-        min=1,
-        help="Length of an alternative by doors over that of the first, at most.",
-        show_default="2.0",
-    ),
-]
-InsideOption = Annotated[
-    bool,
-    typer.Option(
-        "--inside-rooms", help="Also alternatives by the same doors, on other sides of obstacles."
-    ),
-]
-LeastHoleOption = Annotated[
-    float | None,
-    typer.Option(
-        "--least-hole",
-        metavar="A",
-        min=0,
-        help="Square metres of an obstacle whose two sides make two routes, by homotopy.",
-        show_default="1.0",
-    ),
-]
 _POSES = (".csv", ".json", ".geojson")
 """Endings of files of poses."""
-_BY_DOORS = {"--max-overlap", "--max-stretch", "--inside-rooms"}
-"""Options that change nothing by homotopy."""
 LanguageOption = Annotated[
     str,
     typer.Option(
@@ -229,13 +180,7 @@ def plan(
 
     Exits with 0 when it is solved, 1 when it is not, 2 on wrong usage, 3 on unreadable input.
     """
-    check_picture(plot)
-    check_output(poses, "--poses", _POSES)
-    if bag is not None:
-        check_new(bag, "--bag")
-        from hybridnav.io.bag_files import check_rosbags  # noqa: PLC0415 - on demand
-
-        check_rosbags("--bag")
+    _check_files(plot, poses, bag)
     where = _checked_at(at)
     if _planned_in_building(ctx, where, no_stairs=no_stairs):
         return
@@ -254,29 +199,10 @@ def plan(
     first, last = _one_of("start", start, "from", origin), _one_of("goal", goal, "to", to)
     if via and alternatives > 1:
         raise UsageError("--alternatives does not go with --via")
-    hole_m2 = None if least_hole_m2 is None else _checked_least_hole(least_hole_m2)
-    given_by = "doors" if by is None else _checked_by(by)
-    options = {
-        "--by": by,
-        "--max-overlap": max_overlap,
-        "--max-stretch": max_stretch,
-        "--inside-rooms": inside_rooms or None,
-        "--least-hole": least_hole_m2,
-    }
-    _check_used(
-        {name for name, value in options.items() if value is not None}, given_by, alternatives
+    wanted = wanted_of(
+        alternatives, by, max_overlap, max_stretch, least_hole_m2, inside_rooms=inside_rooms
     )
-    wanted = Wanted(
-        alternatives,
-        given_by,
-        max_overlap,
-        max_stretch,
-        inside_rooms,
-        hole_m2,
-    )
-    if settings.planner.refine == "ompl" and wanted.needs_grid:
-        option = "--by homotopy" if by == "homotopy" else "--inside-rooms"
-        raise UsageError(f"{option} needs a preset without OMPL, not {settings.name}")
+    check_refiner(wanted, settings)
     request = Request(
         source=Source(map_file, settings, reading, keep, keep_in),
         waypoints=[first, *map(_parsed_waypoint, via or ()), last],
@@ -292,15 +218,31 @@ def plan(
         language=language,
         as_json=as_json,
     )
-    for option, file in (("--poses", poses), ("--bag", bag)):
-        if file is not None and alternatives > 1:
+    _check_fits(request)
+    if not request.run():
+        raise typer.Exit(EXIT_NOT_SOLVED)
+
+
+def _check_files(plot: Path | None, poses: Path | None, bag: Path | None) -> None:
+    """Refuse files that cannot be written."""
+    check_picture(plot)
+    check_output(poses, "--poses", _POSES)
+    if bag is not None:
+        check_new(bag, "--bag")
+        from hybridnav.io.bag_files import check_rosbags  # noqa: PLC0415 - on demand
+
+        check_rosbags("--bag")
+
+
+def _check_fits(request: Request) -> None:
+    """Refuse files of one path for several, and comparisons of tours."""
+    for option, file in (("--poses", request.poses), ("--bag", request.bag)):
+        if file is not None and request.wanted.count > 1:
             raise UsageError(
                 f"{option} writes one path, and --alternatives asks for more: leave one out"
             )
-    if request.is_tour and compare:
+    if request.is_tour and request.compare:
         raise UsageError("--compare goes with --start and --goal alone, and files as --blocked")
-    if not request.run():
-        raise typer.Exit(EXIT_NOT_SOLVED)
 
 
 def _planned_in_building(ctx: typer.Context, at: At, *, no_stairs: bool) -> bool:
@@ -340,29 +282,3 @@ def _checked_at(at: str) -> At:
     if at == "point":
         return "point"
     raise UsageError(f"--at must be anywhere or point, got {at!r:.80}")
-
-
-def _checked_by(by: str) -> By:
-    if by == "doors":
-        return "doors"
-    if by == "homotopy":
-        return "homotopy"
-    raise UsageError(f"--by must be doors or homotopy, got {by!r:.80}")
-
-
-def _check_used(used: set[str], by: By, alternatives: int) -> None:
-    """Refuse options of alternatives that change nothing."""
-    if used and alternatives == 1:
-        raise UsageError(f"{min(used)} is for alternatives: add --alternatives N, or leave it out")
-    idle = used & _BY_DOORS if by == "homotopy" else set[str]()
-    if by == "doors" and "--inside-rooms" not in used:
-        idle = used & {"--least-hole"}
-    if idle:
-        where = "doors" if by == "homotopy" else "homotopy, or with --inside-rooms"
-        raise UsageError(f"{min(idle)} is for alternatives by {where}: leave it out")
-
-
-def _checked_least_hole(area_m2: float) -> float:
-    if not math.isfinite(area_m2):
-        raise UsageError(f"--least-hole must be a finite number of m² >= 0, got {area_m2}")
-    return area_m2
