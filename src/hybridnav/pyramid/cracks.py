@@ -9,10 +9,11 @@ import numpy as np
 from hybridnav.pyramid._field_kernels import edges_to_rim, find_cracks
 
 if TYPE_CHECKING:
-    from hybridnav._typing import ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 
 
 __all__ = [
+    "boundaries_of",
     "cell_pairs",
     "endpoints_of",
     "find_cracks",
@@ -99,3 +100,34 @@ def line_of_loop(
     faces = cell, cell - (1 if base_edge & 1 else cols)
     parts = [edges_to_rim(face, field_of[cell], *level, came) for face in faces]
     return np.concatenate([*parts, [base_edge]])
+
+
+def boundaries_of(
+    base_edges: LongArray, is_self_loop: BoolArray, level: tuple[IntArray, ByteArray, int, int]
+) -> tuple[LongArray, LongArray]:
+    """Return the base edges of all boundaries of a level, and the arc of each, sorted by arc.
+
+    Parameters
+    ----------
+    base_edges
+        int64 (n_arcs,), the base edge that represents each arc.
+    is_self_loop
+        bool (n_arcs,).
+    level
+        As in `line_of_loop`.
+    """
+    field_of, _, _, cols = level
+    cracks, classes = find_cracks(field_of, len(field_of) // cols, cols)
+    arc_of_class = np.full(len(cracks), -1, dtype=np.int64)
+    plain = np.flatnonzero(~is_self_loop)
+    arc_of_class[classes[np.searchsorted(cracks, base_edges[plain])]] = plain
+    edges, arcs = [cracks], [arc_of_class[classes]]
+    loops = np.flatnonzero(is_self_loop)
+    came = np.zeros(len(field_of) + cols if len(loops) else 0, np.uint8)
+    for loop in loops:
+        line = line_of_loop(int(base_edges[loop]), level, came)
+        edges.append(line)
+        arcs.append(np.full(len(line), loop))
+    edge, arc = np.concatenate(edges), np.concatenate(arcs)
+    order = np.lexsort((edge, arc))
+    return edge[order], arc[order]

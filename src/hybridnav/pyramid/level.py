@@ -12,7 +12,7 @@ from hybridnav.combinatorial import CombinatorialMap
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import _field_kernels, _hull_kernels
 from hybridnav.pyramid.certainty import Certainty, certainty_of
-from hybridnav.pyramid.cracks import cell_pairs, endpoints_of, line_of_loop, middles_of, sides_of
+from hybridnav.pyramid.cracks import boundaries_of, cell_pairs, endpoints_of, middles_of, sides_of
 from hybridnav.pyramid.dual import DualGraph, FaceKind
 from hybridnav.pyramid.export import multigraph, vertices_with_attributes
 from hybridnav.pyramid.record import SURVIVES
@@ -23,8 +23,6 @@ from hybridnav.search.moves import STRAIGHT, length_in_cells
 _SOUTH = 3
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import networkx as nx
 
     from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
@@ -263,7 +261,7 @@ class Level:
         """
         return multigraph(
             self._about(),
-            self._nodes(),
+            vertices_with_attributes(self._grid, self.cells, self.classes, self.areas),
             self.arcs,
             max_distance_m=self.max_distance_m.tolist(),
             through_m=self.through_m.tolist(),
@@ -304,16 +302,12 @@ class Level:
 
         The result has a report of the arcs that this drops.
         """
-        about, nodes = self._about(), self._nodes()
-        return simple_graph(about, nodes, self.arcs, self.max_distance_m, self.through_m)
+        nodes = vertices_with_attributes(self._grid, self.cells, self.classes, self.areas)
+        return simple_graph(self._about(), nodes, self.arcs, self.max_distance_m, self.through_m)
 
     def _about(self) -> dict[str, Any]:
         grid = self._grid
         return {"name": grid.name, "level": self.index, "resolution_m": grid.resolution_m}
-
-    def _nodes(self) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Yield the vertices with their attributes in graphs."""
-        return vertices_with_attributes(self._grid, self.cells, self.classes, self.areas)
 
     @cached_property
     def max_distance_m(self) -> FloatArray:
@@ -366,8 +360,7 @@ class Level:
         edges, of_arc = self.boundary_table
         low, high = np.searchsorted(of_arc, [arc, arc + 1])
         pairs = cell_pairs(edges[low:high], self._grid.shape[1])
-        row, col = pairs[:, 0, 0], pairs[:, 0, 1]
-        turned = self.field_of[row, col] != self.arcs[arc, 0]
+        turned = self.field_of[tuple(pairs[:, 0].T)] != self.arcs[arc, 0]
         pairs[turned] = pairs[turned, ::-1]
         return pairs
 
@@ -401,19 +394,5 @@ class Level:
     @cached_property
     def boundary_table(self) -> tuple[LongArray, LongArray]:
         """Return all boundaries at once: int64 base edges, and the arc of each, sorted by arc."""
-        rows, cols = self._grid.shape
-        cracks, classes = _field_kernels.find_cracks(self._labels[0], rows, cols)
-        arc_of_class = np.full(len(cracks), -1, dtype=np.int64)
-        plain = np.flatnonzero(~self.is_self_loop)
-        arc_of_class[classes[np.searchsorted(cracks, self.base_edges[plain])]] = plain
-        edges, arcs = [cracks], [arc_of_class[classes]]
-        loops = np.flatnonzero(self.is_self_loop)
-        came = np.zeros(rows * cols + cols if len(loops) else 0, np.uint8)
-        labels = self._labels[0], self._record.edge_end, self.index, cols
-        for loop in loops:
-            line = line_of_loop(int(self.base_edges[loop]), labels, came)
-            edges.append(line)
-            arcs.append(np.full(len(line), loop))
-        edge, arc = np.concatenate(edges), np.concatenate(arcs)
-        order = np.lexsort((edge, arc))
-        return edge[order], arc[order]
+        level = self._labels[0], self._record.edge_end, self.index, self._grid.shape[1]
+        return boundaries_of(self.base_edges, self.is_self_loop, level)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
-import operator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, get_args, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.pyramid.checks import check_fit, checked_settings, checked_vertices
 from hybridnav.pyramid.lazy_islands import LazyIslands
 from hybridnav.pyramid.level import Level
-from hybridnav.pyramid.record import Linkage
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import IntArray, LongArray
     from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.pyramid.islands import Islands
-    from hybridnav.pyramid.record import BuildStats, Record
+    from hybridnav.pyramid.record import BuildStats, Linkage, Record
     from hybridnav.pyramid.steering import Resists
 
 
@@ -108,40 +106,18 @@ class DualGraphPyramid:
             whole number, the rooms or the resistance are those of a grid of another shape, or
             both are given.
         """
-        if math.isnan(merge_distance_m) or merge_distance_m <= 0:
-            raise InvalidValueError(
-                f"merge distance must be a positive number of metres, got {merge_distance_m}"
-            )
-        if linkage not in get_args(Linkage):
-            raise InvalidValueError(
-                f"linkage must be one of {', '.join(get_args(Linkage))}, got {linkage!r}"
-            )
-        try:
-            seed = operator.index(seed)
-        except TypeError:
-            raise InvalidValueError(f"seed must be a whole number, got {seed!r:.80}") from None
+        seed = checked_settings(merge_distance_m, linkage, seed)
+        check_fit(grid, rooms, resistance)
         # A model holds what they build.
         from hybridnav.pyramid.decimation import decimate, squared_limit  # noqa: PLC0415
 
         limit = squared_limit(merge_distance_m, grid.resolution_m)
-        labels = None
-        if rooms is not None:
-            labels = rooms.label_of
-            if labels.shape != grid.shape:
-                raise InvalidValueError(
-                    f"rooms are labels of {labels.shape} cells, the grid has {grid.shape}"
-                )
-        if resistance is not None and (rooms is not None or resistance.shape != grid.shape):
-            raise InvalidValueError(
-                f"a resistance was given with rooms or for a map not of {grid.shape} cells: give "
-                "it alone, made from this map"
-            )
         record, stats, darts = decimate(
             grid.classes,
             linkage=linkage,
             limit=limit,
             seed=seed,
-            rooms=labels,
+            rooms=None if rooms is None else rooms.label_of,
             resistance=resistance,
         )
         pyramid = cls(grid, float(merge_distance_m), linkage, seed, stats, rooms, record)
@@ -314,7 +290,9 @@ class DualGraphPyramid:
             When `to` is below `level`, or there is no such vertex.
         """
         lower, upper = self._in_order(level, to)
-        rows, cols = np.moveaxis(lower.cells[_checked(vertices, lower)], -1, 0)
+        rows, cols = np.moveaxis(
+            lower.cells[checked_vertices(vertices, lower.index, lower.n_vertices)], -1, 0
+        )
         found: IntArray = upper.field_of[rows, cols]
         return found
 
@@ -339,7 +317,8 @@ class DualGraphPyramid:
             When `to` is above `level`, or there is no such vertex.
         """
         lower, upper = self._in_order(to, level)
-        return np.flatnonzero(upper.field_of[tuple(lower.cells.T)] == _checked(vertex, upper))
+        found = checked_vertices(vertex, upper.index, upper.n_vertices)
+        return np.flatnonzero(upper.field_of[tuple(lower.cells.T)] == found)
 
     def parent(self, level: int) -> IntArray:
         """Return the vertex of the next level above each vertex of `level`, int32 (n_vertices,)."""
@@ -389,17 +368,3 @@ class DualGraphPyramid:
 
     def __iter__(self) -> Iterator[Level]:
         return (self[index] for index in range(len(self)))
-
-
-def _checked(vertices: ArrayLike, level: Level) -> LongArray:
-    """Return indices of vertices as an array, after a check of their type and range."""
-    found = np.asarray(vertices)
-    if found.size == 0:
-        return found.astype(np.int64)
-    if not np.issubdtype(found.dtype, np.integer):
-        raise InvalidValueError(f"vertices must be whole numbers, got {vertices!s:.80}")
-    if found.min() < 0 or found.max() >= level.n_vertices:
-        raise InvalidValueError(
-            f"vertices of level {level.index} are 0 to {level.n_vertices - 1}, got {vertices!s:.80}"
-        )
-    return found.astype(np.int64)
