@@ -10,6 +10,7 @@ from hybridnav.harness.analysis import load_study
 from hybridnav.harness.columns import EFFICIENCY_COLUMNS, YARDSTICKS, loss_columns
 from hybridnav.harness.contradictions import ANSWERED
 from hybridnav.harness.kinds import CONSISTENCY_COLUMNS, consistency_row
+from hybridnav.harness.method_table import rows_of_methods
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.rows import figures
 from hybridnav.harness.task import TOO_SLOW
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from hybridnav.harness.analysis import Study
     from hybridnav.harness.outcome import MapQuery, Outcome
     from hybridnav.harness.records import Record
+    from hybridnav.harness.times import Circumstances
 
 LEAST_SOLVED = 0.99
 """Share of the pairs that a method solves which is compared over the pairs in common."""
@@ -29,7 +31,7 @@ BESIDE = ("octile", "shortest")
 """Presets whose speed-ups stand beside those of methods that solved fewer pairs."""
 
 _DIGITS = 6
-_COUNTS = ("pairs", "solved", "pairs in common", "nodes", "faults")
+_COUNTS = ("pairs", "solved", "pairs in common", "nodes", "edges", "faults")
 _OF_PAGE = ("numpy", "scipy", "numba", "python", "hybridnav", "processor", "machine")
 """What is told of the machine: not its name."""
 
@@ -115,19 +117,21 @@ def part_figures(study: Study) -> Data:
         ],
         "repeat": about.repeat,
         "dates": list(about.dates),
-        "loads": [round(load, 2) for load in _span(about.loads)],
+        "loads": [round(load, 2) for load in _span(about)],
         "warnings": about.warnings,
         "methods": [_row(study, label, common) for label in whole],
         "others": [_other(study, label, whole) for label in rest],
+        "settings": {str(r["method"]): r["settings"] for r in rows_of_methods(study)},
         "consistency": [_consistency(study, label) for label in study.labels],
         "unanswered": _unanswered(study),
         "by map": _by_map(study, whole, common),
     }
 
 
-def _span(loads: Sequence[float]) -> tuple[float, ...]:
-    """Return the load at the start, at the end and at most."""
-    return (loads[0], loads[-1], max(loads)) if loads else ()
+def _span(about: Circumstances) -> tuple[float, ...]:
+    """Return the load at the start, at the end, and the highest that the timing pass itself met."""
+    loads = about.loads
+    return (loads[0], loads[-1], about.most_load) if loads else ()
 
 
 def _row(study: Study, label: str, common: set[MapQuery]) -> Data:
@@ -143,10 +147,9 @@ def _other(study: Study, label: str, whole: Sequence[str]) -> Data:
     speed-ups of our presets over the same pairs."""
     common = common_pairs(study, [*whole, label])
     row = _row(study, label, common) if _has_solved(study, label) else {"method": label}
-    asked = [outcome for outcome in study.of_method(label) if outcome.solved_keys]
     beside = [own for own in BESIDE if own in whole]
     return row | {
-        "maps": len(asked),
+        "maps": sum(bool(outcome.solved_keys) for outcome in study.of_method(label)),
         **{f"speed-up of {own}": _row(study, own, common)["speed-up"] for own in beside},
     }
 

@@ -184,8 +184,10 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
         facts.append(("measured", " to ".join(dict.fromkeys(dates))))
     if lengths["loads"]:
         start, end, most = lengths["loads"]
-        text = f"{start:.2f} at the start, {end:.2f} at the end, {most:.2f} at most, of which 1 was"
-        facts.append(("load in the timing pass", f"{text} the study's"))
+        # The first reading remembers the answers before the pass, if they took more processes.
+        what = ", of what came before" if start > most else ""
+        text = f"{start:.2f} at the start{what}, {end:.2f} at the end, {most:.2f} at most, of which"
+        facts.append(("load in the timing pass", f"{text} 1 was the study's"))
     facts += [
         ("warning", f"{TITLES[name]}: {one.rstrip('.')}")
         for name, part in data["parts"].items()

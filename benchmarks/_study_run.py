@@ -16,7 +16,7 @@ from hybridnav._files import replace_file
 from hybridnav.config import load_preset
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE, RIVALS, baseline_spec, preset_spec
-from hybridnav.harness.names import class_of
+from hybridnav.harness.names import NamedMethod, class_of
 from hybridnav.harness.run import RunSettings, evaluate
 
 if TYPE_CHECKING:
@@ -32,6 +32,13 @@ COSTS = ("clearance",)
 
 BESIDE_OMPL = "portals"
 """Preset whose paths of cells, shortened by line of sight, stand beside those of OMPL."""
+
+GRAPHS = (
+    NamedMethod("class", "benchmarks._study_graphs:RouteGraphMethod", "route graph"),
+    NamedMethod("class", "benchmarks._study_graphs:SwaggerLike", "swagger-like"),
+)
+"""Graphs of waypoints, made for each map, by their names in tables. Their module is imported where
+they are made: it needs scikit-image."""
 
 _LATE_S = 120.0
 """Silence beyond the limit that loading kernels and judging may add."""
@@ -78,6 +85,7 @@ class Part:
     pairs: int
     repeat: int
     costs: tuple[str, ...] = ()
+    methods: tuple[NamedMethod, ...] = ()
 
 
 def rivals() -> tuple[list[str], dict[str, str]]:
@@ -112,6 +120,7 @@ def parts_of(plan: Plan) -> list[Part]:
             tuple(known),
             plan.pairs,
             plan.repeat,
+            methods=GRAPHS,
         ),
         Part(
             "costs",
@@ -176,6 +185,7 @@ def run(  # noqa: PLR0913 - two have defaults
             scenarios=tuple(one.scenarios for one in maps),
             presets=part.presets,
             baselines=part.baselines,
+            methods=part.methods,
             pairs=part.pairs,
             repeat=part.repeat,
             costs=part.costs,

@@ -32,6 +32,8 @@ _POINTS = 72.0
 _FOOT_IN = 0.3
 _LEAST_TABLE_IN = 1.2
 """Height of a table that must have room on a page; the rest may stand on the next one."""
+_LAST_ROWS = 3
+"""Rows at the end of a table that are not parted."""
 _LEAST_WORDS_IN = 0.6
 _TOO_MANY = 100
 
@@ -79,7 +81,9 @@ class Sheets:
             When its columns do not fit beside each other.
         """
         set_ = _Setting(columns, rows)
-        self._need(min(set_.height_in(), _LEAST_TABLE_IN) + 0.5)
+        whole_in = set_.height_in()
+        least_in = whole_in if len(set_.rows) <= _LAST_ROWS else min(whole_in, _LEAST_TABLE_IN)
+        self._need(least_in + 0.5)
         self._y_in -= 0.06
         self._line(title, MARGIN_IN, TEXT_PT, weight="bold")
         if note:
@@ -87,9 +91,11 @@ class Sheets:
                 self._line(line, MARGIN_IN, TABLE_PT, colour=_QUIET)
         self._y_in -= 0.04
         self._head(set_)
-        for row in set_.rows:
-            height_in = set_.lines(row) * TABLE_PT * _LEADING / _POINTS
-            if self._y_in - height_in < MARGIN_IN + _FOOT_IN:
+        last = max(len(set_.rows) - _LAST_ROWS, 0)
+        for at, row in enumerate(set_.rows):
+            # The last rows go on together: one alone on the next page looks like a mistake.
+            together = set_.rows[at:] if at == last else [row]
+            if self._y_in - set_.height_of(together) < MARGIN_IN + _FOOT_IN:
                 self._new_page()
                 self._head(set_)
             self._row(set_, row, weight="normal")
@@ -235,8 +241,11 @@ class _Setting:
 
     def height_in(self) -> float:
         """Return the height of the table."""
-        count = sum(self.lines(row) for row in (self.head, *self.rows))
-        return count * TABLE_PT * _LEADING / _POINTS + 0.2
+        return self.height_of([self.head, *self.rows]) + 0.2
+
+    def height_of(self, rows: Sequence[Sequence[list[str]]]) -> float:
+        """Return the height of some rows."""
+        return sum(map(self.lines, rows)) * TABLE_PT * _LEADING / _POINTS
 
 
 def _is_number(cell: str) -> bool:

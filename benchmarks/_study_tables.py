@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from benchmarks._study_run import GRAPHS
 from hybridnav.harness.columns import OPTIMA, YARDSTICKS, loss_columns, shown
 from hybridnav.harness.kinds import CONSISTENCY_COLUMNS
 from hybridnav.harness.tables import text_of
@@ -31,6 +32,10 @@ _OTHERS = (
     "metric", "maps", "solved %", "by the grid %", "pairs in common", "any-angle loss mean %",
     "octile loss mean %", "weighted loss mean %", "query ms, median", "speed-up",
     "speed-up of octile", "speed-up of shortest",
+)  # fmt: skip
+_GRAPHS = (
+    "maps", "nodes", "edges", "solved %", "any-angle loss mean %", "any-angle loss p95 %",
+    "expansions", "work in cells", "query ms, median", "speed-up", "preparation s",
 )  # fmt: skip
 _BY_MAP = ("grid-astar", "paper", "octile", "shortest", "robot", "ompl-rrtconnect")
 """Methods of the tables map by map, as far as they were asked."""
@@ -83,10 +88,26 @@ def _of_part(name: str, part: Data) -> list[StudyTable]:
     found.append(table("time", rows, TIME, "Time and memory"))
     if name == "lengths":
         found.append(table("work", rows, WORK, "Work"))
+    graphs = _graphs(part)
+    if graphs:
+        title = f"Graphs of waypoints, loss over {OPTIMA['any-angle']}"
+        made = table("graphs", graphs, _GRAPHS, title)
+        settings = "; ".join(f"{row['method']}: {row['settings']}" for row in graphs)
+        found.append(replace(made, note=f"{made.note} Settings: {settings}."))
     others = [row for row in part["others"] if row.get("pairs in common")]
     if others:
         found.append(table("others", others, _OTHERS, "Methods over pairs of their own"))
     return [*found, _map_by_map(name, part)]
+
+
+def _graphs(part: Data) -> list[Data]:
+    """Return the rows of the graphs of waypoints, wherever else they stand."""
+    names = {method.name for method in GRAPHS}
+    return [
+        {"settings": part["settings"].get(row["method"], ""), "maps": len(part["by map"]), **row}
+        for row in (*part["methods"], *part["others"])
+        if row["method"] in names
+    ]
 
 
 def _table(
@@ -105,6 +126,9 @@ _NOTES = {
     "method's: the median of the ratios, and the ratio of the means.",
     "work": "An expansion is a thing taken from the queue of a search; its price is the time of "
     "all queries over all expansions, in the unit in which the reference expands a cell.",
+    "graphs": "Nodes of all maps in the mean, and each passage as one edge; routes join a graph at "
+    "the nearest node in sight. The figures of each over the pairs that it and all methods of the "
+    "tables of losses solved.",
     "others": "Each method over the pairs that it and all methods of the tables above solved; "
     "beside its speed-up those of our presets over the same pairs.",
 }

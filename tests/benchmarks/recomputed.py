@@ -124,6 +124,8 @@ class Recomputed:
             "speed-up of means": sum(grid) / sum(own),
             "preparation s": statistics.fmean(spent),
             "memory MB": statistics.fmean(memory) / 1e6,
+            "nodes": statistics.fmean(r["n_nodes"] for r in ready),
+            "edges": statistics.fmean(r["n_edges"] for r in ready),
             "work in cells": statistics.fmean(own) / of_cell,
             **({"spread %": 100 * statistics.median(spreads)} if spreads else {}),
             **({"expansions": statistics.fmean(things)} if sum(things) else {}),

@@ -17,8 +17,9 @@ from benchmarks._study_data import collect
 from benchmarks._study_maps import StudyMap
 from benchmarks._study_page import page
 from benchmarks._study_pdf import MOST_PAGES, charts_of, sheets_of
-from benchmarks._study_run import PLANS, Part, Plan, parts_of, read_note, rivals, run
+from benchmarks._study_run import GRAPHS, PLANS, Part, Plan, parts_of, read_note, rivals, run
 from benchmarks._study_sheets import HEIGHT_IN, WIDTH_IN, Sheets, width_of, wrapped
+from benchmarks._study_tables import tables_of
 from hybridnav.config import load_preset
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, RIVALS
@@ -29,7 +30,9 @@ MAPS = Path(__file__).parents[2] / "maps"
 NAMES = ("office/office", "figure1/figure1")
 PLAN = Plan("small", pairs=6, ompl_pairs=3, repeat=3, limit_s=300.0)
 PARTS = (
-    Part("lengths", ("octile", "paper", "shortest"), ("hpa-star", "networkx"), 6, 3),
+    Part(
+        "lengths", ("octile", "paper", "shortest"), ("hpa-star", "networkx"), 6, 3, methods=GRAPHS
+    ),
     Part("costs", ("robot", "shortest"), (), 6, 3, ("clearance",)),
     Part("ompl", (load_preset("portals", overrides=["planner.smooth=line-of-sight"]),), (), 3, 0),
 )
@@ -131,6 +134,26 @@ def test_a_method_that_one_map_is_too_large_for_takes_no_pairs_from_the_others(d
     assert "up to 100,000 free cells" in text
 
 
+def test_graphs_of_waypoints_have_a_table_with_nodes_edges_and_settings(folder, data):
+    lengths = data["parts"]["lengths"]
+    known = Recomputed(folder / "lengths")
+    (table,) = [one for one in tables_of(data) if one.name == "graphs"]
+    rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
+    assert list(rows) == [method.name for method in GRAPHS]
+    assert "any-angle optimum" in table.title
+    needed = {"solved %", "mean %", "p95 %", "expansions", "work in cells"}
+    needed |= {"query ms, median", "preparation s", "nodes", "edges", "maps"}
+    for name, row in rows.items():
+        assert all(row[column] for column in needed)
+        ready = [r for (_, method), r in known.ready.items() if method == name]
+        nodes = sum(record["n_nodes"] for record in ready) / len(ready)
+        assert float(row["nodes"].replace(",", "")) == pytest.approx(nodes, abs=0.6)
+        assert lengths["settings"][name] == ready[0]["settings_text"]
+        assert f"{name}: {ready[0]['settings_text']}" in table.note
+        assert row["maps"] == "2"
+    assert {row["method"] for row in lengths["methods"]} >= set(rows)
+
+
 def test_no_name_of_the_machine_and_no_path_of_it_is_published(folder, data):
     text = (folder / "docs" / "data" / "study.json").read_text(encoding="utf-8") + page(data)
     first = json.loads((folder / "lengths" / "records.jsonl").read_text().splitlines()[0])
@@ -224,6 +247,16 @@ def test_a_table_goes_on_on_the_next_page_and_a_wide_one_is_refused():
         sheets.table("wide", [f"column {at}" for at in range(9)], wide)
 
 
+@pytest.mark.parametrize("rows", range(64, 71))
+def test_no_row_of_a_table_stands_alone_on_a_page(rows):
+    sheets = Sheets("foot")
+    sheets.table("some", ("method", "n"), [(f"m{at}", f"{at}") for at in range(rows)])
+    shown = [{text.get_text() for text in page.texts} for page in sheets.pages]
+    last = [sum(f"m{at}" in texts for at in range(rows)) for texts in shown]
+    assert sum(last) == rows
+    assert len(last) == 1 or last[-1] >= 3
+
+
 def test_lines_are_no_wider_than_asked_for():
     text = "a line of words and averyveryveryverylongwordwithoutablank at its end"
     lines = wrapped(text, 1.0, 9.0)
@@ -311,6 +344,7 @@ def test_every_method_is_in_a_part_or_said_to_be_left_out(name):
     assert {"octile", "paper", "portals", "shortest"} <= set(lengths.presets)
     assert {"hpa-star", "thrun", "weighted-astar", "networkx"} <= set(lengths.baselines)
     assert REFERENCE in lengths.baselines
+    assert {method.name for method in lengths.methods} == {"route graph", "swagger-like"}
     assert {"robot", "portals", "shortest"} <= set(costs.presets)
     assert costs.costs == ("clearance",)
     names = [preset for preset in ompl.presets if isinstance(preset, str)]

@@ -1,10 +1,12 @@
 """The timing pass: interleaved, repeated, resumed pair by pair; its circumstances."""
 
 import json
+import math
 import statistics
 import time
 from collections import Counter
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
@@ -17,6 +19,7 @@ from hybridnav.harness.pairs import Pair, sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, evaluate
 from hybridnav.harness.scenes import MapSpec, read_scene
+from hybridnav.harness.times import circumstances_of
 from hybridnav.harness.timing import TimingTask
 from hybridnav.io import load_map
 from tests.harness import faulty_methods as faulty
@@ -171,6 +174,41 @@ def test_a_busy_machine_is_a_warning(settings, tmp_path):
         assert study.circumstances.is_busy == is_busy
         for file in ("summary.md", "report.html"):
             assert ("The machine was busy" in (path.parent / file).read_text()) == is_busy
+
+
+def loads_over_time(before, within, seconds, step_s=20):
+    """Records of a pass of some seconds; each second of it has a load, and the mean forgets."""
+    began = datetime(2026, 5, 1, tzinfo=UTC)
+    load, found = before, []
+    for second in range(seconds + 1):
+        if second % step_s == 0:
+            date = (began + timedelta(seconds=second)).isoformat()
+            found.append({"status": "timed", "repeat": 2, "date": date, "load": round(load, 2)})
+        load += (1 - math.exp(-1 / 60)) * (within(second) - load)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("before", "within", "seconds", "is_busy"),
+    [
+        (3.0, lambda _: 1.0, 300, False),  # the run's own answers, then the pass alone
+        (8.0, lambda _: 1.0, 300, False),
+        (0.2, lambda _: 1.0, 300, False),
+        (3.0, lambda _: 2.0, 300, True),
+        (0.2, lambda _: 2.0, 300, True),
+        (2.0, lambda second: 1.0 if second < 200 else 4.0, 300, True),
+        (3.0, lambda second: 4.0 if second < 60 else 1.0, 300, True),
+        (3.0, lambda _: 1.0, 40, True),  # too short to tell: the machine may be busy
+    ],
+)
+def test_the_load_of_the_answers_before_is_not_that_of_the_pass(before, within, seconds, is_busy):
+    about = circumstances_of(loads_over_time(before, within, seconds), (), {}, ())
+    assert about.loads[0] == before
+    assert about.is_busy == is_busy
+    assert bool(about.warnings) == is_busy
+    words = dict(about.facts)["load of the machine"]
+    assert words.startswith(f"{before:.2f} at the start")
+    assert ("without what was before it" in words) == (seconds > 60)
 
 
 @pytest.mark.usefixtures("here")

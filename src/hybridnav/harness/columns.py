@@ -65,6 +65,8 @@ MEANINGS: dict[str, str] = {
     "settings": "settings that differ from the usual ones",
     "not asked": "maps that the method cannot take by a limit of its own, and the reason; they are "
     "no fault, and it is in no table of theirs",
+    "nodes": "mean over the maps of the nodes of its graph or topological layer",
+    "edges": "mean over the maps of the edges of the same, both directions as one",
     "metric": "metric of its paths: octile, paths of cells; any-angle, paths of points; weighted "
     "and any-angle-weighted, the same, planned by costs",
     "solved %": "share of the pairs of two joined cells for which it found a path of its own "

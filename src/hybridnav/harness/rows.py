@@ -134,6 +134,7 @@ def _efficiency(
     of_cell = _quotient(float(whole[both].sum()), float(of_grid[both].sum()))
     return {
         "nodes": _mean_of(outcomes, "n_nodes"),
+        "edges": _mean_of(outcomes, "n_edges"),
         "backups": nanmean(counts),
         "backups of the grid / backups": nanquantile(_ratio(grid_counts, counts), 0.5),
         **kinds,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 from hybridnav.harness.outcome import query_key
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
 
 BUSY = 1.5
 """Load above which a machine is busy in the timing pass, whose one process is a load of 1."""
+
+_MEMORY_S = 60.0
+"""Seconds after which a reading of the load remembers what came before to the share 1 / e."""
 
 Key = tuple[str, str]
 """Hashes of a map and a method."""
@@ -30,7 +35,11 @@ class Circumstances:
     dates: tuple[str, str] = ("", "")
     """First and last, UTC."""
     loads: tuple[float, ...] = ()
-    """Loads of the machine in the timing pass, in the order of the records."""
+    """Loads of the machine in the timing pass, in the order of the records. The first ones remember
+    the minute before, in which the run answered all pairs with all its processes."""
+    own_loads: tuple[float, ...] = ()
+    """The same without what was before the pass, from its second minute on; of a shorter pass all
+    loads, as they are."""
     apart: tuple[str, ...] = ()
     """Methods whose times are not of the timing pass of the others."""
     commands: tuple[str, ...] = field(default=())
@@ -39,7 +48,12 @@ class Circumstances:
     @property
     def is_busy(self) -> bool:
         """Whether other processes ran during the timing pass."""
-        return max(self.loads, default=0.0) > BUSY
+        return self.most_load > BUSY
+
+    @property
+    def most_load(self) -> float:
+        """The highest load that the pass itself met."""
+        return max(self.own_loads, default=0.0)
 
     @property
     def facts(self) -> list[tuple[str, str]]:
@@ -48,8 +62,10 @@ class Circumstances:
         if self.dates[0]:
             facts.append(("measured", " to ".join(dict.fromkeys(self.dates))))
         if self.loads:
-            start, end, most = self.loads[0], self.loads[-1], max(self.loads)
-            text = f"{start:.2f} at the start, {end:.2f} at the end, {most:.2f} at most"
+            start, end = self.loads[0], self.loads[-1]
+            text = f"{start:.2f} at the start, {end:.2f} at the end, {self.most_load:.2f} at most"
+            if self.own_loads != self.loads:
+                text += " in the pass, without what was before it"
             facts.append(("load of the machine", text))
         facts += [("command", command) for command in self.commands]
         return facts
@@ -72,7 +88,7 @@ class Circumstances:
         found = []
         if self.is_busy:
             found.append(
-                f"The machine was busy: a load of up to {max(self.loads):.2f}, of which this run "
+                f"The machine was busy: a load of up to {self.most_load:.2f}, of which this run "
                 "made 1. Measure again on a quiet machine."
             )
         if self.apart:
@@ -144,7 +160,7 @@ def circumstances_of(
     """
     used = [record for record in timed if record["status"] in {"ready", "timed"}]
     dates = [record["date"] for record in used if "date" in record]
-    loads = [record["load"] for record in used if record.get("load") is not None]
+    loaded = [record for record in used if record.get("load") is not None]
     apart = [
         outcome.label
         for outcome in outcomes
@@ -156,7 +172,27 @@ def circumstances_of(
     return Circumstances(
         repeat=max((record["repeat"] for record in used), default=0),
         dates=(min(dates), max(dates)) if dates else ("", ""),
-        loads=tuple(loads),
+        loads=tuple(record["load"] for record in loaded),
+        own_loads=_own_loads(loaded),
         apart=tuple(dict.fromkeys(apart)),
         commands=tuple(dict.fromkeys(commands)),
     )
+
+
+def _own_loads(loaded: Sequence[Record]) -> tuple[float, ...]:
+    """Return the loads that a timing pass itself met.
+
+    A load is a mean over the past that forgets: after t seconds the share exp(-t / 60) of it is
+    what was before the first reading. That share is taken out, where it is small enough: from the
+    second minute on.
+    """
+    if not loaded:
+        return ()
+    began, before = datetime.fromisoformat(loaded[0]["date"]), loaded[0]["load"]
+    found = []
+    for record in loaded:
+        passed_s = (datetime.fromisoformat(record["date"]) - began).total_seconds()
+        if passed_s >= _MEMORY_S:
+            share = math.exp(-passed_s / _MEMORY_S)
+            found.append((record["load"] - share * before) / (1 - share))
+    return tuple(found or (record["load"] for record in loaded))
