@@ -55,7 +55,7 @@ class RouteGraphMethod(GraphMethod):
         built = build_route_graph(topology, nodes=nodes)
         graph = _graph_of("our graph", grid, built.positions, built.edges)
         super().__init__(grid, graph)
-        self.settings = f"{nodes} nodes aimed at"
+        self.settings = f"{nodes:,} nodes aimed at"
 
 
 class SwaggerLike(GraphMethod):
@@ -70,7 +70,7 @@ class SwaggerLike(GraphMethod):
         sizes = Distances(scaled.resolution_m, scaled.robot_radius_m)
         cells, sides = swagger_like(free, skeleton, sizes)
         edges = np.concatenate([sides, sides[:, ::-1]])
-        graph = _graph_of("swagger-like", grid, cells + 0.5, edges)
+        graph = _graph_of("swagger-like", grid, cells.astype(np.float64) + 0.5, edges)
         super().__init__(grid, graph)
         self.settings = (
             f"nodes every {SKELETON_M:g} m of skeleton, {BOUNDARY_M:g} m of contour, {SPACE_M:g} m "

@@ -24,7 +24,9 @@ from skimage import feature, measure, morphology
 from hybridnav.refine import Sight
 
 if TYPE_CHECKING:
-    from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from numpy.typing import ArrayLike
+
+    from hybridnav._typing import BoolArray, LongArray
 
 Cell = tuple[int, int]
 
@@ -100,9 +102,10 @@ def swagger_like(
     return nodes, np.array(edges, dtype=np.int64).reshape(-1, 2)
 
 
-def _sees(sight: Sight, tails: FloatArray | LongArray, heads: FloatArray | LongArray) -> BoolArray:
+def _sees(sight: Sight, tails: ArrayLike, heads: ArrayLike) -> BoolArray:
     """Return which cells see each other from centre to centre."""
-    return sight.clear(np.asarray(tails) + 0.5, np.asarray(heads) + 0.5)
+    first, second = (np.asarray(ends, dtype=np.float64) + 0.5 for ends in (tails, heads))
+    return sight.clear(first, second)
 
 
 def _add_skeleton(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -23,6 +24,7 @@ from benchmarks._swagger_like import (
     swagger_like,
 )
 from hybridnav.harness.analysis import load_study
+from hybridnav.harness.graph_method import GraphMethod
 from hybridnav.harness.kinds import consistency_row
 from hybridnav.harness.method_table import rows_of_methods
 from hybridnav.harness.records import read_records
@@ -33,7 +35,7 @@ from tests.harness.test_rival_faults import LIES, nothing, short
 from tests.strategies import class_grids, examples, occupancy_grid
 
 N_PAIRS = 12
-BY_NAME = {"route graph": RouteGraphMethod, "swagger-like": SwaggerLike}
+BY_NAME: dict[str, Any] = {"route graph": RouteGraphMethod, "swagger-like": SwaggerLike}
 
 
 @pytest.fixture(autouse=True)
@@ -106,7 +108,7 @@ def test_nodes_are_as_near_as_the_distances_say():
     # Contours: nodes at half the robot's radius from the cells that are closed to it.
     on_contour = np.abs(wall_m[tuple(nodes.T)] - 0.5 * grid.robot_radius_m) < 2 * grid.resolution_m
     assert on_contour.sum() > 20 / BOUNDARY_M
-    graph = nx.Graph(edges.tolist())
+    graph: nx.Graph[int] = nx.Graph(edges.tolist())
     label, _ = ndimage.label(free, np.ones((3, 3)))
     large = int(np.bincount(label[free]).argmax())
     inside = {at for at, cell in enumerate(nodes.tolist()) if label[tuple(cell)] == large}
@@ -126,7 +128,7 @@ def test_routes_are_those_of_the_exported_file(tmp_path):
     assert made.n_nodes == built.n_nodes
     hn.export_nav2(built, tmp_path / "graph.geojson")
     graph = hn.load_graph(tmp_path / "graph.geojson")
-    by_file = hn.harness.graph_method.GraphMethod(scaled, graph)
+    by_file = GraphMethod(scaled, graph)
     rng = np.random.default_rng(1)
     free = np.argwhere(grid.classes == hn.CellClass.FREE)
     for _ in range(10):
