@@ -70,6 +70,18 @@ def test_wrong_usage_ends_in_one_line(cli, tmp_path):
     assert not out.exists()
 
 
+def test_graphs_for_nav2_have_nodes_near_every_point(cli, tmp_path):
+    def nodes(*more):
+        given = ("export", FIGURE, "-o", tmp_path / f"g.{more[1] if more else 'json'}", "--json")
+        return cli(*given, *SMALL[:2], *more[2:]).answer["nodes"]
+
+    near, far = nodes(), nodes("", "json", "--spacing", 2)
+    assert near == nodes("", "json", "--spacing", 1)
+    assert near > far
+    assert nodes("", "yaml", "--format", "rmf") == far
+    assert nodes("", "json", "--lanes", 1) == nodes("", "json", "--lanes", 1, "--spacing", 2)
+
+
 def test_ids_that_messages_do_not_hold_are_named(cli, tmp_path, monkeypatch):
     given = ("export", FIGURE, "-o", tmp_path / "g.geojson", *SMALL)
     assert "ids  " not in cli(*given).out

@@ -112,7 +112,8 @@ def test_a_corridor_too_narrow_for_two_has_no_lanes_and_a_wide_one_has():
         cells[1:-1, 1:-1] = 0.0
         grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.3)
         here = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
-        graph = hn.keep_right(here, hn.build_route_graph(here), apart_m=0.8)
+        graph = hn.build_route_graph(here, spacing_m=2.0)
+        graph = hn.keep_right(here, graph, apart_m=0.8)
         assert ("lane" in graph.kinds) == fits
         assert graph.is_lane.any() == fits
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 import hybridnav as hn
 from hybridnav.graphs.attach import Network
@@ -31,6 +32,22 @@ def test_no_route_is_a_tenth_longer_than_the_shortest_path(seed):
     assert report.best.mean <= 0.02
     assert report.best.greatest <= 0.1
     assert report.nearest.solved == 1.0
+
+
+def test_a_robot_in_a_hall_is_near_a_node_and_leaves_by_the_nearest():
+    # Two halls, and a passage in the middle of the wall between.
+    cells = np.ones((102, 302), dtype=np.float32)
+    cells[1:-1, 1:-1] = 0.0
+    cells[1:40, 150] = cells[60:-1, 150] = 1.0
+    grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
+    graph = hn.build_route_graph(topology)
+    away = KDTree(graph.positions).query(np.argwhere(FreeSpace.of(grid).free) + 0.5)[0]
+    assert away.max() * 0.1 <= 1.0
+    nearest = hn.judge_route_graph(graph, pairs=2000).nearest
+    assert nearest.solved == 1.0
+    assert nearest.mean <= 0.011
+    assert nearest.greatest <= 0.15
 
 
 def near_pairs(space: FreeSpace, count: int, reach: int) -> tuple[np.ndarray, np.ndarray]:

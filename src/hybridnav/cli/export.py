@@ -63,7 +63,10 @@ _ENDINGS = {
 """Endings of the file of each format."""
 _PARTS = ("rooms", "places")
 """Formats without a graph."""
-_SPACING_M, _STRETCH = 2.0, 1.05
+_STRETCH = 1.05
+_NEAR_M, _FAR_M = 1.0, 2.0
+"""Spacing of graphs for Nav2, which joins them at the nearest node, and of all others: lanes need
+long edges."""
 _MOST_PAIRS = 1_000_000
 
 OutOption = Annotated[
@@ -86,9 +89,12 @@ NodesOption = Annotated[
     ),
 ]
 SpacingOption = Annotated[
-    float,
+    float | None,
     typer.Option(
-        "--spacing", metavar="D", help="Distance in metres within which points see a node."
+        "--spacing",
+        metavar="D",
+        help=f"Distance in metres within which points see a node; by default {_NEAR_M:g}, with "
+        f"--lanes and in formats other than nav2 {_FAR_M:g}.",
     ),
 ]
 StretchOption = Annotated[
@@ -136,7 +142,7 @@ def export(
     out: OutOption,
     kind: FormatOption = "nav2",
     nodes: NodesOption = None,
-    spacing_m: SpacingOption = _SPACING_M,
+    spacing_m: SpacingOption = None,
     stretch: StretchOption = _STRETCH,
     lanes_m: LanesOption = None,
     polylines: PolylinesOption = False,
@@ -174,14 +180,14 @@ def export(
     fleet = Fleet.read(kind, floor, anchor, vehicles, no_doors=no_doors)
     if is_building_file(map_file):
         check_options(refused_options(ctx, EXPORT_OPTIONS))
-        export_building(fleet, ctx.params)
+        export_building(fleet, ctx.params | {"spacing_m": _spacing(ctx.params)})
         return
     if fleet is not None and polylines:
         raise UsageError(f"--polylines is for --format nav2, got {kind}: leave it out")
     if kind in _PARTS:
         given = {
             "--nodes": nodes is not None,
-            "--spacing": spacing_m != _SPACING_M,
+            "--spacing": spacing_m is not None,
             "--stretch": stretch != _STRETCH,
             "--lanes": lanes_m is not None,
             "--polylines": polylines,
@@ -206,7 +212,7 @@ def export(
         graph = hn.build_route_graph(
             topology,
             nodes=nodes,
-            spacing_m=spacing_m,
+            spacing_m=_spacing(ctx.params),
             stretch=stretch,
             seed=settings.pyramid.seed,
             progress=advance,
@@ -215,7 +221,7 @@ def export(
             graph = hn.keep_right(topology, graph, apart_m=lanes_m)
     seconds["graph"] = round(time.perf_counter() - began, 6)
     with stage(f"writing {out}", seconds, "write"):
-        written = hn.merge_bends(graph) if polylines else graph
+        written = hn.merge_bends(graph, stretch=stretch) if polylines else graph
         left_out = _write_graph(topology, (graph, written), fleet, out, frame)
     judged = None
     if report is not None:
@@ -232,6 +238,13 @@ def export(
         from hybridnav.viz import plot_route_graph, save_figure  # noqa: PLC0415 - on demand
 
         save_figure(plot_route_graph(graph), plot)
+
+
+def _spacing(given: dict[str, Any]) -> float:
+    """Return the spacing that is given, or that of the format."""
+    is_near = given["kind"] == "nav2" and given["lanes_m"] is None
+    spacing_m: float | None = given["spacing_m"]
+    return spacing_m if spacing_m is not None else _NEAR_M if is_near else _FAR_M
 
 
 def _check_plain(kind: str, given: dict[str, bool]) -> None:

@@ -29,8 +29,9 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
     A lane runs parallel to the edge, on its right by half of `apart_m`. It leaves the first node
     and joins the second one at 45 degrees, by two nodes of its own, and is free for the robot by
     exact tests. Edges between walls that are too near, and edges shorter than twice `apart_m`, stay
-    as they are. Where nodes are connected, they stay connected in both directions. At the nodes
-    lanes meet: who goes first there is for a fleet manager.
+    as they are: a graph with few nodes, or with a large `spacing_m`, gets more lanes. Where nodes
+    are connected, they stay connected in both directions. At the nodes lanes meet: who goes first
+    there is for a fleet manager.
 
     Parameters
     ----------

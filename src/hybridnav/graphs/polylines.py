@@ -8,23 +8,28 @@ import numpy as np
 
 from hybridnav._copies import frozen
 from hybridnav.errors import InvalidValueError
+from hybridnav.graphs.attach import adjacency, shortest_routes
 from hybridnav.graphs.metadata import edge_metadata, node_metadata
 from hybridnav.graphs.route_graph import RouteGraph
 from hybridnav.graphs.waypoint_graph import WaypointGraph
-from hybridnav.grid.checks import checked_type
+from hybridnav.grid.checks import checked_between, checked_type
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
 
 _LANDMARKS = frozenset({"room", "door", "place"})
+_ROUNDING = 1e-9
+"""Relative slack on the length of a route, which is a sum of rounded numbers."""
+_AT_ONCE = 64
+"""Nodes from which distances to all others are held at once."""
 
 
-def merge_bends(graph: RouteGraph) -> WaypointGraph:
+def merge_bends(graph: RouteGraph, *, stretch: float = 1.05) -> WaypointGraph:
     """Leave out the nodes of a route graph that only bend routes or cover space.
 
-    Nodes at rooms, doors and places stay. Two of them are joined where some node between is nearest
-    to the one, and the next to the other, by the shortest route over the nodes that are left out;
-    so nodes are connected where they were. The cost of an edge is the length of that polyline in
+    Nodes at rooms, doors and places stay. Two of them are joined by the shortest route over the
+    nodes that are left out, where the way over other polylines is longer than `stretch` allows; so
+    nodes are connected where they were. The cost of an edge is the length of that polyline in
     metres; its metadata are those of `export_nav2`, and where it bends `polyline`, with `x_values`
     and `y_values` in metres. A robot must follow the polyline: straight from node to node there may
     be walls, and Nav2's route server of its own accord does not read it.
@@ -33,6 +38,9 @@ def merge_bends(graph: RouteGraph) -> WaypointGraph:
     ----------
     graph
         The graph, without lanes.
+    stretch
+        At least 1: between two of its nodes, a route over polylines is at most this many times as
+        long as a route on `graph`.
 
     Returns
     -------
@@ -42,7 +50,7 @@ def merge_bends(graph: RouteGraph) -> WaypointGraph:
     Raises
     ------
     InvalidValueError
-        When the graph has lanes.
+        When the graph has lanes, or `stretch` is below 1.
 
     Examples
     --------
@@ -53,6 +61,7 @@ def merge_bends(graph: RouteGraph) -> WaypointGraph:
     True
     """
     checked_type("graph", graph, RouteGraph)
+    checked_between("stretch", stretch, 1, 1e6)
     if graph.is_lane.any():
         raise InvalidValueError(
             f"the graph of map {graph.grid.name!r} has lanes, whose edges are straight: merge "
@@ -64,7 +73,7 @@ def merge_bends(graph: RouteGraph) -> WaypointGraph:
     costs: list[float] = []
     lines: dict[int, FloatArray] = {}
     facts: dict[int, dict[str, Any]] = {}
-    for chain in _chains(graph, kept):
+    for chain in _chains(graph, kept, stretch):
         nodes = [*graph.edges[chain, 0].tolist(), int(graph.edges[chain[-1], 1])]
         metadata = edge_metadata(graph, chain)
         points = graph.points[nodes]
@@ -90,42 +99,76 @@ def merge_bends(graph: RouteGraph) -> WaypointGraph:
     )
 
 
-def _chains(graph: RouteGraph, kept: LongArray) -> list[list[int]]:
+def _chains(graph: RouteGraph, kept: LongArray, stretch: float) -> list[list[int]]:
     """Return the edges of each polyline, those of both directions one after the other."""
-    away, before, owner = _nearest(graph, kept)
-    tails, heads = graph.edges.T
-    meets = (owner[tails] >= 0) & (owner[tails] < owner[heads])
-    tails, heads, lengths = tails[meets], heads[meets], graph.lengths_m[meets]
-    through = away[tails] + lengths + away[heads]
-    pairs = owner[tails].astype(np.int64) * graph.n_nodes + owner[heads]
-    order = np.lexsort((through, pairs))
-    _, first = np.unique(pairs[order], return_index=True)
+    tails, heads = kept[_joined(_distances(graph, kept), stretch)].T
+    offsets, nothing = np.arange(len(tails) + 1), np.zeros(len(tails))
+    network = adjacency(graph.n_nodes, graph.edges, graph.lengths_m)
+    _, routes, _ = shortest_routes(network, (offsets, tails, nothing), (offsets, heads, nothing))
     keys = graph.edges[:, 0] * graph.n_nodes + graph.edges[:, 1]  # ascending
     chains: list[list[int]] = []
-    for at in order[first].tolist():
-        nodes = [*_back(before, int(tails[at]))[::-1], *_back(before, int(heads[at]))]
-        for line in (np.array(nodes), np.array(nodes[::-1])):
+    for nodes in routes[: len(tails)]:
+        for line in (nodes, nodes[::-1]):
             found = np.searchsorted(keys, line[:-1] * graph.n_nodes + line[1:])
             chains.append(found.tolist())
     return chains
 
 
-def _back(before: IntArray, node: int) -> list[int]:
-    """Return a node and those before it, up to the one that is kept."""
-    nodes = [node]
-    while before[nodes[-1]] >= 0:
-        nodes.append(int(before[nodes[-1]]))
-    return nodes
+def _joined(away: FloatArray, stretch: float) -> LongArray:
+    """Choose pairs of nodes so that a route over chosen ones joins every pair.
+
+    Parameters
+    ----------
+    away
+        float64 (n, n), the distance of each pair, infinite for none.
+    stretch
+        Most by which a route is longer than the distance.
+
+    Returns
+    -------
+    LongArray
+        int64 (k, 2), lower node first, sorted. A pair is chosen when it is the nearest one without
+        a route that is short enough, of both its nodes: so no other node lies on the way.
+    """
+    count = len(away)
+    chosen = np.zeros((count, count), dtype=np.bool_)
+    waiting = np.arange(count)
+    while True:
+        lengths = _lengths(chosen, away, waiting)
+        rest = np.where(lengths > stretch * (1 + _ROUNDING) * away[waiting], away[waiting], np.inf)
+        waits = np.isfinite(rest).any(axis=1)
+        waiting, rest = waiting[waits], rest[waits]
+        if not len(waiting):
+            return np.argwhere(np.triu(chosen)).astype(np.int64)
+        nearest = np.full(count, -1, dtype=np.int64)
+        nearest[waiting] = rest.argmin(axis=1)
+        both = waiting[nearest[nearest[waiting]] == waiting]
+        chosen[both, nearest[both]] = True
 
 
-def _nearest(graph: RouteGraph, kept: LongArray) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return for each node the distance to the nearest kept one, the node before on the route from
-    it, and that one; negative for none."""
+def _lengths(chosen: BoolArray, away: FloatArray, nodes: LongArray) -> FloatArray:
+    """Return the lengths of the shortest routes over chosen pairs from some nodes to all, float64
+    (k, n)."""
+    from scipy.sparse import csr_array  # noqa: PLC0415 - on demand
+    from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
+
+    matrix = csr_array((away[chosen], np.nonzero(chosen)), shape=away.shape)
+    found: FloatArray = dijkstra(matrix, indices=nodes)
+    return found
+
+
+def _distances(graph: RouteGraph, kept: LongArray) -> FloatArray:
+    """Return the lengths of the shortest routes between some nodes, float64 (k, k), infinite for
+    none."""
     from scipy.sparse import csr_array  # noqa: PLC0415 - on demand
     from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
 
     shape = (graph.n_nodes, graph.n_nodes)
     matrix = csr_array((graph.lengths_m, (graph.edges[:, 0], graph.edges[:, 1])), shape=shape)
-    found: Any = dijkstra(matrix, indices=kept, min_only=True, return_predecessors=True)
-    away, before, owner = found
-    return away, before, owner
+    away = np.empty((len(kept), len(kept)))
+    for first in range(0, len(kept), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        away[some] = dijkstra(matrix, indices=kept[some])[:, kept]
+    # Rounding differs by direction: pairs need one distance.
+    found: FloatArray = np.minimum(away, away.T)
+    return found
