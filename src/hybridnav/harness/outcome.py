@@ -257,11 +257,6 @@ class Outcome:
         return np.where(np.isfinite(self.lengths_m), self.figure("seconds"), math.nan)
 
     @cached_property
-    def first_seconds(self) -> FloatArray:
-        """Seconds until the first path of these queries, for planners that improve their path."""
-        return np.where(np.isfinite(self.lengths_m), self._stage("first path"), math.nan)
-
-    @cached_property
     def reference_seconds(self) -> FloatArray:
         """Wall-clock seconds of the reference on the same pairs."""
         return np.array([record["seconds"] for record in self.references], dtype=float)
