@@ -141,9 +141,10 @@ class OnlineRooms:
         Rooms within 0.3 m of a changed cell are found anew, as a build does, in a window that has
         them whole and 10 m of the map around them. All others keep their free cells; one of them
         may grow by cells of a room that was found anew. Rooms cover what those of a build cover,
-        but may differ from them: a build looks farther, at the main directions of the map and at
-        whole rooms, and knows nothing of the rooms before, which an update holds on to. Borders
-        that a person drew where the map shows none may go when a room is found anew.
+        on scans of single rays but for pockets of a few cells. They may differ: a build looks
+        farther, at the main directions of the map and at whole rooms, and knows nothing of the
+        rooms before, which an update holds on to. Borders that a person drew where the map shows
+        none may go when a room is found anew.
 
         All cells are compared, and the numbers of all cells are copied. The rest takes as long as
         a fresh build of the window. That is more than an update of the places takes: a robot calls
