@@ -92,3 +92,13 @@ def test_the_floor_plan_is_never_replaced(cli: Any, plan: Path) -> None:
     for name in ("plan.yaml", "plan.yml", "../" + plan.parent.name + "/plan.yaml"):
         assert cli("explore", plan, "-o", plan.parent / name).refuses(2, "replace the floor plan")
     assert {file: file.read_bytes() for file in plan.parent.iterdir()} == before
+
+
+def test_the_image_of_the_floor_plan_is_never_replaced(cli: Any, plan: Path) -> None:
+    image = plan.with_name("picture.pgm")
+    plan.with_suffix(".pgm").rename(image)
+    plan.write_text(plan.read_text().replace("plan.pgm", "picture.pgm"))
+    before = image.read_bytes()
+    out = plan.with_name("picture.yaml")
+    assert cli("explore", plan, "-o", out).refuses(2, "replace the floor plan")
+    assert image.read_bytes() == before

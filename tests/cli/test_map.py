@@ -51,6 +51,14 @@ def test_a_log_becomes_a_map_that_other_commands_read(cli: Any, tmp_path: Path) 
     assert cli("plan", out, "--start", "3.5,4", "--goal", "6.5,6").code == 0
 
 
+@pytest.mark.parametrize("name", ["log.yaml", "log.pgm"])
+def test_the_log_is_never_replaced(cli: Any, tmp_path: Path, name: str) -> None:
+    log = room_log(tmp_path / name)
+    before = log.read_bytes()
+    assert cli("map", log, "-o", tmp_path / "log.yaml").refuses(2, "would replace the log")
+    assert log.read_bytes() == before
+
+
 def test_the_figures_are_one_object(cli: Any, tmp_path: Path) -> None:
     log, out = room_log(tmp_path / "room.log"), tmp_path / "room.yaml"
     answer = cli("map", log, "-o", out, "--resolution", "0.1", "--json").answer

@@ -88,6 +88,14 @@ def test_a_plan_may_be_turned() -> None:
     assert done.share_known > 0.99
 
 
+def test_thresholds_of_the_plan_are_none_of_the_robots_map() -> None:
+    # One scan makes no cell as certain as these ask for, and no number of scans a wall.
+    plan = replace(flat(), free_threshold=0.01, occupied_threshold=0.99)
+    done = explore(plan, START, most_goals=3)
+    assert done.share_known > 0.2
+    assert (done.grid.measured == hn.CellClass.OCCUPIED).any()
+
+
 def test_a_ring_of_sonars_explores_a_hall() -> None:
     hall = np.zeros((60, 60), dtype=np.float32)
     hall[[0, -1]] = hall[:, [0, -1]] = 1.0

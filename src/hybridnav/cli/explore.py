@@ -102,11 +102,12 @@ def explore(
     check_output(out, "--out", (".yaml", ".yml"))
     if out is not None:
         check_writable(out.with_suffix(".pgm"), "--out")
-        _check_kept(map_file, out)
     check_output(plot, "--plot", (".gif",))
     load_numba()
     world = hn.load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells).grid
     check_room_to_be(world)
+    if out is not None:
+        _check_kept(map_file, out)
     from hybridnav import explore as exploring  # noqa: PLC0415 - loads numba
 
     maps = _Maps(frames)
@@ -173,8 +174,13 @@ def _point(text: str) -> tuple[float, float]:
 
 
 def _check_kept(map_file: Path, out: Path) -> None:
-    """Refuse a map that would replace the floor plan, or the image beside it."""
-    if out.with_suffix("").resolve() == map_file.with_suffix("").resolve():
+    """Refuse a map that would replace the floor plan, its image, or the image beside it."""
+    from hybridnav.io.ros import files_of  # noqa: PLC0415 - on demand
+
+    kept = {map_file.with_suffix(ending).resolve() for ending in (".yaml", ".yml", ".pgm")}
+    if map_file.suffix.lower() in {".yaml", ".yml"}:
+        kept |= {file.resolve() for file in files_of(map_file)}
+    if not kept.isdisjoint({out.resolve(), out.with_suffix(".pgm").resolve()}):
         raise UsageError(
             f"--out {str(out)!r:.90} would replace the floor plan, expected another name: "
             "choose one"

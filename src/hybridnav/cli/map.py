@@ -126,6 +126,10 @@ def map(  # noqa: A001 - the command's name
         raise UsageError(f"--out must end in .yaml or .yml, got {str(out)!r}")
     for file in (out, out.with_suffix(".pgm")):
         check_writable(file, "--out")
+        if file.resolve() == log_file.resolve():
+            raise UsageError(
+                f"--out {str(out)!r:.90} would replace the log, expected another name: choose one"
+            )
     if topic is not None and is_bag(log_file) and _write_kept(log_file, topic, out, as_json):
         return
     load_numba()

@@ -127,8 +127,6 @@ class Robot:
         began = time.perf_counter()
         grid = self._mapper.to_grid(
             robot_radius_m=self._world.robot_radius_m,
-            free_threshold=self._world.free_threshold,
-            occupied_threshold=self._world.occupied_threshold,
             name=f"{self._world.name}-explored",
             area=area,
         )
