@@ -78,6 +78,11 @@ def read(tmp_path):
         ("a.osm", "<osm>" + PLACE + "".join(
             f'<way id="{k}"><nd ref="1"/><nd ref="2"/><tag k="highway" v="path"/>'
             f'<tag k="level" v="{k}"/></way>' for k in range(1001)) + "</osm>", "1000 levels"),
+        ("a.osm", "<osm>" + "".join(
+            f'<node id="{k}" lat="50" lon="8"><tag k="highway" v="elevator"/>'
+            '<tag k="level" v="1;2"/></node>' for k in range(1, 20_000)) + "".join(
+            f'<way id="{k}"><nd ref="1"/><nd ref="2"/><tag k="highway" v="path"/>'
+            f'<tag k="level" v="{k}"/></way>' for k in (1, 2)) + "</osm>", "1000 lifts, stairs"),
         ("a.osm", "<osm>" + " " * 2**25, "is not read"),
         ("a.json", " " * 2**26 + "{}", "is not read"),
         ("a.json", "[]", "expected a layout"),
@@ -86,6 +91,16 @@ def read(tmp_path):
         ("a.json", '{"layouts": [7]}', "expected the layout as a mapping"),
         ("a.json", '{"layouts": [{"nodes": [{}]}]}', "expected nodeId as a text"),
         ("a.json", f'{{"layouts": [{{"nodes": [{NODE}], "edges": [{{}}]}}]}}', "startNodeId"),
+        ("a.json", json.dumps({"layouts": [
+            {"layoutLevelId": "1", "nodes": [json.loads(NODE)], "edges": [
+                {"edgeId": f"e{k}", "edgeName": f"lift {k}", "startNodeId": "a", "endNodeId": "b"}
+                for k in range(1001)]},
+            {"layoutLevelId": "2", "nodes": [json.loads(NODE) | {"nodeId": "b"}]}]}),
+         "1000 lifts, stairs"),
+        ("a.yaml", "levels:\n" + "".join(
+            f" L{k}: {{vertices: [{', '.join(f'[0, 0, {{lift: l{n}}}]' for n in range(1001))}]}}\n"
+            for k in (1, 2)) + f"lifts: {{{', '.join(f'l{n}: {{}}' for n in range(1001))}}}",
+         "1000 lifts"),
         ("a.json", '{"layouts": ' + "[" * 100_000, "nested"),
         ("a.json", '{"layouts": ' + "9" * 5000 + "}", "too many digits"),
         ("a.json", '{"layouts": [' + "[]," * 9_000_000 + "[]]}", "values is not read"),

@@ -104,6 +104,32 @@ def test_a_layout_needs_vehicle_types(small, tmp_path, types):
         hn.export_lif(small, tmp_path / "a.json", vehicle_types=types)
 
 
+@pytest.mark.parametrize(
+    ("drawn", "read"),
+    [
+        (["lift A", "B"], ["lift A", "lift B"]),
+        (["lift A", "A"], ["lift lift A", "lift A"]),
+        (["lift A", "stairs A"], ["lift lift A", "stairs stairs A"]),
+        (["lift lift A", "lift A"], ["lift lift A", "lift A"]),
+        (["A", "lift A", "lift lift A"], ["lift A", "lift lift A", "lift lift lift A"]),
+    ],
+)
+def test_links_of_any_names_are_read(tmp_path, drawn, read):
+    """`read` has the kind before each name."""
+    node = {"nodePosition": {"x": 1, "y": 2}}
+    edges = [
+        {"edgeId": f"e{at}", "edgeName": name, "startNodeId": "a", "endNodeId": "b"}
+        for at, name in enumerate(drawn)
+    ]
+    layouts = [
+        {"layoutLevelId": "1", "nodes": [node | {"nodeId": "a"}], "edges": edges},
+        {"layoutLevelId": "2", "nodes": [node | {"nodeId": "b"}]},
+    ]
+    (tmp_path / "a.json").write_text(json.dumps({"layouts": layouts}))
+    links = hn.load_building_graph(tmp_path / "a.json").links
+    assert [f"{link.kind} {link.name}" for link in links] == read
+
+
 def test_graphs_of_one_floor_are_graphs(small, tmp_path):
     hn.export_lif(small, tmp_path / "a.json", vehicle_types=["A.B"])
     graph = hn.load_graph(tmp_path / "a.json")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.building import BuildingGraph, FloorGraph, Link, LinkEnd
 from hybridnav.errors import MapError
 from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.gather import Gathered, pair_of, shown
-from hybridnav.io.rmf_floors import MOST_FLOORS, list_of, mapping_of
+from hybridnav.io.rmf_floors import MOST_FLOORS, check_link_count, list_of, mapping_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -82,6 +83,7 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
     meta = mapping_of(data.get("metaInformation"), where, "metaInformation")
     title = str(meta.get("projectIdentification") or name)
     links = _links(crossing, floor_of, point_of, list(kept))
+    check_link_count(len(links), where)
     return BuildingGraph(name=title, floors=tuple(graphs), links=tuple(links))
 
 
@@ -172,16 +174,26 @@ def _links(
         for end in ends:
             if floor_of[end] in place and end in point_of:
                 stops.setdefault(name, {}).setdefault(floor_of[end], point_of[end])
+    stops = {name: found for name, found in stops.items() if len(found) > 1}
+    own_names = _own_names(list(stops))
     links = []
-    taken: set[str] = set()
     for name, found in stops.items():
-        if len(found) < 2:  # noqa: PLR2004
-            continue
-        word, _, rest = name.partition(" ")
-        kind = next((kind for kind in _KINDS if kind == word and rest), None)
-        own = rest if kind is not None and rest not in taken else name
-        taken.add(own)
         ordered = sorted(found, key=place.__getitem__)
         known = tuple(LinkEnd(floor, found[floor]) for floor in ordered)
-        links.append(Link(name=own, kind=kind or "lift", ends=known))
+        links.append(Link(name=own_names[name], kind=_split(name)[0] or "lift", ends=known))
     return links
+
+
+def _split(name: str) -> tuple[LinkKind | None, str]:
+    """Return the kind with which the name of edges begins, if it is one, and what follows."""
+    word, _, rest = name.partition(" ")
+    kind = next((kind for kind in _KINDS if kind == word and rest), None)
+    return kind, name if kind is None else rest
+
+
+def _own_names(names: list[str]) -> dict[str, str]:
+    """Return the name of each link without its kind, where no other link is called so."""
+    rest = {name: _split(name)[1] for name in names}
+    count = Counter(rest.values())
+    own = {name: rest[name] if count[rest[name]] == 1 else name for name in names}
+    return own if len(set(own.values())) == len(names) else {name: name for name in names}

@@ -18,7 +18,7 @@ from hybridnav.io.anchors import Anchor
 from hybridnav.io.osm_areas import add_area_graph
 from hybridnav.io.osm_out import ALONE
 from hybridnav.io.osm_xml import OsmData, OsmWay, Tags, levels_of, read_osm_xml
-from hybridnav.io.rmf_floors import MOST_FLOORS
+from hybridnav.io.rmf_floors import MOST_FLOORS, check_link_count
 
 if TYPE_CHECKING:
     from hybridnav.building import LinkKind
@@ -102,7 +102,7 @@ def read_osm(text: str, where: str, name: str, *, anchor: Anchor | None = None) 
             "with highway and level"
         )
     found = {floor.level: floor.name for floor, _ in kept}
-    links = _Links(data, points, found)
+    links = _Links(data, points, found, where)
     return BuildingGraph(
         name=title,
         floors=tuple(graph for _, graph in kept if graph is not None),
@@ -279,9 +279,9 @@ class _Links:
     """What joins levels: ways and nodes with several levels, and areas of one name."""
 
     def __init__(
-        self, data: OsmData, points: dict[int, Point | None], names: dict[float, str]
+        self, data: OsmData, points: dict[int, Point | None], names: dict[float, str], where: str
     ) -> None:
-        self._data, self._points, self._names = data, points, names
+        self._data, self._points, self._names, self._where = data, points, names, where
         self._taken: set[str] = set()
 
     def found(self, floors: list[OsmFloor]) -> list[Link]:
@@ -342,6 +342,7 @@ class _Links:
         tried = itertools.chain([name] if name else [], numbered)
         own = next(each for each in tried if each not in self._taken)
         self._taken.add(own)
+        check_link_count(len(self._taken), self._where)
         given = {key: number_of(tags.get(f"hybridnav:{key}")) for key in _FACTS}
         known = {key: value for key, value in given.items() if value > 0}
         return Link(name=own, kind=kind, ends=tuple(ends.values()), **known)

@@ -13,8 +13,8 @@ from hybridnav.graphs.gather import Gathered, pair_of, shown
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-MOST_FLOORS = 1000
-"""Most levels of a file, and most lifts of one that is drawn."""
+MOST_FLOORS, MOST_LINKS = 1000, 1000
+"""Most levels of a file, and most links between them."""
 
 Point = tuple[float, float]
 Name = int | str
@@ -124,8 +124,15 @@ def building_of(
             ends = tuple(LinkEnd(floor, known.ends[floor]) for _, floor in stops)
             fits = {} if known.dims_m is None else {"max_radius_m": min(known.dims_m) / 2}
             links.append(Link(name=lift, kind="lift", ends=ends, **fits))
+    check_link_count(len(links), where)
     graphs = tuple(floor.graph(f"{name} {floor.name}") for floor in kept)
     return BuildingGraph(name=name, floors=graphs, links=tuple(links))
+
+
+def check_link_count(count: int, where: str) -> None:
+    """Refuse more lifts, stairs and ramps than any building has: they are matched one by one."""
+    if count > MOST_LINKS:
+        raise MapError(f"{where}: more than {MOST_LINKS} lifts, stairs and ramps are not read")
 
 
 def mapping_of(value: Any, where: str, what: str, most: int | None = None) -> dict[str, Any]:
