@@ -84,13 +84,17 @@ def test_routes_are_for_saved_pages(cli: Any, folder: Path) -> None:
 @pytest.mark.full
 def test_the_file_opens_in_a_browser_without_a_server(cli: Any, folder: Path) -> None:
     with browsing() as browser:
-        _, out = _save(cli, folder, "--route", "0,4:9,12", "--route", "9,12:0,4")
+        routes = ("0,4:9,12", "9,12:0,4", "0,4:-50,-50")
+        _, out = _save(cli, folder, *(part for text in routes for part in ("--route", text)))
         context = browser.new_context(viewport={"width": 1280, "height": 800}, offline=True)
         shown = Shown(context, out.as_uri())
         assert f"{_data(out)['routes'][0]['length_m']:.2f} m" in shown.text("#figures")
         assert "you are at" in shown.text("#words")
         shown.page.locator(".route-card").nth(1).click()
         assert not shown.page.locator("#rename").is_visible()
+        shown.page.locator(".route-card").nth(2).click()
+        assert shown.text("#status").startswith("No route: ")
+        assert not shown.page.locator("#route-title").is_visible()  # nothing stands below it
         for colours in ("map", "level", "rooms"):
             shown.page.select_option("#colours", colours)
         shown.page.select_option("#theme", "dark")

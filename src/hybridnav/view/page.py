@@ -7,7 +7,7 @@ from importlib.resources import files
 
 _NAMES = (
     *("scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js", "names.js"),
-    "main.js",
+    *("pictures.js", "main.js"),
 )
 """The modules of the page."""
 ASSETS = (("page.css", "text/css"), *((name, "text/javascript") for name in _NAMES))

@@ -3,6 +3,7 @@
 import { element } from "./route.js";
 
 const NOTHING = { doors: [], rooms: [], polygons: [] };
+const SAME = 1.5; // cells within which a door or a room is the one that was there before
 
 export class Closures {
   list = []; // { kind, floor, what }; kind is doors, rooms, polygons or links
@@ -19,6 +20,19 @@ export class Closures {
     const found = structuredClone(NOTHING);
     for (const each of this.list) if (each.floor === floor && each.kind in found) found[each.kind].push(each.what);
     return found;
+  }
+
+  // Where doors and rooms of this floor are closed, to be crossed out.
+  get marks() {
+    const closed = this.on(this.page.floors.at);
+    const { rooms, doors } = this.page.map.rooms;
+    return [...doors.filter((door) => closed.doors.includes(door.number)), ...rooms.filter((room) => closed.rooms.includes(room.name))].map((each) => each.at);
+  }
+
+  // What is shaded: drawn areas, and rooms whose outlines are there, each a list of rings.
+  get areas() {
+    const closed = this.on(this.page.floors.at);
+    return [...closed.polygons.map((ring) => [ring]), ...closed.rooms.map((name) => this.page.names.ringsOf(name))];
   }
 
   get links() {
@@ -40,6 +54,7 @@ export class Closures {
   toggle(kind, what) {
     const floor = kind === "links" ? null : this.page.floors.at;
     const at = this.list.findIndex((each) => each.kind === kind && each.floor === floor && each.what === what);
+    if (kind === "rooms") this.page.names.outlined();
     return this.#become(at < 0 ? [...this.list, { kind, floor, what }] : this.list.toSpliced(at, 1));
   }
 
@@ -65,13 +80,24 @@ export class Closures {
     return this.page.routes.plan();
   }
 
-  // Drop what no room or door of the floor stands behind any more.
-  forget(rooms) {
-    const { at } = this.page.floors;
-    const known = { doors: rooms.doors.map((door) => door.number), rooms: rooms.rooms.map((room) => room.name) };
-    this.list = this.list.filter((each) => each.floor !== at || !(each.kind in known) || known[each.kind].includes(each.what));
+  // Follow doors and rooms of a floor to their new numbers and names, by where they are, and
+  // return what is there no more, as it was called.
+  follow(floor, before, after) {
+    const key = { doors: "number", rooms: "name" };
+    const lost = [];
+    const followed = (each) => {
+      if (each.floor !== floor || !(each.kind in key)) return [each];
+      const [name, all] = [key[each.kind], after[each.kind]];
+      const old = before[each.kind].find((one) => one[name] === each.what);
+      const same = each.kind === "rooms" && all.find((one) => one.name === each.what);
+      const found = same || (old && all.find((one) => Math.hypot(one.at[0] - old.at[0], one.at[1] - old.at[1]) < SAME));
+      if (!found) lost.push(each.kind === "doors" ? `door ${each.what}` : each.what);
+      return found ? [{ ...each, what: found[name] }] : [];
+    };
+    this.list = this.list.flatMap(followed);
     this.#before = [];
     this.show();
+    return lost;
   }
 
   addCorner(point) {

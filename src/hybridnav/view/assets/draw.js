@@ -10,6 +10,7 @@ const INKS = {
   dark: { ink: "#f2f4f5", halo: "#14181b", free: "#c3cad0", rim: "#8d979f", unexplored: "#6b757d",
     loop: "#ff9a80", closed: "#d79bea", door: "#f2f4f5", dot: "#7d8790", link: "#6bb0f5" },
 };
+const LABEL_SHIFTS = [0, -18, 18, -26, 26]; // pixels down from the middle of a room
 const FONT = "system-ui, 'Segoe UI', 'Noto Sans', 'DejaVu Sans', sans-serif";
 
 export function inksOf(scene) {
@@ -129,15 +130,16 @@ export function paintNames(scene, rooms, taken, chosen) {
   context.textAlign = "center";
   context.textBaseline = "middle";
   for (const room of order) {
-    const [x, y] = scene.toScreen(room.at);
-    if (x < 0 || y < 0 || x > scene.width || y > scene.height) continue;
+    const [middle, y] = scene.toScreen(room.at);
+    if (middle < 0 || y < 0 || middle > scene.width || y > scene.height) continue;
     context.font = `${room.name === chosen ? "700" : "500"} 13px ${FONT}`;
     const half = context.measureText(room.name).width / 2 + 3;
     const wide = 2.4 * Math.sqrt(room.area_m2) / scene.map.resolution_m * scene.scale;
     if (2 * half > wide && room.name !== chosen) continue;
-    const boxAt = (down) => [x - half, y + down - 9, x + half, y + down + 9];
+    const x = Math.max(half, Math.min(scene.width - half, middle)); // all of it on the screen
+    const boxAt = (down) => [x - half, y + down - 8, x + half, y + down + 8];
     const isFree = (box) => !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);
-    const down = [0, -20, 20].find((each) => isFree(boxAt(each)));
+    const down = LABEL_SHIFTS.find((each) => isFree(boxAt(each)));
     if (down === undefined) continue;
     taken.push(boxAt(down));
     Object.assign(context, { strokeStyle: inks.halo, lineWidth: 3.5, lineJoin: "round", fillStyle: inks.ink });
@@ -189,10 +191,18 @@ export function paintEnd(scene, point, letter) {
   context.fillText(letter, x, y + 0.5);
 }
 
-export function paintClosed(scene, closed, map, draft) {
+// Shade closed areas, each a list of rings, and cross out doors, rooms and links.
+export function paintClosed(scene, areas, crosses, draft) {
   const { context } = scene;
   const inks = inksOf(scene);
-  const cross = (point) => {
+  for (const rings of areas) {
+    context.beginPath();
+    for (const ring of rings) traced(scene, ring, true);
+    Object.assign(context, { fillStyle: `${inks.closed}66`, strokeStyle: inks.closed, lineWidth: 2, lineJoin: "round" });
+    context.fill("evenodd");
+    context.stroke();
+  }
+  for (const point of crosses) {
     const [x, y] = scene.toScreen(point);
     context.beginPath();
     for (const side of [-1, 1]) {
@@ -203,20 +213,25 @@ export function paintClosed(scene, closed, map, draft) {
       Object.assign(context, { strokeStyle: colour, lineWidth: width, lineCap: "round" });
       context.stroke();
     }
-  };
-  for (const ring of closed.polygons) {
-    context.beginPath();
-    traced(scene, ring, true);
-    Object.assign(context, { fillStyle: `${inks.closed}66`, strokeStyle: inks.closed, lineWidth: 2 });
-    context.fill();
-    context.stroke();
   }
-  map.rooms.doors.filter((door) => closed.doors.includes(door.number)).forEach((door) => cross(door.at));
-  map.rooms.rooms.filter((room) => closed.rooms.includes(room.name)).forEach((room) => cross(room.at));
-  closed.ends.forEach(cross);
   if (draft.length) {
     stroked(scene, [draft], inks.closed, 2, [5, 4]);
     dots(scene, draft, inks.closed, 4);
+  }
+}
+
+// The middle of the map, where the space bar clicks.
+export function paintMiddle(scene) {
+  const { context, width, height } = scene;
+  const inks = inksOf(scene);
+  context.beginPath();
+  for (const [x, y] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+    context.moveTo(width / 2 + 4 * x, height / 2 + 4 * y);
+    context.lineTo(width / 2 + 14 * x, height / 2 + 14 * y);
+  }
+  for (const [colour, wide] of [[inks.halo, 5], [inks.link, 2]]) {
+    Object.assign(context, { strokeStyle: colour, lineWidth: wide, lineCap: "butt" });
+    context.stroke();
   }
 }
 

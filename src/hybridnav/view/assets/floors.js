@@ -27,6 +27,7 @@ export class Floors {
   async begin(whole) {
     if (!whole.links) return whole;
     Object.assign(this, { names: whole.floors, links: whole.links, title: whole.name, presets: whole.presets });
+    this.#maps = [];
     const numbers = this.names.map((_, number) => number).reverse(); // as in a house, the highest on top
     this.byId("floor").replaceChildren(...numbers.map((number) => element("option", { value: number }, this.names[number])));
     this.byId("floors").hidden = false;

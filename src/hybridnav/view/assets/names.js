@@ -9,7 +9,9 @@ export class Names {
   rings = []; // outlines of all rooms, in the order of the rooms
   tool = ""; // "split", "corners", or none
   line = []; // points of a cut
+  lifted = null; // a corner that the keyboard has taken up
   #isReplacing = false;
+  #turn = Promise.resolve(); // changes wait for the one before: it makes the version that they change
 
   constructor(page) {
     this.page = page;
@@ -21,18 +23,29 @@ export class Names {
   }
 
   get ownRings() {
-    return this.rings[this.rooms.rooms.findIndex((room) => room.name === this.chosen)] ?? [];
+    return this.ringsOf(this.chosen);
   }
 
-  async choose(name) {
+  ringsOf(name) {
+    return this.rings[this.rooms.rooms.findIndex((room) => room.name === name)] ?? [];
+  }
+
+  // Fetch the outlines of the rooms unless they are there.
+  async outlined() {
+    if (this.rings.length || !this.page.link.isLive) return;
+    const { rings, version } = await this.page.link.get("outlines");
+    if (version !== this.rooms.version) return; // of other rooms than those that are shown
+    this.rings = rings;
+    this.page.scene.draw();
+  }
+
+  async choose(name, typed = name) {
     this.chosen = name;
     this.byId("room").value = name;
-    this.byId("room-name").value = name;
+    this.byId("room-name").value = typed;
+    this.lifted = null;
     this.show();
-    if (name && !this.rings.length && this.page.link.isLive) {
-      this.rings = (await this.page.link.get("outlines")).rings;
-      this.page.scene.draw();
-    }
+    if (name) await this.outlined();
   }
 
   async clicked(point) {
@@ -50,6 +63,7 @@ export class Names {
   use(tool) {
     this.tool = this.tool === tool ? "" : tool;
     this.line = [];
+    this.lifted = null;
     this.show();
     if (this.tool && !this.chosen) this.page.say("Choose a room first", true);
     else if (this.tool === "split") this.page.say("Click two points of the line");
@@ -77,7 +91,7 @@ export class Names {
 
   // Begin anew on another floor.
   reset() {
-    Object.assign(this, { chosen: "", rings: [], tool: "", line: [] });
+    Object.assign(this, { chosen: "", rings: [], tool: "", line: [], lifted: null });
     this.#isReplacing = false;
     this.byId("room-name").value = "";
     this.list();
@@ -86,12 +100,27 @@ export class Names {
 
   // --- changes
 
-  async edit(change, after = this.chosen) {
-    try {
-      await this.#changed(await this.page.link.post("edit", { version: this.rooms.version, change }), after);
-    } catch (problem) {
-      await this.#refused(problem);
-    }
+  edit(change, after = this.chosen) {
+    return this.#change("edit", { change }, after);
+  }
+
+  // Ask for a change of the floor that is shown now, even if another one is when its turn comes.
+  #change(name, more, after) {
+    const { map, link, floors } = this.page;
+    const [base, floor, about] = [link.base, floors.at, this.chosen];
+    return this.#inTurn(async () => {
+      try {
+        const rooms = await link.post(name, { version: map.rooms.version, ...more }, base);
+        await this.#changed(map, floor, rooms, this.chosen === about ? after : this.chosen);
+      } catch (problem) {
+        await this.#refused(problem);
+      }
+    });
+  }
+
+  #inTurn(work) {
+    this.#turn = this.#turn.then(work, work);
+    return this.#turn;
   }
 
   rename() {
@@ -121,48 +150,57 @@ export class Names {
     return this.edit({ op: "split", room: this.chosen, line, name: `${this.chosen} ${number}` });
   }
 
-  async undo() {
-    try {
-      await this.#changed(await this.page.link.post("undo", { version: this.rooms.version }), this.chosen);
-    } catch (problem) {
-      await this.#refused(problem);
-    }
+  undo() {
+    return this.#change("undo", {}, this.chosen);
   }
 
-  async save() {
-    try {
-      const asked = { version: this.rooms.version, replace: this.#isReplacing };
-      this.page.map.rooms = await this.page.link.post("save", asked);
-      this.#isReplacing = false;
-      this.show();
-    } catch (problem) {
-      this.#isReplacing = problem.code === 409;
-      await this.#refused(problem);
-    }
+  save() {
+    const { map, link } = this.page;
+    const { base } = link;
+    return this.#inTurn(async () => {
+      try {
+        map.rooms = await link.post("save", { version: map.rooms.version, replace: this.#isReplacing }, base);
+        this.#isReplacing = false;
+        this.show();
+      } catch (problem) {
+        this.#isReplacing = problem.code === 409;
+        await this.#refused(problem);
+      }
+    });
   }
 
-  async #changed(rooms, chosen) {
-    this.page.map.rooms = rooms;
+  async #changed(map, floor, rooms, chosen) {
+    const lost = this.page.closures.follow(floor, map.rooms, rooms);
+    map.rooms = rooms;
+    if (map !== this.page.map) return; // another floor is shown meanwhile
     this.rings = [];
     this.page.scene.version = rooms.version;
-    this.page.closures.forget(rooms);
     this.list();
-    await this.choose(rooms.rooms.some((room) => room.name === chosen) ? chosen : "");
+    const typed = this.byId("room-name").value;
+    const isTyping = typed !== this.chosen; // a name that must not be lost meanwhile
+    if (rooms.rooms.some((room) => room.name === chosen)) await this.choose(chosen, isTyping ? typed : chosen);
+    else await this.choose("");
+    if (this.page.closures.list.length) await this.outlined();
     await this.page.changed();
+    if (lost.length) this.page.say(`Open again, as it is there no more: ${lost.join(", ")}`, true);
   }
 
   async #refused(problem) {
     this.rings = [];
     await this.refresh();
-    if (this.chosen) await this.choose(this.chosen);
+    if (this.chosen) await this.outlined().catch(() => {});
     this.page.say(problem.message, true);
   }
 
   // Take over what another page has changed.
   async refresh() {
+    const { map, floors } = this.page;
+    const floor = floors.at;
     try {
       const rooms = await this.page.link.get("rooms");
-      if (rooms.version !== this.rooms.version) await this.#changed(rooms, this.chosen);
+      if (rooms.version !== map.rooms.version) await this.#changed(map, floor, rooms, this.chosen);
+      else map.rooms = rooms; // another page may have saved them
+      this.show();
     } catch (problem) {
       this.page.say(problem.message, true);
     }
@@ -188,15 +226,15 @@ export class Names {
 
   show() {
     for (const tool of ["split", "corners"]) this.byId(tool).ariaPressed = String(this.tool === tool);
-    for (const id of ["split", "corners", "merge"]) this.byId(id).disabled = !this.chosen;
+    for (const id of ["split", "corners", "merge", "rename-done"]) this.byId(id).disabled = !this.chosen;
     const { unsaved, notice } = this.rooms;
     const count = unsaved === 1 ? "1 change is not saved" : `${unsaved} changes are not saved`;
-    const isLost = unsaved && !this.page.map.can_save && this.page.floors.isBuilding;
-    const advice = isLost ? "to save them, give this floor rooms: FILE in the file of the building, inside its folder" : "";
-    this.byId("unsaved").textContent = [unsaved ? count : "", notice, advice].filter(Boolean).join("; ");
+    this.byId("unsaved").textContent = [unsaved ? count : "", notice].filter(Boolean).join("; ");
+    this.byId("no-file").textContent = this.page.map.no_file ?? "";
     this.byId("names-undo").disabled = !unsaved;
     this.byId("save").disabled = !this.page.map.can_save;
     this.byId("save").textContent = this.page.map.file ? `Save ${this.page.map.file}` : "Save";
+    this.byId("save").classList.toggle("primary", Boolean(unsaved));
     this.page.scene.draw();
   }
 }

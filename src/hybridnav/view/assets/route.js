@@ -3,6 +3,7 @@
 import { ROUTE_COLOURS } from "./draw.js";
 
 const MOST_UNDER_WAY = 3; // requests at a time
+const FARTHEST = 1e7; // cells, as far as the server takes points
 const METRICS = { "any-angle": "at any angle", octile: "from cell to cell", weighted: "by costs" };
 
 export function element(name, attributes = {}, ...children) {
@@ -25,11 +26,13 @@ export function picture(content) {
 const amountOf = (route) => (route.rides?.length ? route.cost : route.length_m);
 
 function passagesOf(route) {
+  if (!route.solved) return "";
   if (route.rides) return route.rides.length ? `by ${route.rides.map((ride) => ride.link).join(", ")}` : "on one floor";
   const doors = (route.legs ?? []).filter((leg) => leg.door).map((leg) => leg.door).join(", ");
   return doors ? `doors ${doors}` : "no doors";
 }
 
+const timeOf = (seconds) => (seconds < 1 ? `${(1000 * seconds).toFixed(1)} ms` : `${seconds.toFixed(1)} s`);
 const metres = (value) => (value === null ? "none" : `${value.toFixed(2)} m`);
 
 export class Routes {
@@ -93,6 +96,7 @@ export class Routes {
   }
 
   async typed() {
+    const ends = {};
     for (const which of ["start", "goal"]) {
       const [floor, text] = this.page.floors.split(this.byId(which).value);
       const numbers = text.split(/[,;\s]+/).filter(Boolean).map(Number);
@@ -102,9 +106,16 @@ export class Routes {
         this.byId(which).focus();
         return null;
       }
-      this.ends[which] = { floor, point: this.page.scene.fromMetres(numbers, await this.page.floors.map(floor)) };
+      const point = this.page.scene.fromMetres(numbers, await this.page.floors.map(floor));
+      if (point.some((value) => Math.abs(value) > FARTHEST)) {
+        this.page.say(`The ${which} lies far outside of the map`, true);
+        this.byId(which).focus();
+        return null;
+      }
+      ends[which] = { floor, point };
       this.byId(which).value = this.#textOf(floor, text.trim());
     }
+    this.ends = ends;
     return this.plan();
   }
 
@@ -158,9 +169,18 @@ export class Routes {
     return this.#post("plan", { ...asked, closed: this.page.closures.nothing, brief: true });
   }
 
+  // An answer about the ends of now, null for one that came after they were moved.
+  async #timely(name, asked) {
+    const number = this.#asked;
+    const found = await this.#post(name, asked);
+    return number === this.#asked && !this.#wanted ? found : null;
+  }
+
   async optimum() {
     if (!this.hasEnds) return;
-    this.grid = await this.#post("optimum", this.query());
+    const found = await this.#timely("optimum", this.query());
+    if (!found) return;
+    this.grid = found;
     this.show();
   }
 
@@ -171,10 +191,13 @@ export class Routes {
     }
     this.page.say("Looking for routes…");
     const by = this.page.floors.isBuilding ? {} : { by: this.byId("by").value };
-    const found = await this.#post("alternatives", this.query({ count: Number(this.byId("count").value), ...by }));
-    Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null });
+    const found = await this.#timely("alternatives", this.query({ count: Number(this.byId("count").value), ...by }));
+    if (!found) return;
+    if (found.routes.length) Object.assign(this, { routes: found.routes, chosen: 0, grid: null, open: null });
     this.show();
-    this.byId("others-note").textContent = found.note;
+    const note = found.note.charAt(0).toUpperCase() + found.note.slice(1);
+    if (found.routes.length) this.byId("others-note").textContent = note;
+    else this.page.say(`No routes: ${found.note}`, true);
   }
 
   choose(at) {
@@ -225,7 +248,7 @@ export class Routes {
       rows.push(["gap", isOptimal ? "0 %, proved optimal" : `${(100 * route.gap).toFixed(2)} %`]);
       if (this.open?.solved) rows.push(["detour", `${metres(amountOf(route) - amountOf(this.open))} more than ${metres(amountOf(this.open))}`]);
       if (this.grid?.solved) rows.push(["grid", `${metres(amountOf(this.grid))} on the cells of the whole grid`]);
-      rows.push(["time", `${(1000 * route.seconds).toFixed(1)} ms to plan`]);
+      rows.push(["time", `${timeOf(route.seconds)} to plan`]);
     }
     const text = JSON.stringify(rows);
     if (text === this.#last) return;

@@ -249,18 +249,20 @@ export function steer(scene, handlers) {
   canvas.addEventListener("pointerup", release);
   canvas.addEventListener("pointercancel", release);
   canvas.addEventListener("pointerleave", () => handlers.hover(null));
+  for (const kind of ["focus", "blur"]) canvas.addEventListener(kind, () => scene.draw());
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     const lines = event.deltaMode === 1 ? 24 : 1;
     scene.zoom(1.0016 ** -(event.deltaY * lines), at(event));
   }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
-    const step = 80;
+    const step = event.shiftKey ? 8 : 80;
     const actions = {
       ArrowLeft: () => scene.pan(step, 0), ArrowRight: () => scene.pan(-step, 0),
       ArrowUp: () => scene.pan(0, step), ArrowDown: () => scene.pan(0, -step),
       "+": () => scene.zoom(1.4), "=": () => scene.zoom(1.4),
       "-": () => scene.zoom(1 / 1.4), 0: () => scene.fit(),
+      " ": () => handlers.press([scene.width / 2, scene.height / 2]),
     };
     if (event.ctrlKey || event.metaKey || !actions[event.key]) return;
     event.preventDefault();

@@ -1,0 +1,136 @@
+// What the map shows: its colours, the graph and costs over them, marks, names, and the legend.
+
+import { inksOf, linkBox, linkOutline, paintClosed, paintDashed, paintDoors, paintEnd, paintGraph, paintLinks, paintMiddle, paintNames, paintOutline, paintRoutes, paintScaleBar } from "./draw.js";
+import { element, picture } from "./route.js";
+
+const systemTheme = matchMedia("(prefers-color-scheme: dark)");
+
+export class Pictures {
+  #graph = null;
+  #costs = null;
+  #asked = 0;
+
+  constructor(page) {
+    this.page = page;
+    this.byId = (id) => document.getElementById(id);
+    systemTheme.addEventListener("change", () => this.useTheme());
+  }
+
+  useTheme() {
+    const chosen = this.byId("theme").value;
+    const theme = chosen === "auto" ? (systemTheme.matches ? "dark" : "light") : chosen;
+    this.page.scene.theme = theme;
+    document.documentElement.dataset.theme = theme;
+    document.documentElement.style.colorScheme = theme;
+    this.page.routes.show();
+    this.showLegend();
+  }
+
+  // Forget the graph of places: other rooms, or another floor, have another one.
+  forget() {
+    this.#graph = null;
+  }
+
+  async showLayer() {
+    const { map, link, scene } = this.page;
+    const colours = this.byId("colours").value;
+    const level = this.byId("level").value;
+    this.byId("level-row").hidden = colours !== "level" || !link.isLive;
+    scene.layer = colours === "level" ? `level-${level}` : colours;
+    const facts = map.levels[level];
+    this.byId("level-text").textContent = `${level}${facts.name ? ` (${facts.name})` : ""}`;
+    this.byId("level").setAttribute("aria-valuetext", `level ${level}, ${facts.vertices} vertices, ${facts.arcs} arcs`);
+    scene.draw();
+    const wanted = colours === "level" ? level : String(map.place_level);
+    const isWanted = this.byId("show-graph").checked;
+    this.byId("level-note").textContent = "";
+    const number = (this.#asked += 1);
+    if (!isWanted) return;
+    if (this.#graph?.level !== Number(wanted)) {
+      const graph = await link.get(`graph/${wanted}`);
+      if (number !== this.#asked) return; // another one is wanted meanwhile
+      this.#graph = graph;
+    }
+    if (!this.#graph.drawn) this.byId("level-note").textContent = `Level ${wanted} has ${this.#graph.vertices.toLocaleString("en")} vertices: too many to draw its arcs`;
+    scene.draw();
+  }
+
+  async showCosts() {
+    const { scene, link } = this.page;
+    scene.overlay = null;
+    this.#costs = null;
+    if (this.byId("show-costs").checked) {
+      const preset = this.byId("preset").value;
+      this.#costs = await link.get(`costs/${preset}`);
+      if (this.#costs.most === null) this.page.say(`Preset ${preset} plans by lengths, without costs: choose robot, or start with --costs`, true);
+      else scene.overlay = `costs-${preset}`;
+    }
+    this.showLegend();
+    scene.draw();
+  }
+
+  showLegend() {
+    const { map, scene, floors } = this.page;
+    const colours = map.colours[scene.theme];
+    const inks = inksOf(scene);
+    const box = (colour) => `<rect x="1" y="1" width="24" height="12" fill="${colour}" stroke="${inks.rim}"/>`;
+    const three = (first) => [0, 1, 2].map((n) => `<rect x="${1 + 8 * n}" y="1" width="8" height="12" fill="${colours[first + n]}"/>`).join("");
+    const line = (colour, dash = "") => `<path d="M1 7h24" stroke="${colour}" stroke-width="2" stroke-dasharray="${dash}"/>`;
+    const shown = this.byId("colours").value;
+    const entries = [[box(colours[0]), "free"], [box(colours[1]), "unexplored"], [box(colours[2]), `within ${map.robot_radius_m} m`], [box(colours[3]), "occupied"]];
+    if (shown !== "map") entries.push([three(4), shown === "rooms" ? "rooms" : "free places"]);
+    if (shown === "level") entries.push([three(10), "unexplored places"]);
+    if (this.byId("show-graph").checked) {
+      entries.push([`${line(inks.free)}<circle cx="5" cy="7" r="3.5" fill="${inks.ink}"/>`, "place, arc"], [line(inks.loop, "4 2"), "self-loop"]);
+    }
+    if (this.byId("show-doors").checked) {
+      entries.push([`<circle cx="13" cy="7" r="5" fill="${inks.door}"/>`, "door"], [`<rect x="8" y="2" width="10" height="10" fill="${inks.door}"/>`, "opening"],
+        [`<circle cx="13" cy="7" r="4.5" fill="${inks.halo}" stroke="${inks.door}" stroke-width="1.5"/>`, "too narrow"]);
+    }
+    for (const kind of new Set(floors.links.map((link) => link.kind))) {
+      entries.push([`<polygon points="${linkOutline(kind, 13, 7, 5)}" fill="${inks.halo}" stroke="${inks.link}" stroke-width="2"/>`, kind]);
+    }
+    const most = this.#costs?.most;
+    if (most) entries.push([`<defs><linearGradient id="c"><stop stop-color="#fff6b5"/><stop offset="1" stop-color="#b10026"/></linearGradient></defs>${box("url(#c)")}`, `costs 1 to ${Number(most.toPrecision(3))}`]);
+    this.byId("legend").replaceChildren(...entries.map(([content, text]) => element("li", {}, picture(content), text)));
+  }
+
+  // The ends of links on this floor, as they are drawn.
+  #linkMarks() {
+    const { routes, floors } = this.page;
+    const rides = routes.routes[routes.chosen]?.rides ?? [];
+    return floors.ends.map(({ link, at }) => {
+      const ride = rides.find((each) => each.link === link.name && (each.from === floors.at || each.to === floors.at));
+      const other = ride && (ride.from === floors.at ? `to floor ${floors.nameOf(ride.to)}` : `from floor ${floors.nameOf(ride.from)}`);
+      return { kind: link.kind, at, fits: link.fits, isTaken: Boolean(ride), text: link.name + (ride ? `, ${other}` : "") };
+    });
+  }
+
+  paint(scene) {
+    const { routes, names, map, closures, floors } = this.page;
+    const links = this.#linkMarks();
+    const isNaming = this.page.mode === "names";
+    const hasDoors = this.byId("show-doors").checked;
+    if (this.byId("show-graph").checked) paintGraph(scene, this.#graph);
+    if (isNaming && names.chosen) paintOutline(scene, names.ownRings, names.tool === "corners");
+    paintDashed(scene, routes.open, floors.at);
+    paintRoutes(scene, routes.routes, routes.chosen, floors.at);
+    if (hasDoors) paintDoors(scene, map.rooms.doors);
+    paintLinks(scene, links);
+    const ends = floors.ends.filter(({ link }) => closures.links.includes(link.name)).map((end) => end.at);
+    const crosses = [...closures.marks, ...ends];
+    paintClosed(scene, closures.areas, crosses, [...closures.draft, ...names.line]);
+    const doors = hasDoors ? map.rooms.doors.map((door) => door.at) : [];
+    const [start, goal] = ["start", "goal"].map((which) => routes.here(which));
+    const taken = [...doors, ...crosses, start, goal].filter(Boolean).map((point) => {
+      const [x, y] = scene.toScreen(point);
+      return [x - 8, y - 8, x + 8, y + 8];
+    });
+    taken.push(...links.map((mark) => linkBox(scene, mark)));
+    if (this.byId("show-names").checked) paintNames(scene, map.rooms.rooms, taken, isNaming ? names.chosen : "");
+    paintEnd(scene, start, "A");
+    paintEnd(scene, goal, "B");
+    if (scene.canvas.matches(":focus-visible")) paintMiddle(scene);
+    paintScaleBar(scene);
+  }
+}
