@@ -17,6 +17,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.view import Session
+from hybridnav.view.requests import Edit
 from hybridnav.view.rooms_file import RoomsFile
 from tests.view.server import session_of
 
@@ -164,3 +165,49 @@ def test_a_page_without_a_file_saves_nothing(folder: Path) -> None:
     plain = Session(model, topology, model.fitted(None))
     assert plain.describe()["can_save"] is False
     assert RoomsFile(folder, "rooms.yaml").kept() == []
+
+
+@pytest.mark.parametrize("known", ["saved", "found"])
+def test_doors_keep_their_numbers_when_rooms_change(folder: Path, known: str) -> None:
+    if known == "found":
+        (folder / "rooms.yaml").unlink()  # those that are found have no numbers on file
+    session = session_of(folder / "four.yaml")
+
+    def doors() -> dict[int, list[float]]:
+        return {door["number"]: door["at"] for door in session.describe_rooms()["doors"]}
+
+    def split(room: str, line: list[list[float]], name: str) -> None:
+        change = {"op": "split", "room": room, "line": line, "name": name}
+        session.edit(Edit(version=session.version, change=change))
+
+    before = doors()
+    names = session.rooms.names
+    for at, (x, top, bottom) in enumerate(((20, 47, 24), (20, 20, 2), (65, 20, 2))):
+        split(names[(0, 2, 3)[at]], [[x, top], [x, bottom]], f"x{at}")
+        now = doors()
+        assert len(now) == len(before) + 1
+        assert now.items() >= before.items()
+        before = now
+
+
+def test_a_second_save_writes_over_only_what_the_first_told_of(
+    client: Client, folder: Path
+) -> None:
+    file = folder / "rooms.yaml"
+
+    def changed_by_others(name: str) -> str:
+        text = file.read_text(encoding="utf-8").replace("name: d", f"name: {name}", 1)
+        file.write_text(text, encoding="utf-8")
+        return text
+
+    _rename(client, 0, "a", "kitchen")
+    text = changed_by_others("d1")
+    # A conflict of another kind has told nobody of the file.
+    assert client.post("save", {"version": 0}).code == 409
+    assert client.post("save", {"version": 1, "replace": True}).code == 409
+    assert file.read_text(encoding="utf-8") == text
+    text = changed_by_others("d1x")
+    assert client.post("save", {"version": 1, "replace": True}).code == 409
+    assert file.read_text(encoding="utf-8") == text
+    assert client.post("save", {"version": 1, "replace": True}).code == 200
+    assert "kitchen" in file.read_text(encoding="utf-8")

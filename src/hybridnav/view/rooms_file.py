@@ -43,6 +43,7 @@ class RoomsFile:
         self.journal = self.folder / f".{name}.edits"
         self._check_inside(self.path)
         self._seen = self._digest()
+        self._told = self._seen
 
     def _check_inside(self, path: Path) -> None:
         if path.resolve().parent != self.folder:
@@ -58,10 +59,18 @@ class RoomsFile:
         except OSError:
             return ""
 
-    @property
-    def is_changed(self) -> bool:
-        """Whether somebody else has changed the file since it was read or written here."""
-        return self._digest() != self._seen
+    def is_changed(self, *, since_told: bool = False) -> bool:
+        """Return whether somebody else has changed the file since it was read or written here.
+
+        Parameters
+        ----------
+        since_told
+            Whether to overlook the change that the last call returned.
+        """
+        now = self._digest()
+        known = {self._seen, self._told} if since_told else {self._seen}
+        self._told = now
+        return now not in known
 
     def save(self, rooms: RoomLabels, grid: OccupancyGrid) -> None:
         """Write rooms whole or not at all, and end the journal.

@@ -6,6 +6,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.errors import HybridNavError, InvalidValueError
+from hybridnav.grid import RoomLabels
 from hybridnav.view.edits import changed, rings_of
 from hybridnav.view.graph import in_metres, level_graph, map_facts, room_facts
 from hybridnav.view.planning import Planning
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
     from hybridnav.config import Preset
     from hybridnav.costs import CostLayer
-    from hybridnav.grid import RoomLabels
     from hybridnav.io import Model
     from hybridnav.topology import Rooms, TopologicalMap
     from hybridnav.view.requests import Change, Edit, Save
@@ -78,6 +78,8 @@ class Session:
         """Changes that are not saved, each with the rooms before it."""
         self.version = 0
         self.notice = ""
+        self.no_file = ""
+        """What the page advises if there is no file."""
         self.caution: Callable[[Rooms], str] = lambda _: ""
         """Returns what to mind about rooms that have been saved, an empty text for nothing."""
         self._use(topology)
@@ -98,7 +100,7 @@ class Session:
         """Take the changes up that an earlier page made and did not save."""
         if self._file is None or not (kept := self._file.kept()):
             return
-        rooms, lost = self.rooms, 0
+        rooms, lost = _numbered(self.planning.topology.rooms), 0
         for value in kept:
             try:
                 after = changed(rooms, checked_change(value), self.grid)
@@ -131,6 +133,7 @@ class Session:
             "colours": {"light": hex_colours("light"), "dark": hex_colours("dark")},
             "can_save": self._file is not None,
             "file": "" if self._file is None else self._file.path.name,
+            "no_file": self.no_file if self._file is None else "",
             "rooms": self.describe_rooms(),
         }
 
@@ -220,7 +223,7 @@ class Session:
         with self._lock:
             self._check_version(edit.version)
             before = self.rooms
-            after = changed(before, change, self.grid)
+            after = changed(_numbered(self.planning.topology.rooms), change, self.grid)
             self._use(self._model.grown(self._settings.pyramid, after))
             self._changes.append((edit.change, before))
             return self._kept()
@@ -251,7 +254,7 @@ class Session:
             self._check_version(asked.version)
             if self._file is None:
                 raise InvalidValueError("these rooms have no file: start the page with a map")
-            if self._file.is_changed and not asked.replace:
+            if self._file.is_changed(since_told=asked.replace):
                 raise ConflictError(
                     f"{self._file.path.name} was changed by another program since it was read: "
                     "save again to write over it"
@@ -274,3 +277,11 @@ class Session:
             if problem is not None:
                 self.notice = f"not kept for a restart ({problem}): save the rooms elsewhere"
         return self.describe_rooms()
+
+
+def _numbered(rooms: Rooms) -> RoomLabels:
+    """Return rooms that know the numbers of all their doors: those that a change leaves keep
+    them."""
+    labels = rooms.labels
+    doors = {door.number: door.position for door in rooms.doors if not door.is_gap}
+    return RoomLabels(labels.names, labels.label_of, labels.points, {**labels.doors, **doors})
