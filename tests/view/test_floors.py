@@ -148,6 +148,7 @@ def test_rooms_outside_the_folder_are_not_saved(folder: Path) -> None:
     with served(building_session_of(file), folder) as client:
         assert client.get("floor/0/map.json").value["can_save"] is True
         assert client.get("floor/1/map.json").value["can_save"] is False
+        assert "rooms: FILE" in client.get("floor/1/map.json").value["no_file"]
         change = {"op": "rename", "room": "e", "name": "attic"}
         client.post("floor/1/edit", {"version": 0, "change": change})
         assert client.post("floor/1/save", {"version": 1}).code == 422
@@ -199,3 +200,23 @@ def test_files_of_a_building(building: Client, folder: Path, tmp_path: Path) -> 
     elsewhere = QUERY | {"goal": START, "floor": 1}
     refused = building.post("export/path-csv", elsewhere)
     assert (refused.code, "does not visit" in refused.value["error"]) == (422, True)
+
+
+def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(
+    folder: Path, tmp_path: Path
+) -> None:
+    model, out = tmp_path / "building.hnm", tmp_path / "changed.hnm"
+    hn.save(hn.load_building(write_building(folder), robot_radius_m=0.2), model)
+    before = sorted(tmp_path.iterdir())
+    with served(building_session_of(model), tmp_path) as client:
+        found = client.get("floor/1/map.json").value
+        assert found["can_save"] is False
+        assert "Export the model" in found["no_file"]
+        change = {"op": "rename", "room": "e", "name": "attic"}
+        assert client.post("floor/1/edit", {"version": 0, "change": change}).code == 200
+        content = client.post("export/model", None).body
+    assert sorted(tmp_path.iterdir()) == before
+    out.write_bytes(content)
+    rooms = hn.load_building(out).floors[1].rooms
+    assert rooms is not None
+    assert set(rooms.names) == {"attic", "f", "g", "h"}

@@ -138,11 +138,16 @@ class BuildingSource:
             given["max_cells"],
         )
 
+    @property
+    def settings(self) -> hn.Preset | None:
+        """The preset with what overrides it, None if the building has its own."""
+        if self.preset is None and not self.overrides:
+            return None
+        return read_settings(self.preset, list(self.overrides), None, None)
+
     def load(self, seconds: dict[str, float]) -> hn.Building:
         """Load it."""
-        preset = None
-        if self.preset is not None or self.overrides:
-            preset = read_settings(self.preset, list(self.overrides), None, None)
+        preset = self.settings
         load_numba()
         with stage(f"reading {self.file}", seconds, "load"):
             return hn.load_building(

@@ -33,7 +33,12 @@ from hybridnav.cli.options import (
     SeedOption,
     SetOption,
 )
-from hybridnav.cli.view_building import VIEW_OPTIONS, building_session, save_building
+from hybridnav.cli.view_building import (
+    VIEW_OPTIONS,
+    building_opening,
+    building_session,
+    save_building,
+)
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 
@@ -41,7 +46,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import hybridnav as hn
-    from hybridnav.view import BuildingSession, Opening, Session
+    from hybridnav.view import BuildingOpening, BuildingSession, Opening, Session
     from hybridnav.view.requests import PlanQuery
 
 _ROOMS = "rooms.yaml"
@@ -98,11 +103,10 @@ def view(
         raise UsageError("--route is for a saved page: add --save FILE, or leave it out")
     if is_building_file(map_file):
         check_options(refused_options(ctx, VIEW_OPTIONS))
-        building = building_session(ctx.params)
         if save is not None:
-            save_building(building, save, routes or ())
+            save_building(building_session(ctx.params), save, routes or ())
         else:
-            _serve(building, map_file.parent, port, browser=browser)
+            _serve(building_opening(ctx.params), map_file.parent, port, browser=browser)
         return
     pairs = [_endpoints(text) for text in routes or ()]
     given = parsed_costs(costs)
@@ -124,7 +128,7 @@ def view(
 
 
 def _serve(
-    shown: Session | Opening | BuildingSession, folder: Path, port: int, *, browser: bool
+    shown: Opening | BuildingOpening | BuildingSession, folder: Path, port: int, *, browser: bool
 ) -> None:
     """Serve a page until Ctrl-C, and print its address."""
     from hybridnav.view import serve  # noqa: PLC0415 - loads numba and matplotlib

@@ -13,10 +13,10 @@ from hybridnav.cli.errors import UsageError
 from hybridnav.grid.names import read_point
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from hybridnav.io.building_entries import FloorEntry
-    from hybridnav.view import BuildingSession
+    from hybridnav.view import BuildingOpening, BuildingSession
     from hybridnav.view.requests import FloorsPlanQuery
     from hybridnav.view.rooms_file import RoomsFile
 
@@ -28,6 +28,42 @@ VIEW_OPTIONS = frozenset(
 )
 """Parameters of `hybridnav view` that mean something for a building."""
 _POINT = r"[^:]+,[^:]+"
+
+
+def building_opening(given: Mapping[str, Any]) -> BuildingOpening | BuildingSession:
+    """Return what the page of a building shows at once: the cells of its lowest floor, or a model,
+    which has all that it needs.
+
+    Parameters
+    ----------
+    given
+        The values of the parameters of `hybridnav view` by their names.
+    """
+    # These load numba and matplotlib, which wrong usage can do without.
+    from hybridnav.io.building_entries import read_building_entries  # noqa: PLC0415
+    from hybridnav.io.buildings import load_floor  # noqa: PLC0415
+    from hybridnav.io.models import is_model  # noqa: PLC0415
+    from hybridnav.view import BuildingOpening  # noqa: PLC0415
+
+    file: Path = given["map_file"]
+    if is_model(file):
+        return building_session(given)
+    floors = read_building_entries(file).floors
+    source = BuildingSource.of(given)
+    lowest = load_floor(
+        floors[0],
+        file.parent,
+        robot_radius_m=source.robot_radius_m,
+        preset=source.settings,
+        max_cells=source.max_cells,
+    )
+
+    def make(tell: Callable[[str], None]) -> BuildingSession:
+        tell(f"reading {len(floors)} floors" if len(floors) > 1 else "reading the floor")
+        return building_session(given)
+
+    names = [floor.name for floor in floors]
+    return BuildingOpening(file.stem, names, lowest.grid, make)
 
 
 def building_session(given: Mapping[str, Any]) -> BuildingSession:

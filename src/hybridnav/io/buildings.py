@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import PathLike
     from hybridnav.config import Preset
     from hybridnav.io.building_entries import EndEntry, Entries, FloorEntry, LinkEntry
+    from hybridnav.io.models import Model
     from hybridnav.planner import HybridPlanner
     from hybridnav.topology import Rooms
 
@@ -104,6 +105,38 @@ def load_building(
     return _joined(entries, floors)
 
 
+def load_floor(
+    entry: FloorEntry,
+    folder: Path,
+    *,
+    robot_radius_m: float | None = None,
+    preset: PathLike | Preset | None = None,
+    max_cells: int = DEFAULT_MAX_CELLS,
+) -> Model:
+    """Load the map or model of one floor, as `load_building` does.
+
+    Parameters
+    ----------
+    entry
+        The floor.
+    folder
+        The folder of the file that describes the building.
+    robot_radius_m, preset, max_cells
+        As `load_building` takes them.
+
+    Raises
+    ------
+    HybridNavError
+        When it cannot be read; the message names the floor and the line.
+    """
+    map_file = folder / entry.map_file
+    if robot_radius_m is None and not is_model(map_file):
+        chosen = load_preset("shortest" if preset is None else preset)
+        robot_radius_m = chosen.pyramid.robot_radius_m
+    with _at(f"{entry.at}: floor {entry.name}"):
+        return load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells)
+
+
 def _planner(
     entry: FloorEntry,
     folder: Path,
@@ -112,12 +145,10 @@ def _planner(
     max_cells: int,
 ) -> HybridPlanner:
     """Make the planner of a floor, with the rooms that the file names."""
-    map_file = folder / entry.map_file
-    if robot_radius_m is None and not is_model(map_file):
-        chosen = load_preset("shortest" if preset is None else preset)
-        robot_radius_m = chosen.pyramid.robot_radius_m
+    model = load_floor(
+        entry, folder, robot_radius_m=robot_radius_m, preset=preset, max_cells=max_cells
+    )
     with _at(f"{entry.at}: floor {entry.name}"):
-        model = load(map_file, robot_radius_m=robot_radius_m, max_cells=max_cells)
         rooms = model.rooms
         if entry.rooms_file is not None:
             rooms = load_rooms(folder / entry.rooms_file, model.grid)

@@ -1,3 +1,4 @@
+from .building_opening import BuildingOpening as BuildingOpening
 from .floors import BuildingSession as BuildingSession
 from .opening import Opening as Opening
 from .saved import save_page as save_page

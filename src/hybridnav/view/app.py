@@ -12,6 +12,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
+from hybridnav.view.building_opening import BuildingOpening
 from hybridnav.view.export import KINDS, exported, exported_building
 from hybridnav.view.floors import BuildingSession
 from hybridnav.view.opening import Opening, PreparingError
@@ -107,14 +108,18 @@ class Guard:
 
 
 def make_app(
-    shown: Session | Opening | BuildingSession, *, token: str, port: int, folder: Path
+    shown: Session | Opening | BuildingSession | BuildingOpening,
+    *,
+    token: str,
+    port: int,
+    folder: Path,
 ) -> ASGIApp:
     """Return the application of a page.
 
     Parameters
     ----------
     shown
-        What it shows: a map, one that is still being prepared, or a building.
+        What it shows: a map or a building, or one that is still being prepared.
     token
         The first part of every path.
     port
@@ -127,7 +132,7 @@ def make_app(
         Route(f"{at}/", _get(lambda _: live_page(), "text/html")),
         *(Route(f"{at}/{name}", _get(_asset_reader(name), kind)) for name, kind in ASSETS),
     ]
-    if isinstance(shown, BuildingSession):
+    if isinstance(shown, BuildingSession | BuildingOpening):
         on_floor = _OnMap(lambda request: shown.floor(request.path_params["floor"]), folder)
         routes += _OverFloors(shown, folder).routes(at) + on_floor.routes(f"{at}/floor/{{floor}}")
     else:
@@ -216,19 +221,21 @@ class _OnMap:
 class _OverFloors:
     """What each request about a whole building does."""
 
-    def __init__(self, building: BuildingSession, folder: Path) -> None:
-        self._building, self._folder = building, folder
+    def __init__(self, shown: BuildingSession | BuildingOpening, folder: Path) -> None:
+        self._shown, self._folder = shown, folder
 
     def routes(self, at: str) -> list[Route]:
         """Return the routes below a path."""
-        building = self._building
-        acts: dict[str, tuple[type[BaseModel], Callable[[Any], Any]]] = {
-            "plan": (FloorsPlanQuery, building.plan),
-            "optimum": (FloorsQuery, building.optimum),
-            "alternatives": (FloorsAlternativesQuery, building.alternatives),
+        acts: dict[str, tuple[type[BaseModel], Callable[[BuildingSession, Any], Any]]] = {
+            "plan": (FloorsPlanQuery, lambda building, query: building.plan(query)),
+            "optimum": (FloorsQuery, lambda building, query: building.optimum(query)),
+            "alternatives": (
+                FloorsAlternativesQuery,
+                lambda building, query: building.alternatives(query),
+            ),
         }
         return [
-            Route(f"{at}/map.json", _get_json(lambda _: building.describe())),
+            Route(f"{at}/map.json", _get_json(lambda _: self._shown.describe())),
             Route(f"{at}/export/{{kind}}", _post_file(self._export), methods=["POST"]),
             *(
                 Route(f"{at}/{name}", _post(self._act(kind, act)), methods=["POST"])
@@ -236,15 +243,19 @@ class _OverFloors:
             ),
         ]
 
+    def _session(self) -> BuildingSession:
+        """Return the session, once it is there."""
+        return self._shown.session if isinstance(self._shown, BuildingOpening) else self._shown
+
     def _act(
-        self, kind: type[BaseModel], act: Callable[[Any], Any]
+        self, kind: type[BaseModel], act: Callable[[BuildingSession, Any], Any]
     ) -> Callable[[Request, Any], Any]:
-        return lambda _, value: act(checked(kind, value))
+        return lambda _, value: act(self._session(), checked(kind, value))
 
     def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
         kind = request.path_params["kind"]
         query = checked(FloorsPathQuery, value) if value else None
-        return exported_building(self._building, kind, query, self._folder)
+        return exported_building(self._session(), kind, query, self._folder)
 
 
 def _error(message: str, code: int) -> JSONResponse:

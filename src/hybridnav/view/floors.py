@@ -35,6 +35,14 @@ if TYPE_CHECKING:
     from hybridnav.view.rooms_file import RoomsFile
 
 _MOST_DIGITS = 3
+_NO_FILE = (
+    "Changes of rooms of this floor cannot be saved here: give the floor rooms: FILE in the file "
+    "of the building, inside its folder, or export the model, which keeps them."
+)
+_IN_MODEL = (
+    "This building is a model: Save is for maps. Export the model to keep changes of rooms; they "
+    "are lost when the command ends."
+)
 _NEAR_M = 1.0
 """Metres from a door within which the end of a link is taken to be at it."""
 
@@ -61,7 +69,8 @@ class BuildingSession:
     name
         What the page calls it.
     files
-        The files of rooms by the names of floors; rooms of other floors cannot be saved.
+        The files of rooms by the names of floors; rooms of other floors cannot be saved. None for
+        a building that no file describes, such as that of a model.
     links
         The links as the file of the building describes them: a page that saves rooms says which of
         them name a room or a door that is there no more.
@@ -83,6 +92,7 @@ class BuildingSession:
         links: Sequence[LinkEntry] = (),
     ) -> None:
         self.name = name
+        described = files is not None
         self._building = building
         self._made = {self.preset: building}
         self._making = threading.Lock()
@@ -90,7 +100,8 @@ class BuildingSession:
         for floor in building.floors:
             if id(floor.planner) not in sessions:
                 file = (files or {}).get(floor.name)
-                sessions[id(floor.planner)] = _session(floor.planner, file)
+                advice = _NO_FILE if described else _IN_MODEL
+                sessions[id(floor.planner)] = _session(floor.planner, file, advice)
         self.sessions = tuple(sessions[id(floor.planner)] for floor in building.floors)
         for session in sessions.values():
             here = [
@@ -155,6 +166,7 @@ class BuildingSession:
         number_of = {floor.name: number for number, floor in enumerate(building.floors)}
         return {
             "name": self.name,
+            "ready": True,
             "floors": [floor.name for floor in building.floors],
             "links": [
                 {
@@ -297,12 +309,13 @@ class BuildingSession:
         } | {name: finite(getattr(plan, name)) for name in figures}
 
 
-def _session(planner: HybridPlanner, file: RoomsFile | None) -> Session:
+def _session(planner: HybridPlanner, file: RoomsFile | None, advice: str) -> Session:
     """Return the session of a floor, whose planner keeps what it has prepared."""
     model, topology = Model(planner.topology.grid), planner.topology
     if topology.pyramid.rooms is None:
         topology = model.grown(planner.preset.pyramid, find_rooms(model.grid))
     session = Session(model, topology, planner.preset, costs=planner.costs, file=file)
+    session.no_file = advice
     session.planning.adopt(planner)
     return session
 

@@ -12,7 +12,7 @@ from hybridnav.view.graph import map_facts
 from hybridnav.view.tiles import hex_colours, map_layer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from hybridnav.grid import OccupancyGrid
     from hybridnav.view.session import Session
@@ -34,6 +34,9 @@ class Opening:
         The map.
     make
         Makes the session; it is given what to call with the name of each stage.
+    also
+        Returns other sessions whose routes are prepared after that, for the other floors of a
+        building.
 
     Examples
     --------
@@ -54,9 +57,13 @@ class Opening:
     """
 
     def __init__(
-        self, grid: OccupancyGrid, make: Callable[[Callable[[str], None]], Session]
+        self,
+        grid: OccupancyGrid,
+        make: Callable[[Callable[[str], None]], Session],
+        *,
+        also: Callable[[], Iterable[Session]] = tuple,
     ) -> None:
-        self._grid, self._make = grid, make
+        self._grid, self._make, self._also = grid, make, also
         self._layer = map_layer(grid)
         self._began = time.monotonic()
         self._stage = "preparing the map"
@@ -88,8 +95,9 @@ class Opening:
             session.describe()  # rooms and their names, while nobody waits for them
             self._session = session
             self._tell("preparing routes")
-            planner = session.planning.planner(session.planning.presets[0])
-            planner.prepare(progress=self._count)
+            for each in (session, *self._also()):
+                planner = each.planning.planner(each.planning.presets[0])
+                planner.prepare(progress=self._count)
         except Exception as error:  # noqa: BLE001 - it is raised where the page is served
             self.problem = error
             self._on_failure()
@@ -135,6 +143,7 @@ class Opening:
             "colours": {"light": hex_colours("light"), "dark": hex_colours("dark")},
             "can_save": False,
             "file": "",
+            "no_file": "",
             "rooms": nothing | {"notice": ""},
         }
 

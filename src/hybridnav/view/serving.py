@@ -7,6 +7,7 @@ import socket
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.view.building_opening import BuildingOpening
 from hybridnav.view.opening import Opening
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def serve(
-    shown: Session | Opening | BuildingSession,
+    shown: Session | Opening | BuildingSession | BuildingOpening,
     folder: Path,
     *,
     port: int = 0,
@@ -29,7 +30,7 @@ def serve(
     Parameters
     ----------
     shown
-        What the page shows: a map, one that is prepared meanwhile, or a building.
+        What the page shows: a map or a building, or one that is prepared meanwhile.
     folder
         The only folder in which anything is written.
     port
@@ -89,7 +90,7 @@ def serve(
             server_header=False,
         )
         server = uvicorn.Server(config)
-        opening = shown if isinstance(shown, Opening) else None
+        opening = shown if isinstance(shown, Opening | BuildingOpening) else None
         if opening is not None:
             opening.begin(on_failure=lambda: setattr(server, "should_exit", True))
         if ready is not None:
