@@ -65,10 +65,27 @@ def test_a_message_goes_with_what_it_was_about(shown: Shown) -> None:
     shown.page.select_option("#room", "a")
     shown.page.click("#split")
     shown.wait_text("#status", "two points")
-    for point in ((20, 47), (20, 24)):
-        shown.click(*point)
+    shown.click(20, 47)
+    shown.wait_text("#status", "the other end")
+    shown.click(20, 24)
     shown.wait_text("#unsaved", "1 change is not saved")
     assert shown.text("#status") == ""
+
+
+def test_a_change_that_is_refused_is_said_and_stays_said(shown: Shown) -> None:
+    shown.mode("names")
+    shown.page.select_option("#room", "a")
+    shown.page.fill("#room-name", "kitchen")
+    shown.page.keyboard.press("Enter")
+    shown.wait_text("#unsaved", "1 change is not saved")
+    shown.page.click("#corners")
+    shown.page.click("#save")
+    shown.wait_text("#unsaved", "saved to rooms.yaml")
+    shown.page.select_option("#other-room", "d")
+    shown.page.click("#merge")
+    shown.wait_text("#status", "do not touch")
+    shown.page.wait_for_timeout(500)
+    assert shown.page.evaluate(SEEN)
 
 
 def test_a_level_of_too_many_vertices_says_so_until_another_is_chosen(
@@ -89,6 +106,8 @@ def test_far_points_are_refused_in_words(shown: Shown) -> None:
     shown.page.fill("#goal", "1, 3")
     shown.page.keyboard.press("Enter")
     shown.wait_text("#status", "The start lies far outside of the map")
+    shown.page.click("#clear")
+    assert shown.page.input_value("#start") == shown.page.input_value("#goal") == ""
 
 
 def test_that_there_are_no_routes_is_said(shown: Shown) -> None:

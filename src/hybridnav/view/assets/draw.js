@@ -136,7 +136,7 @@ export function paintNames(scene, rooms, taken, chosen) {
     const half = context.measureText(room.name).width / 2 + 3;
     const wide = 2.4 * Math.sqrt(room.area_m2) / scene.map.resolution_m * scene.scale;
     if (2 * half > wide && room.name !== chosen) continue;
-    const x = Math.max(half, Math.min(scene.width - half, middle)); // all of it on the screen
+    const x = Math.max(half + 4, Math.min(scene.width - half - 4, middle)); // all of it on the screen
     const boxAt = (down) => [x - half, y + down - 8, x + half, y + down + 8];
     const isFree = (box) => !taken.some((b) => b[0] < box[2] && box[0] < b[2] && b[1] < box[3] && box[1] < b[3]);
     const down = LABEL_SHIFTS.find((each) => isFree(boxAt(each)));
@@ -226,10 +226,10 @@ export function paintMiddle(scene) {
   const inks = inksOf(scene);
   context.beginPath();
   for (const [x, y] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
-    context.moveTo(width / 2 + 4 * x, height / 2 + 4 * y);
-    context.lineTo(width / 2 + 14 * x, height / 2 + 14 * y);
+    context.moveTo(width / 2 + 5 * x, height / 2 + 5 * y);
+    context.lineTo(width / 2 + 18 * x, height / 2 + 18 * y);
   }
-  for (const [colour, wide] of [[inks.halo, 5], [inks.link, 2]]) {
+  for (const [colour, wide] of [[inks.halo, 7], [inks.link, 3]]) {
     Object.assign(context, { strokeStyle: colour, lineWidth: wide, lineCap: "butt" });
     context.stroke();
   }

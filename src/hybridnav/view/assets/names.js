@@ -52,6 +52,7 @@ export class Names {
     if (this.tool === "split" && this.chosen) {
       this.line.push(point);
       if (this.line.length === 2) await this.#split();
+      else this.page.say("Click the other end of the line");
       this.page.scene.draw();
       return;
     }
@@ -188,8 +189,8 @@ export class Names {
   async #refused(problem) {
     this.rings = [];
     await this.refresh();
-    if (this.chosen) await this.outlined().catch(() => {});
     this.page.say(problem.message, true);
+    if (this.chosen) await this.outlined().catch(() => {}); // the message has said what is wrong
   }
 
   // Take over what another page has changed.

@@ -227,7 +227,7 @@ export class Routes {
     canvas.dataset.length = route?.length_m ?? "";
     scene.draw();
     this.#showFigures(route);
-    for (const id of ["optimum", "clear"]) this.byId(id).disabled = !this.hasEnds;
+    this.byId("optimum").disabled = !this.hasEnds;
     if (isBrief) return; // words and lists follow when the end is dropped
     this.#showWay(route);
     this.#showCards();
