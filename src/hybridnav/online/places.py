@@ -49,14 +49,14 @@ class PlaceTable:
     def __init__(self, numbers: LongArray | None = None, rows: AnyArray | None = None) -> None:
         self._numbers = np.empty(0, np.int64) if numbers is None else numbers
         self._rows = np.empty(0, PLACE) if rows is None else rows
-        self._used = len(self._numbers)
+        self._used = self._count = len(self._numbers)
         self._is_own = False
         self._columns: tuple[AnyArray, ...] | None = None
 
     def next_version(self) -> PlaceTable:
         """Return a table that shares all with this one."""
         table = PlaceTable(self._numbers, self._rows)
-        table._used = self._used
+        table._used, table._count = self._used, self._count
         return table
 
     def close(self) -> None:
@@ -65,11 +65,12 @@ class PlaceTable:
             frozen(self._numbers)
             frozen(self._rows)
             self._is_own, self._columns = False, None
+            self._count = int(np.count_nonzero(self._rows["area"]))
 
     @property
     def count(self) -> int:
-        """How many places there are."""
-        return int(np.count_nonzero(self._rows["area"]))
+        """How many places there were when the table was closed."""
+        return self._count
 
     def has(self, place: int) -> bool:
         """Return whether there is such a place."""
@@ -141,19 +142,22 @@ class PlaceTable:
 
     def _own(self, more: int = 0) -> None:
         """Copy what another version has too; make sure that there is space for more rows."""
-        if self._used + more > len(self._numbers):
-            stays = np.arange(self._used)
-            if not self._is_own:  # what is no place any more can be left out
-                stays = np.flatnonzero(self._rows["area"][: self._used] > 0)
-            rows = np.zeros(len(stays) + more + _SPACE, PLACE)
-            numbers = np.full(len(rows), _NONE)
-            numbers[: len(stays)] = self._numbers[stays]
-            _words(rows)[: len(stays)] = _words(self._rows)[stays]
-            self._numbers, self._rows, self._used = numbers, rows, len(stays)
-            self._is_own, self._columns = True, None
+        if not self._is_own and 2 * self._count < self._used:  # most rows are places no more
+            self._copy(np.flatnonzero(self._rows["area"][: self._used] > 0), more)
+        elif self._used + more > len(self._numbers):
+            self._copy(np.arange(self._used), more)
         elif not self._is_own:
             self._numbers, self._rows = self._numbers.copy(), _rows(_words(self._rows).copy())
             self._is_own, self._columns = True, None
+
+    def _copy(self, stays: LongArray, more: int) -> None:
+        """Copy some rows, with space for more."""
+        rows = np.zeros(len(stays) + more + _SPACE, PLACE)
+        numbers = np.full(len(rows), _NONE)
+        numbers[: len(stays)] = self._numbers[stays]
+        _words(rows)[: len(stays)] = _words(self._rows)[stays]
+        self._numbers, self._rows, self._used = numbers, rows, len(stays)
+        self._is_own, self._columns = True, None
 
     def _add(self, numbers: LongArray) -> None:
         """Make rows for numbers that have none."""
