@@ -25,6 +25,21 @@ def beside_of(cell, side, rows, cols):
     return cell - cols if row > 0 else -1
 
 
+@njit(cache=True, nogil=True)
+def step_to(side, cols):
+    """Return what a flat cell on a side differs by, for cells that are at no side of the window.
+
+    `beside_of` divides, which takes longer than all else that is done for a cell.
+    """
+    if side == 0:
+        return 1
+    if side == 1:
+        return cols
+    if side == 2:
+        return -1
+    return -cols
+
+
 @guarded
 @njit(cache=True, nogil=True)
 def look_again(place, low, table, numbers, limit):
@@ -108,7 +123,7 @@ def leave_near(place, number, box, survivor, limit):
 
     `box` holds the place, in the window.
     """
-    rows, cols = place.shape
+    cols = place.shape[1]
     flat = place.ravel()
     lost, n_lost = np.empty((box[2] - box[0]) * (box[3] - box[1]), np.int64), 0
     for row in range(box[0], box[2]):
@@ -127,8 +142,8 @@ def leave_near(place, number, box, survivor, limit):
         cell = stack[size]
         flat[cell] = number
         for side in range(4):
-            beside = beside_of(cell, side, rows, cols)
-            if beside < 0 or not waits[beside]:
+            beside = cell + step_to(side, cols)
+            if not waits[beside]:
                 continue
             squared = (beside // cols - survivor[0]) ** 2 + (beside % cols - survivor[1]) ** 2
             if squared < limit:
@@ -198,13 +213,13 @@ def join_nearest(window, low, table, cells, limit):
     """
     place, of_class = window
     numbers, area, survivor, box, is_stale = table
-    rows, cols = place.shape
+    cols = place.shape[1]
     flat, classes = place.ravel(), of_class.ravel()
     queue = np.empty(5 * cells.size, np.int64)
     head = tail = 0
     for cell in cells:
         for side in range(4):
-            beside = beside_of(cell, side, rows, cols)
+            beside = cell + step_to(side, cols)
             if flat[beside] >= 0 and classes[beside] == classes[cell]:
                 queue[tail] = cell
                 tail += 1
@@ -217,7 +232,7 @@ def join_nearest(window, low, table, cells, limit):
         row, col = cell // cols + low[0], cell % cols + low[1]
         least, nearest = limit, np.int64(-1)
         for side in range(4):
-            beside = beside_of(cell, side, rows, cols)
+            beside = cell + step_to(side, cols)
             if flat[beside] < 0 or classes[beside] != classes[cell]:
                 continue
             i = np.searchsorted(numbers, np.int64(flat[beside]))
@@ -233,7 +248,7 @@ def join_nearest(window, low, table, cells, limit):
         box[nearest, 2] = max(box[nearest, 2], row + 1)
         box[nearest, 3] = max(box[nearest, 3], col + 1)
         for side in range(4):
-            beside = beside_of(cell, side, rows, cols)
+            beside = cell + step_to(side, cols)
             if flat[beside] < 0 and classes[beside] == classes[cell]:
                 queue[tail] = beside
                 tail += 1

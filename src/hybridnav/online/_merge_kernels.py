@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.online._cell_kernels import beside_of, is_within
+from hybridnav.online._cell_kernels import beside_of, is_within, step_to
 
 _NO, _YES, _BEYOND = 0, 1, 2
 _FEW_CELLS = 256
@@ -248,7 +248,7 @@ def add_pairs(window, low, of_place, pairs, count):
     """Add the pairs of a place, given by number and box, and the places of its class beside it."""
     place, of_class = window
     number, box = of_place
-    rows, cols = place.shape
+    cols = place.shape[1]
     flat, classes = place.ravel(), of_class.ravel()
     first = count
     for row in range(box[0] - low[0], box[2] - low[0]):
@@ -257,7 +257,7 @@ def add_pairs(window, low, of_place, pairs, count):
             if flat[cell] != number:
                 continue
             for side in range(4):
-                beside = beside_of(cell, side, rows, cols)
+                beside = cell + step_to(side, cols)
                 other = flat[beside]
                 if other < 0 or other == number or classes[beside] != classes[cell]:
                     continue
@@ -281,12 +281,12 @@ def pairs_at(window, cells):
     `cells` are flat, none at a side of the window.
     """
     place, of_class = window
-    rows, cols = place.shape
+    cols = place.shape[1]
     flat, classes = place.ravel(), of_class.ravel()
     pairs, count = np.empty((64, 2), np.int64), 0
     for cell in cells:
         for side in range(4):
-            beside = beside_of(cell, side, rows, cols)
+            beside = cell + step_to(side, cols)
             one, other = flat[cell], flat[beside]
             if one < 0 or other < 0 or one == other or classes[cell] != classes[beside]:
                 continue

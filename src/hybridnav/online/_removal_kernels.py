@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import guarded, njit
-from hybridnav.online._cell_kernels import beside_of
+from hybridnav.online._cell_kernels import step_to
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def take_out(place, low, table, removed, scratch, first):
+def take_out(place, low, table, removed, first):
     """Take cells out of their places, and give new numbers to parts that this cuts off.
 
     A place that loses half of its cells has a new number too: it has no heir.
@@ -21,8 +21,6 @@ def take_out(place, low, table, removed, scratch, first):
         See above; areas and stale places change.
     removed
         int64 (n,) twice: flat cells, and the places that they were in, -1 for none.
-    scratch
-        int32 (rows, cols), all -1, and so again at the end.
     first
         The least new number.
 
@@ -47,6 +45,7 @@ def take_out(place, low, table, removed, scratch, first):
     lost, n_lost = np.empty(cells.size, np.int64), 0
     altered, n_altered = np.empty(cells.size, np.int64), 0
     queue = np.empty(flat.size, np.int64)
+    scratch = np.full(place.shape, np.int32(-1), np.int32)
     begin = 0
     while begin < cells.size:
         end = begin
@@ -106,14 +105,14 @@ def cut_off(place, cells, number, scratch, queue, first):
     Searches begin at the cells beside the removed ones and go on by turns until they have met, or
     all but one part is searched.
     """
-    rows, cols = place.shape
+    cols = place.shape[1]
     flat, marks = place.ravel(), scratch.ravel()
     parent = np.empty(4 * cells.size, np.int64)
     n_open = tail = 0
     for cell in cells:
         for side in range(4):
-            beside = beside_of(cell, side, rows, cols)
-            if beside >= 0 and flat[beside] == number and marks[beside] < 0:
+            beside = cell + step_to(side, cols)
+            if flat[beside] == number and marks[beside] < 0:
                 marks[beside] = parent[n_open] = n_open
                 queue[tail] = beside
                 n_open += 1
@@ -126,8 +125,8 @@ def cut_off(place, cells, number, scratch, queue, first):
         head += 1
         root = root_of(parent, marks[cell])
         for side in range(4):
-            beside = beside_of(cell, side, rows, cols)
-            if beside < 0 or flat[beside] != number:
+            beside = cell + step_to(side, cols)
+            if flat[beside] != number:
                 continue
             if marks[beside] < 0:
                 marks[beside] = root

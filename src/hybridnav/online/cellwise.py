@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.online import _cell_kernels as kernels
-from hybridnav.online import _merge_kernels as merging
-from hybridnav.online import _removal_kernels
+from hybridnav.online import _move_kernels, _removal_kernels
+from hybridnav.online._cell_kernels import box_round
+from hybridnav.online._merge_kernels import merge_pairs
 from hybridnav.online._ring_kernels import box_groups
 from hybridnav.online.places import PLACE
 from hybridnav.online.state import State
@@ -91,29 +91,30 @@ class CellDraft:
     def _box_round(self, cells: Differing) -> Box:
         """Return the least box that holds cells and their places."""
         table = self.places.columns()
-        return Box(*kernels.box_round(cells.row, cells.col, cells.place, table))
+        return Box(*box_round(cells.row, cells.col, cells.place, table))
 
     def _move(self, found: Differing, box: Box) -> None:
         """Move changed cells, and merge places that may merge then."""
         window = _Window(self, box.widened(1))
         first = self.next_place
-        waiting, lost, moved = window.take_out(found)
-        if len(waiting):
-            kernels.join_nearest(
-                window.planes, window.low, self.places.columns(), waiting, self.limit
-            )
-            window.make_places(waiting[window.flat[waiting] < 0])
-        again = np.concatenate([moved, np.arange(first, self.next_place)])
-        pairs = [np.stack([again, again], axis=1)]
-        if len(lost):
-            pairs.append(
-                merging.absorbing(
-                    window.planes, window.low, self.places.columns(), lost, self.limit
-                )
-            )
-        if len(waiting):
-            pairs.append(merging.pairs_at(window.planes, waiting))
-        beyond = window.merge(np.concatenate(pairs))
+        waiting, lost, altered = window.take_out(found)
+        joined, moved, boxes = _move_kernels.let_join(
+            window.planes,
+            window.low,
+            self.places.columns(),
+            (altered, first, self.next_place),
+            waiting,
+            self.limit,
+        )
+        made = window.make_places(boxes) if len(boxes) else boxes[:, 0]
+        beyond = _move_kernels.merge_after(
+            window.planes,
+            window.low,
+            self.places.columns(),
+            (made, moved, lost, first, self.next_place, self.before.next_place),
+            joined,
+            self.limit,
+        )
         window.write()
         while len(beyond):
             beyond = np.concatenate([self._merge(pair) for pair in np.unique(beyond, axis=0)])
@@ -146,38 +147,22 @@ class _Window:
         self._box = box
         self.low = box[:2]
         self.planes = draft.tiles.planes(box)
-        self.flat = self.planes[0].ravel()
-        self._classes = self.planes[1].ravel()
-        self._before = self.flat.copy()
-        self._changed: LongArray = np.empty(0, np.int64)
 
     def take_out(self, found: Differing) -> tuple[LongArray, LongArray, LongArray]:
         """Take changed cells out of their places.
 
-        Return flat cells that wait for a place, the places that lost cells, and those that have
-        another surviving cell.
+        Return flat cells that wait for a place, the places that lost cells, and those of them that
+        have to be looked at again beside the new ones.
         """
         draft, places = self._draft, self._draft.places
         cells = (found.row - self.low[0]) * self._box.shape[1] + found.col - self.low[1]
-        self._changed = cells
-        self._classes[cells] = found.of_class
+        self.planes[1].ravel()[cells] = found.of_class
         parents, lost, altered = _removal_kernels.take_out(
-            self.planes[0],
-            self.low,
-            places.columns(),
-            (cells, found.place),
-            np.full(self._box.shape, -1, np.int32),
-            draft.next_place,
+            self.planes[0], self.low, places.columns(), (cells, found.place), draft.next_place
         )
-        parts = self._new(places.read(parents))
-        more, moved = kernels.look_again(
-            self.planes[0],
-            self.low,
-            places.columns(),
-            np.concatenate([altered, parts]),
-            draft.limit,
-        )
-        return np.concatenate([cells[found.of_class > 0], more]), lost, moved
+        if len(parents):
+            self._new(places.read(parents))
+        return cells[found.of_class > 0], lost, altered
 
     def _new(self, rows: AnyArray) -> LongArray:
         """Enter places with new numbers; return these."""
@@ -185,23 +170,21 @@ class _Window:
         self._draft.next_place += len(rows)
         return self._draft.places.append(first, rows)
 
-    def make_places(self, cells: LongArray) -> None:
-        """Make places of connected cells that no place took in."""
-        if not len(cells):
-            return
-        draft, low = self._draft, np.array(self.low)
-        boxes = kernels.join_each_other(self.planes, cells, draft.next_place)
+    def make_places(self, boxes: LongArray) -> LongArray:
+        """Make places of connected cells that no place took in; return those that may be small.
+
+        They have the next numbers, in the window too; their boxes are given.
+        """
+        low = np.array(self.low)
         rows = np.zeros(len(boxes), PLACE)
         rows["area"], rows["box"] = 1, boxes + np.tile(low, 2)
         rows["cell"] = (boxes[:, :2] + boxes[:, 2:]) // 2 + low
         numbers = self._new(rows)
         sides = boxes[:, 2:] - boxes[:, :2] - 1
-        is_large = (sides * sides).sum(axis=1) >= draft.limit
-        kernels.look_again(
-            self.planes[0], self.low, draft.places.columns(), numbers[~is_large], draft.limit
-        )
+        is_large = (sides * sides).sum(axis=1) >= self._draft.limit
         for at in np.flatnonzero(is_large).tolist():
             self._contract(int(numbers[at]), boxes[at])
+        return numbers[~is_large]
 
     def _contract(self, number: int, box: LongArray) -> None:
         """Put places, as contraction makes them, in the place of one that is too large."""
@@ -221,7 +204,7 @@ class _Window:
     def merge(self, pairs: LongArray) -> LongArray:
         """Merge places of pairs that may merge, and so on; return pairs that leave the window."""
         draft = self._draft
-        beyond: LongArray = merging.merge_pairs(
+        beyond: LongArray = merge_pairs(
             self.planes,
             self.low,
             draft.places.columns(),
@@ -233,9 +216,4 @@ class _Window:
 
     def write(self) -> None:
         """Enter the cells into the draft."""
-        altered = self.flat != self._before
-        altered[self._changed] = True
-        cells = np.flatnonzero(altered)
-        row, col = np.divmod(cells, self._box.shape[1])
-        low_row, low_col = self.low
-        self._draft.tiles.put(row + low_row, col + low_col, self.flat[cells], self._classes[cells])
+        self._draft.tiles.put(self._box, self.planes)

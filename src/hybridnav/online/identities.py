@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from hybridnav.online import _tile_kernels
 from hybridnav.online.tiles import NO_PLACE, Box
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
-    from hybridnav._typing import LongArray
     from hybridnav.online.cellwise import CellDraft
 
 
@@ -53,14 +48,17 @@ def settle(draft: CellDraft) -> Events:
     ties. Most places bear their final numbers already.
     """
     first = draft.before.next_place
-    moved = _moved(draft)
-    seen = {place for overlap in moved for place in overlap[:2]} - {NO_PLACE}
-    stay = areas = _areas_before(draft, {place for place in seen if place < first})
-    lost: Counter[int] = Counter()
-    for old, _, cells in moved:
-        lost[old] += cells
-    found = [overlap for overlap in moved if overlap[0] != NO_PLACE]
-    found += [(old, old, area - lost[old]) for old, area in stay.items() if area > lost[old]]
+    moved: list[list[int]] = draft.tiles.moved(draft.before.tiles).tolist()
+    areas = draft.before.places.areas(
+        sorted({place for overlap in moved for place in overlap[:2] if NO_PLACE < place < first})
+    )
+    stay = dict(areas)
+    found: list[Overlap] = []
+    for old, new, cells in moved:
+        if old != NO_PLACE:
+            found.append((old, new, cells))
+            stay[old] -= cells
+    found += [(old, old, cells) for old, cells in stay.items() if cells > 0]
     heirs = heirs_of(found, areas)
     name = dict(heirs.name)
     new = {place for _, place, _ in found} | set(draft.places.numbers(first))
@@ -70,26 +68,9 @@ def settle(draft: CellDraft) -> Events:
             name[place] = draft.next_place
             draft.next_place += 1
     _renumber(draft, {place: final for place, final in name.items() if place != final})
-    return events_of(found, Heirs(heirs.of, name), _areas_now(draft, name), first)
-
-
-def _moved(draft: CellDraft) -> list[Overlap]:
-    """Return the cells in common of places that differ; old places are -1 where there was none."""
-    keys, count = np.empty(0, np.int64), 0
-    for before, after in draft.tiles.changed(draft.before.tiles):
-        if count + before.size > len(keys):
-            keys = np.concatenate([keys[:count], np.empty(count + 8 * before.size, np.int64)])
-        count = _tile_kernels.moved_cells(before, after, keys, count)
-    keys, counts = np.unique(keys[:count], return_counts=True)
-    old, new = (keys >> 32) - 1, (keys & 0xFFFFFFFF) - 1
-    return [*zip(old.tolist(), new.tolist(), counts.tolist(), strict=True)]
-
-
-def _areas_before(draft: CellDraft, places: Iterable[int]) -> dict[int, int]:
-    """Return the cells that old places had."""
-    numbers = sorted(places)
-    areas = draft.before.places.read(numbers)["area"].tolist()
-    return dict(zip(numbers, areas, strict=True))
+    now = draft.places.areas([*name.values()])
+    areas_now = {place: now[final] for place, final in name.items()}
+    return events_of(found, Heirs(heirs.of, name), areas_now, first)
 
 
 def heirs_of(found: list[Overlap], areas: dict[int, int]) -> Heirs:
@@ -136,23 +117,17 @@ def events_of(
     )
 
 
-def _areas_now(draft: CellDraft, name: Mapping[int, int]) -> dict[int, int]:
-    """Return the cells of new places, by the numbers before they had final ones."""
-    areas = draft.places.read([*name.values()])["area"].tolist()
-    return dict(zip(name, areas, strict=True))
-
-
 def _renumber(draft: CellDraft, name: dict[int, int]) -> None:
     """Write other numbers of places in place of some."""
     if not name:
         return
-    rows = draft.places.read([*name])
-    cells = []
-    for number, final, box in zip(name, name.values(), rows["box"].tolist(), strict=True):
-        place, of_class = draft.tiles.planes(Box(*box))
-        row, col = at = (place == number).nonzero()
-        finals: LongArray = np.full(len(row), final, np.int32)
-        cells.append((row + box[0], col + box[1], finals, of_class[at]))
+    tiles, rows = draft.tiles, draft.places.read([*name])
+    boxes = [Box(*around) for around in rows["box"].tolist()]
+    # A final number may be that of another place until now: all cells are found first.
+    masks = [tiles.planes(box)[0] == number for number, box in zip(name, boxes, strict=True)]
+    for final, box, mask in zip(name.values(), boxes, masks, strict=True):
+        planes = tiles.planes(box)
+        planes[0][mask] = final
+        tiles.put(box, planes)
     draft.places.drop(name)
     draft.places.write([*name.values()], rows)
-    draft.tiles.put(*(np.concatenate(values) for values in zip(*cells, strict=True)))

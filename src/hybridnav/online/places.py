@@ -88,6 +88,11 @@ class PlaceTable:
         rows: AnyArray = self._rows[np.searchsorted(self._numbers, np.asarray(places, np.int64))]
         return rows
 
+    def areas(self, places: Sequence[int]) -> dict[int, int]:
+        """Return how many cells each of some places has."""
+        at = np.searchsorted(self._numbers, np.asarray(places, np.int64))
+        return dict(zip(places, self._rows["area"][at].tolist(), strict=True))
+
     def write(self, places: Sequence[int] | LongArray, rows: AnyArray) -> None:
         """Set the rows of some places, no two of which are the same."""
         numbers = np.asarray(places, np.int64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise, product
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -36,8 +36,12 @@ NO_PLACE = -1
 """Number that stands for no place: that of occupied cells and of all outside the map."""
 
 
-_MORE = (16 * SIDE * SIDE, 4)
-"""Shape of the space that is taken for more cells at once."""
+_MANY = 16
+"""Tiles that a kernel is called with at once."""
+_FEW_ROWS = 256
+"""Rows that a list of cells begins with."""
+_Tiles = tuple["IntArray | ByteArray", ...]
+"""The places or the classes of `_MANY` tiles."""
 
 
 class Box(NamedTuple):
@@ -145,7 +149,8 @@ _EMPTY = Tile(
 class Tiles:
     """The tiles of a version, and those of the next one while it is made.
 
-    Arrays of a version never change: those of a tile are copied when they first change.
+    Arrays of a version never change: those of a tile are copied when they first change. All that a
+    kernel reads is read-only, those copies too, because it takes arrays of one type only.
 
     Parameters
     ----------
@@ -155,18 +160,16 @@ class Tiles:
 
     def __init__(self, tiles: Mapping[tuple[int, int], Tile]) -> None:
         self._tiles = dict(tiles)
-        self._own: set[tuple[int, int]] = set()
-        self._own_records: set[tuple[int, int]] = set()
+        self._own: dict[tuple[int, int], tuple[IntArray, ByteArray]] = {}
+        """The places and classes that may be written to."""
+        self._own_records: dict[tuple[int, int], AnyArray] = {}
 
     def next_version(self) -> Tiles:
         """Return tiles that share all arrays of these."""
         return Tiles(self._tiles)
 
     def close(self) -> None:
-        """Make all arrays read-only: the version is complete."""
-        for key in self._own | self._own_records:
-            for values in self._tiles[key]:
-                frozen(values)
+        """Forget what may be written to: the version is complete."""
         self._own.clear()
         self._own_records.clear()
 
@@ -183,11 +186,10 @@ class Tiles:
 
     def planes(self, box: Box) -> tuple[IntArray, ByteArray]:
         """Return copies of the places and the classes of the cells of a box."""
-        place, of_class = np.empty(box.shape, np.int32), np.empty(box.shape, np.uint8)
-        for key, inside, within in _parts_of(box):
-            tile = self._tiles.get(key, _EMPTY)
-            place[inside], of_class[inside] = tile.place[within], tile.of_class[within]
-        return place, of_class
+        planes = np.empty(box.shape, np.int32), np.empty(box.shape, np.uint8)
+        for begin, tiles in self._groups_of(box):
+            _tile_kernels.read_tiles(tiles, begin, box, planes)
+        return planes
 
     def differing(
         self, boxes: Iterable[Box], classes: ByteArray, low: tuple[int, int]
@@ -203,17 +205,26 @@ class Tiles:
         low
             Row and column of its first cell.
         """
-        found, count = np.empty((SIDE * SIDE, 4), np.int32), 0
+        found, count = np.empty((_FEW_ROWS, 4), np.int64), 0
         for box in boxes:
-            at = tuple(box)
-            for row, col in _keys_of(box):
-                if count + SIDE * SIDE > len(found):
-                    found = np.concatenate([found[:count], np.empty(_MORE, np.int32)])
-                place, of_class, _ = self._tiles.get((row, col), _EMPTY)
-                tile = place, of_class, row * SIDE, col * SIDE
-                count = _tile_kernels.find_differing(tile, classes, low, at, found, count)
-        row, col, place, of_class = found[:count].T.astype(np.int64)
+            for begin, tiles in self._groups_of(box):
+                found, count = _tile_kernels.find_differing(
+                    tiles, begin, box, (classes, low), found, count
+                )
+        row, col, place, of_class = found[:count].T.copy()
         return Differing(row, col, place, of_class.astype(np.uint8))
+
+    def _groups_of(self, box: Box) -> Iterator[tuple[int, tuple[_Tiles, _Tiles]]]:
+        """Yield the places and the classes of the tiles that a box meets, `_MANY` at a time.
+
+        They come in the order of rows of tiles, after the number of the first one; what lies beyond
+        the last one is empty.
+        """
+        tiles = [self._tiles.get(key, _EMPTY) for key in _keys_of(box)]
+        tiles += [_EMPTY] * (-len(tiles) % _MANY)
+        for begin in range(0, len(tiles), _MANY):
+            places, classes, _ = zip(*tiles[begin : begin + _MANY], strict=True)
+            yield begin, (places, classes)
 
     def end_at(self, cell: tuple[int, int]) -> int:
         """Return the end of a cell that is a vertex."""
@@ -228,16 +239,17 @@ class Tiles:
         steps = record["parent"][row % SIDE, col % SIDE]
         return row + int(steps[0]), col + int(steps[1])
 
-    def put(self, row: LongArray, col: LongArray, place: IntArray, of_class: ByteArray) -> None:
-        """Set the places and the classes of some cells."""
-        keys = (row // SIDE << 32) + col // SIDE
-        order = np.argsort(keys, kind="stable")
-        bounds = [0, *(np.flatnonzero(np.diff(keys[order])) + 1).tolist(), len(order)]
-        for begin, end in pairwise(bounds if len(order) else ()):
-            part = order[begin:end]
-            at = int(row[part[0]]) // SIDE, int(col[part[0]]) // SIDE
-            tile, low = self._owned(at)[:2], (at[0] * SIDE, at[1] * SIDE)
-            _tile_kernels.put_cells(tile, low, (row, col, place, of_class), part)
+    def put(self, box: Box, planes: tuple[IntArray, ByteArray]) -> None:
+        """Set the places and the classes of the cells of a box; tiles in which all is equal stay
+        shared.
+
+        Cells whose class changes are taken to change their place too: places have one class.
+        """
+        keys = [*_keys_of(box)]
+        for begin, tiles in self._groups_of(box):
+            differs = _tile_kernels.tiles_differ(tiles[0], begin, box, planes[0])
+            for at in differs.tolist():
+                _tile_kernels.put_cells(self._owned(keys[at]), keys[at], box, planes)
 
     def write(self, box: Box, window: AnyArray) -> None:
         """Set the cells of a box; arrays in which all is equal stay shared."""
@@ -245,38 +257,48 @@ class Tiles:
             cells, tile = window[inside], self._tiles.get(key, _EMPTY)
             planes = (tile.place, cells["place"]), (tile.of_class, cells["class"])
             if any((plane[within] != now).any() for plane, now in planes):
-                tile = self._owned(key)
-                tile.place[within], tile.of_class[within] = cells["place"], cells["class"]
+                place, of_class = self._owned(key)
+                place[within], of_class[within] = cells["place"], cells["class"]
             if any((tile.record[n][within] != cells[n]).any() for n in _RECORD.names or ()):
                 record = self._owned_record(key)[within]
                 for name in _RECORD.names or ():
                     record[name] = cells[name]
 
-    def _owned(self, key: tuple[int, int]) -> Tile:
-        """Return a tile whose places and classes may be written to."""
-        tile = self._tiles.get(key, _EMPTY)
-        if key not in self._own:
-            tile = Tile(tile.place.copy(), tile.of_class.copy(), tile.record)
-            self._tiles[key] = tile
-            self._own.add(key)
-        return tile
+    def _owned(self, key: tuple[int, int]) -> tuple[IntArray, ByteArray]:
+        """Return the places and the classes of a tile, to be written to."""
+        own = self._own.get(key)
+        if own is None:
+            tile = self._tiles.get(key, _EMPTY)
+            own = tile.place.copy(), tile.of_class.copy()
+            place, of_class = frozen(own[0].view()), frozen(own[1].view())
+            self._tiles[key] = Tile(place, of_class, tile.record)
+            self._own[key] = own
+        return own
 
     def _owned_record(self, key: tuple[int, int]) -> AnyArray:
         """Return the record of a tile, to be written to."""
-        tile = self._tiles.get(key, _EMPTY)
-        if key not in self._own_records:
-            tile = tile._replace(record=tile.record.copy())
-            self._tiles[key] = tile
-            self._own_records.add(key)
-        return tile.record
+        own = self._own_records.get(key)
+        if own is None:
+            tile = self._tiles.get(key, _EMPTY)
+            own = tile.record.copy()
+            self._tiles[key] = tile._replace(record=frozen(own.view()))
+            self._own_records[key] = own
+        return own
 
-    def changed(self, before: Tiles) -> Iterator[tuple[IntArray, IntArray]]:
-        """Yield the places of each tile in which some changed, in a version before and here.
+    def moved(self, before: Tiles) -> LongArray:
+        """Return how many cells went from one place to another, until `close`.
 
-        Until `close`, the second array may be written to.
+        int64 (n, 3): the place in a version before, the one here, and the cells; no pair of places
+        comes twice.
         """
-        for key in sorted(self._own):
-            yield before._tiles.get(key, _EMPTY).place, self._tiles[key].place
+        keys, runs, count = sorted(self._own), np.empty((_FEW_ROWS, 2), np.int64), 0
+        for begin in range(0, len(keys), _MANY):
+            some = keys[begin : begin + _MANY]
+            more = (_EMPTY.place,) * (_MANY - len(some))
+            old = *(before._tiles.get(key, _EMPTY).place for key in some), *more
+            new = *(self._tiles[key].place for key in some), *more
+            runs, count = _tile_kernels.moved_cells(old, new, runs, count)
+        return _tile_kernels.sums_of(runs, count)
 
     def differing_tiles(self, before: Tiles) -> Iterator[tuple[Tile, Tile]]:
         """Yield the tiles that this version does not share with another one: theirs, and its own.
