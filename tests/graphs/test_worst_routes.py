@@ -42,7 +42,8 @@ def test_a_robot_in_a_hall_is_near_a_node_and_leaves_by_the_nearest():
     grid = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4.0))
     graph = hn.build_route_graph(topology)
-    away = KDTree(graph.positions).query(np.argwhere(FreeSpace.of(grid).free) + 0.5)[0]
+    centres = np.argwhere(FreeSpace.of(grid).free) + 0.5
+    away = np.asarray(KDTree(graph.positions).query(centres)[0])
     assert away.max() * 0.1 <= 1.0
     nearest = hn.judge_route_graph(graph, pairs=2000).nearest
     assert nearest.solved == 1.0

@@ -152,7 +152,9 @@ def _lengths(chosen: BoolArray, away: FloatArray, nodes: LongArray) -> FloatArra
     from scipy.sparse import csr_array  # noqa: PLC0415 - on demand
     from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
 
-    matrix = csr_array((away[chosen], np.nonzero(chosen)), shape=away.shape)
+    tails, heads = np.nonzero(chosen)
+    lengths: FloatArray = away[tails, heads]
+    matrix = csr_array((lengths, (tails, heads)), shape=away.shape)
     found: FloatArray = dijkstra(matrix, indices=nodes)
     return found
 
