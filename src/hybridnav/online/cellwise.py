@@ -184,7 +184,8 @@ class _Window:
         is_large = (sides * sides).sum(axis=1) >= self._draft.limit
         for at in np.flatnonzero(is_large).tolist():
             self._contract(int(numbers[at]), boxes[at])
-        return numbers[~is_large]
+        small: LongArray = numbers[~is_large]
+        return small
 
     def _contract(self, number: int, box: LongArray) -> None:
         """Put places, as contraction makes them, in the place of one that is too large."""

@@ -54,9 +54,9 @@ def settle(draft: CellDraft) -> Events:
     )
     stay = dict(areas)
     found: list[Overlap] = []
-    for old, new, cells in moved:
+    for old, went_to, cells in moved:
         if old != NO_PLACE:
-            found.append((old, new, cells))
+            found.append((old, went_to, cells))
             stay[old] -= cells
     found += [(old, old, cells) for old, cells in stay.items() if cells > 0]
     heirs = heirs_of(found, areas)

@@ -298,7 +298,8 @@ class Tiles:
             old = *(before._tiles.get(key, _EMPTY).place for key in some), *more
             new = *(self._tiles[key].place for key in some), *more
             runs, count = _tile_kernels.moved_cells(old, new, runs, count)
-        return _tile_kernels.sums_of(runs, count)
+        sums: LongArray = _tile_kernels.sums_of(runs, count)
+        return sums
 
     def differing_tiles(self, before: Tiles) -> Iterator[tuple[Tile, Tile]]:
         """Yield the tiles that this version does not share with another one: theirs, and its own.
