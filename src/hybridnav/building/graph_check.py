@@ -103,9 +103,10 @@ def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
 
 
 def _checked_floors(network: BuildingNetwork) -> dict[str, GraphCheck]:
-    """Return what is wrong on each floor, by its name: routes there and back may lead over others.
+    """Return what is wrong on each floor, by its name.
 
-    Of the links, those count that the graph has and this robot fits in.
+    Routes there and back may lead over other floors, by the links of the graph that this robot fits
+    in.
     """
     one_way = one_way_nodes(network.n_nodes, network.edges())
     checks = {}
