@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
+import numpy as np
 import pytest
 
 import hybridnav as hn
@@ -18,6 +19,7 @@ from hybridnav.building import (
     judge_building_graph,
     match_graph,
 )
+from hybridnav.building.graph_network import BuildingNetwork
 from hybridnav.graphs import BUILDING_KINDS
 from tests.houses import LIFT, STAIRS, two_rooms
 
@@ -202,6 +204,22 @@ def test_what_no_robot_can_follow_may_be_left_out(house: hn.Building) -> None:
         matched = match_graph(house, FAULTS[name][0])
         report = judge_building_graph(matched, pairs=100, clear_edges_only=True)
         assert "contradicted" not in report.counts["all"].answers
+
+
+def test_a_node_far_outside_an_open_map_is_never_seen() -> None:
+    grid = hn.OccupancyGrid(np.zeros((6, 9)), robot_radius_m=0.0)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
+    building = hn.Building([hn.Floor("1", hn.HybridPlanner(topology))])
+    plain: nx.Graph[str] = nx.Graph()
+    for node, (x, y) in {"a": (1.5, 1.5), "far": (2e8, 1e8), "b": (7.5, 4.5)}.items():
+        plain.add_node(node, x=x, y=y)
+    plain.add_edges_from([("a", "far"), ("far", "b")])
+    graph = FloorGraph(name="1", graph=hn.WaypointGraph.from_networkx(plain))
+    network = BuildingNetwork(match_graph(building, BuildingGraph(name="open", floors=(graph,))))
+    leg = np.array([0, 1, 2])
+    for point in ((2.5, 2.5), (3.5, 5.5)):
+        kept = network.floors[0].network.without_passed(np.array(point), leg)
+        assert kept.tolist() == [0, 1, 2]
 
 
 def test_every_kind_of_finding_is_planted_here() -> None:

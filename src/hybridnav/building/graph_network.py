@@ -290,8 +290,8 @@ class BuildingNetwork:
 
 def _n_passed(floor: PlacedFloor, nodes: list[int], point: FloatArray) -> int:
     """Return how many nodes of a leg are left out at its start: one that was passed, or none."""
-    at = floor.placed.positions[np.array(nodes) - floor.base]
-    return len(nodes) - len(floor.network.without_passed(point, at))
+    here = np.array(nodes, dtype=np.int64) - floor.base
+    return len(nodes) - len(floor.network.without_passed(point, here))
 
 
 def _of_all(seen: Offsets, floor: PlacedFloor) -> Offsets:

@@ -111,7 +111,13 @@ class Network:
         """
         return Attached(self, starts, goals, self.in_sight(starts), self.in_sight(goals))
 
-    def without_passed(self, point: FloatArray, nodes: FloatArray) -> FloatArray:
+    @cached_property
+    def _is_usable(self) -> BoolArray:
+        found = np.zeros(len(self.positions), dtype=np.bool_)
+        found[self.usable] = True
+        return found
+
+    def without_passed(self, point: FloatArray, nodes: LongArray) -> LongArray:
         """Return the nodes of a route without the first, if a robot at a point has passed it, and
         sees the next one.
 
@@ -120,11 +126,14 @@ class Network:
         point
             float64 (2,), where the robot is.
         nodes
-            float64 (k, 2), positions of the nodes.
+            int64 (k,), the nodes; those in walls or outside the map are never seen.
         """
-        if len(nodes) < 2 or (nodes[1] - nodes[0]) @ (point - nodes[0]) <= 0:  # noqa: PLR2004
+        if len(nodes) < 2 or not self._is_usable[nodes[1]]:  # noqa: PLR2004
             return nodes
-        is_seen = self.sight.clear(point[None], nodes[None, 1])[0]
+        first, second = self.positions[nodes[:2]]
+        if (second - first) @ (point - first) <= 0:
+            return nodes
+        is_seen = self.sight.clear(point[None], second[None])[0]
         return nodes[1:] if is_seen else nodes
 
 
@@ -180,9 +189,9 @@ class Attached:
         for pair, is_direct in enumerate(self.direct.tolist()):
             inner = np.empty((0, 2)) if is_direct else None
             if not is_direct and np.isfinite(lengths[pair]):
-                nodes = self.network.positions[passed[pair]]
-                nodes = self.network.without_passed(self.starts[pair], nodes)
-                inner = self.network.without_passed(self.goals[pair], nodes[::-1])[::-1]
+                nodes = self.network.without_passed(self.starts[pair], passed[pair])
+                nodes = self.network.without_passed(self.goals[pair], nodes[::-1])[::-1]
+                inner = self.network.positions[nodes]
             ends = self.starts[pair, None], self.goals[pair, None]
             line = None if inner is None else np.concatenate([ends[0], inner, ends[1]])
             lines.append(line)
