@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridnav.building.links import Link
-    from hybridnav.result import InstructionSource, Metric, PlanResult
+    from hybridnav.result import Metric, PlanResult
+    from hybridnav.result.plan import InstructionSource
     from hybridnav.sentences import Instruction
 
 COUNTS = ("expanded", "expanded_places", "expanded_border_cells", "expanded_intervals")

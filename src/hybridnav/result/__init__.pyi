@@ -1,7 +1,6 @@
 from .path import Path as Path
 from .plan import (
     COST_METRICS as COST_METRICS,
-    InstructionSource as InstructionSource,
     Metric as Metric,
     PlanBatch as PlanBatch,
     PlanResult as PlanResult,
@@ -9,7 +8,6 @@ from .plan import (
     PlanStatus as PlanStatus,
     Refinement as Refinement,
     Route as Route,
-    RouteSource as RouteSource,
 )
 
 __all__: list[str]

@@ -27,6 +27,7 @@ Metric = Literal[
     "dubins",
     "reeds-shepp",
 ]
+"""What a path is judged by: the kind of its length, or of its cost."""
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
 
