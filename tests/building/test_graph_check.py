@@ -207,7 +207,7 @@ def test_what_no_robot_can_follow_may_be_left_out(house: hn.Building) -> None:
 
 
 def test_a_node_far_outside_an_open_map_is_never_seen() -> None:
-    grid = hn.OccupancyGrid(np.zeros((6, 9)), robot_radius_m=0.0)
+    grid = hn.OccupancyGrid(np.zeros((6, 9), dtype=np.float32), robot_radius_m=0.0)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=2.0))
     building = hn.Building([hn.Floor("1", hn.HybridPlanner(topology))])
     plain: nx.Graph[str] = nx.Graph()
