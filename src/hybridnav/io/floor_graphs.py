@@ -104,7 +104,7 @@ def building_graph(  # noqa: PLR0913 - all but the first have defaults
     name: str = "building",
     nodes: int | None = None,
     spacing_m: float = 2.0,
-    stretch: float = 1.02,
+    stretch: float = 1.05,
     seed: int = 0,
     progress: Progress = no_progress,
 ) -> BuildingGraph:
