@@ -39,7 +39,7 @@ INTEL_LOG = "radish_logs/intel-corrected.log.gz"
 SIDES = (500, 1000, 2000, 4000)
 """Rows and columns of the maps on which growth is measured: 0.25 M to 16 M cells."""
 CHANGE = 60
-PLACES = 12
+PLACES = 24
 """Changes of each map: at the same cells of all maps, so that their sizes alone differ."""
 SIGHT = 80
 """Cells that a robot sees to each side: 4 m."""
@@ -171,45 +171,56 @@ def show(name: str, run: Run, distance_m: float) -> Shown:
     return Shown(float(median), float(high), run.version.n_places / places - 1)
 
 
+class Tiled:
+    """A map of rooms with doors, of some size, whose cells are closed and opened again."""
+
+    def __init__(self, side: int) -> None:
+        tile = np.ones((250, 250), np.uint8)
+        tile[::125] = tile[:, ::125] = 0
+        tile[50:60, ::125] = tile[::125, 50:60] = tile[180:190, ::125] = tile[::125, 180:190] = 1
+        self.classes = np.tile(tile, (side // 250, side // 250))
+        probability = np.where(self.classes == 0, np.float32(1), np.float32(0))
+        self.grid = hn.OccupancyGrid(probability, hn.Frame(0.05), robot_radius_m=0)
+        self.version = OnlinePyramid.of(hn.DualGraphPyramid.build(self.grid))
+        start = time.perf_counter()
+        hn.DualGraphPyramid.build(self.grid)
+        self.fresh = time.perf_counter() - start
+
+    def update(self, low: tuple[int, int], *, closed: bool) -> float:
+        """Return the seconds of an update by which a box of cells is closed, or open again."""
+        changed = self.classes.copy()
+        if closed:
+            changed[tuple(slice(at, at + CHANGE) for at in low)] = 0
+        now = with_classes(self.grid, changed)
+        box = area_of(self.grid.frame, low, (low[0] + CHANGE, low[1] + CHANGE))
+        start = time.perf_counter()
+        after = self.version.update(now, changed=box)
+        taken = time.perf_counter() - start
+        self.version = after.version  # frees the map before, which is no part of an update
+        return taken
+
+
 def growth() -> tuple[dict[int, float], dict[int, float]]:
     """Print the time of one change on maps of several sizes, and of a fresh build of each.
 
     Return, by the side of the map, the time of an update and how many times longer a build takes.
     """
-    times: dict[int, float] = {}
-    ratios: dict[int, float] = {}
+    maps = {side: Tiled(side) for side in SIDES}
+    taken: dict[int, list[float]] = {side: [] for side in SIDES}
+    # At many places: how many places a change touches depends on where it lies. All maps in turn,
+    # so that a machine that slows down slows down all of them.
+    rng = np.random.default_rng(0)
+    for row, col in rng.integers(0, SIDES[0] - CHANGE, (PLACES, 2)).tolist():
+        for closed in (True, False):
+            for side, one in maps.items():
+                taken[side].append(one.update((row, col), closed=closed))
+    times = {side: float(np.median(found[2:])) for side, found in taken.items()}
+    ratios = {side: one.fresh / times[side] for side, one in maps.items()}
     print("\n| cells | an update, ms | a fresh build, ms | ratio |")
     print("|---|---|---|---|")
-    tile = np.ones((250, 250), np.uint8)
-    tile[::125] = tile[:, ::125] = 0
-    tile[50:60, ::125] = tile[::125, 50:60] = tile[180:190, ::125] = tile[::125, 180:190] = 1
-    for side in SIDES:
-        classes = np.tile(tile, (side // 250, side // 250))
-        probability = np.where(classes == 0, np.float32(1), np.float32(0))
-        grid = hn.OccupancyGrid(probability, hn.Frame(0.05), robot_radius_m=0)
-        version = OnlinePyramid.of(hn.DualGraphPyramid.build(grid))
-        built = time.perf_counter()
-        hn.DualGraphPyramid.build(grid)
-        fresh = time.perf_counter() - built
-        taken = []
-        # At many places: how many places a change touches depends on where it lies.
-        for low in np.random.default_rng(0).integers(0, SIDES[0] - CHANGE, (PLACES, 2)).tolist():
-            part = tuple(slice(at, at + CHANGE) for at in low)
-            box = area_of(grid.frame, tuple(low), (low[0] + CHANGE, low[1] + CHANGE))
-            for there in (True, False):
-                changed = classes.copy()
-                if there:
-                    changed[part] = 0
-                now = with_classes(grid, changed)
-                start = time.perf_counter()
-                version = version.update(now, changed=box).version
-                taken.append(time.perf_counter() - start)
-        update = float(np.median(taken[1:]))
-        print(
-            f"| {side * side:,} | {update * 1e3:.1f} | {fresh * 1e3:.0f} | {fresh / update:.0f} |",
-            flush=True,
-        )
-        times[side], ratios[side] = update, fresh / update
+    for side, one in maps.items():
+        figures = f"{times[side] * 1e3:.2f} | {one.fresh * 1e3:.0f} | {ratios[side]:.0f}"
+        print(f"| {side * side:,} | {figures} |")
     return times, ratios
 
 
