@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("uvicorn", reason="the page needs the extra view")
 pytest.importorskip("starlette", reason="the page needs the extra view")
 
-from tests.view.browser import browsing
+from tests.view.browser import WINDOW, Shown, browsing
 from tests.view.server import (
     building_session_of,
     folder_in,
@@ -51,3 +51,20 @@ def building(folder: Path) -> Iterator[Client]:
     session = building_session_of(write_building(folder))
     with served(session, folder) as client:
         yield client
+
+
+@pytest.fixture
+def context(browser: Any) -> Iterator[Any]:
+    """A person of its own, with a window of 1280 pixels."""
+    context = browser.new_context(**WINDOW)
+    yield context
+    context.close()
+
+
+@pytest.fixture
+def shown(context: Any, client: Client) -> Iterator[Shown]:
+    """The page of four rooms; nothing on it may fail, or ask another server."""
+    shown = Shown(context, client.address)
+    yield shown
+    assert shown.errors == []
+    assert all(url.startswith((client.address, "blob:", "data:")) for url in shown.requests)

@@ -8,32 +8,14 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.view.tiles import palette
-from tests.view.browser import WINDOW, Shown
+from tests.view.browser import Shown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from tests.view.server import Client
 
 START, GOAL = (10.5, 40.5), (70.5, 10.5)
-
-
-@pytest.fixture
-def context(browser: Any) -> Iterator[Any]:
-    """A person of its own, with a window of 1280 pixels."""
-    context = browser.new_context(**WINDOW)
-    yield context
-    context.close()
-
-
-@pytest.fixture
-def shown(context: Any, client: Client) -> Iterator[Shown]:
-    """The page of four rooms; nothing on it may fail."""
-    shown = Shown(context, client.address)
-    yield shown
-    assert shown.errors == []
-    assert all(url.startswith((client.address, "blob:", "data:")) for url in shown.requests)
 
 
 def _planned(shown: Shown) -> None:

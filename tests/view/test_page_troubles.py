@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.view.browser import WINDOW, Shown
+from tests.view.browser import Shown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from tests.view.server import Client
 
 pytestmark = pytest.mark.full
@@ -21,22 +19,6 @@ SEEN = """() => {
     const at = document.elementFromPoint(box.left + 20, box.top + box.height / 2);
     return box.height > 0 && box.top >= 0 && box.bottom <= innerHeight && at.id === 'status';
 }"""
-
-
-@pytest.fixture
-def context(browser: Any) -> Iterator[Any]:
-    """A person with a window of 1280 pixels."""
-    context = browser.new_context(**WINDOW)
-    yield context
-    context.close()
-
-
-@pytest.fixture
-def shown(context: Any, client: Client) -> Iterator[Shown]:
-    """The page of four rooms; nothing on it may fail."""
-    shown = Shown(context, client.address)
-    yield shown
-    assert shown.errors == []
 
 
 def _planned(shown: Shown) -> None:
