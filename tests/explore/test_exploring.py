@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import defaultdict
 from dataclasses import replace
 
 import networkx as nx
@@ -14,8 +15,9 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav.explore import Exploration, Goals, Step, explore, laser_all_round
-from hybridnav.explore.doubts import doubtful_spots
+from benchmarks.explore import missed_cells, narrow_world, widest_point
+from hybridnav.explore import By, Exploration, Goals, Step, explore, laser_all_round
+from hybridnav.explore.doubts import doubtful_spots, narrow_spots
 from hybridnav.explore.robot import Robot
 from hybridnav.mapping import SimulatedLaser, SimulatedSonars
 from tests.strategies import examples
@@ -91,7 +93,7 @@ def test_a_plan_may_be_turned() -> None:
 def test_thresholds_of_the_plan_are_none_of_the_robots_map() -> None:
     # One scan makes no cell as certain as these ask for, and no number of scans a wall.
     plan = replace(flat(), free_threshold=0.01, occupied_threshold=0.99)
-    done = explore(plan, START, most_goals=3)
+    done = explore(plan, START, most_goals=4)
     assert done.share_known > 0.2
     assert (done.grid.measured == hn.CellClass.OCCUPIED).any()
 
@@ -201,9 +203,24 @@ def test_doubtful_cells_that_close_a_door_are_a_reason_to_look_again() -> None:
     assert doubtful_spots(nothing_beyond, (0, 0)).tolist() == []
 
 
+def test_a_gap_that_only_a_thinner_robot_could_pass_is_a_reason_to_look_again() -> None:
+    # Two known rooms; the robot's radius, 1.5 cells, closes the door of two cells between them.
+    cells = np.zeros((12, 20), dtype=np.float32)
+    cells[:, 9], cells[5:7, 9] = 1.0, 0.0
+    cells[:, 17:] = np.nan
+    grid = hn.OccupancyGrid(cells, hn.Frame(0.5), robot_radius_m=0.75)
+    (spot,) = narrow_spots(grid, (5, 2)).tolist()
+    assert spot in ([5, 7], [6, 7])
+    for radius_m in (1.3, 0.4):  # no gap, even if it were a cell thinner; and it passes
+        assert narrow_spots(replace(grid, robot_radius_m=radius_m), (5, 2)).tolist() == []
+    cells[:, 17:] = 1.0
+    nothing_beyond = hn.OccupancyGrid(cells, hn.Frame(0.5), robot_radius_m=0.75)
+    assert narrow_spots(nothing_beyond, (5, 2)).tolist() == []
+
+
 def test_a_robot_with_a_noisy_laser_looks_again_before_it_ends() -> None:
     noisy = laser_all_round(noise_m=0.05)
-    done = explore(flat(radius_m=0.35), START, sensor=noisy, seed=11)
+    done = explore(flat(radius_m=0.35), START, sensor=noisy, seed=9)
     assert done.is_complete
     assert done.n_looks_again > 0
     assert done.share_known == 1.0
@@ -249,12 +266,47 @@ def test_a_robot_that_finishes_rooms_stays_while_goals_are_left() -> None:
         explore(flat(), START, by="luck")  # type: ignore[arg-type]
 
 
-def test_a_robot_that_drives_to_each_frontier_drives_farther(explored: Exploration) -> None:
-    steps: list[Step] = []
-    done = explore(flat(), START, by="frontier", watch=steps.append)
-    assert done.is_complete
+def test_a_robot_that_drives_to_each_frontier_drives_farther() -> None:
+    driven_m: dict[By, float] = defaultdict(float)
+    for seed in range(4):
+        steps: list[Step] = []
+        rankings: tuple[By, ...] = ("path", "frontier")
+        for by in rankings:
+            steps.clear()
+            done = explore(flat(), START, by=by, seed=seed, watch=steps.append)
+            assert (done.is_complete, done.share_known) == (True, 1.0)
+            driven_m[by] += done.driven_m
+        for before, after in itertools.pairwise(steps[:-1]):
+            if before.chosen >= 0:
+                goal = before.topology.grid.frame.points_of(before.goals.cells[before.chosen])
+                assert after.pose[:2] == pytest.approx(tuple(goal), abs=1e-6)
+    assert driven_m["frontier"] > driven_m["path"]
+
+
+def test_a_door_at_the_side_of_the_map_is_a_frontier() -> None:
+    """No scan meets a cell beyond the door, so it lies in the first column of the map."""
+    cells = np.ones((24, 60), dtype=np.float32)
+    cells[2:-2, 2:28] = cells[2:-2, 32:-2] = cells[10:16, 28:32] = 0.0
+    plan = hn.OccupancyGrid(cells, hn.Frame(0.1), robot_radius_m=0.2)
+    short = laser_all_round(max_range_m=0.6, noise_m=0.0)
+    done = explore(plan, (4.5, 1.25), sensor=short)
     assert done.share_known == 1.0
-    assert done.driven_m > explored.driven_m
-    for before, after in itertools.pairwise(steps[:-1]):
-        goal = before.topology.grid.frame.points_of(before.goals.cells[before.chosen])
-        assert after.pose[:2] == pytest.approx(tuple(goal), abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_robot_comes_through_doors_that_are_hardly_wider(seed: int) -> None:
+    world = narrow_world(seed, resolution_m=0.05)
+    start = widest_point(world)
+    done = explore(world, start, seed=seed)
+    assert done.is_complete
+    assert missed_cells(world, done.grid, start) == 0
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("resolution_m", [0.1, 0.05])
+def test_no_world_of_many_keeps_a_cell_unknown(resolution_m: float) -> None:
+    for seed in range(100):
+        world = narrow_world(seed, resolution_m=resolution_m)
+        start = widest_point(world)
+        done = explore(world, start, seed=seed)
+        assert missed_cells(world, done.grid, start) == 0, seed

@@ -233,7 +233,7 @@ def _summary(done: Exploration, world: hn.OccupancyGrid, out: Path | None) -> st
         f"driven     {done.driven_m:.1f} m, {len(done.points):,} scans, {done.n_goals:,} goals",
         f"known      {known:g} % of what the robot can reach, {ended}",
         f"given up   {done.n_given_up:,} cells that stayed unexplored from beside them",
-        f"doubts     {done.n_looks_again:,} spots from which doubtful cells were seen again",
+        f"doubts     {done.n_looks_again:,} spots where doubtful cells or gaps were seen again",
         f"seconds    {timings(done.seconds)}",
     ]
     return "\n".join(lines) + "\n"

@@ -11,7 +11,7 @@ from scipy import ndimage
 from hybridnav.grid import CellClass
 
 if TYPE_CHECKING:
-    from hybridnav._typing import LongArray
+    from hybridnav._typing import BoolArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
 DOUBTFUL_BELOW = 0.9
@@ -38,11 +38,10 @@ def doubtful_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
         int64 (n, 2), (row, col).
     """
     doubtful = (grid.measured == CellClass.OCCUPIED) & (grid.probability < DOUBTFUL_BELOW)
+    if not doubtful.any():
+        return np.zeros((0, 2), np.int64)
     without = replace(grid, probability=np.where(doubtful, np.float32(0.0), grid.probability))
-    reach, more = (
-        labels == labels[cell]
-        for labels, _ in (ndimage.label(g.classes == CellClass.FREE) for g in (grid, without))
-    )
+    reach, more = _connected(grid, cell), _connected(without, cell)
     beyond = ndimage.binary_dilation(without.classes == CellClass.UNEXPLORED)
     parts, n_parts = ndimage.label(more & ~reach)
     leads_on = np.zeros(n_parts + 1, dtype=np.bool_)
@@ -54,5 +53,48 @@ def doubtful_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
     return np.stack([rows[first], cols[first]], axis=1)
 
 
+def narrow_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
+    """Return the cells in reach that are nearest to where only a thinner robot could go on.
+
+    A wall may be mapped a cell too thick. So the cells are looked for that a robot could reach in
+    addition if its radius were a cell less, two cells or more off the reach, in connected sets with
+    unexplored cells beside. Each set has one spot: the cell in reach nearest to it.
+
+    Parameters
+    ----------
+    grid
+        What the robot knows.
+    cell
+        (row, col) of the robot, a free cell.
+
+    Returns
+    -------
+    LongArray
+        int64 (n, 2), (row, col).
+    """
+    if grid.robot_radius_m < grid.resolution_m:
+        return np.zeros((0, 2), np.int64)
+    thin = replace(grid, robot_radius_m=grid.robot_radius_m - grid.resolution_m)
+    reach, more = _connected(grid, cell), _connected(thin, cell)
+    parts, _ = ndimage.label(more & ~ndimage.binary_dilation(reach, _SQUARE))
+    leads_on = np.unique(parts[ndimage.binary_dilation(thin.classes == CellClass.UNEXPLORED)])
+    if not leads_on.any():
+        return np.zeros((0, 2), np.int64)
+    cells_off, nearest = ndimage.distance_transform_edt(~reach, return_indices=True)
+    first = ndimage.minimum_position(cells_off, parts, leads_on[leads_on > 0])
+    rows, cols = np.array(first, np.int64).reshape(-1, 2).T
+    spots: LongArray = nearest[:, rows, cols].T.astype(np.int64)
+    return spots
+
+
+def _connected(grid: OccupancyGrid, cell: tuple[int, int]) -> BoolArray:
+    """Return the free cells that a robot in a cell can reach, bool (rows, cols)."""
+    labels, _ = ndimage.label(grid.classes == CellClass.FREE)
+    reach: BoolArray = labels == labels[cell]
+    return reach
+
+
 _CROSS = ndimage.generate_binary_structure(2, 1)
 """A cell and its four neighbours."""
+_SQUARE = np.ones((3, 3), np.bool_)
+"""A cell and its eight neighbours, which are less than two cells off."""

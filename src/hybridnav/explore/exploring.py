@@ -25,6 +25,9 @@ By = Literal["path", "frontier", "room"]
 """How goals are ranked."""
 MOST_GOALS = 10_000
 """Goals after which an exploration ends, whatever is left."""
+_LEAVES_M = 3.0
+"""Cost of the nearest goal from which the robot leaves where it is, and first looks round there for
+doors that its map may have closed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,8 @@ class Step:
     pose: tuple[float, float, float]
     goals: Goals
     chosen: int
-    """Index of the goal, -1 where none is left: at the end, and before the robot looks again."""
+    """Index of the goal, -1 where none is left: at the end, and before the robot drives back or
+    looks again. If the goal is far, the robot may look again nearer by first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +81,7 @@ class Exploration:
     n_given_up: int
     """Unexplored cells that stayed so although the robot stood beside them."""
     n_looks_again: int
-    """Spots from which the robot scanned doubtful cells again when no goal was left."""
+    """Spots from which the robot scanned doubtful cells and narrow gaps again."""
     share_known: float
     """Share of the floor plan's free cells in the robot's reach that its map knows."""
     is_complete: bool
@@ -108,8 +112,9 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
 
     Noise can close a door or a gap in the map. So when no goal is left, the robot drives back the
     way it came if that leads to a part of its map with goals. Else it takes the occupied cells away
-    whose probability is below 0.9. Where it could then go on, it drives near, scans again and
-    starts anew, at most twice at a spot.
+    whose probability is below 0.9, and takes itself to be a cell thinner. Where it could then go
+    on, it drives near, scans again and starts anew, at most three times at a spot. Before it leaves
+    for a goal that is farther than 3 m, it does this where such a spot is nearer.
 
     Parameters
     ----------
@@ -125,7 +130,8 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
         Seed of the sensor's noise and of the pyramid.
     by
         How goals are ranked. `"path"`: by the cost of the path alone. `"frontier"`: by the same,
-        and the robot drives to each goal although it has become known, as Yamauchi's does.
+        the robot drives to each goal although it has become known, as Yamauchi's does, and it
+        looks again only when no goal is left.
         `"room"`: as `"path"`, but goals in the room that the robot is in come first.
     most_goals
         Goals after which the exploration ends, from 1.
@@ -167,11 +173,15 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
         chosen = int(np.lexsort((goals.costs_m, ~first))[0]) if len(goals) else -1
         if watch is not None:
             watch(Step(robot.topology, robot.pose, goals, chosen))
-        if chosen >= 0:
+        if chosen < 0:
+            is_complete = not (robot.go_back() or robot.look_again())
+            if is_complete:
+                break
+            continue
+        cost_m = float(goals.costs_m[chosen])
+        leaves = by != "frontier" and cost_m > _LEAVES_M
+        if not (leaves and robot.look_again(within_m=cost_m)):
             robot.visit(goals, chosen, arrives=by == "frontier")
-        elif not (robot.go_back() or robot.look_again()):
-            is_complete = True
-            break
     return Exploration(
         robot.topology.grid,
         robot.topology,

@@ -5,26 +5,27 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.explore.doubts import doubtful_spots
+from hybridnav.explore.doubts import doubtful_spots, narrow_spots
 from hybridnav.explore.goals import Goals
-from hybridnav.grid import CellClass, Frame, OccupancyGrid
-from hybridnav.grid.clearance import clearance_cells
+from hybridnav.explore.plans import cells_in_reach, rimmed, walled, widest_point
+from hybridnav.grid import CellClass
 from hybridnav.mapping import LaserModel, Mapper, SimulatedLaser, SimulatedSonars, SonarModel
+from hybridnav.mapping._beam_kernels import ray_lengths
 from hybridnav.online import OnlinePyramid, OnlineRooms
 from hybridnav.planner import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.search.moves import legal_moves
+from hybridnav.search.moves import legal_moves, length_in_cells
 from hybridnav.search.waypoints import costs_from
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
+    from hybridnav.grid import OccupancyGrid
     from hybridnav.mapping.mapper import Area
 
 Sensor = SimulatedLaser | SimulatedSonars
@@ -37,9 +38,12 @@ _NEAR_M = 0.5
 """Metres that a robot may stand beside the free cells it takes itself to be in."""
 _SCANS_AGAIN = 4
 """Scans at a spot from which the robot looks again."""
-_TRIES = 2
-"""Visits of an unexplored cell that stays unexplored before it is given up, and looks at doubtful
-cells from about the same spot."""
+_BESIDE_CELLS, _SCANS_BESIDE = 10, 8
+"""Scans from so near, in sight, that decide about a narrow gap: two looks. From afar, beams graze
+its sides, and those that cut a corner may occupy a cell of it again and again."""
+_TRIES = 3
+"""Visits of an unexplored cell that stays unexplored before it is given up, drives back to the same
+cell, and looks at doubtful cells from about the same spot."""
 
 
 def laser_all_round(*, max_range_m: float = 8.0, noise_m: float = 0.01) -> SimulatedLaser:
@@ -78,7 +82,7 @@ class Robot:
     def __init__(
         self, world: OccupancyGrid, start: tuple[float, float] | None, sensor: Sensor, seed: int
     ) -> None:
-        self._world = _walled(world)
+        self._world = walled(world)
         self._sensor, self._seed = sensor, seed
         self._turns = [0.0]
         if isinstance(sensor, SimulatedSonars):  # one echo says little of a cell
@@ -87,9 +91,10 @@ class Robot:
         far_m = sensor.max_range_m
         self._mapper = Mapper(
             resolution_m=world.resolution_m,
-            laser=LaserModel(max_range_m=far_m, clear_range_m=far_m),
+            laser=_laser_model(sensor, world.resolution_m),
             sonar=SonarModel(max_range_m=far_m),
             corner_m=world.frame.origin_m,
+            yaw_rad=world.frame.yaw_rad,
         )
         self._tries: Counter[tuple[int, int]] = Counter()
         """Visits of unexplored cells, by their row and column on the lattice."""
@@ -106,8 +111,9 @@ class Robot:
         """Points that the robot has driven through, with the bends between its scans."""
         self.n_goals, self.driven_m = 0, 0.0
         self.seconds = dict.fromkeys(("mapping", "pyramid", "goals", "rooms", "planning"), 0.0)
-        point = _widest(self._world) if start is None else start
-        self._reach_points = self._world.frame.points_of(np.argwhere(_reach(self._world, point)))
+        point = widest_point(self._world) if start is None else start
+        in_reach = np.argwhere(cells_in_reach(self._world, point))
+        self._reach_points = self._world.frame.points_of(in_reach)
         self.reach_cells = len(self._reach_points)
         self.pose = (float(point[0]), float(point[1]), 0.0)
         self._scan()
@@ -130,6 +136,7 @@ class Robot:
             name=f"{self._world.name}-explored",
             area=area,
         )
+        grid = rimmed(grid, grid.probability, math.nan)  # frontiers lie at its sides, too
         self.seconds["mapping"] += time.perf_counter() - began
         return grid
 
@@ -202,8 +209,8 @@ class Robot:
     def go_back(self) -> bool:
         """Drive back the way the robot came, to the last part of free space that has goals.
 
-        Noise can close a gap of the map behind a robot that came through it. Return whether there
-        is such a part.
+        Noise can close a gap of the map behind a robot that came through it, so it drives a metre
+        into that part. Return whether there is such a part.
         """
         from scipy import ndimage  # noqa: PLC0415 - half a second
 
@@ -223,7 +230,10 @@ class Robot:
         self._returns[last] += 1
         if self._returns[last] > _TRIES:
             return False
-        self._drive(track[back[-1] :][::-1], None)
+        steps = np.hypot(*np.diff(track[::-1], axis=0).T)
+        driven = np.concatenate([[0.0], np.cumsum(steps)])[::-1]
+        inside = back[driven[back] <= driven[back[-1]] + 2 * _NEAR_M][0]
+        self._drive(track[inside:][::-1], None)
         return True
 
     def _goal_cells(self, grid: OccupancyGrid) -> BoolArray:
@@ -233,22 +243,25 @@ class Robot:
             cells[self._in_grid(grid, cell)] = False
         return cells
 
-    def look_again(self) -> bool:
-        """Drive to the nearest spot from which doubtful cells can be seen, and scan there.
+    def look_again(self, within_m: float = math.inf) -> bool:
+        """Drive to the nearest spot from which a door may turn out to be open, and scan there.
 
-        Return whether there is one that the robot has not looked from twice.
+        Return whether there is one within a distance that the robot has not looked from enough.
         """
         began = time.perf_counter()
         grid = self.topology.grid
-        spots = doubtful_spots(grid, self._at)
-        points = grid.frame.points_of(spots)
-        looked = np.array(self._spots).reshape(-1, 1, 2)
-        near = np.hypot(*np.moveaxis(points - looked, -1, 0)) < _NEAR_M
-        spots = spots[near.sum(axis=0) < _TRIES]
-        flat = spots @ np.array([grid.shape[1], 1])
-        moves = legal_moves(grid.classes == CellClass.FREE, grid.corner_cutting)
-        costs = costs_from(moves, self._at, flat)[flat]
-        spots, costs = spots[costs >= 0], costs[costs >= 0]
+        seldom = (spot for spot in narrow_spots(grid, self._at) if self._is_seldom_seen(spot))
+        spots = np.array([*doubtful_spots(grid, self._at), *seldom], np.int64).reshape(-1, 2)
+        looked = np.reshape(self._spots, (-1, 1, 2))
+        apart_m = np.hypot(*np.moveaxis(grid.frame.points_of(spots) - looked, -1, 0))
+        spots = spots[(apart_m < _NEAR_M).sum(axis=0) < _TRIES]
+        if len(spots):
+            flat = spots @ np.array([grid.shape[1], 1])
+            moves = legal_moves(grid.classes == CellClass.FREE, grid.corner_cutting)
+            costs = costs_from(moves, self._at, flat)[flat]
+            spots, costs = spots[costs >= 0], costs[costs >= 0]
+            within = length_in_cells(costs) * grid.resolution_m < within_m
+            spots, costs = spots[within], costs[within]
         self.seconds["goals"] += time.perf_counter() - began
         if not len(spots):
             return False
@@ -261,6 +274,14 @@ class Robot:
             for _ in range(_SCANS_AGAIN):
                 self._scan()
         return True
+
+    def _is_seldom_seen(self, spot: LongArray) -> bool:
+        """Return whether too few scans were taken near a cell, in its sight."""
+        grid, centre = self.topology.grid, spot + 0.5
+        at = grid.frame.positions_of(np.array(self.points))
+        at = at[np.hypot(*(at - centre).T) < _BESIDE_CELLS]
+        blind = np.isfinite(ray_lengths(grid.measured, int(CellClass.OCCUPIED), centre, at))
+        return int((~blind).sum()) < _SCANS_BESIDE
 
     def _path_to(self, cell: LongArray) -> FloatArray | None:
         """Return the points of a path to a cell, None if the planner finds none."""
@@ -291,8 +312,7 @@ class Robot:
 
     def _is_known(self, cell: tuple[int, int]) -> bool:
         far_m = self._world.robot_radius_m + 2 * self._world.resolution_m
-        lattice = Frame(self._world.resolution_m, self._world.frame.origin_m)
-        x_m, y_m = lattice.points_of(np.array(cell)).tolist()
+        x_m, y_m = self._world.frame.points_of(np.array(cell)).tolist()
         grid = self._grid((x_m - far_m, y_m - far_m, x_m + far_m, y_m + far_m))
         row, col = self._in_grid(grid, cell)
         inside = 0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]
@@ -309,8 +329,7 @@ class Robot:
         return cell[0] - rows, cell[1] - cols
 
     def _offset(self, grid: OccupancyGrid) -> tuple[int, int]:
-        lattice = Frame(grid.resolution_m, self._world.frame.origin_m)
-        row, col = lattice.position_of(*grid.frame.origin_m)
+        row, col = self._world.frame.position_of(*grid.frame.origin_m)
         return round(row), round(col)
 
     def known_cells(self) -> int:
@@ -323,7 +342,7 @@ class Robot:
 
     @property
     def n_looks_again(self) -> int:
-        """Spots from which the robot looked at doubtful cells again."""
+        """Spots from which the robot looked again at doubtful cells and narrow gaps."""
         return len(self._spots)
 
     @property
@@ -332,37 +351,17 @@ class Robot:
         return len(self._given_up)
 
 
-def _walled(world: OccupancyGrid) -> OccupancyGrid:
-    """Return a plan in which all is wall that is not free, and so is a rim round it."""
-    walls = np.where(world.measured == CellClass.FREE, np.float32(0.0), np.float32(1.0))
-    rim = np.pad(walls, 1, constant_values=1.0)
-    x, y = world.frame.points_of_grid([-1, -1]).tolist()
-    frame = Frame(world.resolution_m, (x, y), world.frame.yaw_rad)
-    return replace(world, probability=rim, frame=frame, least_island_m2=0.0)
+def _laser_model(sensor: Sensor, resolution_m: float) -> LaserModel:
+    """Return the inverse model of a laser whose noise and poses are known.
 
-
-def _widest(plan: OccupancyGrid) -> tuple[float, float]:
-    """Return the point of a walled plan that is farthest from walls."""
-    clearance = clearance_cells(plan.measured == CellClass.OCCUPIED)
-    cell = np.unravel_index(int(clearance.argmax()), plan.shape)
-    x, y = plan.frame.points_of(np.array(cell)).tolist()
-    return x, y
-
-
-def _reach(plan: OccupancyGrid, start: tuple[float, float]) -> BoolArray:
-    """Return the cells of a walled plan that a robot can reach, bool (rows, cols)."""
-    from scipy import ndimage  # noqa: PLC0415 - half a second
-
-    point = np.asarray(start, dtype=np.float64)
-    if point.shape != (2,) or not np.isfinite(point).all():
-        raise InvalidValueError(f"the start must be two finite metres (x, y), got {start!r:.60}")
-    row, col = plan.frame.cells_of(point).tolist()
-    inside = 0 <= row < plan.shape[0] and 0 <= col < plan.shape[1]
-    if not inside or plan.classes[row, col] != CellClass.FREE:
-        raise InvalidValueError(
-            f"the start ({point[0]:g}, {point[1]:g}) is not in a free cell of the plan: choose a "
-            f"point on the map that is more than {plan.robot_radius_m:g} m from walls"
-        )
-    labels, _ = ndimage.label(plan.classes == CellClass.FREE)
-    reached: BoolArray = labels == labels[row, col]
-    return reached
+    Nearly all beams occupy a cell behind the surface that they meet, and free none. A quarter of a
+    cell at most, for beams that cut a corner would occupy cells behind it.
+    """
+    far_m, blurred_m = sensor.max_range_m, 3 * sensor.noise_m
+    return LaserModel(
+        max_range_m=far_m,
+        clear_range_m=far_m,
+        tolerance_m=min(blurred_m, resolution_m),
+        depth_m=min(max(blurred_m, 0.1 * resolution_m), 0.25 * resolution_m),
+        hits_win=False,
+    )
