@@ -458,6 +458,7 @@ def test_a_scan_without_a_reading_leaves_the_grid_where_later_ones_need_it() -> 
         {"corner_m": 3},
         {"yaw_rad": math.inf},
         {"yaw_rad": "left"},
+        {"laser": LaserModel(depth_m=1e9)},
         {"laser": "SICK"},
         {"sonar": LaserModel()},
     ],

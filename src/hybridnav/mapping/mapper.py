@@ -108,7 +108,10 @@ class Mapper:
             )
         self._limit = -log_odds_of(max(least, _NO_LIMIT))
         self._max_cells = checked_count("max_cells", max_cells, MAX_CELLS)
-        far_m = max(self._laser.max_range_m, self._sonar.max_range_m + self._sonar.tolerance_m)
+        far_m = max(
+            self._laser.max_range_m + self._laser.depth_m,
+            self._sonar.max_range_m + self._sonar.tolerance_m,
+        )
         if far_m / self.resolution_m > MOST_RANGE_CELLS:
             raise InvalidValueError(
                 f"a range of {far_m:g} m is {far_m / self.resolution_m:.0f} cells of "
