@@ -15,7 +15,7 @@ from hybridnav.explore.goals import Goals
 from hybridnav.explore.plans import cells_in_reach, rimmed, walled, widest_point
 from hybridnav.grid import CellClass
 from hybridnav.mapping import LaserModel, Mapper, SimulatedLaser, SimulatedSonars, SonarModel
-from hybridnav.mapping._beam_kernels import ray_lengths
+from hybridnav.mapping.sensors import in_sight
 from hybridnav.online import OnlinePyramid, OnlineRooms
 from hybridnav.planner import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
@@ -277,11 +277,10 @@ class Robot:
 
     def _is_seldom_seen(self, spot: LongArray) -> bool:
         """Return whether too few scans were taken near a cell, in its sight."""
-        grid, centre = self.topology.grid, spot + 0.5
+        grid, centre = self.topology.grid, spot.astype(np.float64) + 0.5
         at = grid.frame.positions_of(np.array(self.points))
         at = at[np.hypot(*(at - centre).T) < _BESIDE_CELLS]
-        blind = np.isfinite(ray_lengths(grid.measured, int(CellClass.OCCUPIED), centre, at))
-        return int((~blind).sum()) < _SCANS_BESIDE
+        return int(in_sight(grid, centre, at).sum()) < _SCANS_BESIDE
 
     def _path_to(self, cell: LongArray) -> FloatArray | None:
         """Return the points of a path to a cell, None if the planner finds none."""

@@ -17,7 +17,7 @@ from hybridnav.mapping.models import MOST_RANGE_CELLS
 from hybridnav.mapping.scans import LaserScan, SonarScan, sonar_ring
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import BoolArray, FloatArray
 
 
 def _check(max_range_m: float, noise_m: float) -> None:
@@ -55,6 +55,29 @@ def _ranges(
     )
     lengths: FloatArray = ray_lengths(grid.measured, int(CellClass.OCCUPIED), start, targets)
     return lengths * side_m
+
+
+def in_sight(grid: OccupancyGrid, start: FloatArray, targets: FloatArray) -> BoolArray:
+    """Return which targets no occupied cell hides from a start.
+
+    Parameters
+    ----------
+    grid
+        The map.
+    start
+        `(row, col)` in cells.
+    targets
+        float64 (n, 2), `(row, col)` in cells, within 2^14 cells of the start.
+
+    Returns
+    -------
+    BoolArray
+        bool (n,).
+    """
+    hidden: BoolArray = np.isfinite(
+        ray_lengths(grid.measured, int(CellClass.OCCUPIED), start, targets)
+    )
+    return ~hidden
 
 
 def _noisy(ranges_m: FloatArray, noise_m: float, seed: int | np.random.Generator) -> FloatArray:
