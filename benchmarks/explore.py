@@ -30,7 +30,7 @@ _WALL, _DEPTH, _LEAST_ROOM, _BIG_ROOM = 2, 4, 10, 24
 
 
 def narrow_world(seed: int, *, resolution_m: float = 0.1) -> hn.OccupancyGrid:
-    """Return rooms, turned by any angle, whose doors are at most a cell wider than need be.
+    """Return rooms, at one of four yaws, whose doors are at most a cell wider than need be.
 
     Walls are one or two cells thick, doors as narrow as a robot of the world's radius, 1.6 to 4.2
     cells, can pass, or a cell wider; pillars stand anywhere, in doors too.

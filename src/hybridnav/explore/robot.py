@@ -136,7 +136,6 @@ class Robot:
             name=f"{self._world.name}-explored",
             area=area,
         )
-        grid = rimmed(grid, grid.probability, math.nan)  # frontiers lie at its sides, too
         self.seconds["mapping"] += time.perf_counter() - began
         return grid
 
@@ -144,6 +143,7 @@ class Robot:
         """Bring map and pyramid up to date, and return the goals."""
         grid = self._grid()
         began = time.perf_counter()
+        grid = rimmed(grid, grid.probability, math.nan)  # frontiers lie at its sides, too
         if self._version is None:
             self._version = OnlinePyramid.of(DualGraphPyramid.build(grid, seed=self._seed))
         elif self._changed:

@@ -218,7 +218,8 @@ class Mapper:
         area = self._grown(tuple(box.tolist()))
         if area is None:
             return None
-        changes = log_odds_of(model.when_hit), log_odds_of(model.when_passed), self._limit
+        odds = log_odds_of(model.when_hit), log_odds_of(model.when_passed), self._limit
+        changes = tuple(np.float32(change) for change in odds)
         for add in (add_hits, add_passes) if model.hits_win else (add_passes, add_hits):
             add(
                 self._evidence,
@@ -226,7 +227,7 @@ class Mapper:
                 self._corner,
                 (hits, ends, kinds),
                 self._n_scans + 1,
-                tuple(np.float32(change) for change in changes),
+                changes,
             )
         return area
 
