@@ -11,10 +11,25 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.grid import CellClass
-from hybridnav.mesh import MeshSearch, build_mesh, cut_mesh, locate_polygons, renew_mesh
+from hybridnav.mesh import (
+    ConvexMesh,
+    MeshSearch,
+    build_mesh,
+    cut_mesh,
+    locate_polygons,
+    renew_mesh,
+)
+from hybridnav.metrics import VisibilityGraph
 from tests.oracle.any_angle import some_positions
-from tests.oracle.mesh import assert_sides_agree, twice_the_area
-from tests.strategies import class_grids, examples
+from tests.oracle.mesh import (
+    KINDS,
+    assert_sides_agree,
+    corners_in_use,
+    edges_between_corners,
+    search_of,
+    twice_the_area,
+)
+from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
 
 @st.composite
@@ -28,6 +43,24 @@ def cuts(draw: st.DrawFn) -> tuple[Any, Any]:
     return free, np.flatnonzero(shut)
 
 
+def assert_as_fresh(mesh: ConvexMesh, free: Any) -> None:
+    """Hold that a mesh has the corners and edges of one that is built of the free cells."""
+    fresh = build_mesh(free)
+    assert corners_in_use(mesh) == corners_in_use(fresh)
+    assert len(edges_between_corners(mesh)) == len(edges_between_corners(fresh))
+
+
+def assert_shortest(searches: list[MeshSearch], free: Any, seed: int) -> None:
+    """Hold that paths are as short as those of the visibility graph of the free cells."""
+    graph = VisibilityGraph(occupancy_grid(free.astype(np.uint8)))
+    for (first, start), (last, goal) in itertools.pairwise(some_positions(free, seed)):
+        length = graph.between(start, goal).length_m
+        for search in searches:
+            found = search.path((first, last), (start, goal))
+            assert found.length_cells == pytest.approx(length, abs=1e-9)
+            assert found.lower_bound_cells == pytest.approx(length, abs=1e-9)
+
+
 @settings(max_examples=examples(60), deadline=None)
 @given(cuts(), st.integers(0, 2**32 - 1))
 def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
@@ -37,15 +70,9 @@ def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
     mesh = cut_mesh(build_mesh(free), left, closed)
     assert_sides_agree(mesh)
     assert twice_the_area(mesh) == 2 * left.sum()
+    assert_as_fresh(mesh, left)
     assume(left.any())
-    wanted, searches = MeshSearch(build_mesh(left)), (MeshSearch(mesh), MeshSearch(mesh))
-    searches[1].prepare()
-    endpoints = some_positions(left, seed)
-    for (first, start), (last, goal) in itertools.pairwise(endpoints):
-        query = (first, last), (start, goal)
-        length = wanted.path(*query).length_cells
-        for search in searches:
-            assert search.path(*query).length_cells == pytest.approx(length, abs=1e-9)
+    assert_shortest([search_of(mesh, kind) for kind in KINDS], left, seed)
 
 
 def test_what_is_not_free_cuts_nothing() -> None:
@@ -86,6 +113,19 @@ def changes(draw: st.DrawFn) -> list[Any]:
     return maps
 
 
+def prepared_by_queries(mesh: ConvexMesh, free: Any) -> MeshSearch:
+    """A search after queries that make it prepare its graph, unless they expand nothing."""
+    search, cells = MeshSearch(mesh), np.argwhere(free)
+    pairs = cells[np.random.default_rng(0).integers(len(cells), size=(400, 2))].tolist()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hybridnav.mesh.search._WORTH", 0)
+        for (a, b), (c, d) in pairs:
+            search.path(((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5)))
+            if search.is_prepared:
+                break
+    return search
+
+
 @settings(max_examples=examples(80), deadline=None)
 @given(changes(), st.integers(0, 2**32 - 1))
 def test_a_renewed_mesh_is_as_good_as_a_fresh_one(maps: list[Any], seed: int) -> None:
@@ -103,15 +143,12 @@ def test_a_renewed_mesh_is_as_good_as_a_fresh_one(maps: list[Any], seed: int) ->
         located = locate_polygons(mesh, free)
         assert ((located.polygon_at >= 0) == free).all()
         assert (mesh.component[located.polygon_at[free]] >= 0).all()
-        if not free.any():
-            continue
-        wanted, searches = MeshSearch(build_mesh(free)), (MeshSearch(mesh), MeshSearch(located))
-        endpoints = some_positions(free, seed)
-        for (first, start), (last, goal) in itertools.pairwise(endpoints):
-            query = (first, last), (start, goal)
-            length = wanted.path(*query).length_cells
-            for search in searches:
-                assert search.path(*query).length_cells == pytest.approx(length, abs=1e-9)
+        assert_as_fresh(mesh, free)
+        if free.any():
+            searches = [search_of(mesh, kind) for kind in KINDS]
+            assert_shortest(
+                [*searches, prepared_by_queries(mesh, free), MeshSearch(located)], free, seed
+            )
 
 
 def test_a_door_that_opens_and_closes_leaves_the_other_polygons_as_they_are() -> None:
@@ -127,3 +164,13 @@ def test_a_door_that_opens_and_closes_leaves_the_other_polygons_as_they_are() ->
         assert gone.sum() <= 20
         assert renewed.n_polygons - mesh.n_polygons <= 30
         mesh = renewed
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_corners_at_which_walls_run_straight_on_are_left_out(kind: str) -> None:
+    old = drawn("#..", "#.#", "...", "#..", "#..", "##.", "#..") == CellClass.FREE
+    free = drawn("#.#", "#..", "#.#", "#..", ".#.", "##.", "#..") == CellClass.FREE
+    mesh = renew_mesh(build_mesh(old), free, np.flatnonzero(old != free))
+    assert_as_fresh(mesh, free)
+    found = search_of(mesh, kind).path(((3, 2), (5, 2)), ((3.5, 2.5), (5.5, 2.5)))
+    assert found.length_cells == found.lower_bound_cells == pytest.approx(1 + np.sqrt(2))

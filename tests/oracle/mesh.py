@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hybridnav.mesh import MeshSearch
+from hybridnav.mesh.corner_graph import find_edges
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,3 +62,24 @@ def assert_sides_agree(mesh: ConvexMesh) -> None:
     assert (mesh.twins[mesh.twins[crossable]] == crossable).all()
     assert (mesh.begins[mesh.twins[crossable]] == endpoints_of_sides(mesh)[crossable]).all()
     assert (mesh.component[mesh.polygon_of[crossable]] >= 0).all()
+
+
+def corners_in_use(mesh: ConvexMesh) -> set[tuple[int, ...]]:
+    """Row, column and kind of each corner of the polygons that belong to a component; each point
+    once."""
+    used = np.unique(mesh.begins[mesh.component[mesh.polygon_of] >= 0])
+    found = np.column_stack([mesh.corners[used], mesh.kinds[used]]).tolist()
+    assert len({(row, col) for row, col, _ in found}) == len(found)
+    return {tuple(corner) for corner in found}
+
+
+def edges_between_corners(mesh: ConvexMesh) -> set[tuple[int, int]]:
+    """The edges of the graph of corners, each of which has its reverse."""
+    edges = find_edges(mesh, MeshSearch(mesh).arrays)
+    assert edges is not None
+    first, heads = edges
+    tails = np.repeat(np.arange(len(mesh.corners)), np.diff(first[::2]))
+    found = set(zip(tails.tolist(), heads.tolist(), strict=True))
+    assert len(found) == len(heads)
+    assert found == {(head, tail) for tail, head in found}
+    return found

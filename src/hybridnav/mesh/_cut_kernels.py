@@ -207,26 +207,17 @@ def corners_of_cells(free, closed):
     return found, kinds
 
 
-@njit(cache=True, nogil=True)
-def _holds(points, at):
-    """Return the index of a flat lattice point in a sorted list, -1 if it is not there."""
-    found = np.searchsorted(points, at)
-    return found if found < len(points) and points[found] == at else -1
-
-
 @guarded
 @njit(cache=True, nogil=True)
-def walls_of_changed(free, changed, points):
-    """Return the walls at changed cells, from vertex to vertex.
+def walls_between(free, points):
+    """Return the walls from one of some corners to the next corner, if that is one of them too.
 
     Parameters
     ----------
     free
         bool (rows, cols), the free cells now.
-    changed
-        int64 (m,), flat cells.
     points
-        int64 (n,), flat lattice points that are vertices, sorted.
+        int64 (n,), flat lattice points at which walls turn, sorted.
 
     Returns
     -------
@@ -235,119 +226,54 @@ def walls_of_changed(free, changed, points):
     """
     rows, cols = free.shape
     wide = cols + 1
-    walls = np.empty((4 * len(changed), 2), np.int64)
+    walls = np.empty((2 * len(points), 2), np.int64)
     n = 0
-    for cell in changed:
-        row, col = cell // cols, cell % cols
-        for side in range(4):
-            # The other cell of the side, and the two endpoints of the side.
-            down = row - 1 if side == 0 else row + 1 if side == 1 else row
-            across = col - 1 if side == 2 else col + 1 if side == 3 else col
-            beyond = 0 <= down < rows and 0 <= across < cols and free[down, across]
-            if beyond == free[row, col]:
+    for begin in range(len(points)):
+        row, col = points[begin] // wide, points[begin] % wide
+        for step in (1, wide):
+            if not _is_wall(free, row, col, step):
                 continue
-            at = (row + (side == 1)) * wide + col + (side == 3)
-            step = 1 if side < 2 else wide
-            begin = _holds(points, at)
-            if begin < 0 and not free[row, col]:
-                continue  # the wall begins at another closed cell
-            while begin < 0:
-                at -= step
-                begin = _holds(points, at)
-            end = at + step
-            stop = _holds(points, end)
-            while stop < 0:
+            # A wall ends at a corner, at the latest on the rim of the map.
+            end = points[begin] + step
+            for _ in range(rows + cols):
+                if kind_at(free, end // wide, end % wide) != NO_CORNER:
+                    break
                 end += step
-                stop = _holds(points, end)
-            walls[n, 0], walls[n, 1] = begin, stop
-            n += 1
+            stop = np.searchsorted(points, end)
+            if stop < len(points) and points[stop] == end:
+                walls[n, 0], walls[n, 1] = begin, stop
+                n += 1
     return walls[:n].copy()
+
+
+@njit(cache=True, nogil=True)
+def _is_wall(free, row, col, step):
+    """Return whether one cell of two is free beside the side from a lattice point, along the row
+    with a step of 1, else along the column."""
+    rows, cols = free.shape
+    if step == 1:
+        below = row > 0 and col < cols and free[row - 1, col]
+        return below != (row < rows and col < cols and free[row, col])
+    before = row < rows and col > 0 and free[row, col - 1]
+    return before != (row < rows and col < cols and free[row, col])
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def rim_of(sides, is_touched, touched):
-    """Return the slots of touched polygons that are walls or lead to other polygons, int64."""
+def doors_of(sides, is_touched, touched):
+    """Return the slots of touched polygons that lead to polygons which are not, int64."""
     first, _, twins, polygon_of = sides
     n = 0
     for polygon in touched:
         n += first[polygon + 1] - first[polygon]
-    rim = np.empty(n, np.int64)
+    doors = np.empty(n, np.int64)
     n = 0
     for polygon in touched:
         for slot in range(first[polygon], first[polygon + 1]):
-            if twins[slot] < 0 or not is_touched[polygon_of[twins[slot]]]:
-                rim[n] = slot
+            if twins[slot] >= 0 and not is_touched[polygon_of[twins[slot]]]:
+                doors[n] = slot
                 n += 1
-    return rim[:n].copy()
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def segments_of_rim(sides, rim, point_of, points, free):
-    """Return the sides of a rim, divided at vertices, int64 (w, 2), indices of `points`.
-
-    Parameters
-    ----------
-    sides
-        Arrays first, begins, twins, polygon_of of the mesh.
-    rim
-        Slots of `rim_of`. Walls run along rows or columns; no other side passes a vertex.
-    point_of
-        int64 (n,), flat lattice point of each corner of the mesh.
-    points
-        int64 (k,), flat lattice points that are vertices, sorted.
-    free
-        bool (rows, cols), the free cells now: sides of walls between two of them are left out.
-    """
-    first, begins, twins, polygon_of = sides
-    wide = free.shape[1] + 1
-    segments = np.empty((2 * len(rim) + 4 * len(points), 2), np.int64)
-    n = 0
-    for slot in rim:
-        polygon = polygon_of[slot]
-        after = first[polygon] if slot + 1 == first[polygon + 1] else slot + 1
-        at, end = point_of[begins[slot]], point_of[begins[after]]
-        if twins[slot] >= 0:
-            segments[n, 0], segments[n, 1] = _holds(points, at), _holds(points, end)
-            n += 1
-            continue
-        step = wide if abs(end - at) >= wide else 1
-        if end < at:
-            step = -step
-        here, back = _holds(points, at), at
-        # Where a wall goes on at one of its former ends, this end is no vertex.
-        while here < 0 and _n_free(free, at, step) == 1:
-            back -= step
-            here = _holds(points, back)
-        left, there = abs(end - at) // abs(step), here
-        while left > 0 or (here >= 0 and there < 0):
-            n_free = _n_free(free, at, step)
-            if n_free == 2 or (left <= 0 and n_free == 0):
-                here = -1
-            at += step
-            left -= 1
-            there = _holds(points, at)
-            if there >= 0:
-                if here >= 0:
-                    segments[n, 0], segments[n, 1] = here, there
-                    n += 1
-                here = there
-    return segments[:n].copy()
-
-
-@njit(cache=True, nogil=True)
-def _n_free(free, at, step):
-    """Return how many cells beside the side from a lattice point on are free."""
-    rows, cols = free.shape
-    wide = cols + 1
-    low = min(at, at + step)
-    row, col = low // wide, low % wide
-    if abs(step) == 1:
-        below = row > 0 and free[row - 1, col]
-        return int(below) + int(row < rows and free[row, col])
-    before = col > 0 and free[row, col - 1]
-    return int(before) + int(col < cols and free[row, col])
+    return doors[:n].copy()
 
 
 @guarded

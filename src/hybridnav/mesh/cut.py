@@ -87,12 +87,12 @@ def renew_mesh(mesh: ConvexMesh, free: BoolArray, changed: LongArray) -> ConvexM
     looked = np.concatenate([changed[~free.ravel()[changed]], beside])
     place = mesh.polygon_at, mesh.component
     is_cut, cut = kernels.touched_polygons(mesh.corners, sides, place, looked)
-    hole = _Hole(cut, kernels.rim_of(sides, is_cut, cut), freed)
+    hole = _Hole(cut, kernels.doors_of(sides, is_cut, cut), freed)
     slots = np.concatenate(
         [np.empty(0, np.int64), *(np.arange(*mesh.first[number : number + 2]) for number in cut)]
     )
-    vertices = _vertices_of(mesh, slots, free, (changed, freed))
-    anew = _polygons_in(mesh, hole, vertices, free, changed)
+    vertices = _vertices_of(mesh, slots, free, changed)
+    anew = _polygons_in(mesh, hole, vertices, free)
     polygons = _with_hole_filled(mesh, hole, slots, anew)
     blocks = blocks_of(polygons[0], *polygons[2:])
     is_gone = np.concatenate([mesh.component < 0, np.zeros(len(anew[0]) - 1, np.bool_)])
@@ -139,10 +139,10 @@ def locate_polygons(mesh: ConvexMesh, free: BoolArray) -> ConvexMesh:
 
 @dataclass(frozen=True, eq=False)
 class _Hole:
-    """Polygons that are removed, their slots round the hole that remains, and freed cells."""
+    """Polygons that are removed, their slots that lead to others, and freed cells."""
 
     polygons: IntArray
-    rim: LongArray
+    doors: LongArray
     freed: LongArray
 
 
@@ -161,46 +161,39 @@ class _Vertices:
 
 
 def _vertices_of(
-    mesh: ConvexMesh, slots: LongArray, free: BoolArray, cells: tuple[LongArray, LongArray]
+    mesh: ConvexMesh, slots: LongArray, free: BoolArray, changed: LongArray
 ) -> _Vertices:
-    """Return the corners of the removed polygons, and the points at which walls turn now.
+    """Return the corners in a hole: those at which walls turn now, as in a fresh mesh.
 
-    Points at freed cells where no wall turns any more are left out; no other polygon has them.
+    Points at changed cells where walls have begun to run straight on are left out. No other polygon
+    has them: all free cells round them belong to the hole.
     """
     wide = free.shape[1] + 1
-    changed, freed = cells
+    at, kinds_at = kernels.corners_of_cells(free, changed)
+    turns = kinds_at != NO_CORNER
     old = np.unique(mesh.begins[slots])
     known = mesh.corners[old] @ np.array([wide, 1], dtype=np.int64)
-    at, kinds_at = kernels.corners_of_cells(free, changed)
-    if len(freed):
-        around, kinds_around = kernels.corners_of_cells(free, freed)
-        stays = ~np.isin(known, around[kinds_around == NO_CORNER])
-        old, known = old[stays], known[stays]
-    order = np.argsort(known)
-    old, known = old[order], known[order]
-    made = np.setdiff1d(at[kinds_at != NO_CORNER], known)
-    points = np.union1d(known, made)
-    number_of = np.empty(len(points), np.int32)
-    number_of[np.searchsorted(points, known)] = old
-    number_of[np.searchsorted(points, made)] = len(mesh.corners) + np.arange(len(made))
+    is_straight = np.isin(known, at[~turns])
+    made = np.setdiff1d(at[turns], known)
+    points = np.concatenate([known[~is_straight], made])
+    number_of = np.concatenate([old[~is_straight], len(mesh.corners) + np.arange(len(made))])
+    order = np.argsort(points)
+    points, number_of = points[order], number_of[order].astype(np.int32)
     corners = np.concatenate([mesh.corners, np.stack(np.divmod(made, wide), axis=1)])
     kinds = np.concatenate([mesh.kinds, np.full(len(made), MANY, np.uint8)])
-    is_one = np.isin(at, points)
-    kinds[number_of[np.searchsorted(points, at[is_one])]] = np.minimum(kinds_at[is_one], MANY)
+    kinds[old[is_straight]] = MANY
+    kinds[number_of[np.searchsorted(points, at[turns])]] = kinds_at[turns]
     return _Vertices(points, number_of, corners.astype(np.int32), kinds)
 
 
 def _polygons_in(
-    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray, changed: LongArray
+    mesh: ConvexMesh, hole: _Hole, vertices: _Vertices, free: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """Fill a hole; return first slots, corners, twins and polygons of slots of the new polygons."""
-    sides = mesh.first, mesh.begins, mesh.twins, mesh.polygon_of
-    wide = free.shape[1] + 1
-    around = mesh.corners @ np.array([wide, 1], dtype=np.int64)
-    rim = kernels.segments_of_rim(sides, hole.rim, around, vertices.points, free)
-    walls = np.concatenate([rim, kernels.walls_of_changed(free, changed, vertices.points)])
-    if len(hole.freed):
-        walls = np.unique(np.sort(walls, axis=1), axis=0)
+    ends = np.stack([mesh.begins[hole.doors], mesh.finishes[hole.doors]], axis=1)
+    around = mesh.corners[ends] @ np.array([free.shape[1] + 1, 1], dtype=np.int64)
+    doors = np.searchsorted(vertices.points, around)
+    walls = np.concatenate([doors, kernels.walls_between(free, vertices.points)])
     local = vertices.corners[vertices.number_of]
     triangles, neighbours = triangulate(local, walls)
     kept = are_free(local, triangles, free)
@@ -225,8 +218,7 @@ def _with_hole_filled(
     n_slots = len(mesh.begins)
     all_twins = np.concatenate([mesh.twins, np.where(twins >= 0, twins + n_slots, -1)])
     all_twins[slots] = -1
-    doors = hole.rim[mesh.twins[hole.rim] >= 0]
-    behind, before = _joined(mesh, doors, (first, begins, twins))
+    behind, before = _joined(mesh, hole.doors, (first, begins, twins))
     all_twins[behind], all_twins[n_slots + before] = n_slots + before, behind
     return (
         np.concatenate([mesh.first, n_slots + first[1:]]),
