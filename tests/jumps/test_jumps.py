@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -171,6 +172,15 @@ def test_a_contracted_graph_expands_less() -> None:
 def test_noise_is_not_contracted_for_minutes() -> None:
     graph = build_jump_graph(np.random.default_rng(0).random((300, 300)) > 0.1)
     assert contract_graph(graph) is graph
+
+
+def test_a_graph_with_an_arc_without_its_reverse_is_not_contracted() -> None:
+    graph = build_jump_graph(drawn("......", "..##..", "......", ".##...", "......") == 1)
+    assert contract_graph(graph).is_contracted
+    for arc in range(len(graph.arcs)):
+        first = (graph.first - (graph.first > arc)).astype(graph.first.dtype)
+        halved = replace(graph, first=first, arcs=np.delete(graph.arcs, arc, axis=0))
+        assert contract_graph(halved) is halved
 
 
 def test_threads_that_share_a_search_get_the_answers_of_one() -> None:

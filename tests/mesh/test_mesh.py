@@ -25,6 +25,7 @@ from hybridnav.mesh import (
     CornerHierarchy,
     MeshSearch,
     build_mesh,
+    corner_graph,
     shortest_paths,
 )
 from hybridnav.metrics import VisibilityGraph, segment_faults
@@ -106,6 +107,31 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
             assert not segment_faults(grid, points)
         back = search.path((last, first), (goal, start))
         assert back.length_cells == pytest.approx(found.length_cells)
+
+
+def test_a_graph_with_an_edge_without_its_reverse_is_not_used(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    classes = drawn(".....", ".###.", ".###.", ".....")
+    graph, mesh = VisibilityGraph(occupancy_grid(classes)), build_mesh(classes == CellClass.FREE)
+    made = corner_graph.kernels.edges_of
+    whole = MeshSearch(mesh)
+    whole.prepare()
+    assert whole.edges is not None
+    for edge in range(len(whole.edges[1])):
+
+        def all_but_one(*given: Any, edge: int = edge) -> Any:
+            first, heads = made(*given)
+            return first - (first > edge), np.delete(heads, edge)
+
+        monkeypatch.setattr(corner_graph.kernels, "edges_of", all_but_one)
+        search = MeshSearch(mesh)
+        search.prepare()
+        assert search.is_prepared
+        assert search.graph is search.edges is search.landmarked() is None
+        found = search.path(((0, 0), (3, 4)), ((0.5, 0.5), (3.5, 4.5)))
+        assert found.length_cells == found.lower_bound_cells
+        assert found.length_cells == pytest.approx(graph.shortest((0, 0), (3, 4)).length_m)
 
 
 def test_copies_of_a_search_answer_by_the_kernels_that_are_compiled() -> None:

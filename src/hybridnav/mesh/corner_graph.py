@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.mesh import _corner_graph_kernels as kernels
+from hybridnav.search.contraction import have_reverses
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, IntArray, LongArray
@@ -60,7 +61,8 @@ def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray,
     Returns
     -------
     tuple or None
-        See `CornerGraph`. None if there are too many edges, as on wide open maps.
+        See `CornerGraph`. None if there are too many edges, as on wide open maps, or if one has no
+        reverse: searches rely on both.
 
     Notes
     -----
@@ -68,7 +70,7 @@ def find_edges(mesh: ConvexMesh, arrays: tuple[object, ...]) -> tuple[LongArray,
     using hierarchical taut paths, 2017.
     """
     first, heads = kernels.edges_of(arrays, mesh.component, _MOST_EDGES * len(mesh.corners))
-    if first[-1] < 0:
+    if first[-1] < 0 or not have_reverses(first[::2], heads):
         return None
     for array in (first, heads):
         array.flags.writeable = False

@@ -23,6 +23,8 @@ SLACK = 6000
 """Delay with which a corner may still be contracted, in thousandths of a level. With 0 there are 3
 % fewer shortcuts, in twice the time."""
 _UNKNOWN = -(1 << 40)
+_MOST_ARCS = 1 << 16
+"""Most arcs from a corner, whose positions have 16 bits, see `contract`."""
 HEAD_SHIFT = 12
 """Bits of the two classes of an arc, see `pack`."""
 
@@ -34,6 +36,40 @@ def pack(head, near, far):
     Classes are below 64 and describe how the arc leads away from the corner.
     """
     return head << HEAD_SHIFT | near << 6 | far
+
+
+@njit(cache=True, nogil=True)
+def have_reverses(first, heads):
+    """Return whether each arc of a graph occurs once, and once in the other direction.
+
+    Parameters
+    ----------
+    first, heads
+        Offsets of the arcs of each corner, and the corner at which each arc ends.
+    """
+    n = first.size - 1
+    begin = np.zeros(n + 1, np.int64)
+    for arc in range(heads.size):
+        begin[heads[arc] + 1] += 1
+    for node in range(n):
+        begin[node + 1] += begin[node]
+    tails, at = np.empty(heads.size, np.int64), begin.copy()
+    for node in range(n):
+        for arc in range(first[node], first[node + 1]):
+            tails[at[heads[arc]]] = node
+            at[heads[arc]] += 1
+    seen = np.full(n, -1, np.int64)
+    for node in range(n):
+        for arc in range(first[node], first[node + 1]):
+            if seen[heads[arc]] == node:
+                return False
+            seen[heads[arc]] = node
+        if begin[node + 1] - begin[node] != first[node + 1] - first[node]:
+            return False
+        for arc in range(begin[node], begin[node + 1]):
+            if seen[tails[arc]] != node:
+                return False
+    return True
 
 
 @njit(cache=True, nogil=True)
@@ -166,12 +202,12 @@ def _take_out(begin, size, pool, node):
     for arc in range(begin[node], begin[node] + size[node]):
         other = pool[arc, 1] >> HEAD_SHIFT
         last = begin[other] + size[other] - 1
-        at = begin[other]
-        while pool[at, 1] >> HEAD_SHIFT != node:
-            at += 1
-        for k in range(3):
-            pool[at, k] = pool[last, k]
-        size[other] -= 1
+        for at in range(begin[other], last + 1):
+            if pool[at, 1] >> HEAD_SHIFT == node:
+                for k in range(3):
+                    pool[at, k] = pool[last, k]
+                size[other] -= 1
+                break
 
 
 @njit(cache=True, nogil=True)
@@ -240,14 +276,15 @@ def contract(kinds, first, arcs, follow, effort):
         uint8 (n,), kinds of corners.
     first, arcs
         The graph: offsets of the arcs of each corner; int64 (m, 2), the cost of each, and the
-        result of `pack`. Each arc comes with its reverse.
+        result of `pack`. Each arc comes with its reverse; a graph with one that does not is given
+        up at once.
     follow
         int64 (kinds, classes): bit c is set where a shortest path that passes a corner of this kind
         along an arc of the one class may continue along one of class c. If the bit is not set, the
         two must cost more than another path, by more than the rounding of costs.
     effort
         Most corners that a witness search settles; most arcs to examine before contraction is given
-        up.
+        up, as it also is for a corner with more than `_MOST_ARCS` arcs.
 
     Returns
     -------
@@ -272,9 +309,17 @@ def contract(kinds, first, arcs, follow, effort):
     pairs = np.empty((most, 2), np.int64)
     stamp = looked = np.int64(0)
     waiting = n
+    is_given_up = not have_reverses(first, arcs[:, 1] >> HEAD_SHIFT)
     while waiting > 0:
         node = pop(queue, waiting)
         waiting -= 1
+        legs = np.int64(0)
+        for arc in range(begin[node], begin[node] + size[node]):
+            legs += pool[arc, 2] & 0xFFFFFFFF
+            looked += size[node] + most_settled * size[pool[arc, 1] >> HEAD_SHIFT]
+        if is_given_up or looked > most_looked or size[node] > _MOST_ARCS:
+            size[:] = 0
+            return *_packed_arcs(begin, size, pool), taken
         if most_settled * most >= heap.shape[0]:
             heap = np.empty((2 * most_settled * most + 1, 2), np.int64)
         if size[node] * size[node] > pairs.shape[0]:
@@ -283,13 +328,6 @@ def contract(kinds, first, arcs, follow, effort):
         n_pairs, n_legs, stamp = _shortcuts(graph, node, stamp, work, pairs)
         key = 1000 * level[node]
         if size[node] > 0:
-            legs = np.int64(0)
-            for arc in range(begin[node], begin[node] + size[node]):
-                legs += pool[arc, 2] & 0xFFFFFFFF
-                looked += size[node] + most_settled * size[pool[arc, 1] >> HEAD_SHIFT]
-            if looked > most_looked:
-                size[:] = 0
-                return *_packed_arcs(begin, size, pool), taken
             key += 1000 * n_pairs // size[node] + 1000 * n_legs // legs
         if waiting > 0 and key > queue[0, 0] + SLACK:
             push(queue, waiting, key, node)

@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
-from hybridnav.search._contract_kernels import HEAD_SHIFT, contract, pack, renumbered
+from hybridnav.search._contract_kernels import (
+    HEAD_SHIFT,
+    contract,
+    have_reverses,
+    pack,
+    renumbered,
+)
 from hybridnav.search._unpack_kernels import NO_ARC, corners_between
 
-__all__ = ["HEAD_SHIFT", "NO_ARC", "contract", "corners_between", "pack", "renumbered"]
+__all__ = [
+    "HEAD_SHIFT",
+    "NO_ARC",
+    "contract",
+    "corners_between",
+    "have_reverses",
+    "pack",
+    "renumbered",
+]
