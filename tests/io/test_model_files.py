@@ -49,6 +49,12 @@ def content(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return path.read_bytes()
 
 
+def prepared_planners(path: Path) -> list[hn.HybridPlanner]:
+    """The planners in a file."""
+    model = hn.load(path)
+    return [model.planner(name) for name in PRESETS]
+
+
 def read_all(path: Path) -> list[float]:
     """Everything that a file holds, and what it answers."""
     model = hn.load(path)
@@ -236,6 +242,74 @@ def test_an_index_out_of_range_is_found_though_its_checksum_is_right(
     array.flat[array.size // 2] = value
     container.write_parts(path, found, compress=False)
     assert kind in refusal(path)
+
+
+def _rolled(name: str) -> Callable[[Any], None]:
+    """Give each valid index to the next place that has one."""
+
+    def change(arrays: Any) -> None:
+        valid = np.flatnonzero(arrays[name] >= 0)
+        arrays[name][valid] = np.roll(arrays[name][valid], 1)
+
+    return change
+
+
+def _less_deep(arrays: Any) -> None:
+    arrays["depth"][np.argmax(arrays["depth"])] -= 1
+
+
+def _one_sided(arrays: Any) -> None:
+    heads = arrays["heads"]
+    heads[0] = heads[0] + 1 if heads[0] == 0 else heads[0] - 1
+
+
+def _free_of_cost(arrays: Any) -> None:
+    arrays["arcs"][0, 0] = 0
+
+
+def _standing_for_itself(arrays: Any) -> None:
+    """Make the first arc a shortcut that consists of itself, twice."""
+    tail = int(np.flatnonzero(np.diff(arrays["first"]))[0])
+    arrays["middles"][0] = tail << 32
+
+
+def _going_round(arrays: Any) -> None:
+    """Let two vertices go into each other."""
+    gone = np.flatnonzero(arrays["vertex_parent"] >= 0)[:2]
+    arrays["vertex_parent"][gone] = gone[::-1]
+
+
+def _out_of_the_map(arrays: Any) -> None:
+    arrays["edge_end"][-1] = 3
+
+
+CONTRADICTIONS = [
+    ("mesh", _rolled("twins"), "twins"),
+    ("mesh", _rolled("polygon_of"), "polygon_of"),
+    ("mesh", _less_deep, "depth"),
+    ("corner edges", _one_sided, "no reverse"),
+    ("corner hierarchy", _free_of_cost, "cost nothing"),
+    ("corner hierarchy", _standing_for_itself, "the two that they stand for"),
+    ("jump graph", _free_of_cost, "cost nothing"),
+    ("pyramid", _going_round, "do not outlive them"),
+    ("pyramid", _out_of_the_map, "out of the map"),
+]
+"""Values in range, on which a walk would have no end, or lead out of its arrays."""
+
+
+@pytest.mark.parametrize(("kind", "change", "message"), CONTRADICTIONS)
+def test_values_that_contradict_each_other_are_found_though_their_checksum_is_right(
+    kind: str, change: Callable[[Any], None], message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "m.hnm"
+    hn.save(planners(), path)
+    found = [filed.read() for filed in container.read_parts(path)]
+    arrays = next(each for each in found if each.kind == kind).arrays
+    arrays.update({name: array.copy() for name, array in arrays.items()})
+    change(arrays)
+    container.write_parts(path, found, compress=False)
+    with pytest.raises(hn.ModelError, match=f"{kind}: .*{message}"):
+        prepared_planners(path)
 
 
 def test_other_files_are_no_models(tmp_path: Path) -> None:

@@ -238,7 +238,7 @@ def sweeps(survivors, edge_end, level, cols):
     """
     n_cells = edge_end.size // 2
     sweep = np.zeros(n_cells, np.int32)
-    stack = np.empty((n_cells, 2), np.int32)
+    stack, left = np.empty((n_cells, 2), np.int32), n_cells
     for root in survivors:
         stack[0, 0], stack[0, 1] = root, -1
         size = 1
@@ -255,6 +255,10 @@ def sweeps(survivors, edge_end, level, cols):
                 beyond = second if first == cell else first
                 rise = (beyond - cell) // cols if edge & 1 else 0
                 sweep[beyond] = sweep[cell] + rise * (cell % cols)
+                # Contracted edges are a forest, in which each cell is met once.
+                left -= 1
+                if left <= 0:
+                    return sweep
                 stack[size, 0], stack[size, 1] = beyond, edge
                 size += 1
     return sweep

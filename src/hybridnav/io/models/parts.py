@@ -17,7 +17,14 @@ from hybridnav.io.models.array_specs import refusal
 from hybridnav.io.models.structures import GRID, PRESET, PYRAMID, ROOMS
 from hybridnav.io.size import check_size
 from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize, Linkage, Record
+from hybridnav.pyramid.record import (
+    MAX_LEVELS,
+    SURVIVES,
+    BuildStats,
+    LevelSize,
+    Linkage,
+    Record,
+)
 
 if TYPE_CHECKING:
     from hybridnav._typing import AnyArray
@@ -242,6 +249,13 @@ def pyramid_of(
     if len(values.tops) < wanted or max(values.tops) >= len(values.sizes):
         raise refusal(filed, f"tops are {values.tops}, of {len(values.sizes)} levels")
     record = Record(**PYRAMID.read(filed, known))
+    gone = np.flatnonzero((record.vertex_end > 0) & (record.vertex_end < SURVIVES))
+    into = record.vertex_parent[gone]
+    if (into < 0).any() or (record.vertex_end[into] <= record.vertex_end[gone]).any():
+        raise refusal(filed, "vertices go into others that do not outlive them")
+    edge_end = record.edge_end.reshape(known["rows"], known["cols"], 2)
+    if edge_end[-1, :, 1].any() or edge_end[:, -1, 0].any():
+        raise refusal(filed, "edges lead out of the map")
     sizes = [LevelSize(*size) for size in values.sizes]
     stats = BuildStats(sizes, dict(values.seconds), list(values.tops))
     return DualGraphPyramid(

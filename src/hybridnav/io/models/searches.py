@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from hybridnav.config import PlannerSettings
     from hybridnav.io.models.container import FiledPart, Part
     from hybridnav.jumps import JumpSearch
-    from hybridnav.mesh import CornerGraph, CornerHierarchy, MeshSearch
+    from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.planner.cell_planner import Prepared
     from hybridnav.portals import BuiltPortals
     from hybridnav.topology import TopologicalMap
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 _FRAME = 2
 """Rows and columns of the frame of blocked cells round a jump-point graph."""
+_SIDES = 3
+"""Least number of sides of a polygon."""
 
 
 class _Values(BaseModel):
@@ -144,11 +146,34 @@ def _mesh_parts(search: MeshSearch, key: dict[str, Any]) -> list[Part]:
 
 def _mesh_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> MeshSearch:
     values = values_of(_MeshValues, fitting[MESH.kind])
-    search = meshes.MeshSearch(meshes.ConvexMesh(**MESH.read(fitting[MESH.kind], known)))
+    mesh = meshes.ConvexMesh(**MESH.read(fitting[MESH.kind], known))
+    _check_mesh(fitting[MESH.kind], mesh)
+    search = meshes.MeshSearch(mesh)
     search.expanded = values.expanded
     if values.is_prepared:
         search.adopt(*_corners_of(fitting, known, len(search.mesh.corners)))
     return search
+
+
+def _check_mesh(filed: FiledPart, mesh: ConvexMesh) -> None:
+    """Refuse sides that do not belong together, and blocks that form no tree: searches walk from
+    side to side, and up the tree."""
+    twins, finishes = mesh.twins, mesh.finishes
+    slots = np.flatnonzero(twins >= 0)
+    behind = twins[slots]
+    size = np.diff(mesh.first)
+    if (mesh.polygon_of != np.repeat(np.arange(mesh.n_polygons), size)).any() or (
+        size < _SIDES
+    ).any():
+        raise refusal(filed, "polygon_of and first name other polygons")
+    is_joined = (twins[behind] == slots) & (mesh.begins[behind] == finishes[slots])
+    if not (is_joined & (finishes[behind] == mesh.begins[slots])).all():
+        raise refusal(filed, "twins are not each other's, or do not run the other way")
+    deep = np.flatnonzero(mesh.block_up >= 0)
+    above = mesh.block_head[mesh.block_up[deep]]
+    is_tree = (mesh.depth[above] == mesh.depth[deep] - 1).all()
+    if not is_tree or (mesh.depth[mesh.block_up < 0] != 0).any():
+        raise refusal(filed, "depth is not that of a tree of blocks")
 
 
 def _corners_of(
@@ -160,6 +185,7 @@ def _corners_of(
             _check_same(fitting[structure.kind], "corners", n_corners)
     if CORNER_GRAPH.kind in fitting:
         graph = meshes.CornerGraph(**CORNER_GRAPH.read(fitting[CORNER_GRAPH.kind], known))
+        _check_edges(fitting[CORNER_GRAPH.kind], graph.first, graph.heads)
         return (graph.first, graph.heads), graph
     if CORNER_HIERARCHY.kind not in fitting:
         return None, None
@@ -168,8 +194,17 @@ def _corners_of(
         raise refusal(filed, f"the {CORNER_EDGES.kind} are missing")
     edges = CORNER_EDGES.read(fitting[CORNER_EDGES.kind], known)
     arrays = CORNER_HIERARCHY.read(filed, known)
+    _check_edges(fitting[CORNER_EDGES.kind], edges["first"], edges["heads"])
     _check_arcs(filed, arrays)
     return (edges["first"], edges["heads"]), meshes.CornerHierarchy(**arrays)
+
+
+def _check_edges(filed: FiledPart, first: LongArray, heads: IntArray) -> None:
+    """Refuse edges without their reverse."""
+    from hybridnav.search.contraction import have_reverses  # noqa: PLC0415 - loads numba
+
+    if not have_reverses(first[::2], heads):
+        raise refusal(filed, "an edge has no reverse")
 
 
 def _jump_parts(search: JumpSearch, key: dict[str, Any]) -> list[Part]:
@@ -203,16 +238,23 @@ def _jumps_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> JumpSearc
 
 
 def _check_arcs(filed: FiledPart, arrays: dict[str, Any]) -> None:
-    """Refuse arcs to corners, and references to arcs, that do not exist."""
+    """Refuse arcs to corners, and references to arcs, that do not exist, and shortcuts that do not
+    cost what their two arcs cost: as each of these costs less, unpacking ends."""
     from hybridnav.search.contraction import HEAD_SHIFT  # noqa: PLC0415 - loads numba
+    from hybridnav.search.moves import FAR  # noqa: PLC0415 - loads numba
 
     heads, middles = arrays["arcs"][:, 1] >> HEAD_SHIFT, arrays["middles"]
-    past = middles[middles >= 0]
+    shortcuts = np.flatnonzero(middles >= 0)
+    past = middles[shortcuts]
     room = np.diff(arrays["first"])[past >> 32]
     if (heads >= filed.part.sizes["corners"]).any():
         raise refusal(filed, "arcs lead to corners that do not exist")
     if ((past >> 16 & 0xFFFF) >= room).any() or ((past & 0xFFFF) >= room).any():
         raise refusal(filed, "middles name arcs that do not exist")
+    costs, begin = arrays["arcs"][:, 0], arrays["first"][past >> 32]
+    parts = costs[begin + (past >> 16 & 0xFFFF)] + costs[begin + (past & 0xFFFF)]
+    if not ((costs > 0) & (costs < FAR)).all() or (costs[shortcuts] != parts).any():
+        raise refusal(filed, "arcs cost nothing, or other than the two that they stand for")
 
 
 def _check_index(filed: FiledPart, index: LongArray) -> None:

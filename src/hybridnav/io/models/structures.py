@@ -124,7 +124,7 @@ PORTALS = Structure(
         _Open("clique", "int32", ("costs",), least=0),
         _Open("exit_start", "int64", ("gates+1",), below="exits", is_offsets=True),
         _Open("exit_gate", "int32", ("exits",), least=0, below="gates"),
-        _Open("exit_cost", "int32", ("exits",), least=0),
+        _Open("exit_cost", "int32", ("exits",), least=1),
         _Open("side_start", "int64", ("fields+1",), below="sides", is_offsets=True),
         _Open("side_gates_start", "int64", ("sides+1",), below="members", is_offsets=True),
         _Open("side_gates", "int32", ("members",), least=0, below="gates"),
