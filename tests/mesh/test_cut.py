@@ -82,6 +82,14 @@ def test_what_is_not_free_cuts_nothing() -> None:
     assert cut_mesh(mesh, free, np.array([6])) is mesh
 
 
+def test_cells_that_were_not_free_and_are_not_change_nothing() -> None:
+    free = np.zeros((4, 5), np.bool_)
+    assert renew_mesh(build_mesh(free), free, np.array([6])).n_polygons == 0
+    free[1, 1:4] = True
+    renewed = renew_mesh(build_mesh(free), free, np.array([17]))
+    assert twice_the_area(renewed) == 6
+
+
 def test_only_polygons_that_are_touched_are_made_anew() -> None:
     rng = np.random.default_rng(0)
     free = rng.random((80, 80)) > 0.1

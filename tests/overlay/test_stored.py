@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hybridnav.overlay import build_overlay
+from hybridnav.errors import HybridNavError
+from hybridnav.overlay import OverlaySearch, build_overlay
 from hybridnav.overlay._cost_kernels import clique_place
 from hybridnav.overlay._exit_kernels import reach_over_exits
 from hybridnav.overlay.layout import slots_of
@@ -59,3 +60,25 @@ def test_distances_over_exits_are_least_costs_inside_the_field(seed):
             least = judge.least(start)[1][ends]
             expected = np.where(np.isfinite(least), least * 2 * UNITS, 1 << 60)
             np.testing.assert_array_equal(reach, expected)
+
+
+@pytest.mark.parametrize("name", ["steps", "clique", "marks", "move_cost", "distance"])
+def test_costs_that_contradict_each_other_end_in_an_error_or_a_path(name):
+    refused = 0
+    for seed in range(6):
+        overlay, free, _ = stored(seed)
+        part = overlay.top if name == "distance" else overlay.levels
+        array, rng = getattr(part, name), np.random.default_rng(seed)
+        wrong = rng.random(array.size) < 0.3
+        array[wrong] = rng.permutation(array)[wrong]
+        search, cells = OverlaySearch(overlay, near_cells=0), np.argwhere(free)
+        for start, goal in cells[rng.integers(len(cells), size=(60, 2))].tolist():
+            try:
+                found = search.path(start, goal).cells
+            except HybridNavError:
+                refused += 1
+                continue
+            if found is not None:
+                assert found[[0, -1]].tolist() == [start, goal]
+                assert (np.abs(np.diff(found, axis=0)) <= 1).all()
+    assert refused

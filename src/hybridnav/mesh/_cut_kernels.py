@@ -60,7 +60,7 @@ def touched_polygons(corners, sides, place, cells):
         int32 (rows, cols), the polygon at the centre of each cell before the mesh was renewed, -1
         for none; int32 (p,), component of each polygon, -1 for removed ones.
     cells
-        int64 (m,), flat cells that were free.
+        int64 (m,), flat cells; those that were not free touch nothing.
 
     Returns
     -------
@@ -81,6 +81,8 @@ def touched_polygons(corners, sides, place, cells):
         inner = polygon_at[row, col]
         if inner < 0 or component[inner] < 0:
             inner = _polygon_with(corners, first, begins, near, row, col)
+        if inner < 0:
+            continue
         waiting[0], size = inner, 1
         seen[inner] = cell
         while size:
@@ -130,7 +132,7 @@ def _polygons_near(corners, sides, component, cells, n_cols):
 
 @njit(cache=True, nogil=True)
 def _polygon_with(corners, first, begins, near, row, col):
-    """Return the one of some polygons with the centre of a cell."""
+    """Return the one of some polygons with the centre of a cell, -1 for none."""
     for polygon in near:
         low, high = first[polygon], first[polygon + 1]
         holds = True
@@ -145,7 +147,7 @@ def _polygon_with(corners, first, begins, near, row, col):
             )  # fmt: skip
         if holds:
             return polygon
-    return near[0]
+    return -1
 
 
 @guarded

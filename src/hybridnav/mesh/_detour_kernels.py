@@ -22,7 +22,9 @@ def still_there(mesh, graph, closure, x, y, corner):
     """
     cx, cy, kinds = mesh[0], mesh[1], mesh[2]
     first, heads = graph[0], graph[1]
-    while corner >= 0 and is_at_closed(closure, cx[corner], cy[corner]):
+    for _ in range(len(kinds)):
+        if corner < 0 or not is_at_closed(closure, cx[corner], cy[corner]):
+            break
         ux, uy = cx[corner], cy[corner]
         place = 2 * corner + lobe_of(kinds[corner], ux - x, uy - y)
         corner = -1
@@ -37,7 +39,7 @@ def is_in_sight(mesh, closure, polygon_at, polygon, segment):
     """Return whether a segment from a point in a polygon is legal with cells closed."""
     ax, ay, bx, by = segment
     cx, cy, _, first, begins, finishes, twins, polygon_of = mesh
-    while True:
+    for _ in range(len(first)):
         leaves = -1
         for slot in range(first[polygon], first[polygon + 1]):
             u, w = begins[slot], finishes[slot]
@@ -52,6 +54,7 @@ def is_in_sight(mesh, closure, polygon_at, polygon, segment):
         if twins[leaves] < 0:
             return False
         polygon = polygon_of[twins[leaves]]
+    return False
 
 
 @guarded

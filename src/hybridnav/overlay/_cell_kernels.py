@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._jit import njit
-from hybridnav.overlay._cost_kernels import move_cost, slot_of
+from hybridnav.overlay._cost_kernels import BLOCK_BITS, move_cost, slot_of
 from hybridnav.overlay._lane_kernels import LANES, NO_PATH, STEP_BITS
 from hybridnav.overlay._path_kernels import append
 from hybridnav.search.moves import COL_STEP, ROW_STEP
@@ -13,17 +13,18 @@ from hybridnav.search.moves import COL_STEP, ROW_STEP
 
 @njit(cache=True, nogil=True)
 def _steps_to(levels, field, i):
-    """Return where the steps to the i-th node of a field of the finest level begin, and its bit."""
+    """Return where the steps to the i-th node of a field of the finest level begin, its bit, and
+    the number of cells with steps, which no path exceeds."""
     blocks = (levels.node_at[field + 1] - levels.node_at[field] + LANES - 1) // LANES
     size = (levels.steps_at[field + 1] - levels.steps_at[field]) // blocks
-    return levels.steps_at[field] + i // LANES * size, i % LANES
+    return levels.steps_at[field] + i // LANES * size, i % LANES, size // STEP_BITS
 
 
 @njit(cache=True, nogil=True)
 def _step(levels, slot, lane):
     """Return the direction of the step from the cell in a slot; see `_steps_to`."""
-    at = lane[0] + STEP_BITS * np.int64(levels.place_of[slot])
     steps, bit = levels.steps, lane[1]
+    at = min(lane[0] + STEP_BITS * np.int64(levels.place_of[slot]), steps.size - STEP_BITS)
     low, middle, high = steps[at] >> bit & 1, steps[at + 1] >> bit & 1, steps[at + 2] >> bit & 1
     return np.int64(low | middle << 1 | high << 2)
 
@@ -47,20 +48,20 @@ def reach_nodes(levels, ground, cell, reach):
     for i in range(levels.node_at[field + 1] - first):
         goal, here, total = np.int64(levels.cell_of[first + i]), np.int64(cell), np.int64(0)
         lane, slot = _steps_to(levels, field, i), slot_of(ground, here)
-        while here != goal:
+        for _ in range(lane[2]):
+            if here == goal:
+                break
             k = _step(levels, slot, lane)
             other = here + ROW_STEP[k] * cols + COL_STEP[k]
             # Without a path the steps end at the border, or at a wall.
             if not ground.moves[slot] >> k & 1:
-                total = np.int64(NO_PATH)
                 break
             next_slot = slot_of(ground, other)
             if ground.field_of[next_slot] != field:
-                total = np.int64(NO_PATH)
                 break
             total += move_cost(units[slot] + units[next_slot], k)
             here, slot = other, next_slot
-        reach[i] = total
+        reach[i] = total if here == goal else np.int64(NO_PATH)
 
 
 @njit(cache=True, nogil=True)
@@ -79,12 +80,15 @@ def append_steps(levels, ground, cell, node, cells, n):
     Returns
     -------
     tuple
-        `cells`, in a new array if there was no room, and the number filled.
+        `cells`, in a new array if there was no room, and the number filled: without the node's cell
+        if the steps do not lead there.
     """
     field, cell = np.int64(levels.field_of[node]), np.int64(cell)
     lane = _steps_to(levels, field, node - levels.node_at[field])
-    goal = np.int64(levels.cell_of[node])
-    while cell != goal:
+    goal, most = np.int64(levels.cell_of[node]), ground.block_at.size << BLOCK_BITS
+    for _ in range(lane[2]):
+        if cell == goal or not 0 <= cell < most:
+            break
         k = _step(levels, slot_of(ground, cell), lane)
         cell += ROW_STEP[k] * ground.cols + COL_STEP[k]
         cells = append(cells, n, cell)

@@ -249,16 +249,18 @@ def walk_over_exits(levels, node, target, nodes, n):
     Returns
     -------
     tuple
-        `nodes`, in a new array if there was no room, and their number.
+        `nodes`, in a new array if there was no room, and their number, -1 if no path is as long as
+        the costs state.
     """
     span, last = inside_of(levels, levels.field_of[target]), np.int64(levels.below[target])
     _, leaving, rest = _to_exit(levels, node, target)
-    while node != last:
+    while node != last and leaving >= 0:
         if leaving != node:
             nodes = append(nodes, n, leaving)
             n += 1
             node = leaving
             continue
+        leaving = np.int64(-1)
         for at in range(levels.move_at[node], levels.move_at[node + 1]):
             other = np.int64(levels.move_to[at])
             if not span[0] <= other < span[1] or levels.move_cost[at] > rest:
@@ -269,7 +271,7 @@ def walk_over_exits(levels, node, target, nodes, n):
                 nodes = append(nodes, n, node)
                 n += 1
                 break
-    return nodes, n
+    return nodes, (n if node == last else -1)
 
 
 @njit(cache=True, nogil=True)
@@ -288,6 +290,11 @@ def descend(levels, level, upper, children, reaches):
         The fields of start and goal on the level below.
     reaches
         Two int64 (n,), the distances inside them, from the start and to the goal.
+
+    Returns
+    -------
+    ndarray
+        int64 (m,), empty if no path is as long as the costs state.
     """
     begin = levels.node_at[levels.level_at[level]]
     first, last = upper[0], upper[-1]
@@ -297,6 +304,8 @@ def descend(levels, level, upper, children, reaches):
         nodes[0] = _exit_of(levels, children[0], reaches[0], first)
         nodes, n = walk_over_exits(levels, nodes[0], first, nodes, 1)
     for i in range(1, upper.size):
+        if n < 0:
+            break
         before, node = upper[i - 1], upper[i]
         field = levels.field_of[node]
         if node >= begin and levels.field_of[before] == field:
@@ -304,11 +313,12 @@ def descend(levels, level, upper, children, reaches):
         else:
             nodes = append(nodes, n, levels.below[node] if node >= begin else node)
             n += 1
-    if last >= begin:
+    if last >= begin and n >= 0:
         tail = np.empty(64, np.int64)
         tail[0] = _exit_of(levels, children[1], reaches[1], last)
         tail, m = walk_over_exits(levels, tail[0], last, tail, 1)
         for i in range(m - 2, -1, -1):
             nodes = append(nodes, n, tail[i])
             n += 1
-    return nodes[:n]
+        n = n if m >= 0 else -1
+    return nodes[: max(n, 0)]

@@ -115,7 +115,7 @@ def path_inside(ground, distance, goal):
     cells, n, cell = np.empty(64, np.int64), 1, np.int64(goal)
     cells[0] = goal
     while distance[cell] > 0:
-        slot = slot_of(ground, cell)
+        slot, before = slot_of(ground, cell), cell
         for k in range(8):
             if ground.moves[slot] >> k & 1:
                 other = cell + ROW_STEP[k] * cols + COL_STEP[k]
@@ -124,6 +124,8 @@ def path_inside(ground, distance, goal):
                     if distance[other] + cost == distance[cell]:
                         cell = other
                         break
+        if cell == before:
+            break
         if n == cells.size:
             cells = grow(cells)
         cells[n] = cell

@@ -37,7 +37,7 @@ def mark_paths(levels, field, table):
         last, row = np.int64(levels.below[first + i]), table[i]
         for j in range(i):
             node = np.int64(levels.below[first + j])
-            while node != last and row[node - span[0]] < FAR:
+            while node >= 0 and node != last and row[node - span[0]] < FAR:
                 bit = i * width + node - span[0]
                 if marks[bit >> 3] >> (bit & 7) & 1:
                     break
@@ -55,6 +55,11 @@ def to_finest(levels, ground, upper):
         See `Levels` and `CellCosts`.
     upper
         int64 (n,), nodes of the two finest levels.
+
+    Returns
+    -------
+    ndarray
+        int64 (m,), empty if no path is as long as the costs state.
     """
     if len(levels.level_at) == 2:
         return upper
@@ -70,6 +75,8 @@ def to_finest(levels, ground, upper):
                 continue
             filled = n
             nodes, n = _over_marked(levels, ground, low, high, nodes, n)
+            if n < 0:
+                return nodes[:0]
             if high == node:
                 nodes[filled:n] = nodes[filled:n][::-1].copy()
             nodes = append(nodes, n, levels.below[node])
@@ -99,7 +106,8 @@ def _over_marked(levels, ground, low, high, nodes, n):
     Returns
     -------
     tuple
-        `nodes`, in a new array if there was no room, and their number.
+        `nodes`, in a new array if there was no room, and their number, -1 if no path is as long as
+        the costs state.
     """
     field = levels.field_of[high]
     span, first = inside_of(levels, field), levels.node_at[field]
@@ -114,7 +122,7 @@ def _over_marked(levels, ground, low, high, nodes, n):
     heap, size, goal_cell = np.empty((64, 2), np.int64), 1, levels.cell_of[goal]
     push(heap, 0, np.int64(0), start)
     distance[start - begin], before[start - begin] = 0, start
-    while distance[goal - begin] > limit:
+    while size > 0 and distance[goal - begin] > limit:
         entry = heap[0, 1]
         pop(heap, size)
         size -= 1
@@ -147,6 +155,8 @@ def _over_marked(levels, ground, low, high, nodes, n):
                     distance[other - begin], before[other - begin] = total, node
                     push(heap, size, rank(total, ahead), other)
                     size += 1
+    if distance[goal - begin] > limit:
+        return nodes, -1
     node = np.int64(before[goal - begin])
     while node != start:
         nodes = append(nodes, n, node)

@@ -182,10 +182,14 @@ def least_reach(levels, ground, cell, reach):
 def _active(levels, node):
     """Return the node on the same cell of the highest level whose field there is not stale."""
     field = levels.field_of[node]
-    while levels.is_stale[field]:
+    while levels.is_stale[field] and levels.below[node] >= 0:
         node = levels.below[node]
         field = levels.field_of[node]
-    while levels.parent[field] >= 0 and not levels.is_stale[levels.parent[field]]:
+    while (
+        levels.parent[field] >= 0
+        and not levels.is_stale[levels.parent[field]]
+        and levels.above[node] >= 0
+    ):
         node = levels.above[node]
         field = levels.field_of[node]
     return node

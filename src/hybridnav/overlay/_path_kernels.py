@@ -35,6 +35,11 @@ def next_node(levels, span, row, node):
         int (nodes of the span,), their distances to the last one.
     node
         The node.
+
+    Returns
+    -------
+    int
+        -1 if no node leads on.
     """
     first, rest = span[0], row[node - span[0]]
     for at in range(levels.move_at[node], levels.move_at[node + 1]):
@@ -94,12 +99,14 @@ def join_ends(levels, upper, children, reaches, rows):
     """
     nodes = np.empty(2 * upper.size + 64, np.int64)
     nodes, n = _walk_out(levels, upper[0], children[0], reaches[0], rows[0], nodes, 0)
+    if n < 0:
+        return nodes[:0]
     nodes[:n] = nodes[:n][::-1].copy()
     for node in upper:
         nodes = append(nodes, n, node)
         n += 1
     nodes, n = _walk_out(levels, upper[-1], children[1], reaches[1], rows[1], nodes, n)
-    return nodes[:n]
+    return nodes[: max(n, 0)]
 
 
 @njit(cache=True, nogil=True)
@@ -119,7 +126,8 @@ def _walk_out(levels, node, child, below, row, nodes, n):
     row
         int64 (n,), those to all nodes of the finest level inside the node's field.
     nodes, n
-        int64 (room,) and how many of them are filled.
+        int64 (room,) and how many of them are filled; -1 is returned if no path is as long as the
+        distances state.
     """
     if node < levels.node_at[levels.level_at[1]]:
         return append(nodes, n, node), n + 1
@@ -128,8 +136,12 @@ def _walk_out(levels, node, child, below, row, nodes, n):
     node = np.int64(levels.below[node])
     nodes = append(nodes, n, node)
     n += 1
-    while levels.field_of[node] != child or row[node - span[0]] != below[node - first]:
+    for _ in range(row.size):
+        if levels.field_of[node] == child and row[node - span[0]] == below[node - first]:
+            return nodes, n
         node = next_node(levels, span, row, node)
+        if node < 0:
+            break
         nodes = append(nodes, n, node)
         n += 1
-    return nodes, n
+    return nodes, -1

@@ -17,6 +17,9 @@ from hybridnav.overlay._node_kernels import climb, least_reach, over_cliques
 from hybridnav.overlay._path_kernels import back_over_cliques, join_ends
 from hybridnav.overlay._top_kernels import join
 
+TORN = -1
+"""Cost of a path whose parts do not meet."""
+
 
 @njit(cache=True, nogil=True)
 def _fields(levels, field, n_levels):
@@ -162,16 +165,18 @@ def _find_flat(ground, levels, top, endpoints, epsilon, near_cells, cell_work, n
     )
     if level < 0:
         return cost, bound, cells, expanded, n_expanded
-    while level > 1:
+    while level > 1 and nodes.size > 0:
         children = (around[0][level - 1], around[1][level - 1])
         both = (reaches[0][level - 1], reaches[1][level - 1])
         nodes = descend(levels, level, nodes, children, both)
         level -= 1
-    nodes = join_ends(
-        levels, nodes, (around[0][0], around[1][0]), (reaches[0][0], reaches[1][0]), rows
-    )
+    if nodes.size > 0:
+        nodes = join_ends(
+            levels, nodes, (around[0][0], around[1][0]), (reaches[0][0], reaches[1][0]), rows
+        )
     nodes = to_finest(levels, ground, nodes)
-    cells = cells_of_path(levels, ground, endpoints, nodes)
+    # Without nodes the costs contradict each other.
+    cells = cells_of_path(levels, ground, endpoints, nodes) if nodes.size > 0 else nodes
     return cost, bound, cells, expanded, n_expanded
 
 
@@ -198,8 +203,9 @@ def find_path(ground, levels, top, endpoints, epsilon, near_cells, cell_work, no
     Returns
     -------
     tuple
-        The cost, NO_PATH for no path, and a lower bound on it; int64 (n, 2), (row, col) of the
-        cells of the path, and the sums of `sums_along`; the numbers of cells and of nodes expanded.
+        The cost, NO_PATH for no path, `TORN` if stored costs and steps contradict each other, and a
+        lower bound on it; int64 (n, 2), (row, col) of the cells of the path, and the sums of
+        `sums_along`; the numbers of cells and of nodes expanded.
     """
     for end in endpoints:
         slot = slot_of(ground, end)
@@ -208,8 +214,15 @@ def find_path(ground, levels, top, endpoints, epsilon, near_cells, cell_work, no
     cost, bound, flat, expanded, n_expanded = _find_flat(
         ground, levels, top, endpoints, epsilon, near_cells, cell_work, node_work
     )
-    cells = np.empty((flat.size, 2), np.int64)
+    cells, gap = np.empty((flat.size, 2), np.int64), np.int64(0)
+    row_before, col_before = endpoints[0] // ground.cols, endpoints[0] % ground.cols
     for i in range(flat.size):
         row = np.int64(np.uint32(flat[i]) // np.uint32(ground.cols))
-        cells[i, 0], cells[i, 1] = row, flat[i] - row * ground.cols
+        col = flat[i] - row * ground.cols
+        cells[i, 0], cells[i, 1] = row, col
+        gap = max(gap, abs(row - row_before), abs(col - col_before))
+        row_before, col_before = row, col
+    if cost < NO_PATH and (flat.size == 0 or gap > 1 or flat[-1] != endpoints[1]):
+        cost = np.int64(TORN)
+        return cost, cost, cells, (cost, cost), expanded, n_expanded
     return cost, bound, cells, sums_along(ground, cells), expanded, n_expanded

@@ -61,7 +61,8 @@ def join(levels, top, fields, reaches, limit):
     Returns
     -------
     tuple
-        The distance; int64 (n,) nodes, none when there is nothing below the limit.
+        The distance; int64 (n,) nodes, none when there is nothing below the limit, or when no path
+        is as long as the distances state.
     """
     starts, from_start, over_start = gates_near(levels, top, fields[0], reaches[0])
     goals, to_goal, over_goal = gates_near(levels, top, fields[1], reaches[1])
@@ -82,6 +83,8 @@ def join(levels, top, fields, reaches, limit):
     nodes[n] = top.gates[gate]
     n += 1
     nodes, n = _walk_over_gates(levels, top, gate, row, nodes, n)
+    if n < 0 or nodes[n - 1] != top.gates[last]:
+        return best, nodes[:0]
     if over_goal[j] != top.gates[last]:
         nodes = append(nodes, n, over_goal[j])
         n += 1
@@ -148,11 +151,14 @@ def _walk_over_gates(levels, top, gate, row, nodes, n):
     Returns
     -------
     tuple
-        `nodes`, in a new array if there was no room, and their number.
+        `nodes`, in a new array if there was no room, and their number, -1 if no path is as long as
+        the distances state.
     """
     origin = levels.node_at[levels.level_at[len(levels.level_at) - 2]]
     gate = np.int64(gate)
-    while row[gate] > 0:
+    for _ in range(row.size):
+        if row[gate] <= 0:
+            break
         start, found, way = np.int64(top.gates[gate]), np.int64(-1), (-1, -1, -1)
         for entry_at in range(levels.move_at[start] - 1, levels.move_at[start + 1]):
             is_own = entry_at < levels.move_at[start]
@@ -179,9 +185,11 @@ def _walk_over_gates(levels, top, gate, row, nodes, n):
                     break
             if found >= 0:
                 break
+        if found < 0:
+            break
         for node in way:
             if node != nodes[n - 1]:
                 nodes = append(nodes, n, node)
                 n += 1
         gate = found
-    return nodes, n
+    return nodes, (n if row[gate] <= 0 else -1)

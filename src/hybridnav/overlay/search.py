@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.overlay import _query_kernels as kernels
 from hybridnav.overlay._lane_kernels import FAR, NO_PATH
 from hybridnav.overlay.layout import NodeWork
@@ -178,6 +178,11 @@ class OverlaySearch:
                     near_cells,
                     work.cells,
                     work.nodes,
+                )
+            if cost == kernels.TORN:
+                raise HybridNavError(
+                    f"the stored costs of this overlay lead to no path from {start} to {goal} "
+                    "although they state one: build it anew, and report this as a fault"
                 )
             if cost >= NO_PATH:
                 return OverlayPath(None, math.inf, math.inf, expanded, expanded_nodes)
