@@ -25,9 +25,9 @@ from hybridnav.mesh import (
     CornerHierarchy,
     MeshSearch,
     build_mesh,
-    corner_graph,
     shortest_paths,
 )
+from hybridnav.mesh._corner_graph_kernels import edges_of
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from tests.oracle.any_angle import some_positions
 from tests.oracle.mesh import (
@@ -114,21 +114,21 @@ def test_a_graph_with_an_edge_without_its_reverse_is_not_used(
 ) -> None:
     classes = drawn(".....", ".###.", ".###.", ".....")
     graph, mesh = VisibilityGraph(occupancy_grid(classes)), build_mesh(classes == CellClass.FREE)
-    made = corner_graph.kernels.edges_of
     whole = MeshSearch(mesh)
     whole.prepare()
     assert whole.edges is not None
     for edge in range(len(whole.edges[1])):
 
         def all_but_one(*given: Any, edge: int = edge) -> Any:
-            first, heads = made(*given)
+            first, heads = edges_of(*given)
             return first - (first > edge), np.delete(heads, edge)
 
-        monkeypatch.setattr(corner_graph.kernels, "edges_of", all_but_one)
+        monkeypatch.setattr("hybridnav.mesh._corner_graph_kernels.edges_of", all_but_one)
         search = MeshSearch(mesh)
         search.prepare()
         assert search.is_prepared
-        assert search.graph is search.edges is search.landmarked() is None
+        assert search.graph is None
+        assert search.edges is None
         found = search.path(((0, 0), (3, 4)), ((0.5, 0.5), (3.5, 4.5)))
         assert found.length_cells == found.lower_bound_cells
         assert found.length_cells == pytest.approx(graph.shortest((0, 0), (3, 4)).length_m)
