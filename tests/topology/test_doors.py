@@ -157,9 +157,14 @@ def test_a_door_that_is_too_narrow_for_the_robot_is_listed_as_such():
     grid, labels = flat(radius_m=0.4)
     rooms = rooms_of(grid, labels)
     assert [door.passable for door in rooms.doors] == [False, False]
-    assert rooms.counted()[:2] == ("3 rooms", "2 doors, 2 of them too narrow for 0.4 m")
+    assert rooms.counted()[:2] == (
+        "3 rooms",
+        "2 doors, 2 of them too narrow for a robot 0.8 m wide",
+    )
     ax = plot_rooms(hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels)))
-    assert "2 doors, 2 of them too narrow for 0.4 m" in ax.get_title().replace("\n", " ")
+    assert "2 doors, 2 of them too narrow for a robot 0.8 m wide" in ax.get_title().replace(
+        "\n", " "
+    )
     (hollow,) = [line for line in ax.lines if line.get_gid() == "narrow-doors"]
     at = np.column_stack(hollow.get_data())
     assert np.allclose(at, [door.position for door in rooms.doors])
@@ -309,7 +314,7 @@ def test_list_picture_file_json_and_words_tell_the_same_doors(cli, map_file, tmp
     out = tmp_path / "again.yaml"
     query = ("rooms", map_file, "--rooms", tmp_path / "rooms.yaml", "--robot-radius")
     told = cli(*query, "0.4", "-o", out, "--plot", tmp_path / "rooms.svg").out
-    assert "rooms      3; 2 doors, 2 of them too narrow for 0.4 m" in told
+    assert "rooms      3; 2 doors, 2 of them too narrow for a robot 0.8 m wide" in told
     assert "hall (2: 0.30 m, too narrow)" in told
     assert 'id="narrow-doors"' in (tmp_path / "rooms.svg").read_text()
     wide = cli("rooms", map_file, "--rooms", out, "--robot-radius", "0", "--json").answer
@@ -339,9 +344,9 @@ def test_a_room_that_does_not_fit_is_marked_in_the_list(cli, map_file):
     )
     query = (map_file, "--rooms", rooms_file, "--robot-radius", "0.65")
     done = cli("rooms", *query)
-    assert "rooms      2, 1 of them too small for 0.65 m" in done.out
+    assert "rooms      2, 1 of them too small for a robot 1.3 m wide" in done.out
     (line,) = [line for line in done.out.splitlines() if line.startswith("slit")]
-    assert "no robot of 0.65 m fits" in line
+    assert "no robot 1.3 m wide fits" in line
     path = cli("plan", *query, "--from", "kitchen", "--to", "slit")
     assert path.refuses(2, "'slit'", "no free cell for this robot radius")
 

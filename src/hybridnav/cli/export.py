@@ -288,8 +288,8 @@ def _parts_answer(
     out, map_file = files
     counts = {"places": topology.n_places, "arcs": topology.n_arcs}
     if kind == "rooms":
-        doors = sum(not door.is_gap for door in topology.rooms.doors)
-        counts = {"rooms": len(topology.rooms.names), "doors": doors}
+        doors = len(topology.rooms.listed_doors)
+        counts = {"rooms": int(topology.rooms.is_listed.sum()), "doors": doors}
     if as_json:
         figures = counts | {"file": str(out), "map": str(map_file), "seconds": seconds}
         return json.dumps(figures, allow_nan=False) + "\n"

@@ -40,6 +40,8 @@ from hybridnav.grid import DEFAULT_MAX_CELLS, CellClass
 from hybridnav.grid.names import Segmentation, read_point
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from hybridnav._typing import FloatArray
     from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.grid.room_labels import Point
@@ -81,6 +83,12 @@ ToleranceOption = Annotated[
         show_default="the least with which the file has 20 kB",
     ),
 ]
+AllOption = Annotated[
+    bool,
+    typer.Option(
+        "--all", help="List and draw rooms that cannot be entered, gaps, and doors to them too."
+    ),
+]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")]
 
 
@@ -99,6 +107,7 @@ def rooms(
     at: AtOption = None,
     force: ForceOption = False,
     tolerance_m: ToleranceOption = None,
+    everything: AllOption = False,
     as_json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
@@ -149,13 +158,15 @@ def rooms(
     answer(
         json.dumps(figures, allow_nan=False) + "\n"
         if as_json
-        else "\n".join([_listing(topology.rooms, areas_m2), *islands_line(grid)])
+        else "\n".join(
+            [_listing(topology.rooms, areas_m2, everything=everything), *islands_line(grid)]
+        )
         + f"\nseconds    {timings(seconds)}\n"
     )
     if plot is not None:
         from hybridnav.viz import plot_rooms, save_figure  # noqa: PLC0415 - matplotlib on demand
 
-        save_figure(plot_rooms(topology), plot)
+        save_figure(plot_rooms(topology, everything=everything), plot)
 
 
 def _measures_of(labels: RoomLabels, grid: OccupancyGrid) -> list[RoomMeasures]:
@@ -202,8 +213,10 @@ def _room_line(found: dict[str, Any]) -> str:
 
 
 def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
-    """Return rooms and doors as plain values; gaps are doors here."""
+    """Return rooms and doors as plain values, all of them: `is_listed` tells which the list has."""
+    shown = {door.number for door in rooms.listed_doors}
     return {
+        "is_building": rooms.is_building,
         "robot_radius_m": rooms.grid.robot_radius_m,
         "rooms": [
             {
@@ -214,18 +227,20 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                 "centre_m": _rounded(facts.centre_m),
                 "extent_m": [_rounded(facts.low_m), _rounded(facts.high_m)],
                 "fits": fits,
+                "is_listed": is_listed,
                 "neighbours": [
                     {"room": other, "door": door.number, "width_m": round(door.width_m, 6)}
                     for door, other in beside
                 ],
             }
-            for number, (name, area_m2, fits, facts, beside) in enumerate(
+            for number, (name, area_m2, fits, is_listed, facts, beside) in enumerate(
                 zip(
                     rooms.names,
                     areas_m2.tolist(),
                     rooms.fits.tolist(),
+                    rooms.is_listed.tolist(),
                     _measures_of(rooms.labels, rooms.grid),
-                    _neighbours(rooms),
+                    _neighbours(rooms, rooms.listed_doors),
                     strict=True,
                 ),
                 start=1,
@@ -240,6 +255,7 @@ def _figures(rooms: Rooms, areas_m2: FloatArray) -> dict[str, Any]:
                 "kind": door.kind,
                 "passable": door.passable,
                 "is_gap": door.is_gap,
+                "is_listed": door.number in shown,
             }
             for door in rooms.doors
         ],
@@ -254,40 +270,46 @@ def _rounded(point: tuple[float, float]) -> list[float]:
     return [round(number, 6) for number in point]
 
 
-def _neighbours(rooms: Rooms) -> list[list[tuple[Door, str | None]]]:
-    """Return for each room its doors, gaps aside, and the room behind each."""
+def _neighbours(rooms: Rooms, doors: Iterable[Door]) -> list[list[tuple[Door, str | None]]]:
+    """Return for each room its doors among some, and the room behind each."""
     found: dict[str | None, list[tuple[Door, str | None]]] = {name: [] for name in rooms.names}
-    for door in rooms.doors:
+    for door in doors:
         for name, other in (door.rooms, door.rooms[::-1]):
-            if name is not None and not door.is_gap:
+            if name is not None:
                 found[name].append((door, other))
     return [found[name] for name in rooms.names]
 
 
-def _listing(rooms: Rooms, areas_m2: FloatArray) -> str:
+def _listing(rooms: Rooms, areas_m2: FloatArray, *, everything: bool) -> str:
     """Return one line a room: its number, free area, size, the point that stands for it, the doors
     to its neighbours."""
-    width = max((len(name) for name in rooms.names), default=0)
+    is_shown = [everything or is_listed for is_listed in rooms.is_listed.tolist()]
+    shown = [name for name, is_one in zip(rooms.names, is_shown, strict=True) if is_one]
+    width = max(map(len, shown), default=0)
     digits = len(str(len(rooms.names)))
-    of_rooms, of_doors, gaps = rooms.counted()
-    left_out = f"; {gaps} not listed" if gaps else ""
+    of_rooms, of_doors, rest = rooms.counted(everything=everything)
+    left_out = f"; not listed without --all: {rest}" if rest else ""
     lines = [
         f"rooms      {of_rooms.replace(' rooms', '', 1)}; {of_doors}{left_out}",
         "columns    room, number, area, extent in x and y, its point, doors to (number: width)",
     ]
+    if not rooms.is_building:
+        lines.insert(1, "building   no door between walls: these rooms are parts of open space")
     measures = _measures_of(rooms.labels, rooms.grid)
     each = zip(
         rooms.names,
         areas_m2.tolist(),
         rooms.fits.tolist(),
         measures,
-        _neighbours(rooms),
+        _neighbours(rooms, rooms.doors if everything else rooms.listed_doors),
         strict=True,
     )
     for number, (name, area_m2, fits, facts, beside) in enumerate(each, start=1):
+        if not is_shown[number - 1]:
+            continue
         point = "({:.2f}, {:.2f})".format(*_at(rooms, name))
         size = "{:.1f} x {:.1f} m".format(*facts.size_m)
-        stated = [] if fits else [f"no robot of {rooms.grid.robot_radius_m:g} m fits"]
+        stated = [] if fits else [f"no robot {2 * rooms.grid.robot_radius_m:g} m wide fits"]
         stated += [_door(door, other) for door, other in beside]
         lines.append(
             f"{name:<{width}} {number:>{digits}} {area_m2:>9.2f} m²  {size:<15} {point:<16} "

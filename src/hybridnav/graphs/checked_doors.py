@@ -63,10 +63,8 @@ def add_rooms_and_doors(  # noqa: PLR0913, PLR0917 - one call, all of it needed
         passed |= set(passes.passed(cells_of_line(space.free, placed.line_of(edge))))
     wanted = [
         door
-        for door in rooms.doors
-        if door.passable
-        and not (door.is_gap or door.is_opening)
-        and is_kept[rooms.cells_beside(door.number)].any()
+        for door in rooms.listed_doors
+        if door.passable and not door.is_opening and is_kept[rooms.cells_beside(door.number)].any()
     ]
     for door in wanted:
         if door.number not in passed:

@@ -96,9 +96,7 @@ def add_landmarks(
     if topology.pyramid.rooms is not None:
         rooms = topology.rooms
         middles = rooms.level.boundary_middles
-        doors = [
-            (door.number, arc.index) for door in rooms.doors for arc in door.arcs if not door.is_gap
-        ]
+        doors = [(door.number, arc.index) for door in rooms.listed_doors for arc in door.arcs]
         at = [checked_position(space, tuple(middles[arc])) for _, arc in doors]
         _add_kept(nodes, at, "door", is_kept, [number for number, _ in doors])
         named = [name for name, fits in zip(rooms.names, rooms.fits.tolist(), strict=True) if fits]

@@ -64,8 +64,8 @@ class Landmarks:
     def _doors_of(self) -> dict[str | None, list[Door]]:
         """The doors that a person notices, by the room on each side."""
         found: dict[str | None, list[Door]] = {}
-        for door in self._rooms.doors:
-            if door.width_m >= _NARROWEST_M and not door.is_gap:
+        for door in self._rooms.listed_doors:
+            if door.width_m >= _NARROWEST_M:
                 for room in set(door.rooms):
                     found.setdefault(room, []).append(door)
         return found

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.grid import NO_ROOM, CellClass
+from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.pyramid.arc import LevelArc
 from hybridnav.pyramid.cracks import endpoints_of
 from hybridnav.topology.doors import (
@@ -20,10 +20,11 @@ from hybridnav.topology.doors import (
     farthest_ends,
     measured_clearance_m,
 )
+from hybridnav.topology.listing import Listing
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid, RoomLabels
+    from hybridnav.grid import OccupancyGrid
     from hybridnav.pyramid import DualGraphPyramid, Level
 
 
@@ -211,6 +212,35 @@ class Rooms:
             for at in np.argsort(numbers).tolist()
         )
 
+    @cached_property
+    def _listing(self) -> Listing:
+        return Listing.of(self.labels, self.level)
+
+    @property
+    def is_listed(self) -> BoolArray:
+        """bool (n_rooms,), rooms in lists and pictures: wider than 1 m in the mean, or the map's
+        robot can enter them, or they have a name of their own. The others are what a laser sees
+        through glass."""
+        return self._listing.is_listed[: len(self.names)]
+
+    @cached_property
+    def listed_labels(self) -> RoomLabels:
+        """The rooms in lists and pictures; cells of the others are in no room."""
+        of = self.labels.label_of
+        shown = np.where(np.append(self.is_listed, False)[of], of, np.int32(NO_ROOM))
+        return RoomLabels(self.names, shown, self.labels.points, self.labels.doors)
+
+    @cached_property
+    def listed_doors(self) -> tuple[Door, ...]:
+        """Doors in lists and pictures, by number: no gaps, and both sides are listed. A side in no
+        room is listed if the robot can enter it and it has 1 m² and a mean width of 1 m."""
+        found, listing = self._boundaries, self._listing
+        first = found.edges[np.unique(found.boundary_of, return_index=True)[1]]
+        ends = np.stack(endpoints_of(first, self.grid.shape[1]))
+        both = listing.is_listed[listing.space_of.ravel()[ends]].all(axis=0)
+        shown = set(self._numbers[both].tolist())
+        return tuple(door for door in self.doors if door.number in shown and not door.is_gap)
+
     def door(self, number: int) -> Door:
         """Return the door with a number.
 
@@ -283,30 +313,54 @@ class Rooms:
         (x, y), (u, v) = self.grid.frame.points_of_grid(ends).tolist()
         return (x, y), (u, v)
 
-    def counted(self) -> tuple[str, str, str]:
+    @property
+    def is_building(self) -> bool:
+        """Whether any listed door has walls on both sides. On a map without, rooms are parts of
+        open space: a race track, a yard, a hall."""
+        return any(not door.is_opening for door in self.listed_doors)
+
+    def counted(self, *, everything: bool = False) -> tuple[str, str, str]:
         """Describe how many rooms, doors and openings there are, and how many of them this robot
         cannot use.
+
+        Parameters
+        ----------
+        everything
+            Count all rooms and doors, not only those that are listed.
 
         Returns
         -------
         tuple of str
-            Such as "22 rooms, 1 of them too small for 0.25 m", "71 doors, 12 of them too narrow for
-            0.25 m, 9 openings", and "43 gaps below 0.3 m", which are not among the doors; empty
-            without any.
+            Such as "22 rooms, 1 of them too small for a robot 0.5 m wide", "71 doors, 12 of them
+            too narrow for a robot 0.5 m wide, 9 openings", and "3 rooms, 43 gaps below 0.3 m and
+            12 other doors": what is left out, empty if nothing is.
         """
-        wide = [door for door in self.doors if not door.is_gap]
-        openings = [door for door in wide if door.is_opening]
-        doors = [door for door in wide if not door.is_opening]
-        n_gaps = len(self.doors) - len(wide)
-        small = f"too small for {self.grid.robot_radius_m:g} m"
-        narrow = f"too narrow for {self.grid.robot_radius_m:g} m"
+        shown = self.doors if everything else self.listed_doors
+        fits = self.fits if everything else self.fits[self.is_listed]
+        openings = [door for door in shown if door.is_opening]
+        doors = [door for door in shown if not door.is_opening]
+        robot = f"for a robot {2 * self.grid.robot_radius_m:g} m wide"
+        narrow = f"too narrow {robot}"
         passages = _counted("doors", [door.passable for door in doors], narrow)
         if openings:
-            passages += ", " + _counted("openings", [door.passable for door in openings], narrow)
-        return (
-            _counted("rooms", self.fits.tolist(), small),
-            passages,
-            f"{n_gaps} gap{'s' if n_gaps != 1 else ''} below {LEAST_DOOR_M:g} m" if n_gaps else "",
+            passable = [door.passable for door in openings]
+            why = narrow if all(door.passable for door in doors) else "too narrow"
+            passages += ", " + _counted("openings", passable, why)
+        rooms = _counted("rooms", fits.tolist(), f"too small {robot}")
+        return rooms, passages, "" if everything else self._left_out()
+
+    def _left_out(self) -> str:
+        """Return what lists and pictures leave out."""
+        n_gaps = sum(door.is_gap for door in self.doors)
+        counts = [
+            (int((~self.is_listed).sum()), "narrow room{s} without a way in"),
+            (n_gaps, f"gap{{s}} below {LEAST_DOOR_M:g} m"),
+            (len(self.doors) - len(self.listed_doors) - n_gaps, "door{s} to what is not listed"),
+        ]
+        return ", ".join(
+            f"{count} {things.format(s='s' if count != 1 else '')}"
+            for count, things in counts
+            if count
         )
 
     def point_of(self, name: str) -> tuple[float, float]:

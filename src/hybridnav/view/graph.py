@@ -110,25 +110,33 @@ def map_facts(grid: OccupancyGrid, n_zooms: int) -> dict[str, Any]:
 
 
 def room_facts(rooms: Rooms) -> dict[str, Any]:
-    """Return names, areas and positions of rooms, and their doors without gaps."""
+    """Return names, areas and positions of rooms, and their doors without gaps; `listed` tells
+    which of them the page shows unless it is asked for all."""
     grid = rooms.grid
+    shown = {door.number for door in rooms.listed_doors}
     return {
         "rooms": [
             {
                 "name": name,
                 "area_m2": round(area, 2),
                 "fits": fits,
+                "listed": is_listed,
                 "at": in_grid(_middle(rooms, name, centre), grid),
             }
-            for name, area, fits, centre in zip(
+            for name, area, fits, is_listed, centre in zip(
                 rooms.names,
                 rooms.areas_m2.tolist(),
                 rooms.fits.tolist(),
+                rooms.is_listed.tolist(),
                 _centres_m(rooms.labels, grid),
                 strict=True,
             )
         ],
-        "doors": [_door(door, grid) for door in rooms.doors if not door.is_gap],
+        "doors": [
+            _door(door, grid) | {"listed": door.number in shown}
+            for door in rooms.doors
+            if not door.is_gap
+        ],
     }
 
 

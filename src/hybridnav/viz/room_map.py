@@ -37,6 +37,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     *,
     ax: Axes | None = None,
     names: bool = True,
+    everything: bool = False,
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
@@ -47,8 +48,9 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     unless they end in them, as `room-7` does. Doors have their numbers if there is room for them.
 
     Openings are squares: they are wider than 2 m or not between jambs. Those of both kinds that are
-    too narrow for the map's robot radius are hollow dots. Gaps, doors narrower than
-    0.3 m, are left out; the legend counts them, and the numbers stay.
+    too narrow for the map's robot radius are hollow dots. What is not listed is left out and
+    counted in the legend: gaps, which are doors narrower than 0.3 m, rooms that cannot be entered
+    (`Rooms.is_listed`), and doors to them. Those rooms are drawn as free cells.
 
     Parameters
     ----------
@@ -60,6 +62,8 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         Axes to draw on; by default new ones in a new figure.
     names
         Whether to write the names.
+    everything
+        Whether to draw all rooms and doors, not only those that are listed.
     title
         Title instead of the map's name and the count of rooms; empty for none.
     width_in
@@ -84,25 +88,27 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     >>> plot_rooms(rooms, grid, title="rooms").get_title()
     'rooms'
     """
-    view, labels, grid = _view_of(rooms, grid)
+    view, labels, grid = _view_of(rooms, grid, everything=everything)
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     draw_room_cells(canvas, labels, grid)
     words = [grid.name, f"{len(labels.names)} rooms"]
-    writer, gaps = RoomWriter(canvas, grid, labels), ""
+    writer = RoomWriter(canvas, grid, labels)
     doors: list[Door] = []
     if view is not None:
-        *counted, gaps = view.counted()
-        words = [grid.name, *counted]
-        doors = [door for door in view.doors if not door.is_gap]
+        words = [grid.name, *view.counted(everything=everything)[:2]]
+        doors = list(view.doors if everything else view.listed_doors)
         writer.labels.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     if names:
         writer.write_names()
         writer.number_rooms()
-    entries: list[Entry] = [(swatch(style.PLACES), "rooms")]
+    n_rooms = 0 if view is None or everything else int((~view.is_listed).sum())
+    left_out = f" ({n_rooms} narrow ones without a way in left out)" if n_rooms else ""
+    entries: list[Entry] = [(swatch(style.PLACES), f"rooms{left_out}")]
     key = _key(writer.unnamed, labels.names)
     if view is not None:
-        entries += draw_doors(canvas, doors, f"{gaps} left out" if gaps else "")
-        writer.number_doors(sorted(doors, key=lambda door: -door.width_m))
+        n_left_out = len(view.doors) - len(doors)
+        entries += draw_doors(canvas, doors, f"{n_left_out} left out" if n_left_out else "")
+        writer.number_doors(sorted(doors, key=lambda door: (door.is_opening, -door.width_m)))
     entries += [*ground_entries(grid), *key]
     finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
@@ -119,11 +125,12 @@ def _key(numbered: Sequence[int], names: Sequence[str]) -> list[Entry]:
 
 
 def _view_of(
-    rooms: RoomLabels | TopologicalMap, grid: OccupancyGrid | None
+    rooms: RoomLabels | TopologicalMap, grid: OccupancyGrid | None, *, everything: bool
 ) -> tuple[Rooms | None, RoomLabels, OccupancyGrid]:
     """Return the rooms with doors (None for labels alone), the labels, and the map."""
     if isinstance(rooms, TopologicalMap):
-        return rooms.rooms, rooms.rooms.labels, rooms.grid
+        view = rooms.rooms
+        return view, view.labels if everything else view.listed_labels, view.grid
     if grid is None:
         raise InvalidValueError("labels of rooms are drawn with their map: give the grid too")
     if rooms.label_of.shape != grid.shape:

@@ -27,7 +27,7 @@ _NAME_SIZES = (0.75, 0.65, 0.55)
 """Font sizes that are tried for a name, as shares of the picture's font size."""
 _LEAST_FONT = 4.0
 """Least legible font size, in points."""
-_NUMBER_SIZE = 0.7
+_NUMBER_SIZE = 0.5
 _LEADS = (4.0, 9.0, 16.0, 26.0)
 """Lengths of the line to a number beside its room that are tried, in points."""
 _HALO = 1.5

@@ -228,10 +228,10 @@ def _draw_ground(
         entry: Entry = (swatch(style.PLACES, style.PALE), "places")
         return [entry, *ground_entries(grid)], LabelPlacer(canvas)
     rooms = topology.rooms
-    draw_room_cells(canvas, rooms.labels, grid, strength=strength)
+    draw_room_cells(canvas, rooms.listed_labels, grid, strength=strength)
     passed = list({leg.door.number: leg.door for leg in legs if leg.door is not None}.values())
     doors = _drawn_doors(rooms, passed)
-    writer = RoomWriter(canvas, grid, rooms.labels)
+    writer = RoomWriter(canvas, grid, rooms.listed_labels)
     writer.labels.keep_free(
         [end for line in lines for end in line[[0, -1]]], 0.6 * _WAYPOINT_POINTS
     )
@@ -244,6 +244,6 @@ def _draw_ground(
 
 
 def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
-    """Return the doors wide enough to draw, and all that the path passes."""
-    numbers = {door.number for door in passed}
-    return [d for d in rooms.doors if not d.is_gap or d.number in numbers]
+    """Return the doors that are listed, and all that the path passes."""
+    numbers = {door.number for door in (*passed, *rooms.listed_doors)}
+    return [door for door in rooms.doors if door.number in numbers]

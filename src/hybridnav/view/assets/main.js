@@ -58,10 +58,10 @@ function reported(work, isOwn = true) {
 // --- pointer
 
 async function clickedToClose(at) {
-  const { scene, map, closures, floors } = page;
+  const { scene, names, closures, floors } = page;
   const end = floors.ends.find((each) => near(scene.toScreen(each.at), at, END_REACH));
   if (end) return closures.toggle("links", end.link.name);
-  const door = map.rooms.doors.find((each) => near(scene.toScreen(each.at), at, END_REACH));
+  const door = names.shown.doors.find((each) => near(scene.toScreen(each.at), at, END_REACH));
   if (door) return closures.toggle("doors", door.number);
   const { room } = await page.link.post("at", { point: scene.toGrid(at) });
   return room ? closures.toggle("rooms", room) : page.say("Neither a door nor a room lies there", true);
@@ -158,6 +158,7 @@ function connectView() {
   for (const id of ["colours", "show-graph"]) on(id, "change", async () => { await pictures.showLayer(); pictures.showLegend(); });
   on("level", "input", () => pictures.showLayer());
   for (const id of ["show-names", "show-doors"]) on(id, "change", () => { scene.draw(); pictures.showLegend(); });
+  on("show-all", "change", () => { page.names.list(); scene.draw(); });
   on("show-costs", "change", () => pictures.showCosts());
   on("theme", "change", () => pictures.useTheme());
   on("floor", "change", () => showFloor(Number(byId("floor").value)));
@@ -231,7 +232,7 @@ function describe() {
 function stateFacts() {
   const { map, floors } = page;
   const size = [map.cols, map.rows].map((n) => n.toLocaleString("en"));
-  const rooms = map.ready ? `, ${map.rooms.rooms.length} rooms` : "";
+  const rooms = map.ready ? `, ${page.names.shown.rooms.length} rooms` : "";
   const floor = floors.isBuilding ? `Floor ${floors.nameOf(floors.at)}: ` : "";
   byId("facts").textContent = `${floor}${size.join(" × ")} cells of ${map.resolution_m} m, robot radius ${map.robot_radius_m} m${rooms}`;
 }

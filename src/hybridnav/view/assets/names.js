@@ -22,6 +22,13 @@ export class Names {
     return this.page.map.rooms;
   }
 
+  // Rooms and doors in lists and on the map: those that people look for, or all.
+  get shown() {
+    const { rooms, doors } = this.rooms;
+    const isShown = ({ listed, name }) => listed || name === this.chosen || this.byId("show-all").checked;
+    return { rooms: rooms.filter(isShown), doors: doors.filter(isShown) };
+  }
+
   get ownRings() {
     return this.ringsOf(this.chosen);
   }
@@ -210,7 +217,8 @@ export class Names {
   // --- the panel
 
   list() {
-    const names = this.rooms.rooms.map((room) => room.name);
+    const { rooms, doors: shown } = this.shown;
+    const names = rooms.map((room) => room.name);
     const options = (first, values, text = (v) => v) => [
       element("option", { value: "" }, first),
       ...values.map((value) => element("option", { value }, text(value))),
@@ -218,8 +226,8 @@ export class Names {
     this.byId("room").replaceChildren(...options("choose…", names));
     this.byId("other-room").replaceChildren(...options("choose…", names));
     this.byId("close-room").replaceChildren(...options("choose…", names));
-    const doors = this.rooms.doors.map((door) => door.number);
-    const beside = new Map(this.rooms.doors.map((door) => [door.number, door.rooms]));
+    const doors = shown.map((door) => door.number);
+    const beside = new Map(shown.map((door) => [door.number, door.rooms]));
     const text = (n) => `${n}: ${beside.get(n).map((room) => room ?? "no room").join(" – ")}`;
     this.byId("close-door").replaceChildren(...options("choose…", doors, text));
     this.byId("room").value = this.chosen;

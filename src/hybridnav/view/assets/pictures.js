@@ -107,7 +107,7 @@ export class Pictures {
   }
 
   paint(scene) {
-    const { routes, names, map, closures, floors } = this.page;
+    const { routes, names, closures, floors } = this.page;
     const links = this.#linkMarks();
     const isNaming = this.page.mode === "names";
     const hasDoors = this.byId("show-doors").checked;
@@ -115,19 +115,19 @@ export class Pictures {
     if (isNaming && names.chosen) paintOutline(scene, names.ownRings, names.tool === "corners");
     paintDashed(scene, routes.open, floors.at);
     paintRoutes(scene, routes.routes, routes.chosen, floors.at);
-    if (hasDoors) paintDoors(scene, map.rooms.doors);
+    if (hasDoors) paintDoors(scene, names.shown.doors);
     paintLinks(scene, links);
     const ends = floors.ends.filter(({ link }) => closures.links.includes(link.name)).map((end) => end.at);
     const crosses = [...closures.marks, ...ends];
     paintClosed(scene, closures.areas, crosses, [...closures.draft, ...names.line]);
-    const doors = hasDoors ? map.rooms.doors.map((door) => door.at) : [];
+    const doors = hasDoors ? names.shown.doors.map((door) => door.at) : [];
     const [start, goal] = ["start", "goal"].map((which) => routes.here(which));
     const taken = [...doors, ...crosses, start, goal].filter(Boolean).map((point) => {
       const [x, y] = scene.toScreen(point);
       return [x - 8, y - 8, x + 8, y + 8];
     });
     taken.push(...links.map((mark) => linkBox(scene, mark)));
-    if (this.byId("show-names").checked) paintNames(scene, map.rooms.rooms, taken, isNaming ? names.chosen : "");
+    if (this.byId("show-names").checked) paintNames(scene, names.shown.rooms, taken, isNaming ? names.chosen : "");
     paintEnd(scene, start, "A");
     paintEnd(scene, goal, "B");
     if (scene.canvas.matches(":focus-visible")) paintMiddle(scene);
