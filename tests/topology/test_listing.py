@@ -85,7 +85,8 @@ def test_what_is_listed_is_what_cells_counted_one_by_one_say(scene, radius_m, si
     labels = RoomLabels(tuple(f"room-{n}" for n in range(len(labels.names))), labels.label_of)
     grid = replace(occupancy_grid(classes, resolution_m=side_m), robot_radius_m=radius_m)
     rooms = rooms_of(grid, labels)
-    spaces, is_wide, parts = {}, {}, ndimage.label(grid.classes == CellClass.FREE)[0]
+    spaces: dict[object, list[tuple[int, int]]] = {}
+    is_wide, parts = {}, ndimage.label(grid.classes == CellClass.FREE)[0]
     free = classes == CellClass.FREE
     nameless = ndimage.label(free & (labels.label_of < 0))[0]
     for cell in map(tuple, np.argwhere(free).tolist()):

@@ -108,7 +108,8 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     if view is not None:
         n_left_out = len(view.doors) - len(doors)
         entries += draw_doors(canvas, doors, f"{n_left_out} left out" if n_left_out else "")
-        writer.number_doors(sorted(doors, key=lambda door: (door.is_opening, -door.width_m)))
+        doors.sort(key=lambda door: (door.is_opening, -door.width_m))
+        writer.number_doors(doors)
     entries += [*ground_entries(grid), *key]
     finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
