@@ -89,7 +89,8 @@ def test_what_is_listed_is_what_cells_counted_one_by_one_say(scene, radius_m, si
     is_wide, parts = {}, ndimage.label(grid.classes == CellClass.FREE)[0]
     free = classes == CellClass.FREE
     nameless = ndimage.label(free & (labels.label_of < 0))[0]
-    for cell in map(tuple, np.argwhere(free).tolist()):
+    for row, col in np.argwhere(free).tolist():
+        cell = (int(row), int(col))
         label = int(labels.label_of[cell])
         spaces.setdefault(label if label >= 0 else (int(nameless[cell]),), []).append(cell)
     for space, cells in spaces.items():
