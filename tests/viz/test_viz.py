@@ -3,10 +3,12 @@
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
@@ -239,16 +241,54 @@ def test_a_map_finer_than_any_page_is_averaged_in_place(monkeypatch):
 def test_a_plan_shows_its_path_route_and_ends(rooms, plan):
     ax = plot_plan(rooms, plan, start=START, goal=GOAL)
     np.testing.assert_array_equal(_find(ax, "path").get_xydata(), plan.path.points)
+    (route,) = _lines(ax, "route")
+    np.testing.assert_array_equal(route, plan.path.points)
+    dots = np.asarray(_find(ax, "route-places").get_offsets())
+    cells = rooms.grid.frame.cells_of(dots)
+    assert rooms.place_ids[rooms.level.field_of[tuple(cells.T)]].tolist() == list(plan.route.places)
+    line = shapely.LineString(plan.path.points)
+    assert max(line.distance(shapely.Point(dot)) for dot in dots) < 1e-9
+    start, goal = _find(ax, "start"), _find(ax, "goal")
+    np.testing.assert_allclose(start.get_xydata(), [START])
+    np.testing.assert_allclose(goal.get_xydata(), [GOAL])
+    assert start.get_marker() != goal.get_marker()
+
+
+def test_a_route_without_a_path_runs_from_place_to_place(rooms, plan):
+    ax = plot_plan(rooms, replace(plan, path=None))
     middles = [line[1] for line in _lines(ax, "route")]
     np.testing.assert_allclose(
         sorted(map(tuple, middles)),
         sorted(tuple(rooms.level.boundary_middles[a]) for a in plan.route.arcs),
     )
-    assert len(_find(ax, "route-places").get_offsets()) == len(plan.route.places)
-    start, goal = _find(ax, "start"), _find(ax, "goal")
-    np.testing.assert_allclose(start.get_xydata(), [START])
-    np.testing.assert_allclose(goal.get_xydata(), [GOAL])
-    assert start.get_marker() != goal.get_marker()
+
+
+def test_a_plan_shows_what_costs_more_and_what_is_closed(rooms, plan):
+    factors = np.ones(rooms.grid.shape)
+    factors[20:25, 5:10] = 4.0
+    closed = hn.Blocked(cells=[(7, 31)])
+    ax = plot_plan(rooms, plan, costs=hn.CostLayer(factors), blocked=closed)
+    plain = plot_plan(rooms, plan)
+    costs, shut = (np.asarray(_find(ax, gid).get_array())[..., 3] for gid in ("costs", "closed"))
+    assert costs[22, 7] > 0 == costs[22, 15]
+    assert shut[7, 31] > 0 == shut[7, 15]
+    texts = [text.get_text() for text in _legend(ax).get_texts()]
+    assert {"a metre costs up to 4", "closed"} <= set(texts)
+    assert not {"a metre costs up to 4", "closed"} & {
+        text.get_text() for text in _legend(plain).get_texts()
+    }
+
+
+def test_unexplored_places_are_drawn_where_they_are_asked_for():
+    topology = _topology(_two_rooms(margin=10))
+    result = _plan(topology, (3.0, 3.0), (5.0, 5.0))
+    gids = ("unexplored-arcs", "unexplored-dots", "rim-arcs")
+    drawn = {child.get_gid() for child in plot_plan(topology, result).get_children()}
+    assert not drawn & set(gids)
+    drawn = {
+        child.get_gid() for child in plot_plan(topology, result, unexplored=True).get_children()
+    }
+    assert "unexplored-dots" in drawn
 
 
 def test_places_of_the_corridor_stand_out(rooms):

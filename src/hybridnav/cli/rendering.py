@@ -37,17 +37,21 @@ def draw(
     outcome: hn.PlanResult | hn.Tour | hn.Alternatives,
     waypoints: Sequence[Waypoint],
     optimum_m: float | None,
+    *,
+    costs: hn.CostLayer | None,
+    blocked: hn.Blocked | None,
 ) -> None:
     """Save the picture of a plan between two points, of a tour, or of alternatives."""
     from hybridnav import viz  # noqa: PLC0415 - loads matplotlib
 
+    query: Any = {"costs": costs, "blocked": blocked}
     if isinstance(outcome, hn.PlanResult):
         start, goal = (waypoint[:2] for waypoint in waypoints)
-        ax = viz.plot_plan(topology, outcome, start=start, goal=goal, optimum_m=optimum_m)
+        ax = viz.plot_plan(topology, outcome, start=start, goal=goal, optimum_m=optimum_m, **query)
     elif isinstance(outcome, hn.Tour):
-        ax = viz.plot_tour(topology, outcome)
+        ax = viz.plot_tour(topology, outcome, **query)
     else:
-        ax = viz.plot_alternatives(topology, outcome)
+        ax = viz.plot_alternatives(topology, outcome, **query)
     viz.save_figure(ax, path)
 
 

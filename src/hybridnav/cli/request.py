@@ -116,7 +116,15 @@ class Request:
             hn.save_bag(self.bag, [outcome], grid=grid)
         if self.plot is not None:
             optimum_m = beside["optimum_m"] if beside.get("loss") is not None else None
-            draw(self.plot, topology, found or outcome, self.waypoints, optimum_m)
+            draw(
+                self.plot,
+                topology,
+                found or outcome,
+                self.waypoints,
+                optimum_m,
+                costs=planner.costs,
+                blocked=closed,
+            )
         return outcome.solved
 
     def _rooms_file(self) -> Path | None:

@@ -150,14 +150,32 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
 
     `colours[field_of]` is the colour of a cell; occupied and blocked cells have their own colours.
     """
-    ax, view = canvas.ax, canvas.view
+    window, block = _window(canvas.view, grid)
+    image = _image(grid.measured[window], grid.classes[window], field_of[window], colours, block)
+    _draw_image(canvas, grid, image, gid="cells")
+
+
+def draw_shades(canvas: Canvas, grid: OccupancyGrid, shades: ByteArray, *, gid: str) -> None:
+    """Draw RGBA of each cell, uint8 (rows, cols, 4), over the cells that were drawn before."""
+    window, block = _window(canvas.view, grid)
+    _draw_image(canvas, grid, shades[window][::block, ::block], gid=gid)
+
+
+def _window(view: View, grid: OccupancyGrid) -> tuple[tuple[slice, slice], int]:
+    """Return the cells inside a view, and how many of them a side of a pixel stands for."""
     (left, bottom), (right, top) = view.low, view.high
     cells = grid.frame.cells_of([[left, bottom], [left, top], [right, bottom], [right, top]])
     low = np.maximum(cells.min(axis=0), 0)
     high = np.minimum(cells.max(axis=0) + 1, grid.shape)
-    window = np.s_[low[0] : high[0], low[1] : high[1]]
-    block = -(-int((high - low).max()) // MAX_IMAGE_SIDE)
-    image = _image(grid.measured[window], grid.classes[window], field_of[window], colours, block)
+    window = np.s_[int(low[0]) : int(high[0]), int(low[1]) : int(high[1])]
+    return window, -(-int((high - low).max()) // MAX_IMAGE_SIDE)
+
+
+def _draw_image(canvas: Canvas, grid: OccupancyGrid, image: ByteArray, *, gid: str) -> None:
+    """Draw the pixels of the cells inside the view, turned into the map frame."""
+    ax, view = canvas.ax, canvas.view
+    (rows, cols), block = _window(view, grid)
+    low = np.array([rows.start, cols.start])
     end = low + block * np.array(image.shape[:2])
     (up_x, up_y), (along_x, along_y) = grid.frame.axes_m.tolist()
     to_map = Affine2D.from_values(along_x, along_y, up_x, up_y, *grid.frame.origin_m)
@@ -169,7 +187,7 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
         # Average if the page is coarser than the map: thin walls must not vanish.
         interpolation="antialiased",
         zorder=0,
-        gid="cells",
+        gid=gid,
     )
     _show(ax, view)  # imshow set the limits to those of an image without yaw
 

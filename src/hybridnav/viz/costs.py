@@ -14,8 +14,9 @@ from matplotlib.patches import Patch
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.metrics.judge import checked_points
+from hybridnav.planner.blocked import as_blocked
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
 from hybridnav.viz.layout import LABELS, add_legend, add_title, fit_height, label_axes
 from hybridnav.viz.maps import ground_entries
 
@@ -25,8 +26,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike
 
+    from hybridnav._typing import BoolArray
     from hybridnav.costs import CostLayer
     from hybridnav.grid import OccupancyGrid
+    from hybridnav.planner.blocked import Closable
+    from hybridnav.topology import TopologicalMap
     from hybridnav.viz.layout import Entry
 
 _LEVELS = 254
@@ -38,6 +42,10 @@ _SHADES = (0.1, 0.33, 0.6, 0.85)
 """Parts of the colour map that follow white: its darkest end would look like a wall."""
 _PALE = 0.55
 """Part of white in these colours where paths are drawn over them."""
+_LEAST_SHADE, _CLOSED_ALPHA = 0.1, 190
+"""Opacity of the least cost above 1, as a share, and of closed cells, of 255."""
+_LEAST_CLOSED_POINTS = 3.0
+"""Least breadth of what is closed, in points."""
 _BAR, _BAR_HEIGHT = 3.0, 0.8
 """Heights of the colour bar with its labels and of the bar itself, in font sizes."""
 _TICKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
@@ -45,6 +53,76 @@ _BAR_LEFT, _BAR_WIDTH = 0.3, 0.4
 """Place of the bar below the map, in widths of the map."""
 _PATHS = ("#0b3c8c", "#007f5f", *style.ROUTES[2:])
 """Colours of paths: the red of other pictures would vanish on costs."""
+
+
+def draw_query(
+    canvas: Canvas, topology: TopologicalMap, costs: CostLayer | None, blocked: Closable | None
+) -> list[Entry]:
+    """Draw what a query was planned with over the cells: costs as shades, closed cells.
+
+    Parameters
+    ----------
+    canvas
+        Canvas on which the cells are drawn.
+    topology
+        The map.
+    costs
+        Costs of its cells; the more a metre costs, the less of the cell shows through.
+    blocked
+        Closures of the query.
+
+    Returns
+    -------
+    list of Entry
+        Entries of the legend.
+    """
+    grid = topology.grid
+    entries: list[Entry] = []
+    is_open = grid.classes != CellClass.OCCUPIED
+    is_closed = np.zeros(grid.shape, dtype=np.bool_)
+    if costs is not None:
+        costs.check_fits(grid)
+        scale = _scale_of(grid, costs)
+        at = np.where(
+            grid.classes == CellClass.FREE, np.asarray(scale(costs.factors)).clip(0, 1), 0.0
+        )
+        table = np.round(colormaps["YlOrRd"](np.linspace(0.2, _SHADES[-1], _LEVELS)) * 255)
+        shades = table.astype(np.uint8)[np.round(at * (_LEVELS - 1)).astype(np.intp)]
+        shades[..., 3] = np.where(at > 0, 255 * (_LEAST_SHADE + (1 - _LEAST_SHADE) * at), 0)
+        draw_shades(canvas, grid, shades, gid="costs")
+        text = f"a metre costs up to {scale.vmax:.3g}"
+        entries.append((Patch(fc=colormaps["YlOrRd"](_SHADES[-1])), text))
+        if costs.closed is not None:
+            is_closed |= costs.closed
+    if blocked is not None:
+        is_closed.ravel()[as_blocked(blocked).cells_of(topology)] = True
+    is_closed &= is_open
+    if is_closed.any():
+        # A closed door may be a single cell: everything closed is seen on the page.
+        cell_points = grid.resolution_m * canvas.sizes.points_per_metre
+        is_closed = _wider(is_closed, int(_LEAST_CLOSED_POINTS / cell_points / 2)) & is_open
+        shades = np.zeros((*grid.shape, 4), dtype=np.uint8)
+        shades[is_closed] = (*style.rgb(_CLOSED)[0].tolist(), _CLOSED_ALPHA)
+        draw_shades(canvas, grid, shades, gid="closed")
+        entries.append((Patch(fc=_CLOSED), "closed"))
+    return entries
+
+
+def _wider(cells: BoolArray, steps: int) -> BoolArray:
+    """Return cells with those at most some steps away from them."""
+    from scipy import ndimage  # noqa: PLC0415 - most pictures show nothing that is closed
+
+    if not steps:
+        return cells
+    wider: BoolArray = ndimage.binary_dilation(cells, iterations=steps)
+    return wider
+
+
+def _scale_of(grid: OccupancyGrid, layer: CostLayer) -> Normalize:
+    """Return the scale of factors: logarithmic beyond 10."""
+    most = float(layer.factors[grid.classes == CellClass.FREE].max(initial=1.0))
+    most = max(most, 1.0 + 1e-3)
+    return LogNorm(1.0, most) if most > _DECADE else Normalize(1.0, most)
 
 
 def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
@@ -95,9 +173,7 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
     """
     layer.check_fits(grid)
     canvas = Canvas.opened(ax, width_in, known_view(grid))
-    is_free = grid.classes == CellClass.FREE
-    most = max(float(layer.factors[is_free].max(initial=1.0)), 1.0 + 1e-3)
-    scale: Normalize = LogNorm(1.0, most) if most > _DECADE else Normalize(1.0, most)
+    scale = _scale_of(grid, layer)
     strong = colormaps["YlOrRd"](_SHADES)[:, :3]
     colours_of_costs = [style.FREE, *(_PALE + (1 - _PALE) * strong if paths else strong)]
     shades = LinearSegmentedColormap.from_list("factors", colours_of_costs)
@@ -114,7 +190,7 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
     if layer.closed is not None:
         entries.append((Patch(fc=_CLOSED), "closed"))
     entries += _draw_paths(canvas, paths or {})
-    words = [grid.name, f"metres cost 1 to {most:.3g} times as much"]
+    words = [grid.name, f"metres cost 1 to {scale.vmax:.3g} times as much"]
     _finish(canvas, entries, words if title is None else [title], ScalarMappable(scale, shades))
     return canvas.ax
 

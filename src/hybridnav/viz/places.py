@@ -48,14 +48,15 @@ class Places:
         large: BoolArray = areas >= min(TINY_M2, areas.max(initial=0.0))
         return large
 
-    def colours(self, strong: BoolArray | None = None) -> ByteArray:
-        """Return RGB per place and one row more, for cells without a place; `strong` are not
-        pale."""
+    def colours(self, strong: BoolArray | None = None, *, unexplored: bool = True) -> ByteArray:
+        """Return RGB per place and one row more, for cells without a place; `strong` are not pale,
+        and unexplored places are all of one grey if they are not drawn."""
         index = colour_vertices(self.level.arcs, self.level.n_vertices)
         table = style.rgb(*style.PLACES)[index]
         if strong is not None:
             table[~strong] = style.rgb(*style.PLACES, strength=style.PALE)[index[~strong]]
-        table[~self.free] = style.rgb(*style.UNEXPLORED_PLACES)[index[~self.free]]
+        greys = style.rgb(*(style.UNEXPLORED_PLACES if unexplored else [style.UNEXPLORED]))
+        table[~self.free] = greys[index[~self.free] % len(greys)]
         return np.concatenate([table, style.rgb(style.BLOCKED)])
 
     def dot(self, sizes: Sizes) -> float:
@@ -88,7 +89,9 @@ class Places:
         return list(at + out * (to + across) + back * (to - across))
 
 
-def draw_arcs(canvas: Canvas, places: Places, *, self_loops: bool = False) -> None:
+def draw_arcs(
+    canvas: Canvas, places: Places, *, self_loops: bool = False, unexplored: bool = True
+) -> None:
     """Draw the arcs between places that are no specks, the fainter the less a route can use them.
 
     Unexplored places cover most of many maps: their arcs must not hide those between free ones.
@@ -102,7 +105,7 @@ def draw_arcs(canvas: Canvas, places: Places, *, self_loops: bool = False) -> No
         (0, style.UNEXPLORED_ARC, 0.6, "unexplored-arcs"),
         (1, style.RIM_ARC, 0.6, "rim-arcs"),
         (2, style.ARC, 1.0, "arcs"),
-    ):
+    )[0 if unexplored else 2 :]:
         lines = places.lines(seen & (n_free == free_endpoints))
         canvas.add_lines(lines, colors=colour, linewidths=share * width, **look, gid=gid)
     if self_loops:
@@ -111,13 +114,13 @@ def draw_arcs(canvas: Canvas, places: Places, *, self_loops: bool = False) -> No
         canvas.add_lines(loops, **look, gid="self-loops")
 
 
-def draw_dots(canvas: Canvas, places: Places) -> None:
+def draw_dots(canvas: Canvas, places: Places, *, unexplored: bool = True) -> None:
     """Draw the positions of the places that are no specks: free ones dark, unexplored ones grey."""
     ax, diameter = canvas.ax, places.dot(canvas.sizes)
     for mask, colour, share, gid in (
         (~places.free, style.UNEXPLORED_DOT, 0.75, "unexplored-dots"),
         (places.free, style.INK, 1.0, "free-dots"),
-    ):
+    )[0 if unexplored else 1 :]:
         x, y = places.positions[mask & places.large].T
         size = (share * diameter) ** 2
         ax.scatter(x, y, s=size, c=colour, linewidths=0, zorder=4, gid=gid)

@@ -14,6 +14,7 @@ from hybridnav.result import COST_METRICS
 from hybridnav.route import corridor_of
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.costs import draw_query
 from hybridnav.viz.labels import Marker, draw_markers
 from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import arc_handle, ground_entries, swatch
@@ -24,11 +25,15 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from hybridnav._typing import BoolArray, FloatArray
+    from hybridnav.costs import CostLayer
+    from hybridnav.planner.blocked import Closable
     from hybridnav.result import PlanResult, Route
     from hybridnav.topology import TopologicalMap
     from hybridnav.viz.layout import Entry
     from hybridnav.viz.style import Sizes
 
+_LOOKS = 4
+"""Points of a path that are looked up in the map, to a cell."""
 _ROUTE_WIDTH, PATH_WIDTH, _CASING = 1.5, 2.0, 1.5
 
 
@@ -41,13 +46,17 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     goal: ArrayLike | None = None,
     title: str | None = None,
     optimum_m: float | None = None,
+    costs: CostLayer | None = None,
+    blocked: Closable | None = None,
+    unexplored: bool = False,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw a plan: map, places, arcs, route, path, start and goal, scale bar.
 
     Arcs run through the middle of their boundaries, so that two doors are two lines. Places of the
     route, or of the corridor if the preset searched in one, keep their full colours; the others are
-    pale. Without a path the title states the reason.
+    pale. The route lies along the path, with a dot in each place that it passes; a route without a
+    path runs from place to place. Without a path the title states the reason.
 
     Parameters
     ----------
@@ -63,6 +72,11 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
         Title instead of the map's name, length, loss and places; empty for none.
     optimum_m
         Cost of an optimal path of the same metric in metres, for the loss in the title.
+    costs, blocked
+        What the query was planned with, drawn over the cells; None for nothing.
+    unexplored
+        Whether to draw unexplored places and their arcs, of which most maps have many; they are
+        drawn in any case if the plan may enter them.
     width_in
         Width of a new figure in inches, 3.3 for one column of a paper; its height follows.
 
@@ -93,18 +107,21 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
         view = view.holding(np.stack([marker.point for marker in markers]), margin)
     canvas = Canvas.opened(ax, width_in, view)
     strong = _corridor(topology, result)
-    draw_cells(canvas, grid, topology.level.field_of, places.colours(strong))
-    draw_arcs(canvas, places)
-    draw_dots(canvas, places)
-    path = np.empty((0, 2))
+    unexplored |= result.settings.get("planner", {}).get("allow_unexplored", False)
+    colours = places.colours(strong, unexplored=unexplored)
+    draw_cells(canvas, grid, topology.level.field_of, colours)
+    query = draw_query(canvas, topology, costs, blocked)
+    draw_arcs(canvas, places, unexplored=unexplored)
+    draw_dots(canvas, places, unexplored=unexplored)
+    path = np.empty((0, 2)) if result.path is None else result.path.points
     if result.route is not None:
-        _draw_route(canvas, topology, result.route, places)
+        _draw_route(canvas, topology, result.route, places, path)
     if result.path is not None:
-        path = result.path.points
         draw_path(canvas, path)
     draw_markers(canvas, markers, [path])
     words = _words(topology, result, optimum_m) if title is None else [title]
-    entries = _entries(result, places, strong, canvas.sizes) + ground_entries(grid)
+    entries = _entries(result, places, strong, canvas.sizes, unexplored=unexplored)
+    entries += query + ground_entries(grid)
     return finish(canvas, entries, words)
 
 
@@ -139,22 +156,45 @@ def _corridor(topology: TopologicalMap, result: PlanResult) -> BoolArray:
     return corridor_of(topology, on_route, neighbours=neighbours).places
 
 
-def _draw_route(canvas: Canvas, topology: TopologicalMap, route: Route, places: Places) -> None:
-    arcs = np.isin(topology.arc_ids, route.arcs)
+def _draw_route(
+    canvas: Canvas, topology: TopologicalMap, route: Route, places: Places, path: FloatArray
+) -> None:
+    """Draw a route along its path, with a dot in the middle of each stretch in one place; from
+    place to place if there is no path."""
     width = _ROUTE_WIDTH * canvas.sizes.line
-    look = {"colors": style.INK, "linewidths": width, "capstyle": "round", "zorder": 5}
-    canvas.add_lines(places.lines(arcs), **look, gid="route")
-    x, y = places.positions[np.isin(topology.place_ids, route.places)].T
+    lines = [path]
+    dots = _middles(topology, path) if len(path) else places.positions[:0]
+    if not len(path):
+        lines = places.lines(np.isin(topology.arc_ids, route.arcs))
+        dots = places.positions[np.isin(topology.place_ids, route.places)]
+    look = {"colors": style.INK, "capstyle": "round", "zorder": 5}
+    rim = (PATH_WIDTH + _CASING) * canvas.sizes.line if len(path) else 0.0
+    canvas.add_lines(lines, linewidths=width + rim, **look, gid="route")
     canvas.ax.scatter(
-        x,
-        y,
+        dots[:, 0],
+        dots[:, 1],
         s=max(places.dot(canvas.sizes), 2.4 * width) ** 2,
         c=style.FREE,
         edgecolors=style.INK,
         linewidths=0.7 * width,
-        zorder=6,
+        zorder=7.5 if len(path) else 6,
         gid="route-places",
     )
+
+
+def _middles(topology: TopologicalMap, path: FloatArray) -> FloatArray:
+    """Return the middle of each stretch of a path in one place, `(x, y)` in metres, shape (n, 2);
+    the path is looked up a few times in each cell."""
+    ends_m = np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))
+    count = max(1, math.ceil(_LOOKS * ends_m[-1] / topology.grid.resolution_m))
+    at_m = (np.arange(count) + 0.5) * (ends_m[-1] / count)
+    points = np.column_stack([np.interp(at_m, ends_m, along) for along in path.T])
+    cells = topology.grid.frame.cells_of(points).clip(0, np.array(topology.grid.shape) - 1)
+    places = topology.level.field_of[tuple(cells.T)]
+    points, places = points[places >= 0], places[places >= 0]  # a side of a wall lies in a wall
+    begins = np.flatnonzero(np.diff(places, prepend=-1))
+    middles: FloatArray = points[(begins + np.append(begins[1:], len(places))) // 2]
+    return middles
 
 
 def draw_path(canvas: Canvas, points: FloatArray) -> None:
@@ -193,7 +233,9 @@ def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None
     return [*words, f"{n_places} place{'s' if n_places > 1 else ''} on the route"]
 
 
-def _entries(result: PlanResult, places: Places, strong: BoolArray, sizes: Sizes) -> list[Entry]:
+def _entries(
+    result: PlanResult, places: Places, strong: BoolArray, sizes: Sizes, *, unexplored: bool
+) -> list[Entry]:
     """Return the legend entries for the items drawn over the cells, and for places."""
     entries: list[Entry] = []
     width = sizes.line
@@ -210,5 +252,6 @@ def _entries(result: PlanResult, places: Places, strong: BoolArray, sizes: Sizes
         label = "other places" if result.route is not None else "places"
         entries.append((swatch(style.PLACES, style.PALE), label))
     if not places.free.all():
-        entries.append((swatch(style.UNEXPLORED_PLACES), "unexplored"))
+        greys = style.UNEXPLORED_PLACES if unexplored else [style.UNEXPLORED]
+        entries.append((swatch(greys), "unexplored"))
     return entries

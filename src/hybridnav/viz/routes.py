@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from hybridnav.result import COST_METRICS
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.costs import draw_query
 from hybridnav.viz.labels import LabelPlacer, Marker, draw_markers
 from hybridnav.viz.layout import finish
 from hybridnav.viz.maps import ground_entries, swatch
@@ -29,8 +30,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from hybridnav._typing import FloatArray
+    from hybridnav.costs import CostLayer
     from hybridnav.planner import Tour
     from hybridnav.planner.alternatives import Alternatives
+    from hybridnav.planner.blocked import Closable
     from hybridnav.planner.legs import Leg
     from hybridnav.topology import Door, Rooms, TopologicalMap
     from hybridnav.viz.layout import Entry
@@ -51,12 +54,14 @@ _DASHES: tuple[_Dashes | None, ...] = (
 """Dashes, each for as many routes as there are colours."""
 
 
-def plot_tour(
+def plot_tour(  # noqa: PLR0913 - all but two have defaults
     topology: TopologicalMap,
     tour: Tour,
     *,
     ax: Axes | None = None,
     title: str | None = None,
+    costs: CostLayer | None = None,
+    blocked: Closable | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw a tour: the rooms as in `plot_rooms`, and the paths from waypoint to waypoint.
@@ -73,6 +78,8 @@ def plot_tour(
         Axes to draw on; by default new ones in a new figure.
     title
         Title instead of the map's name and the length; empty for none.
+    costs, blocked
+        What the query was planned with, drawn over the cells; None for nothing.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -95,6 +102,7 @@ def plot_tour(
     paths = [result.path.points for result in tour.results if result.path is not None]
     canvas = Canvas.opened(ax, width_in, known_view(topology.grid))
     entries, _ = _draw_ground(canvas, topology, tour.legs, paths, 1.0)
+    entries += draw_query(canvas, topology, costs, blocked)
     for points in paths:
         line = Line2D(*points.T, color=style.PATH, linewidth=_TOUR_WIDTH, zorder=7)
         line.set_gid("path")
@@ -115,12 +123,14 @@ def plot_tour(
     return finish(canvas, entries, [topology.grid.name, text] if title is None else [title])
 
 
-def plot_alternatives(
+def plot_alternatives(  # noqa: PLR0913 - all but two have defaults
     topology: TopologicalMap,
     alternatives: Alternatives,
     *,
     ax: Axes | None = None,
     title: str | None = None,
+    costs: CostLayer | None = None,
+    blocked: Closable | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw alternative routes, each in its own colour, on rooms or places.
@@ -139,6 +149,8 @@ def plot_alternatives(
         Axes to draw on; by default new ones in a new figure.
     title
         Title instead of the map's name and the count of routes; empty for none.
+    costs, blocked
+        What the query was planned with, drawn over the cells; None for nothing.
     width_in
         Width of a new figure in inches; its height follows.
 
@@ -161,6 +173,7 @@ def plot_alternatives(
     endpoints = list(paths[0].points[[0, -1]]) if paths else []
     lines = [path.points for path in paths]
     ground, labels = _draw_ground(canvas, topology, legs, lines, style.PALE)
+    ground += draw_query(canvas, topology, costs, blocked)
     entries: list[Entry] = []
     styles = itertools.product(_DASHES, style.ROUTES)
     for number, (one, (dashes, colour)) in enumerate(zip(alternatives, styles, strict=False)):
