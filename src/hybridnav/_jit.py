@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numba
 from numba.core import types
 from numba.core.registry import CPUDispatcher
+from numba.extending import register_jitable
 
+from hybridnav._trig import IN_KERNELS
 from hybridnav.errors import CacheWarning
 
 if TYPE_CHECKING:
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 Kernel = TypeVar("Kernel")
 
 _LOG = logging.getLogger("hybridnav.kernels")
+
+for _function in IN_KERNELS:
+    register_jitable(_function)
 
 
 def njit(**options: Any) -> Callable[[Any], Any]:

@@ -9,6 +9,7 @@ import reprlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from hybridnav._trig import asin, atan2, cos, sin
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -113,13 +114,13 @@ def quaternion_of(message: Any, path: str, what: str) -> Quaternion:
 def yaw_of(quaternion: Quaternion) -> float:
     """Return the direction of the x axis of a pose, in radians, counter-clockwise."""
     x, y, z, w = quaternion
-    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
 def tilt_of(quaternion: Quaternion) -> float:
     """Return the angle between the vertical and the z axis of a pose, in radians."""
     x, y, _, _ = quaternion
-    return 2 * math.asin(min(1.0, math.hypot(x, y)))
+    return 2 * asin(min(1.0, math.hypot(x, y)))
 
 
 def pose_of(message: Any, path: str, what: str) -> tuple[float, float, float]:
@@ -200,7 +201,7 @@ def pose_message(pose: tuple[float, float, float]) -> dict[str, Any]:
     x, y, yaw = pose
     return {
         "position": {"x": x, "y": y, "z": 0.0},
-        "orientation": {"x": 0.0, "y": 0.0, "z": math.sin(yaw / 2), "w": math.cos(yaw / 2)},
+        "orientation": {"x": 0.0, "y": 0.0, "z": sin(yaw / 2), "w": cos(yaw / 2)},
     }
 
 

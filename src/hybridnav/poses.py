@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import directions, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class Motion:
     def _travel(self) -> FloatArray:
         """Direction of each step; a step without length has that of the step before, or behind."""
         steps = self._steps
-        travel = np.arctan2(steps[:, 1], steps[:, 0])
+        travel = directions(steps[:, 1], steps[:, 0])
         return _filled(travel, np.hypot(steps[:, 0], steps[:, 1]) > 0)
 
     @property
@@ -61,8 +62,7 @@ class Motion:
     def lengths_m(self) -> FloatArray:
         """float64 (n - 1,), metres driven on each step."""
         chords: FloatArray = np.hypot(*self._steps.T)
-        # np.sinc(x) is sin(pi x) / (pi x): the ratio of a chord to its arc.
-        return chords / np.sinc(self._turns / (2 * np.pi)) if self.curved else chords
+        return chords / _chord_of_arc(self._turns / 2) if self.curved else chords
 
     @property
     def directions(self) -> SignArray:
@@ -71,7 +71,7 @@ class Motion:
         ahead = np.ones(len(self.points) - 1)
         if self.headings_rad is not None:
             middle = self.headings_rad[:-1] + self._turns / 2
-            ahead = np.where(np.cos(self._travel - middle) < -_ROUNDING, -1.0, 1.0)
+            ahead = np.where(sines_and_cosines(self._travel - middle)[1] < -_ROUNDING, -1.0, 1.0)
             ahead = _filled(ahead, self.lengths_m > 0)
         return ahead.astype(np.int8)
 
@@ -172,10 +172,17 @@ class Motion:
 
         def ahead(part: FloatArray) -> FloatArray:
             half = part * turns / 2
-            chord = part * driven_m * np.sinc(half / np.pi)
-            return np.column_stack([chord * np.cos(heading + half), chord * np.sin(heading + half)])
+            chord = part * driven_m * _chord_of_arc(half)
+            sines, cosines = sines_and_cosines(heading + half)
+            return np.column_stack([chord * cosines, chord * sines])
 
         return ahead(part) - part[:, None] * ahead(np.ones_like(part))
+
+
+def _chord_of_arc(half_rad: FloatArray) -> FloatArray:
+    """Return the ratios of chords to arcs, given half of the turn."""
+    sines = sines_and_cosines(half_rad)[0]
+    return np.divide(sines, half_rad, out=np.ones_like(sines), where=half_rad != 0)
 
 
 def wrapped(angles_rad: FloatArray) -> FloatArray:

@@ -174,7 +174,9 @@ def basis_pairs(cells: LongArray, basis: IntArray) -> tuple[LongArray, FloatArra
     candidates = np.moveaxis(nearest, 0, -1)
     towards = (candidates - cells[:, None, :]).astype(np.float64)
     towards /= np.hypot(towards[..., 0], towards[..., 1])[..., None]
-    cosine = np.einsum("nik,njk->nij", towards, towards).reshape(len(cells), len(_STEPS) ** 2)
+    cosine = (
+        (towards[:, :, None] * towards[:, None]).sum(axis=3).reshape(len(cells), len(_STEPS) ** 2)
+    )
     most = cosine.argmin(axis=1)
     first, second = np.divmod(most, len(_STEPS))
     index = np.arange(len(cells))
@@ -249,7 +251,7 @@ def regions_between(free: BoolArray, cells: LongArray, basis: LongArray) -> IntA
     labels[rest > 0] = rest[rest > 0] - 1 + n_labels
     found, first, dense = np.unique(labels[free], return_index=True, return_inverse=True)
     rank = np.empty(len(found), dtype=np.int32)
-    rank[np.argsort(first)] = np.arange(len(found), dtype=np.int32)
+    rank[np.argsort(first, kind="stable")] = np.arange(len(found), dtype=np.int32)
     region_of = np.full(free.shape, -1, dtype=np.int32)
     region_of[free] = rank[dense]
     return region_of

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import frozen
+from hybridnav._trig import atan2, cos, sin
 from hybridnav.building.floor_graphs import BuildingGraph, FloorArea, FloorGraph
 from hybridnav.building.links import LinkEnd
 from hybridnav.errors import InvalidValueError
@@ -148,7 +149,7 @@ def fitted_pose(own: FloatArray, wanted: FloatArray) -> Pose:
     """Return the pose that brings points nearest to others, by least squares."""
     middle, there = own.mean(axis=0), wanted.mean(axis=0)
     (x, y), (u, v) = (own - middle).T, (wanted - there).T
-    yaw = math.atan2(float(x @ v - y @ u), float(x @ u + y @ v))
+    yaw = atan2(float((x * v - y * u).sum()), float((x * u + y * v).sum()))
     turned_x, turned_y = moved_point((float(middle[0]), float(middle[1])), (0.0, 0.0, yaw))
     return float(there[0]) - turned_x, float(there[1]) - turned_y, yaw
 
@@ -161,13 +162,14 @@ def _end(end: LinkEnd, poses: dict[str, Pose]) -> LinkEnd:
 def moved_point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
     """Return a point in another frame."""
     x, y, yaw = pose
-    cosine, sine = math.cos(yaw), math.sin(yaw)
+    cosine, sine = cos(yaw), sin(yaw)
     return x + cosine * point[0] - sine * point[1], y + sine * point[0] + cosine * point[1]
 
 
 def moved_points(points: FloatArray, pose: Pose) -> FloatArray:
     """Return points in another frame, float64 (n, 2)."""
     x, y, yaw = pose
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    turned: FloatArray = points @ np.array([[cosine, sine], [-sine, cosine]])
-    return frozen(turned + np.array([x, y]))
+    cosine, sine = cos(yaw), sin(yaw)
+    ahead, aside = points.T
+    along = x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
+    return frozen(np.stack(along, axis=1))

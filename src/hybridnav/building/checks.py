@@ -167,7 +167,7 @@ def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, Flo
         cells = sizes[of_cell[grid.frame.cell_of(*end.position_m)]]
         if cells < _LEAST_PART * sizes.max():
             x, y = end.position_m
-            here, most = (n * grid.resolution_m**2 for n in (cells, sizes.max()))
+            here, most = (n * grid.cell_area_m2 for n in (cells, sizes.max()))
             raise InvalidValueError(
                 f"link {link.name}: its end ({x:g}, {y:g}) on floor {end.floor} lies in a "
                 f"part of {here:.3g} m² that is cut off from the rest, {most:.3g} m²: give a "

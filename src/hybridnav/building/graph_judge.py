@@ -211,7 +211,7 @@ def drawn_pairs(
     for index, floor in enumerate(building.floors):
         labels = parts_of(floor)
         area_m2 = np.bincount(labels[labels >= 0], minlength=1).astype(np.float64)
-        area_m2 *= floor.planner.topology.grid.resolution_m**2
+        area_m2 *= floor.planner.topology.grid.cell_area_m2
         large = np.argwhere((labels >= 0) & (area_m2[labels] >= LEAST_AREA_M2))
         if len(large):
             cells_of[index] = large.astype(np.float64) + 0.5

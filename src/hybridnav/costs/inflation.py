@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import exp
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
 
@@ -37,7 +38,7 @@ def cost_at(distance_m: float, scaling: float, inscribed_m: float) -> int:
         return LETHAL
     if distance_m <= inscribed_m:
         return INSCRIBED
-    return int(HIGHEST * math.exp(-scaling * (distance_m - inscribed_m)))
+    return int(HIGHEST * exp(-scaling * (distance_m - inscribed_m)))
 
 
 def inflated_costs(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import atan2
 from hybridnav.errors import InvalidValueError
 from hybridnav.explore.doubts import doubtful_spots, narrow_spots
 from hybridnav.explore.goals import Goals
@@ -174,7 +175,7 @@ class Robot:
             )
         squared = ((free + 0.5 - at) ** 2).sum(axis=1)
         reach = max(_NEAR_M / grid.resolution_m, math.sqrt(squared.min()) + 1)
-        near = squared <= reach**2
+        near = squared <= reach * reach
         free, squared = free[near], squared[near]
         sizes = np.bincount(labels.ravel())[labels[tuple(free.T)]]
         row, col = free[np.lexsort((squared, -sizes))[0]].tolist()
@@ -301,7 +302,7 @@ class Robot:
         for at in np.linspace(0.0, along[-1], n_scans + 1)[1:].tolist():
             last = x_m, y_m
             x_m, y_m = (float(np.interp(at, along, column)) for column in points.T)
-            self.pose = x_m, y_m, math.atan2(y_m - last[1], x_m - last[0])
+            self.pose = x_m, y_m, atan2(y_m - last[1], x_m - last[0])
             self._scan()
             if beyond and self._is_known(beyond):
                 self._track[-1] = np.concatenate([points[along < at], [self.pose[:2]]])

@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import guarded, njit
+from hybridnav._trig import exp, log
 
 _ROUNDING = 1e-12
 """Relative slack on the length of a route, which is a sum of rounded numbers."""
@@ -144,3 +145,12 @@ def routes(graph, starts, goals, passed):
         for k in range(goals[0][pair], goals[0][pair + 1]):
             finish[goals[1][k]] = np.inf
     return found, offsets, expanded
+
+
+@njit(cache=True, nogil=True)
+def log_uniform(low, high, shares):
+    """Return numbers between `low` and each of `high`, by their shares in the logarithm."""
+    found = np.empty(len(high))
+    for k in range(len(high)):
+        found[k] = low * exp(shares[k] * log(high[k] / low))
+    return found

@@ -131,7 +131,7 @@ class Network:
         if len(nodes) < 2 or not self._is_usable[nodes[1]]:  # noqa: PLR2004
             return nodes
         first, second = self.positions[nodes[:2]]
-        if (second - first) @ (point - first) <= 0:
+        if ((second - first) * (point - first)).sum() <= 0:
             return nodes
         is_seen = self.sight.clear(point[None], second[None])[0]
         return nodes[1:] if is_seen else nodes

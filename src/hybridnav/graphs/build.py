@@ -130,7 +130,7 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
     progress(1, _STEPS)
     chosen = Nodes(space, most)
     sizes = np.bincount(space.component_of[space.free], minlength=1)
-    is_kept = sizes * cell_m**2 >= LEAST_AREA_M2
+    is_kept = sizes * (cell_m * cell_m) >= LEAST_AREA_M2
     add_landmarks(chosen, topology, is_kept, min(wanted.bend, wanted.spacing))
     if not len(chosen):
         raise InvalidValueError(
@@ -153,7 +153,7 @@ def _refined(
 ) -> LongArray:
     """Add bends and cover until routes are short; return the edges."""
     space = chosen.space
-    least = int(LEAST_AREA_M2 / space.grid.resolution_m**2)
+    least = int(LEAST_AREA_M2 / space.grid.cell_area_m2)
     starts, goals = space.random_pairs(_PAIRS, rng, least)
     paths = space.paths(starts, goals)
     progress(2, _STEPS)

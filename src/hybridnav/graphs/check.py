@@ -127,7 +127,7 @@ def check_graph(
     _add_nodes(findings, graph, placed, grid, component)
     _add_edges(findings, graph, placed, space, is_clear)
     sizes = np.bincount(space.component_of[space.free], minlength=1)
-    is_large = sizes * grid.resolution_m**2 >= LEAST_AREA_M2
+    is_large = sizes * grid.cell_area_m2 >= LEAST_AREA_M2
     add_components(findings, graph, component)
     _add_parts(findings, space, is_large, component)
     doors, rooms = add_rooms_and_doors(findings, topology, placed, is_clear, space, is_large)
@@ -253,7 +253,7 @@ def _add_parts(
     for part in empty.tolist():
         cell = np.unravel_index(first[np.searchsorted(found, part)], space.free.shape)
         point: Point = tuple(space.grid.frame.points_of(np.array(cell)).tolist())
-        area_m2 = sizes[part] * space.grid.resolution_m**2
+        area_m2 = sizes[part] * space.grid.cell_area_m2
         findings.add("missing-part", f"{area_m2:.1f} m²", point)
 
 

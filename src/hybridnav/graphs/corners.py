@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import sines_and_cosines
+from hybridnav.graphs._spanner_kernels import log_uniform
+
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray
     from hybridnav.graphs.space import FreeSpace
@@ -15,7 +18,7 @@ if TYPE_CHECKING:
 def is_among(positions: FloatArray, others: FloatArray) -> BoolArray:
     """Return which positions are among others, bool (n,), both float64 (n, 2)."""
     # One number a position: sorting rows takes ten times as long.
-    one, other = (each @ np.array([float(1 << 26), 1.0]) for each in (positions, others))
+    one, other = (each[:, 0] * (1 << 26) + each[:, 1] for each in (positions, others))
     found: BoolArray = np.isin(one, other)
     return found
 
@@ -87,12 +90,13 @@ class Corners:
         angles = rng.uniform(0.0, np.pi / 2, size=(2, len(corners)))
         # Together less than a right angle, or the way over the corner is not taut.
         angles = np.where(angles.sum(axis=0) > np.pi / 2, np.pi / 2 - angles, angles)
-        along, beside = np.cos(angles), -np.sin(angles)
+        sines, along = sines_and_cosines(angles)
+        beside = -sines
         ends: list[FloatArray] = []
         for step in ((along[0], beside[0]), (beside[1], along[1])):
             steps = np.stack(step, axis=1) * blocked
             reach = np.maximum(sight.reaches(corners, steps, reach_cells[1]), reach_cells[0])
-            away = reach_cells[0] * (reach / reach_cells[0]) ** rng.uniform(size=len(corners))
+            away = log_uniform(reach_cells[0], reach, rng.uniform(size=len(corners)))
             ends.append(np.floor(corners + away[:, None] * steps) + 0.5)
         both = np.concatenate(ends, axis=1)
         inside = (both > 0).all(axis=1) & (both < np.tile(space.free.shape, 2)).all(axis=1)

@@ -96,7 +96,7 @@ def judge_route_graph(
     checked_type("graph", graph, RouteGraph)
     checked_between("pairs", pairs, 1, 1e6)
     space = FreeSpace.of(graph.grid)
-    least = int(1.0 / graph.grid.resolution_m**2)
+    least = int(1.0 / graph.grid.cell_area_m2)
     starts, goals = space.random_pairs(pairs, np.random.default_rng(seed), least)
     optimum = space.paths(starts, goals).length_cells
     counts = optimum * graph.grid.resolution_m >= least_m

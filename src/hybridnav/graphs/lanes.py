@@ -134,6 +134,6 @@ def _fits(
 def _opposite(edges: LongArray, n_nodes: int) -> LongArray:
     """Return the index of each edge's opposite; graphs of maps have one for each."""
     keys = edges[:, 0] * n_nodes + edges[:, 1]
-    order = np.argsort(keys)
+    order = np.argsort(keys, kind="stable")
     found: LongArray = order[np.searchsorted(keys[order], edges[:, 1] * n_nodes + edges[:, 0])]
     return found

@@ -37,7 +37,7 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
         return occupied.copy()
     if radius_cells >= math.hypot(*occupied.shape):
         return np.ones_like(occupied)
-    squared = math.floor(radius_cells**2 * (1 + _ROUNDING))
+    squared = math.floor(radius_cells * radius_cells * (1 + _ROUNDING))
     if squared <= _FEW_ROWS**2:
         return _within_rows(occupied, squared)
     return _within_distance(occupied, squared)
@@ -57,7 +57,8 @@ def greatest_within(values: FloatArray, *, radius_cells: float) -> FloatArray:
         return values.copy()
     from scipy import ndimage  # noqa: PLC0415 - on demand, as above
 
-    squared = math.floor(min(radius_cells, math.hypot(*values.shape)) ** 2 * (1 + _ROUNDING))
+    reach = min(radius_cells, math.hypot(*values.shape))
+    squared = math.floor(reach * reach * (1 + _ROUNDING))
     greatest = values.copy()
     for down in range(min(math.isqrt(squared) + 1, len(values))):
         width = 2 * min(math.isqrt(squared - down**2), values.shape[1]) + 1

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import cos, sin
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -82,12 +83,17 @@ class Frame:
                 f"origin must lie within {FARTHEST_M:g} m, and yaw within as many radians, "
                 f"got {self.origin_m} and {self.yaw_rad:g}"
             )
-        object.__setattr__(self, "_turn", (math.cos(self.yaw_rad), math.sin(self.yaw_rad)))
+        object.__setattr__(self, "_turn", (cos(self.yaw_rad), sin(self.yaw_rad)))
 
     @property
     def for_kernels(self) -> tuple[float, float, float, float, float]:
         """Side of a cell, `(x, y)` of the origin in metres, cosine and sine of the yaw."""
         return (self.resolution_m, *self.origin_m, *self._turn)
+
+    @property
+    def cell_area_m2(self) -> float:
+        """Area of a cell in square metres."""
+        return self.resolution_m * self.resolution_m  # a power differs between processors
 
     @property
     def axes_m(self) -> FloatArray:
@@ -98,7 +104,7 @@ class Frame:
     @property
     def per_metre(self) -> FloatArray:
         """Rows, then columns, in a metre along x and along y, float64 (2, 2)."""
-        return self.axes_m / self.resolution_m**2
+        return self.axes_m / self.cell_area_m2
 
     def moved(self, pose: tuple[float, float, float]) -> Frame:
         """Return this frame where a pose puts the coordinates in which it is given.

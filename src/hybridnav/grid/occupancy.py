@@ -156,7 +156,7 @@ class OccupancyGrid:
             classes, dropped = without_islands(
                 classes,
                 least_area_m2=self.least_island_m2,
-                cell_area_m2=self.frame.resolution_m**2,
+                cell_area_m2=self.frame.cell_area_m2,
             )
             object.__setattr__(self, "dropped", dropped)
         for name, array in (
@@ -263,6 +263,11 @@ class OccupancyGrid:
     def resolution_m(self) -> float:
         """Side of a cell in metres."""
         return self.frame.resolution_m
+
+    @property
+    def cell_area_m2(self) -> float:
+        """Area of a cell in square metres."""
+        return self.frame.cell_area_m2
 
     def enterable(self, *, allow_unexplored: bool = False) -> BoolArray:
         """Return the cells that paths may use, bool (rows, cols): free and, if allowed, unexplored.

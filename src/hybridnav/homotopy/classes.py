@@ -217,7 +217,7 @@ class HomotopyClasses:
         self.roots = self.face_of[outer[outer >= 0]].tolist()
         inner = self._level.face_darts(islands.obstacle_cell[RIM + 1 :], _EAST, among=cells)
         found = inner >= 0
-        filled = islands.filled_cells()[RIM + 1 :] * topology.grid.resolution_m**2
+        filled = islands.filled_cells()[RIM + 1 :] * topology.grid.cell_area_m2
         self.areas_m2[self.face_of[inner[found]]] = filled[found]
         self.areas_m2[self.roots] = np.inf
 

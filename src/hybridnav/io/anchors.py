@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
+from hybridnav._trig import cos, sin
 from hybridnav.errors import InvalidValueError
 
 _EQUATOR_M = 6378137.0
@@ -57,10 +58,10 @@ class Anchor:
     @cached_property
     def _radii_m(self) -> tuple[float, float]:
         """Metres per radian to the north and to the east."""
-        sine = math.sin(math.radians(self.latitude_deg))
+        sine = sin(math.radians(self.latitude_deg))
         bulge = 1.0 - _SQUARED_ECCENTRICITY * sine * sine
-        north = _EQUATOR_M * (1.0 - _SQUARED_ECCENTRICITY) / bulge**1.5
-        east = _EQUATOR_M / math.sqrt(bulge) * math.cos(math.radians(self.latitude_deg))
+        north = _EQUATOR_M * (1.0 - _SQUARED_ECCENTRICITY) / (bulge * math.sqrt(bulge))
+        east = _EQUATOR_M / math.sqrt(bulge) * cos(math.radians(self.latitude_deg))
         return north, east
 
     def degrees_of(self, point: tuple[float, float]) -> tuple[float, float]:
@@ -85,4 +86,4 @@ class Anchor:
     @property
     def _turn(self) -> tuple[float, float]:
         heading = math.radians(self.heading_deg)
-        return math.sin(heading), math.cos(heading)
+        return sin(heading), cos(heading)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._trig import acos, sin
 from hybridnav.messages import number_of, quaternion_of, stamp_ns_of, value_of
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ class Transforms:
         rotation, place = np.eye(3), np.zeros(3)
         for name in chain[: chain.index(fixed)]:
             turn, move = self._series[name].at(stamp_ns)
-            rotation, place = turn @ rotation, turn @ place + move
+            rotation, place = _applied(turn, rotation), _applied(turn, place) + move
         return rotation, place
 
 
@@ -183,15 +184,22 @@ def rotation_of(quaternion: FloatArray) -> FloatArray:
     )
 
 
+def _applied(turn: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the product of a matrix and a matrix or vector, its sums in order."""
+    columns = zip(turn.T, other, strict=True)
+    product: FloatArray = sum(np.multiply.outer(column, row) for column, row in columns)
+    return product
+
+
 def _blended(first: FloatArray, last: FloatArray, part: float) -> FloatArray:
     """Return the rotation a share of the way between two, along the shorter arc (Shoemake 1985)."""
-    dot = float(first @ last)
+    dot = float((first * last).sum())
     last, dot = (-last, -dot) if dot < 0 else (last, dot)
-    angle = math.acos(min(dot, 1.0))
+    angle = acos(min(dot, 1.0))
     if angle < _STRAIGHT:
         blended = first + part * (last - first)
     else:
-        near, far = math.sin((1 - part) * angle), math.sin(part * angle)
-        blended = (near * first + far * last) / math.sin(angle)
-    unit: FloatArray = blended / np.linalg.norm(blended)
+        near, far = sin((1 - part) * angle), sin(part * angle)
+        blended = (near * first + far * last) / sin(angle)
+    unit: FloatArray = blended / math.sqrt((blended * blended).sum())
     return unit

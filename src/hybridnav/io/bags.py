@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._trig import atan2, cos
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.grid import OccupancyGrid
 from hybridnav.io.bag_files import GRID, LASER, ODOMETRY, TRANSFORMS, Bag
@@ -183,14 +184,14 @@ def _scan_of(message: Any, transforms: Transforms, fixed: str) -> LaserScan:
     stamp_ns = stamp_ns_of(message, what)
     frame = frame_of(message, "header.frame_id")
     rotation, place = transforms.pose(frame, fixed, stamp_ns)
-    upright = math.cos(_MOST_TILT_RAD)
+    upright = cos(_MOST_TILT_RAD)
     if abs(rotation[2, 2]) < upright:
         raise NoPoseError("laser tilted")
     side = math.copysign(1.0, rotation[2, 2])  # a laser upside down counts clockwise
     far_m = float(value_of(message, "range_max", what))
     return LaserScan(
         _ranges(message),
-        (float(place[0]), float(place[1]), math.atan2(rotation[1, 0], rotation[0, 0])),
+        (float(place[0]), float(place[1]), atan2(rotation[1, 0], rotation[0, 0])),
         start_rad=side * number_of(message, "angle_min", what),
         step_rad=side * number_of(message, "angle_increment", what),
         max_range_m=far_m if far_m > 0 else math.inf,

@@ -135,7 +135,7 @@ def _from_corner(chain: LineString) -> LineString:
         return chain
     ring = points[:-1]
     # The outermost corner in a direction that is no wall's.
-    first = int(np.argmax(ring @ (1.0, 0.618)))
+    first = int(np.argmax(ring[:, 0] + 0.618 * ring[:, 1]))
     return shapely.LineString(np.roll(ring, -first, axis=0)[[*range(len(ring)), 0]])
 
 

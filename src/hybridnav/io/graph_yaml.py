@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from hybridnav._trig import atan2, cos, sin
 from hybridnav.config.yaml_file import Limits
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import Gathered, edge_text, name_of, number_of, pair_of
@@ -96,7 +97,7 @@ class _Poses:
             return point
         x, y = point
         shift_x, shift_y = self._shift or (0.0, 0.0)
-        cosine, sine = math.cos(self._yaw), math.sin(self._yaw)
+        cosine, sine = cos(self._yaw), sin(self._yaw)
         return shift_x + cosine * x - sine * y, shift_y + sine * x + cosine * y
 
 
@@ -105,5 +106,5 @@ def _yaw_of(rotation: Any) -> float:
     if not isinstance(rotation, dict):
         return 0.0
     w, x, y, z = (number_of(rotation.get(axis, 0.0)) for axis in "wxyz")
-    yaw = math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+    yaw = atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return yaw if math.isfinite(yaw) else 0.0

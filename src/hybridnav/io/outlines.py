@@ -116,4 +116,7 @@ def _rings(area: BaseGeometry, grid: OccupancyGrid, decimals: int = _DECIMALS) -
 
 def decimals_of(grid: OccupancyGrid) -> int:
     """Return the decimals of coordinates in metres: centimetres, or a fifth of a cell."""
-    return max(_DECIMALS, int(np.ceil(-np.log10(grid.resolution_m / 5))))
+    decimals = _DECIMALS
+    while float(f"1e-{decimals}") > grid.resolution_m / 5:
+        decimals += 1
+    return decimals

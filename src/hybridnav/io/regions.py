@@ -44,7 +44,7 @@ def kept_cells(label_of: IntArray, grid: OccupancyGrid) -> BoolArray:
     """
     is_free = grid.measured == CellClass.FREE
     part_of, _ = ndimage.label(is_free & (label_of == NO_ROOM))
-    is_many = np.bincount(part_of.ravel()) * grid.resolution_m**2 >= _LEAST_NAMELESS_M2
+    is_many = np.bincount(part_of.ravel()) * grid.cell_area_m2 >= _LEAST_NAMELESS_M2
     is_many[0] = False
     kept: BoolArray = (is_free & (label_of != NO_ROOM)) | is_many[part_of]
     return kept
@@ -63,7 +63,7 @@ def _without_islands(label_of: IntArray, is_kept: BoolArray, grid: OccupancyGrid
         region_of[box][inside & ~is_held[part_of]] = NO_ROOM
     outside = region_of == NO_ROOM
     padded, _ = ndimage.label(np.pad(outside, 1, constant_values=True))
-    is_island = np.bincount(padded.ravel()) * grid.resolution_m**2 < _LARGEST_ISLAND_M2
+    is_island = np.bincount(padded.ravel()) * grid.cell_area_m2 < _LARGEST_ISLAND_M2
     is_island[[0, padded[0, 0]]] = False
     part_of = padded[1:-1, 1:-1]
     is_island[part_of[is_kept & outside]] = False

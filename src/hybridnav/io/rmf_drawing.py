@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -148,8 +147,12 @@ def _fitted(pairs: list[tuple[complex, complex]], scale: float, where: str) -> D
     ]
     if any(one == 0 or other == 0 for one, other in between):
         raise MapError(f"{where}: two fiducials lie at one point")
-    turns = sum(cmath.exp(1j * (cmath.phase(one) - cmath.phase(other))) for one, other in between)
+    turns = sum((_unit(one) * _unit(other).conjugate() for one, other in between), 0j)
     relative = math.fsum(abs(other) / abs(one) for one, other in between) / len(between)
-    turn = cmath.exp(1j * cmath.phase(turns)) * scale / relative
+    turn = (_unit(turns) if turns else 1.0) * scale / relative
     shift = sum(scale * one - turn * other for one, other in pairs) / len(pairs)
     return Drawing(turn, shift, y_up=False)
+
+
+def _unit(vector: complex) -> complex:
+    return vector / math.hypot(vector.real, vector.imag)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
+from hybridnav._trig import cos, sin
 from hybridnav.building import DoorLine
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import number_of, pair_of, shown
@@ -245,7 +246,7 @@ class _Cabin:
         if point is None or level not in self._levels:
             return False
         dx, dy = point[0] - self._at[0], point[1] - self._at[1]
-        cosine, sine = math.cos(self._yaw), math.sin(self._yaw)
+        cosine, sine = cos(self._yaw), sin(self._yaw)
         across, along = abs(dx * cosine + dy * sine), abs(dy * cosine - dx * sine)
         return across <= self.dims_m[0] / 2 + _GAP_M and along <= self.dims_m[1] / 2 + _GAP_M
 

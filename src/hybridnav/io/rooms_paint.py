@@ -118,7 +118,7 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[i
     nameless = (grid.measured == CellClass.FREE) & (label_of == NO_ROOM)
     part_of, n_parts = ndimage.label(nameless)
     cells = np.bincount(part_of.ravel(), minlength=n_parts + 1)
-    small = cells * grid.resolution_m**2 < _LEAST_NAMELESS_M2
+    small = cells * grid.cell_area_m2 < _LEAST_NAMELESS_M2
     small[0] = False
     taken = np.where((grid.measured == CellClass.FREE), label_of, np.int32(NO_ROOM))
     pairs = []

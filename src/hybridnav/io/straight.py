@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from hybridnav._trig import atan2, cos, sin
+from hybridnav._trig import directions as directions_of
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -74,7 +77,7 @@ def _in_line(
     """Return points of which those on one line along a wall are brought into line."""
     step = points[sides[:, 1]] - points[sides[:, 0]]
     length = np.hypot(*step.T)
-    heading = np.arctan2(step[:, 1], step[:, 0])
+    heading = directions_of(step[:, 1], step[:, 0])
     off = np.full((len(directions), len(sides)), np.inf)
     middle = (points[sides[:, 0]] + points[sides[:, 1]]) / 2
     for number, (angle, within) in enumerate(directions):
@@ -82,20 +85,26 @@ def _in_line(
         turned = np.abs((heading - angle + math.pi / 4) % (math.pi / 2) - math.pi / 4)
         off[number] = np.where(within[row, col], turned, np.inf)
     nearest = off.argmin(axis=0)
-    is_wall = (off.min(axis=0) <= math.atan(_SKEW)) & (length * resolution_m >= _LEAST_WALL_M)
+    is_wall = (off.min(axis=0) <= atan2(_SKEW, 1.0)) & (length * resolution_m >= _LEAST_WALL_M)
     most = _FARTHEST_M / resolution_m
     moved = points.copy()
     for number, (angle, _) in enumerate(directions):
         angle = 0.0 if abs(angle) < _UNTURNED_RAD else angle  # noqa: PLW2901
-        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         own = sides[is_wall & (nearest == number)]
-        turned, first = moved @ turn.T, points @ turn.T
+        turned, first = _turned(moved, -angle), _turned(points, -angle)
         for axis in (0, 1):
             across, along = np.abs(first[own[:, 1]] - first[own[:, 0]]).T[[axis, 1 - axis]]
             ordered = own[across < along][np.argsort(across[across < along], kind="stable")]
             turned[:, axis] = _lined_up(turned[:, axis], first[:, axis], ordered, most)
-        moved = turned @ turn
+        moved = _turned(turned, angle)
     return moved
+
+
+def _turned(points: FloatArray, angle_rad: float) -> FloatArray:
+    """Return points turned about the origin."""
+    cosine, sine = cos(angle_rad), sin(angle_rad)
+    x, y = points.T
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
 
 def _lined_up(values: FloatArray, first: FloatArray, pairs: LongArray, most: float) -> FloatArray:

@@ -92,7 +92,7 @@ class JumpPatch:
         dirty = np.argwhere(tile_of >= 0)
         if len(dirty) > _MOST_DIRTY * tile_of.size + 4:
             return None
-        dirty = dirty[np.argsort(tile_of[tuple(dirty.T)])]
+        dirty = dirty[np.argsort(tile_of[tuple(dirty.T)], kind="stable")]
         n = len(self.is_stale)
         shape = graph.shape
         codes, more = kernels.codes_of_tiles(dirty, free, graph.origin, shape, n)

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import guarded, njit
+from hybridnav._trig import cos, exp, sin
 
 _SHIFT = 16
 _NONE, _HIT, _CLEAR = 0, 1, 2
@@ -65,7 +66,7 @@ def beam_ends(ranges_m, pose, angles, limits, resolution_m):
         until = reach - blurred if reach < high else clear
         reach = reach + depth if reach < high else clear
         angle = heading + (angles[0] + k * angles[1])
-        cosine, sine = math.cos(angle), math.sin(angle)
+        cosine, sine = cos(angle), sin(angle)
         if until > 0.0:
             ends[k, 0] = _on_lattice((y + until * sine) / resolution_m)
             ends[k, 1] = _on_lattice((x + until * cosine) / resolution_m)
@@ -212,3 +213,14 @@ def ray_lengths(classes, obstacle, start, targets):
                 line = (col if right else col + 1) << _SHIFT
                 share = (line - start_col) / (end_col - start_col)
     return lengths
+
+
+@njit(cache=True, nogil=True)
+def probabilities(evidence, met):
+    """Return the probabilities, float32, of log odds; NaN where no scan met a cell."""
+    found = np.full(evidence.shape, np.nan, np.float32)
+    for i in range(evidence.shape[0]):
+        for j in range(evidence.shape[1]):
+            if met[i, j]:
+                found[i, j] = 1.0 / (1.0 + exp(-np.float64(evidence[i, j])))
+    return found

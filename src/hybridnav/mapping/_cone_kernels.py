@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from hybridnav._jit import njit
+from hybridnav._trig import atan2, cos, log, sin, tan
 
 
 @njit(cache=True, nogil=True)
@@ -19,11 +20,11 @@ def _box(apex, half_angle, far):
     low_row, high_row, low_col, high_col = apex[0], apex[0], apex[1], apex[1]
     for k in range(-2, 3):
         angle = apex[2] + k * half_angle / 2
-        row, col = apex[0] + far * math.sin(angle), apex[1] + far * math.cos(angle)
+        row, col = apex[0] + far * sin(angle), apex[1] + far * cos(angle)
         low_row, high_row = min(low_row, row), max(high_row, row)
         low_col, high_col = min(low_col, col), max(high_col, col)
     # Between two of these directions the arc bulges.
-    bulge = far * (1.0 - math.cos(half_angle / 4))
+    bulge = far * (1.0 - cos(half_angle / 4))
     rows = math.floor(low_row - bulge), math.floor(high_row + bulge)
     return rows, (math.floor(low_col - bulge), math.floor(high_col + bulge))
 
@@ -54,10 +55,10 @@ def add_cone(evidence, seen_at, corner, apex, reading, shape, changes, scan):
     reach, is_echo = reading
     half_angle, tolerance, least = shape
     when_hit, when_passed, limit = changes
-    axis_row, axis_col = math.sin(apex[2]), math.cos(apex[2])
+    axis_row, axis_col = sin(apex[2]), cos(apex[2])
     far = reach + tolerance if is_echo else reach
     near = reach - tolerance if is_echo else reach
-    widest = math.tan(half_angle)
+    widest = tan(half_angle)
     (first_row, last_row), (first_col, last_col) = _box(apex, half_angle, far)
     for row in range(first_row, last_row + 1):
         for col in range(first_col, last_col + 1):
@@ -68,7 +69,7 @@ def add_cone(evidence, seen_at, corner, apex, reading, shape, changes, scan):
             distance = math.hypot(rows, cols)
             if not least <= distance <= far:
                 continue
-            off_axis = math.atan2(aside, ahead) / half_angle
+            off_axis = atan2(aside, ahead) / half_angle
             if distance >= near and is_echo:
                 share = _profile((distance - reach) / tolerance, off_axis)
                 probability = 0.5 + (when_hit - 0.5) * share
@@ -79,5 +80,5 @@ def add_cone(evidence, seen_at, corner, apex, reading, shape, changes, scan):
                 continue
             i, j = row - corner[0], col - corner[1]
             seen_at[i, j] = scan
-            change = math.log(probability / (1.0 - probability))
+            change = log(probability / (1.0 - probability))
             evidence[i, j] = min(max(evidence[i, j] + change, -limit), limit)

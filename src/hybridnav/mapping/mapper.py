@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import cos, sin
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.grid.checks import checked_type
-from hybridnav.mapping._beam_kernels import add_hits, add_passes, beam_ends
+from hybridnav.mapping._beam_kernels import add_hits, add_passes, beam_ends, probabilities
 from hybridnav.mapping._cone_kernels import add_cone
 from hybridnav.mapping.checks import checked_array, checked_count, checked_number
 from hybridnav.mapping.models import MOST_RANGE_CELLS, LaserModel, SonarModel, log_odds_of
@@ -164,7 +165,7 @@ class Mapper:
         """Return a pose in the axes of the lattice, relative to its corner, metres and radians."""
         (x0, y0), yaw_rad = self._frame.origin_m, self._frame.yaw_rad
         x, y, heading_rad = pose[0] - x0, pose[1] - y0, pose[2] - yaw_rad
-        cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
+        cosine, sine = cos(yaw_rad), sin(yaw_rad)
         return cosine * x + sine * y, cosine * y - sine * x, heading_rad
 
     def add(self, scan: LaserScan | SonarScan) -> Area | None:
@@ -234,7 +235,7 @@ class Mapper:
     def _add_sonars(self, scan: SonarScan) -> Area | None:
         model, side_m = self._sonar, self.resolution_m
         x, y, heading_rad = self._on_lattice(scan.pose)
-        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+        cosine, sine = cos(heading_rad), sin(heading_rad)
         apexes = [
             (
                 (y + sine * ahead + cosine * aside) / side_m,
@@ -359,12 +360,11 @@ class Mapper:
         if not rows.size:
             raise InvalidValueError("a map needs at least one scan with a reading, add one first")
         window = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-        probability = 1.0 / (1.0 + np.exp(-evidence[window].astype(np.float64)))
-        probability[~met[window]] = math.nan
+        probability = probabilities(evidence[window], met[window])
         first = [int(rows[0]) + top, int(cols[0]) + left]
         x, y = self._frame.points_of_grid(first).tolist()
         return OccupancyGrid(
-            probability.astype(np.float32),
+            probability,
             Frame(self.resolution_m, (x, y), self._frame.yaw_rad),
             free_threshold=free_threshold,
             occupied_threshold=occupied_threshold,

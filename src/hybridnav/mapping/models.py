@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from hybridnav._trig import log
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
 from hybridnav.mapping.checks import checked_number
@@ -24,7 +25,7 @@ MOST_RANGE_CELLS = 2**14
 
 def log_odds_of(probability: float) -> float:
     """Return the log odds of a probability within (0, 1)."""
-    return math.log(probability / (1.0 - probability))
+    return log(probability / (1.0 - probability))
 
 
 def _check_probabilities(when_hit: float, when_passed: float) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.frame import FARTHEST_M
 from hybridnav.mapping.checks import (
@@ -167,4 +168,5 @@ def sonar_ring(n_sonars: int = 16, *, radius_m: float = 0.23) -> FloatArray:
             f"radius_m is {radius_m}, expected a finite length >= 0: give metres"
         )
     heading = np.arange(count) * (math.tau / count)
-    return np.stack([radius * np.cos(heading), radius * np.sin(heading), heading], axis=1)
+    sines, cosines = sines_and_cosines(heading)
+    return np.stack([radius * cosines, radius * sines, heading], axis=1)

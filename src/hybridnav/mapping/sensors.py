@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import cos, sin, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, OccupancyGrid
 from hybridnav.grid.checks import checked_type
@@ -50,9 +51,8 @@ def _ranges(
     # Directions in the grid, which may be turned in the map frame.
     turned = angles_rad - grid.frame.yaw_rad
     reach = max_range_m / side_m
-    targets = np.stack(
-        [start[0] + reach * np.sin(turned), start[1] + reach * np.cos(turned)], axis=1
-    )
+    sines, cosines = sines_and_cosines(turned)
+    targets = np.stack([start[0] + reach * sines, start[1] + reach * cosines], axis=1)
     lengths: FloatArray = ray_lengths(grid.measured, int(CellClass.OCCUPIED), start, targets)
     return lengths * side_m
 
@@ -264,7 +264,7 @@ class SimulatedSonars:
         mounts = np.atleast_1d(checked_array("mounts", self.mounts))
         shape = SonarScan(np.full(len(mounts), math.inf), pose, mounts)
         x_m, y_m, heading_rad = shape.pose
-        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+        cosine, sine = cos(heading_rad), sin(heading_rad)
         # Beside the ray on the axis.
         n_aside = math.ceil(self.half_angle_rad * self.max_range_m / grid.resolution_m)
         fan = np.linspace(-self.half_angle_rad, self.half_angle_rad, 2 * n_aside + 1)

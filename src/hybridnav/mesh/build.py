@@ -113,7 +113,7 @@ def build_mesh(free: BoolArray) -> ConvexMesh:
     # Neighbours on the map are near in memory too: on large maps, queries take 25 % less time.
     order = np.lexsort(tuple((corners // _BLOCK_CELLS).T[::-1]))
     corners, kind_of = corners[order], kind_of[order]
-    walls = np.argsort(order).astype(np.int32)[walls]
+    walls = np.argsort(order, kind="stable").astype(np.int32)[walls]
     vertices, neighbours = triangulate(corners, walls)
     kept = are_free(corners, vertices, cells)
     polygons = merge_triangles(corners, *select_triangles(vertices, neighbours, kept))

@@ -177,7 +177,7 @@ def _vertices_of(
     made = np.setdiff1d(at[turns], known)
     points = np.concatenate([known[~is_straight], made])
     number_of = np.concatenate([old[~is_straight], len(mesh.corners) + np.arange(len(made))])
-    order = np.argsort(points)
+    order = np.argsort(points, kind="stable")
     points, number_of = points[order], number_of[order].astype(np.int32)
     corners = np.concatenate([mesh.corners, np.stack(np.divmod(made, wide), axis=1)])
     kinds = np.concatenate([mesh.kinds, np.full(len(made), MANY, np.uint8)])
@@ -242,6 +242,6 @@ def _joined(
     # The slot on the far side of a door runs the other way.
     beyond = mesh.twins[doors]
     wanted = mesh.finishes[beyond] * n + mesh.begins[beyond]
-    order = np.argsort(keys)
+    order = np.argsort(keys, kind="stable")
     place = np.searchsorted(keys, wanted, sorter=order)
     return beyond, rim[order[place]].astype(np.int64)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import cos, sin, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.metrics.judge import checked_points
 
@@ -136,8 +137,8 @@ def chords_of(grid: OccupancyGrid, points: ArrayLike, headings_rad: ArrayLike) -
             continue
         turn = (headings[at + 1] - headings[at] + math.pi) % math.tau - math.pi
         middle = headings[at] + turn / 2
-        aside_m = abs(math.cos(middle) * step[1] - math.sin(middle) * step[0])
-        ahead_m = math.cos(middle) * step[0] + math.sin(middle) * step[1]
+        aside_m = abs(cos(middle) * step[1] - sin(middle) * step[0])
+        ahead_m = cos(middle) * step[0] + sin(middle) * step[1]
         if aside_m > _OFF_CELLS * side_m or ahead_m < 0:
             faults.append(
                 f"step {at} of the path is neither a line nor an arc tangent to its headings"
@@ -148,10 +149,11 @@ def chords_of(grid: OccupancyGrid, points: ArrayLike, headings_rad: ArrayLike) -
             off_m.append(np.zeros(1))
             lengths_m.append(chord_m)
             continue
-        radius_m = chord_m / (2 * math.sin(abs(turn) / 2))
+        radius_m = chord_m / (2 * sin(abs(turn) / 2))
         parts.append(_arc(xy[at], headings[at], turn, radius_m, side_m))
         parts[-1][-1] = xy[at + 1]
-        priced_m = (_PRICED_CHORD_CELLS * side_m) ** 2 / (8 * radius_m)
+        priced_chord_m = _PRICED_CHORD_CELLS * side_m
+        priced_m = priced_chord_m * priced_chord_m / (8 * radius_m)
         off_m.append(np.full(len(parts[-1]), priced_m))
         lengths_m.append(radius_m * abs(turn))
     return Chords(np.concatenate(parts), np.concatenate(off_m), math.fsum(lengths_m), tuple(faults))
@@ -165,7 +167,8 @@ def _arc(
     n = max(2, math.ceil(max(radius_m / chord_m, 1 / _CHORD_RAD) * abs(turn_rad)))
     hand = math.copysign(1.0, turn_rad)
     angles = heading_rad + turn_rad * np.arange(1, n + 1) / n
-    along = hand * radius_m * (np.sin(angles) - math.sin(heading_rad))
-    across = hand * radius_m * (math.cos(heading_rad) - np.cos(angles))
+    sines, cosines = sines_and_cosines(angles)
+    along = hand * radius_m * (sines - sin(heading_rad))
+    across = hand * radius_m * (cos(heading_rad) - cosines)
     found: FloatArray = start + np.stack([along, across], axis=1)
     return found

@@ -217,7 +217,8 @@ def distance_buckets(optima_m: ArrayLike, *, edges: ArrayLike | None = None) -> 
     known = np.isfinite(lengths)
     if edges is None:
         longest = float(lengths[known].max(initial=1.0))
-        cuts = np.exp2(np.arange(max(math.ceil(math.log2(longest)), 1), dtype=np.float64))
+        mantissa, power = math.frexp(longest)
+        cuts = np.ldexp(1.0, np.arange(max(power - (mantissa == 0.5), 1)))  # noqa: PLR2004
     else:
         cuts = np.asarray(edges, dtype=np.float64).ravel()
     if not len(cuts) or not np.isfinite(cuts).all() or (np.diff(cuts) <= 0).any():

@@ -162,7 +162,7 @@ class OnlinePyramid:
         events = settle(draft)
         cells = draft.cells - np.array(low)
         version = replace(self, grid=grid, low=low, _state=draft.close())
-        order = np.argsort(cells[:, 0] * grid.shape[1] + cells[:, 1])
+        order = np.argsort(cells[:, 0] * grid.shape[1] + cells[:, 1], kind="stable")
         return Update(version, *events, frozen(cells[order]))
 
     @property

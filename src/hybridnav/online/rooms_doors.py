@@ -177,7 +177,7 @@ def _parts(old: list[OnlineDoor], new: list[OnlineDoor]) -> dict[int, list[int]]
         return {}
     cracks = np.concatenate([door.cracks for door in new])
     owner = np.repeat([door.number for door in new], [len(door.cracks) for door in new])
-    order = np.argsort(cracks)
+    order = np.argsort(cracks, kind="stable")
     parts: dict[int, list[int]] = {}
     for door in old:
         at = np.minimum(np.searchsorted(cracks[order], door.cracks), len(cracks) - 1)

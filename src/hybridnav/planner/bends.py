@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import atan2, directions
 from hybridnav.poses import wrapped
 from hybridnav.sentences.instruction import LEAST_BEND_RAD
 
@@ -80,7 +81,7 @@ class Line:
         (x, y), (to_x, to_y) = self.at(begin_m), self.at(end_m)
         if math.hypot(to_x - x, to_y - y) < _ROUNDING_M:
             return math.nan
-        return math.atan2(to_y - y, to_x - x)
+        return atan2(to_y - y, to_x - x)
 
     def between(self, begin_m: float, end_m: float) -> tuple[FloatArray, FloatArray]:
         """Return points at most 0.1 m apart, float64 (n, 2), and the length at each."""
@@ -103,7 +104,7 @@ class Line:
         """
         points, along = self._simplified()
         steps = np.diff(points, axis=0)
-        headings = np.arctan2(steps[:, 1], steps[:, 0])
+        headings = directions(steps[:, 1], steps[:, 0])
         turns = wrapped(np.diff(headings))
         return [
             Bend(
@@ -126,7 +127,7 @@ class Line:
         if len(points) < 2:  # noqa: PLR2004
             return math.nan
         x, y = (points[1] - points[0]).tolist()
-        return math.atan2(y, x)
+        return atan2(y, x)
 
     def _simplified(self) -> tuple[FloatArray, FloatArray]:
         """Return the points that are kept, the ends of all paths among them, and their lengths."""

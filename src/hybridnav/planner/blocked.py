@@ -331,7 +331,7 @@ def _cells_in_runs(runs: LongArray) -> LongArray:
     """Return the cells of the union of runs, without arrays larger than the result."""
     if not len(runs):
         return np.empty(0, dtype=np.int64)
-    start, stop = runs[np.argsort(runs[:, 0])].T
+    start, stop = runs[np.argsort(runs[:, 0], kind="stable")].T
     stop = np.maximum.accumulate(stop)
     begins = np.concatenate([[True], start[1:] > stop[:-1]])
     start, stop = start[begins], stop[np.concatenate([begins[1:], [True]])]

@@ -146,12 +146,12 @@ class Guide:
         rooms, level = self._rooms, self._rooms.level
         if rooms.label_of_vertex[vertex] >= 0:
             return "room"
-        area_m2 = float(level.areas[vertex]) * rooms.grid.resolution_m**2
+        area_m2 = float(level.areas[vertex]) * rooms.grid.cell_area_m2
         if area_m2 < _LEAST_ROOM_M2:
             return "passage"
         field = level.receptive_field(vertex)
         breadth_m = 2 * float(rooms.clearance_m[tuple(field.T)].max())
-        if area_m2 >= _LONG_SHAPE * breadth_m**2:
+        if area_m2 >= _LONG_SHAPE * breadth_m * breadth_m:
             nearby_m = 2 * float(np.quantile(rooms.clearance_m[tuple(cells.T)], 0.75))
             if min(breadth_m, nearby_m) <= _WIDEST_CORRIDOR_M:
                 return "corridor"

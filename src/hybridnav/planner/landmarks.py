@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import atan2, directions, sin
 from hybridnav.grid import CellClass
 from hybridnav.poses import wrapped
 from hybridnav.sentences import Landmark, Passed, Space
@@ -108,7 +109,7 @@ class Landmarks:
             across.append(int(onward) - int(back))
         if across == [0, 0]:
             return math.nan
-        return math.atan2(across[1], across[0]) + self._rooms.grid.frame.yaw_rad
+        return atan2(across[1], across[0]) + self._rooms.grid.frame.yaw_rad
 
     def passed(
         self, line: Line, between_m: tuple[float, float], room: str | None, but: Collection[int]
@@ -254,7 +255,7 @@ class Landmarks:
     def _leads_to(self, door: Door, point: tuple[float, float], heading_rad: float) -> bool:
         """Return whether some part of a door lies in the direction of a path."""
         across, up = (self._span(door) - point).T
-        off = wrapped(np.arctan2(up, across) - heading_rad)
+        off = wrapped(directions(up, across) - heading_rad)
         return bool((np.abs(off) <= _TOWARDS_RAD).any())
 
     def _span(self, door: Door) -> FloatArray:
@@ -270,7 +271,7 @@ class Landmarks:
     def _hand_of(self, door: Door, room: str | None, heading_rad: float) -> Hand | None:
         """Return the hand to which a door leads out of a room; None if it lies across the path."""
         way = self.way_out_rad(door, is_forward=door.rooms[0] == room)
-        sideways = math.sin(way - heading_rad)
+        sideways = sin(way - heading_rad)
         if not abs(sideways) >= _LEAST_SIDEWAYS:
             return None
         return "left" if sideways > 0 else "right"
@@ -297,7 +298,7 @@ class Landmarks:
 
 def _turn_to(heading_rad: float, point: tuple[float, float], end: Sequence[float]) -> float:
     """Return the turn from a heading towards a point, radians in [-pi, pi]."""
-    way = math.atan2(end[1] - point[1], end[0] - point[0])
+    way = atan2(end[1] - point[1], end[0] - point[0])
     return math.remainder(way - heading_rad, math.tau)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from hybridnav._trig import atan2
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
@@ -225,7 +226,7 @@ def _heading(grid: OccupancyGrid, path: LongArray) -> float:
     """Return the direction of a segment of a path in the map frame; NaN if it has no length."""
     points = grid.frame.points_of(path[[0, -1]])
     x, y = (points[1] - points[0]).tolist()
-    return math.atan2(y, x) if len(path) > 1 else math.nan
+    return atan2(y, x) if len(path) > 1 else math.nan
 
 
 def _point_of(topology: TopologicalMap, waypoint: ArrayLike | str, at: At) -> ArrayLike | None:

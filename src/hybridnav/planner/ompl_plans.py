@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav._trig import directions
 from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.refine import LineOfSight, MotionCheck
@@ -310,7 +311,7 @@ class OmplPlanner:
         """
         check = self._check.confined(closed=closed)
         steps = np.diff(points, axis=0)
-        ahead = np.arctan2(steps[:, 1], steps[:, 0])
+        ahead = directions(steps[:, 1], steps[:, 0])
         if self.ompl.space == "differential":
             poses = np.column_stack([points, [endpoints[0][2], *ahead]])
             return driven(check, np.vstack([poses, endpoints[1]]), reverses=self.ompl.reverses)

@@ -71,7 +71,7 @@ def vertices_with_attributes(
         cells.tolist(),
         grid.frame.points_of(cells).tolist(),
         classes.tolist(),
-        (areas * np.float64(grid.resolution_m**2)).tolist(),
+        (areas * np.float64(grid.cell_area_m2)).tolist(),
         strict=True,
     )
     for vertex, (cell, position, cell_class, area_m2) in enumerate(columns):

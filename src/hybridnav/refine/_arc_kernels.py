@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import guarded, njit
+from hybridnav._trig import atan2, cos, sin, tan
 from hybridnav.costs.integral import segment_cost
 from hybridnav.refine._legal_cost_kernels import legal_cost
 from hybridnav.refine._segment_kernels import is_legal
@@ -66,29 +67,29 @@ def arc_cost(free, factors, a, bend, c):
     in_row, in_col = bend[0] - a[0], bend[1] - a[1]
     out_row, out_col = c[0] - bend[0], c[1] - bend[1]
     ahead = math.hypot(in_row, in_col)
-    turn = math.atan2(in_row * out_col - in_col * out_row, in_row * out_row + in_col * out_col)
+    turn = atan2(in_row * out_col - in_col * out_row, in_row * out_row + in_col * out_col)
     if turn == 0:  # of a bend that rounding has made straight
         return -1.0
-    radius = ahead / math.tan(abs(turn) / 2)
+    radius = ahead / tan(abs(turn) / 2)
     hand = 1.0 if turn > 0 else -1.0
     # Unit vectors ahead and towards the centre.
     u_row, u_col = in_row / ahead, in_col / ahead
     v_row, v_col = -hand * u_col, hand * u_row
     n = max(2, math.ceil(radius * abs(turn) / _PIECE))
     step = abs(turn) / n
-    reach = radius * math.tan(step / 2)
+    reach = radius * tan(step / 2)
     total, chords = 0.0, 0.0
     row, col = a[0], a[1]
     for k in range(1, n + 1):
         angle = step * k
         at_row, at_col = c[0], c[1]
         if k < n:
-            along, beside = radius * math.sin(angle), radius * (1 - math.cos(angle))
+            along, beside = radius * sin(angle), radius * (1 - cos(angle))
             at_row = _on_grain(a[0] + along * u_row + beside * v_row)
             at_col = _on_grain(a[1] + along * u_col + beside * v_col)
         before = angle - step
-        tip_row = row + reach * (math.cos(before) * u_row + math.sin(before) * v_row)
-        tip_col = col + reach * (math.cos(before) * u_col + math.sin(before) * v_col)
+        tip_row = row + reach * (cos(before) * u_row + sin(before) * v_row)
+        tip_col = col + reach * (cos(before) * u_col + sin(before) * v_col)
         low_row, high_row = min(row, at_row, tip_row), max(row, at_row, tip_row)
         low_col, high_col = min(col, at_col, tip_col), max(col, at_col, tip_col)
         if not _box_is_free(free, low_row, low_col, high_row, high_col):
@@ -105,7 +106,7 @@ def _turn_at(line, i):
     in_row, in_col = line[i, 0] - line[i - 1, 0], line[i, 1] - line[i - 1, 1]
     out_row, out_col = line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1]
     cross, dot = in_row * out_col - in_col * out_row, in_row * out_row + in_col * out_col
-    return abs(math.atan2(cross, dot))
+    return abs(atan2(cross, dot))
 
 
 @njit(cache=True, nogil=True)
@@ -188,7 +189,7 @@ def _thinned(free, factors, line, radius, spare):
         before, i = n, 1
         while i < n - 2:
             length = math.hypot(line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1])
-            need = math.tan(_turn_at(line, i) / 2) + math.tan(_turn_at(line, i + 1) / 2)
+            need = tan(_turn_at(line, i) / 2) + tan(_turn_at(line, i + 1) / 2)
             if radius * need > length:
                 added = _merged(free, factors, line, n, i, spare)
                 if added < np.inf:
@@ -231,10 +232,10 @@ def round_bends(free, factors, line, radius, spare):
     for i in range(1, n - 1):
         bend, ahead = line[i].copy(), line[i + 1].copy()
         turn = max(_turn_at(line, i), _SMALLEST_TURN)
-        half = math.tan(turn / 2)
+        half = tan(turn / 2)
         most = math.hypot(ahead[0] - bend[0], ahead[1] - bend[1])
         if i < n - 2:
-            kept = radius * math.tan(_turn_at(line, i + 1) / 2) + _MARGIN
+            kept = radius * tan(_turn_at(line, i + 1) / 2) + _MARGIN
             most = max(most - kept, min(most, radius * half))
         room = math.hypot(bend[0] - last[0], bend[1] - last[1])
         most = min(room, most, _LARGEST * radius * half)
@@ -255,7 +256,7 @@ def round_bends(free, factors, line, radius, spare):
             most = max(most / 2, radius * half)
         cost += segment_cost(factors, last[0], last[1], a[0], a[1]) + arc
         length += math.hypot(a[0] - last[0], a[1] - last[1])
-        length += math.hypot(c[0] - a[0], c[1] - a[1]) * (turn / 2) / math.sin(turn / 2)
+        length += math.hypot(c[0] - a[0], c[1] - a[1]) * (turn / 2) / sin(turn / 2)
         points[size], directions[size] = a, directions[size - 1]
         points[size + 1], directions[size + 1] = c, _direction(line, i)
         size, last = size + 2, c

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav._trig import acos, asin, atan2, cos, sin
 
 _FULL = 2 * math.pi
 _ROUNDING = 1e-9
@@ -78,18 +79,18 @@ def _dubins(x, y, phi, kinds, lengths):
     for s in (1, -1):
         for e in (1, -1):
             # From the centre of the first circle to that of the last.
-            d_x, d_y = x - e * math.sin(phi), y + e * math.cos(phi) - s
-            distance, angle = math.hypot(d_x, d_y), math.atan2(d_y, d_x)
+            d_x, d_y = x - e * sin(phi), y + e * cos(phi) - s
+            distance, angle = math.hypot(d_x, d_y), atan2(d_y, d_x)
             if s == e:
                 t, p, q = _forward(s * angle), distance, _forward(s * (phi - angle))
                 best = _take(kinds, lengths, best, 1, 1, False, (s, 0, e), (t, p, q))
                 if distance <= 4 + _ROUNDING:
-                    p = _FULL - 2 * math.asin(min(distance / 4, 1.0))
+                    p = _FULL - 2 * asin(min(distance / 4, 1.0))
                     t = _forward(s * angle + p / 2)
                     q = _forward(s * phi - t + p)
                     best = _take(kinds, lengths, best, 1, 1, False, (s, -s, s), (t, p, q))
             elif distance >= 2 - _ROUNDING:
-                angle += s * math.asin(min(2 / distance, 1.0))
+                angle += s * asin(min(2 / distance, 1.0))
                 t, q = _forward(s * angle), _forward(e * (phi - angle))
                 p = math.sqrt(max(distance * distance - 4, 0.0))
                 best = _take(kinds, lengths, best, 1, 1, False, (s, 0, e), (t, p, q))
@@ -100,9 +101,9 @@ def _dubins(x, y, phi, kinds, lengths):
 def _tau_omega(u, v, xi, eta, phi):
     """Return the first and last arc of four whose middle two are u and v."""
     delta = _wrapped(u - v)
-    a, b = math.sin(u) - math.sin(delta), math.cos(u) - math.cos(delta) - 1
-    tau = math.atan2(eta * a - xi * b, xi * a + eta * b)
-    if 2 * (math.cos(delta) - math.cos(v) - math.cos(u)) + 3 < 0:
+    a, b = sin(u) - sin(delta), cos(u) - cos(delta) - 1
+    tau = atan2(eta * a - xi * b, xi * a + eta * b)
+    if 2 * (cos(delta) - cos(v) - cos(u)) + 3 < 0:
         tau += math.pi
     tau = _wrapped(tau)
     return tau, _wrapped(tau - u + v - phi)
@@ -122,7 +123,7 @@ def _three_segments(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip)
         See `_take`.
     """
     xi, eta = x - sine, y - 1 + cosine
-    u, t = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
+    u, t = math.sqrt(xi * xi + eta * eta), atan2(eta, xi)
     v = _wrapped(phi - t)
     if t >= -_ROUNDING and v >= -_ROUNDING:
         best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, 1), (t, u, v))
@@ -130,7 +131,7 @@ def _three_segments(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip)
     squared = xi * xi + eta * eta
     if squared >= 4:
         u = math.sqrt(squared - 4)
-        t = _wrapped(math.atan2(eta, xi) + math.atan2(2.0, u))
+        t = _wrapped(atan2(eta, xi) + atan2(2.0, u))
         v = _wrapped(t - phi)
         if t >= -_ROUNDING and v >= -_ROUNDING:
             best = _take(kinds, lengths, best, mirror, flip, False, (1, 0, -1), (t, u, v))
@@ -150,14 +151,14 @@ def _four_arcs(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     squared = xi * xi + eta * eta
     rho = (2 + math.sqrt(squared)) / 4
     if rho <= 1:
-        u = math.acos(rho)
+        u = acos(rho)
         t, v = _tau_omega(u, -u, xi, eta, phi)
         if t >= -_ROUNDING and v <= _ROUNDING:
             word = (1, -1, 1, -1)
             best = _take(kinds, lengths, best, mirror, flip, False, word, (t, u, -u, v))
     rho = (20 - squared) / 16
     if 0 <= rho <= 1:
-        u = -math.acos(rho)
+        u = -acos(rho)
         t, v = _tau_omega(u, u, xi, eta, phi)
         if t >= -_ROUNDING and v >= -_ROUNDING:
             word = (1, -1, 1, -1)
@@ -180,7 +181,7 @@ def _quarter_turns(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip):
     if squared >= 4:
         u = 4 - math.sqrt(squared - 4)
         if u <= 0:
-            t = _wrapped(math.atan2((4 - u) * xi - 2 * eta, -2 * xi + (u - 4) * eta))
+            t = _wrapped(atan2((4 - u) * xi - 2 * eta, -2 * xi + (u - 4) * eta))
             v = _wrapped(t - phi)
             if t >= -_ROUNDING and v >= -_ROUNDING:
                 word, segments = (1, -1, 0, 1, -1), (t, -quarter, u, -quarter, v)
@@ -203,9 +204,9 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     """
     quarter = math.pi / 2
     xi, eta = x - sine, y - 1 + cosine
-    distance, angle = math.sqrt(xi * xi + eta * eta), math.atan2(eta, xi)
+    distance, angle = math.sqrt(xi * xi + eta * eta), atan2(eta, xi)
     if distance <= 4:
-        u = -2 * math.asin(distance / 4)
+        u = -2 * asin(distance / 4)
         t = _wrapped(angle + u / 2 + math.pi)
         v = _wrapped(phi - t + u)
         if t >= -_ROUNDING:
@@ -213,7 +214,7 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     if distance >= 2:
         r = math.sqrt(distance * distance - 4)
         u = 2 - r
-        t = _wrapped(angle + math.atan2(r, -2.0))
+        t = _wrapped(angle + atan2(r, -2.0))
         v = _wrapped(phi - quarter - t)
         if t >= -_ROUNDING and u <= _ROUNDING and v <= _ROUNDING:
             word, segments = (1, -1, 0, 1), (t, -quarter, u, v)
@@ -221,7 +222,7 @@ def _turned(x, y, phi, sine, cosine, kinds, lengths, best, mirror, flip, back):
     xi, eta = x + sine, y - 1 - cosine
     distance = math.sqrt(xi * xi + eta * eta)
     if distance >= 2:
-        u, t = 2 - distance, math.atan2(xi, -eta)
+        u, t = 2 - distance, atan2(xi, -eta)
         v = _wrapped(t + quarter - phi)
         if t >= -_ROUNDING and v <= _ROUNDING:
             word, segments = (1, -1, 0, -1), (t, -quarter, u, v)
@@ -237,7 +238,7 @@ def _reeds_shepp(x, y, phi, kinds, lengths):
     the words of section 8, each also mirrored, flipped in direction, and driven from its end.
     """
     best = np.inf
-    sine, cosine = math.sin(phi), math.cos(phi)
+    sine, cosine = sin(phi), cos(phi)
     for flip in (1, -1):
         for mirror in (1, -1):
             a, b, turn, turn_sine = flip * x, mirror * y, flip * mirror * phi, flip * mirror * sine
@@ -278,7 +279,7 @@ def shortest_word(x0, y0, yaw0, x1, y1, yaw1, radius, reverses, kinds, lengths):
         return 0
     if not (abs(yaw0) <= LARGEST_HEADING and abs(yaw1) <= LARGEST_HEADING):
         return 0
-    cosine, sine = math.cos(yaw0), math.sin(yaw0)
+    cosine, sine = cos(yaw0), sin(yaw0)
     x, y, phi = cosine * x + sine * y, cosine * y - sine * x, _wrapped(yaw1 - yaw0)
     if reverses:
         best = _reeds_shepp(x, y, phi, kinds, lengths)

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav._trig import atan2, cos, sin
 from hybridnav.refine._curve_kernels import LARGEST_HEADING, shortest_word
 from hybridnav.refine._spin_kernels import body_spins, free_turn
 from hybridnav.refine._sweep_kernels import (
@@ -201,7 +202,7 @@ def body_drives_straight(marks, place, body, x0, y0, yaw0, x1, y1, yaw1, backwar
     heading, last = yaw0 - place[6], yaw1 - place[6]
     if x0 == x1 and y0 == y1:
         return not math.isnan(free_turn(body, row, col, heading, _short_turn(heading, last)))
-    travel = math.atan2(y1 - y0, x1 - x0) - place[6]
+    travel = atan2(y1 - y0, x1 - x0) - place[6]
     if backwards:
         travel += math.pi
     if not body_sweeps(body, row, col, travel, b_row - row, b_col - col, 0.0, 0.0):
@@ -297,8 +298,8 @@ def body_drives(
         length = lengths[k] * place[7]
         if kinds[k] == 0:
             d_row, d_col, turn, signed = (
-                length * math.sin(heading),
-                length * math.cos(heading),
+                length * sin(heading),
+                length * cos(heading),
                 0.0,
                 0.0,
             )

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav._trig import acos, asin, atan2, cos, sin
 from hybridnav.refine._sweep_kernels import (
     ROUNDING,
     STAYS,
@@ -52,25 +53,25 @@ def _critical(part, square, low, high, headings):
     count = 0
     i = part.shape[0] - 1
     for j in range(part.shape[0]):
-        radius, angle = math.hypot(part[j, 0], part[j, 1]), math.atan2(part[j, 1], part[j, 0])
+        radius, angle = math.hypot(part[j, 0], part[j, 1]), atan2(part[j, 1], part[j, 0])
         for offset in range(2):
             row, col = square[0] + offset, square[1] + offset
             if abs(row) < radius:
-                at = math.asin(row / radius)
+                at = asin(row / radius)
                 count = _note(headings, count, at - angle, low, high)
                 count = _note(headings, count, math.pi - at - angle, low, high)
             if abs(col) < radius:
-                at = math.acos(col / radius)
+                at = acos(col / radius)
                 count = _note(headings, count, at - angle, low, high)
                 count = _note(headings, count, -at - angle, low, high)
         d_x, d_y = part[j, 0] - part[i, 0], part[j, 1] - part[i, 1]
         away = (d_y * part[j, 0] - d_x * part[j, 1]) / math.hypot(d_x, d_y)
-        angle = math.atan2(-d_x, d_y)
+        angle = atan2(-d_x, d_y)
         for corner in range(4):
             row, col = square[0] + corner // 2, square[1] + corner % 2
             radius = math.hypot(row, col)
             if abs(away) < radius:
-                at, phi = math.acos(away / radius), math.atan2(row, col)
+                at, phi = acos(away / radius), atan2(row, col)
                 count = _note(headings, count, phi - angle - at, low, high)
                 count = _note(headings, count, phi - angle + at, low, high)
         i = j
@@ -84,7 +85,7 @@ def _overlaps(part, square, heading):
 
     It does not if the line of a side of one has the other on its far side.
     """
-    cosine, sine = math.cos(heading), math.sin(heading)
+    cosine, sine = cos(heading), sin(heading)
     # The middle of the cell in the polygon's frame.
     centre_x = cosine * (square[1] + 0.5) + sine * (square[0] + 0.5)
     centre_y = cosine * (square[0] + 0.5) - sine * (square[1] + 0.5)

@@ -23,6 +23,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav._trig import cos, sin
 from hybridnav.refine._segment_kernels import is_legal
 
 BLOCKED, OPEN, STAND = 0, 1, 2
@@ -98,8 +99,8 @@ def moved(row, col, heading, d_row, d_col, turn, radius, share):
     now = heading + share * turn
     if radius == 0.0:
         return row + share * d_row, col + share * d_col, now
-    row += radius * (math.cos(heading) - math.cos(now))
-    col += radius * (math.sin(now) - math.sin(heading))
+    row += radius * (cos(heading) - cos(now))
+    col += radius * (sin(now) - sin(heading))
     return row, col, now
 
 
@@ -119,7 +120,7 @@ def following(part, level):
 @njit(cache=True, nogil=True)
 def place(corners, row, col, heading, placed):
     """Return the rounded positions of the corners of a body."""
-    cosine, sine = math.cos(heading), math.sin(heading)
+    cosine, sine = cos(heading), sin(heading)
     for i in range(corners.shape[0]):
         x, y = corners[i, 0], corners[i, 1]
         placed[i, 0] = rounded(row + sine * x + cosine * y)

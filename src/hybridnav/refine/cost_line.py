@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav._copies import copies_alike
+from hybridnav._trig import directions
 from hybridnav.poses import wrapped
 from hybridnav.refine import _cost_line_kernels as kernels
 from hybridnav.refine._arc_kernels import round_bends
@@ -142,7 +143,7 @@ class CostLine:
         points, ahead, cost, length = round_bends(
             self._free, self._factors, line, radius_m / per_cell, spare
         )
-        headings = np.arctan2(ahead[:, 0], ahead[:, 1])
+        headings = directions(ahead[:, 0], ahead[:, 1])
         if self._frame.yaw_rad != 0:
             headings = wrapped(headings + self._frame.yaw_rad)
         found = self._in_metres(points, start, goal)

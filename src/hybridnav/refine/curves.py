@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import cos, sin, sines_and_cosines
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine._curve_kernels import shortest_word
 
@@ -72,12 +73,12 @@ class Curve:
             return pose[None]
         x, y, yaw = pose.tolist()
         if kind == 0:
-            xs, ys = x + along_m * math.cos(yaw), y + along_m * math.sin(yaw)
+            xs, ys = x + along_m * cos(yaw), y + along_m * sin(yaw)
             return np.stack([xs, ys, np.full(len(along_m), yaw)], axis=1)
         radius_m = kind * self.radius_m
         yaws = yaw + along_m / radius_m
-        xs = x + radius_m * (np.sin(yaws) - math.sin(yaw))
-        ys = y + radius_m * (math.cos(yaw) - np.cos(yaws))
+        sines, cosines = sines_and_cosines(yaws)
+        xs, ys = x + radius_m * (sines - sin(yaw)), y + radius_m * (cos(yaw) - cosines)
         return np.stack([xs, ys, yaws], axis=1)
 
 

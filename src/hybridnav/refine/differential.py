@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import atan2
+
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.refine.curves import Pose
@@ -72,7 +74,7 @@ def _drives(
             if math.isnan(check.spin(*first, second[2])):
                 return None
             continue
-        heading = math.atan2(second[1] - first[1], second[0] - first[0])
+        heading = atan2(second[1] - first[1], second[0] - first[0])
         if not check.drive_valid(*first, *second):
             if not (reverses and check.drive_valid(*first, *second, backwards=True)):
                 return None

@@ -115,6 +115,6 @@ def _polygon_of(corners_m: Any) -> shapely.Polygon:
     if not polygon.is_valid:
         why = shapely.is_valid_reason(polygon)
         raise InvalidValueError(f"a footprint must be a simple polygon, got {why}")
-    if polygon.area <= _ROUNDING * polygon.length**2:
+    if polygon.area <= _ROUNDING * polygon.length * polygon.length:
         raise InvalidValueError("a footprint must be a simple polygon with an area, got none")
     return polygon if polygon.exterior.is_ccw else polygon.reverse()

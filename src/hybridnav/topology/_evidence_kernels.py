@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav._trig import atan2, cos, exp, sin
 from hybridnav.topology._merging_kernels import union_hull
 
 
@@ -114,7 +115,7 @@ def axes_of(moments):
     cc = moments[5] / n - col * col
     half = math.sqrt(max(0.0, (rr - cc) ** 2 / 4 + rc * rc))
     major, minor = max(0.08, (rr + cc) / 2 + half), max(0.08, (rr + cc) / 2 - half)
-    return math.sqrt(major / minor), 0.5 * math.atan2(2 * rc, rr - cc)
+    return math.sqrt(major / minor), 0.5 * atan2(2 * rc, rr - cc)
 
 
 @njit(cache=True, nogil=True)
@@ -140,7 +141,7 @@ def fill_evidence(state, pairs, resolution, reach, jamb, evidence):
         rim_u, rim_v = state.rims[u], state.rims[v]
         rim = max(1.0, rim_u + rim_v - 2 * border)
         widest, peak_u, peak_v = state.widest[pair], state.peaks[u], state.peaks[v]
-        width, axis = found[2], math.atan2(found[7], found[6])
+        width, axis = found[2], atan2(found[7], found[6])
         row[0], row[1], row[2] = width * resolution, found[0] * resolution, width / found[0]
         row[3], row[4] = found[1] * resolution, found[1] / found[0]
         row[5], row[6], row[7] = found[3], found[4], found[5]
@@ -156,8 +157,8 @@ def fill_evidence(state, pairs, resolution, reach, jamb, evidence):
         row[24], row[25] = broad_u * resolution, broad_v * resolution
         row[26], row[27], row[28] = long_u, long_v, long_both
         row[29], row[30] = width / broad_u, width / broad_v
-        row[31], row[32] = abs(math.cos(axis_u - axis_v)), abs(math.sin(axis - axis_u))
-        row[33] = abs(math.sin(axis - axis_v))
+        row[31], row[32] = abs(cos(axis_u - axis_v)), abs(sin(axis - axis_u))
+        row[33] = abs(sin(axis - axis_v))
         row[34], row[35] = state.degrees[u], state.degrees[v]
         row[36] = width * resolution / max(0.3, 2 * widest * resolution)
         row[37], row[38] = found[8], found[9] * resolution
@@ -177,5 +178,5 @@ def probabilities(evidence, features, thresholds, leaves, base):
                 right = evidence[k, features[tree, node]] > thresholds[tree, node]
                 node = 2 * node + 1 + right
             total += leaves[tree, node - inner]
-        found[k] = 1 / (1 + math.exp(-total))
+        found[k] = 1 / (1 + exp(-total))
     return found

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hybridnav._jit import njit
+from hybridnav._trig import cos, sin
 from hybridnav.search.arrays import find
 
 
@@ -138,7 +139,7 @@ def sharpness(rows, cols, angles):
     side = int(math.hypot(np.abs(rows).max(), np.abs(cols).max())) + 2
     one, other = np.zeros(2 * side + 1, np.int64), np.zeros(2 * side + 1, np.int64)
     for k in range(len(angles)):
-        cosine, sine = math.cos(angles[k]), math.sin(angles[k])
+        cosine, sine = cos(angles[k]), sin(angles[k])
         one[:] = 0
         other[:] = 0
         for i in range(len(rows)):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._trig import cos, tan
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells, closing
 from hybridnav.topology import _segmentation_kernels
@@ -88,7 +89,7 @@ class Ground:
         elif unexplored > _RAYS:
             free = closed_by_disc(free, occupied, _CLOSE_RAYS_M / grid.resolution_m)
             holes, _ = ndimage.label(~free & ~occupied)
-            small = np.bincount(holes.ravel()) * grid.resolution_m**2 < _HOLE_M2
+            small = np.bincount(holes.ravel()) * grid.cell_area_m2 < _HOLE_M2
             small[0] = False
             free = free | small[holes]
             occupied = occupied | _rim(free)
@@ -116,7 +117,7 @@ def fine_segments(ground: Ground) -> IntArray:
     for angle_rad, within in wall_directions(ground.wall, ground.resolution_m):
         _cut_in(ground, angle_rad, within, cut)
     parts, _ = ndimage.label(free & ~cut)
-    kept = np.bincount(parts.ravel()) * ground.resolution_m**2 >= _LEAST_M2
+    kept = np.bincount(parts.ravel()) * (ground.resolution_m * ground.resolution_m) >= _LEAST_M2
     kept[0] = False
     lines = np.where(kept[parts], parts - 1, -1).astype(np.int32)
     everywhere = np.where(free, np.int32(0), np.int32(-1))
@@ -209,14 +210,14 @@ def _apart(angle_rad: FloatArray, other_rad: float) -> FloatArray:
 def _cut_in(ground: Ground, angle_rad: float, within: BoolArray, cut: BoolArray) -> None:
     """Add the gaps between walls on lines in a direction, and square to it."""
     slack = max(1, round(_SLACK_M / ground.resolution_m))
-    along = math.cos(angle_rad) / ground.resolution_m
+    along = cos(angle_rad) / ground.resolution_m
     lengths = tuple(max(1, round(length_m * along)) for length_m in _LENGTHS_M)
     for turned in (False, True):
         wall, free, inside, out = (
             np.ascontiguousarray(mask.T if turned else mask)
             for mask in (ground.wall, ground.free, within, np.zeros_like(cut))
         )
-        slope = -math.tan(angle_rad) if turned else math.tan(angle_rad)
+        slope = -tan(angle_rad) if turned else tan(angle_rad)
         size = 2 * slack + 1
         wall = ndimage.maximum_filter1d(wall.view(np.uint8), size, 0, mode="constant") > 0
         _segmentation_kernels.cut_along(wall, free, slope, inside, lengths, _FREE_SHARE, out)

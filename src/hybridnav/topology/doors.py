@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import cos, sin, sines_and_cosines
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.grid.clearance import clearance_cells
 from hybridnav.pyramid.cracks import endpoints_of, find_cracks, middles_of, sides_of
@@ -101,7 +102,7 @@ class RoomBoundaries:
         between = free[first] & free[second]  # then their rooms differ
         edges, first, second = edges[between], first[between], second[between]
         _, begins, dense = np.unique(classes[between], return_index=True, return_inverse=True)
-        order = np.argsort(begins)  # edges ascend: the first of each is its least
+        order = np.argsort(begins, kind="stable")  # edges ascend: the first of each is its least
         rank = np.empty_like(order)
         rank[order] = np.arange(len(order))
         boundary_of = rank[dense.reshape(-1)].astype(np.int64)
@@ -220,9 +221,10 @@ def _extents(edges: LongArray, cols: int, boundary_of: LongArray) -> FloatArray:
     order = np.argsort(boundary_of, kind="stable")
     begins = np.flatnonzero(np.diff(boundary_of[order], prepend=-1))
     extents = np.zeros(len(begins))
-    for angle_rad in np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS):
-        direction = np.array([np.cos(angle_rad), np.sin(angle_rad)])
-        at, half = (middles @ direction)[order], np.abs(along @ direction)[order]
+    for angle_rad in (np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS)).tolist():
+        by_row, by_col = cos(angle_rad), sin(angle_rad)
+        at, half = (side[order, 0] * by_row + side[order, 1] * by_col for side in (middles, along))
+        half = np.abs(half)
         highest = np.maximum.reduceat(at + half, begins)
         extents = np.maximum(extents, highest - np.minimum.reduceat(at - half, begins))
     return extents
@@ -245,8 +247,8 @@ def farthest_ends(edges: LongArray, cols: int) -> FloatArray:
         float64 (2, 2), (row, col) in grid units.
     """
     corners = _corners(edges, cols).astype(np.float64)
-    angles = np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS)
-    along = corners @ np.stack([np.cos(angles), np.sin(angles)])
+    sines, cosines = sines_and_cosines(np.arange(_DIRECTIONS) * (np.pi / _DIRECTIONS))
+    along = corners[:, :1] * cosines + corners[:, 1:] * sines
     pairs = corners[np.stack([along.argmin(axis=0), along.argmax(axis=0)], axis=1)]
     lengths = np.hypot(*(pairs[:, 1] - pairs[:, 0]).T)
     found: FloatArray = pairs[int(lengths.argmax())]

@@ -118,7 +118,7 @@ class TopologicalMap:
     @cached_property
     def areas_m2(self) -> FloatArray:
         """float64 (n_places,), area of each place in square metres."""
-        areas: FloatArray = self.level.areas * np.float64(self.grid.resolution_m**2)
+        areas: FloatArray = self.level.areas * np.float64(self.grid.cell_area_m2)
         return areas
 
     def place_at(self, cell: tuple[int, int]) -> int:
@@ -229,7 +229,7 @@ class TopologicalMap:
             raise InvalidValueError(
                 f"least area must be a number of square metres >= 0, got {least_area_m2}"
             )
-        cells = least_area_m2 / self.grid.resolution_m**2
+        cells = least_area_m2 / self.grid.cell_area_m2
         return self.inclusion.encloses(place, least_area_cells=cells)
 
     def enclosed_by(self, thing: int | Sequence[int] | Obstacle | Component) -> tuple[int, ...]:

@@ -42,7 +42,7 @@ class Segments:
         self._label_of = dense.reshape(label_of.shape).astype(np.int32) - first
         self._label_of[self._label_of < 0] = -1
         self._n = len(found) - first
-        self._cell_m2 = resolution_m**2
+        self._cell_m2 = resolution_m * resolution_m
         self._reach = _REACH_M / resolution_m
         reaching = grown(self._label_of, self._reach)
         self._free = np.bincount(self._label_of[self._label_of >= 0], minlength=self._n)

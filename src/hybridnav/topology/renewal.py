@@ -129,8 +129,8 @@ def renewed_rooms(
     segments = JudgedSegments(label_of, ground)
     # The numbers of rooms that stay lie below all others, and segments keep the order.
     stays = np.arange(len(np.unique(room_of[room_of >= 0])))
-    specks = least_cells(min(SPECK_M2, least_area_m2), grid.resolution_m**2)
-    least = least_cells(least_area_m2, grid.resolution_m**2)
+    specks = least_cells(min(SPECK_M2, least_area_m2), grid.cell_area_m2)
+    least = least_cells(least_area_m2, grid.cell_area_m2)
     rules = Small(specks), Likely(_Lasting(segments, before).judge, LEAST_LIKELY), Small(least)
     contract(segments, [_Apart(rule, stays) for rule in rules])
     known = np.full(segments.n_segments, NO_ROOM, np.int32)

@@ -209,7 +209,7 @@ class Rooms:
                 float(found.passages_m[at]),
                 bool(found.between_jambs[at]),
             )
-            for at in np.argsort(numbers).tolist()
+            for at in np.argsort(numbers, kind="stable").tolist()
         )
 
     @cached_property
@@ -410,5 +410,5 @@ def room_areas_m2(labels: RoomLabels, grid: OccupancyGrid) -> FloatArray:
     metres."""
     free = labels.label_of[grid.measured == CellClass.FREE]
     cells = np.bincount(free[free >= 0], minlength=len(labels.names))
-    areas: FloatArray = cells * np.float64(grid.resolution_m**2)
+    areas: FloatArray = cells * np.float64(grid.cell_area_m2)
     return areas

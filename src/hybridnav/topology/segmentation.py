@@ -97,7 +97,7 @@ def find_rooms(
         )
     check_least_area(least_area_m2)
     found = _judged if method == "judged" else _convex
-    least = least_cells(least_area_m2, grid.resolution_m**2)
+    least = least_cells(least_area_m2, grid.cell_area_m2)
     labels = _in_reading_order(found(grid, method, least_area_m2), least)
     n_rooms = int(labels.max(initial=NO_ROOM)) + 1
     if n_rooms > MAX_ROOMS:
@@ -162,8 +162,8 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     outside = outside_of(grid)
     ground = Ground.of(grid, outside)
     segments = JudgedSegments(fine_segments(ground), ground)
-    specks = least_cells(min(SPECK_M2, least_area_m2), grid.resolution_m**2)
-    least = least_cells(least_area_m2, grid.resolution_m**2)
+    specks = least_cells(min(SPECK_M2, least_area_m2), grid.cell_area_m2)
+    least = least_cells(least_area_m2, grid.cell_area_m2)
     contract(segments, [Small(specks), Likely(forest.judge, LEAST_LIKELY), Small(least)])
     free = (grid.measured == CellClass.FREE) & ~outside
     return np.where(free, segments.label_of, np.int32(NO_ROOM))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._trig import atan2, cos, exp, sin
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
 from hybridnav.topology import _segmentation_kernels
@@ -138,7 +139,7 @@ def wall_line_segments(grid: OccupancyGrid, *, least_m2: float = LEAST_SEGMENT_M
         upright = _turned(occupied, tilt_rad), _turned(free, tilt_rad)
         cut = _turned_back(_gaps(*upright, grid.resolution_m), tilt_rad, grid.shape)
     labels, _ = ndimage.label(free & ~cut)
-    areas_m2 = np.bincount(labels.ravel()) * grid.resolution_m**2
+    areas_m2 = np.bincount(labels.ravel()) * grid.cell_area_m2
     kept = areas_m2 >= least_m2
     kept[0] = False
     segments: IntArray = np.where(kept[labels], labels - 1, -1).astype(np.int32)
@@ -160,13 +161,20 @@ def main_direction(occupied: BoolArray) -> float:
     float
         From -pi/4 to pi/4, counter-clockwise with row 0 at the bottom; 0 without walls.
     """
-    smooth = ndimage.gaussian_filter(occupied.astype(np.float64), 2.0)
+    weights = np.array([exp(-k * k / 8) for k in range(-8, 9)])  # a deviation of two cells
+    smooth = occupied.astype(np.float64)
+    for axis in (0, 1):
+        smooth = ndimage.correlate1d(smooth, weights / weights.sum(), axis)
     if min(occupied.shape) < 2:  # noqa: PLR2004 - no gradient
         return 0.0
     by_row, by_col = np.gradient(smooth)
     # Four times the angle makes walls and their normals, whichever way they face, one direction.
-    turned = np.exp(4j * np.arctan2(by_row, by_col)) * np.hypot(by_row, by_col)
-    return float(np.angle(turned.sum()) / 4)
+    steepness = np.hypot(by_row, by_col)
+    by_row, by_col, steepness = (each[steepness > 0] for each in (by_row, by_col, steepness))
+    ahead, aside = by_col * by_col - by_row * by_row, 2 * by_row * by_col
+    rights = (ahead * ahead - aside * aside) / (steepness * steepness * steepness)
+    ups = 2 * ahead * aside / (steepness * steepness * steepness)
+    return atan2(float(ups.sum()), float(rights.sum())) / 4
 
 
 def _gaps(occupied: BoolArray, free: BoolArray, resolution_m: float) -> BoolArray:
@@ -201,7 +209,7 @@ def _upright(slack: int) -> BoolArray:
 def _rotation(tilt_rad: float) -> FloatArray:
     """Return the matrix that turns offsets (row, col) of an upright image into those of the
     grid."""
-    cosine, sine = math.cos(tilt_rad), math.sin(tilt_rad)
+    cosine, sine = cos(tilt_rad), sin(tilt_rad)
     return np.array([[cosine, sine], [-sine, cosine]])
 
 
@@ -211,7 +219,7 @@ def _turned(mask: BoolArray, tilt_rad: float) -> BoolArray:
     side = math.ceil(math.hypot(*mask.shape)) + 2
     turn = _rotation(tilt_rad)
     middle = (np.array(mask.shape) - 1) / 2
-    offset = middle - turn @ np.full(2, (side - 1) / 2)
+    offset = middle - (turn * ((side - 1) / 2)).sum(axis=1)
     found: BoolArray = ndimage.affine_transform(
         mask.astype(np.uint8), turn, offset, (side, side), order=0
     ).astype(np.bool_)
@@ -221,7 +229,7 @@ def _turned(mask: BoolArray, tilt_rad: float) -> BoolArray:
 def _turned_back(mask: BoolArray, tilt_rad: float, shape: tuple[int, int]) -> BoolArray:
     turn = _rotation(tilt_rad).T
     middle = (np.array(mask.shape) - 1) / 2
-    offset = middle - turn @ ((np.array(shape) - 1) / 2)
+    offset = middle - (turn * ((np.array(shape) - 1) / 2)).sum(axis=1)
     found: BoolArray = ndimage.affine_transform(
         mask.astype(np.uint8), turn, offset, shape, order=0
     ).astype(np.bool_)

@@ -239,7 +239,7 @@ def _ellipse(corridor: SearchArea, inner: FloatArray, cost: float) -> tuple[Floa
     """
     offset = (inner[-1] - inner[0])[:2]
     straight = float(np.hypot(*offset))
-    across = math.sqrt(max(cost**2 - straight**2, 0.0)) / 2
+    across = math.sqrt(max(cost * cost - straight * straight, 0.0)) / 2
     direction = offset / straight if straight > 0 else np.array([1.0, 0.0])
     half = np.sqrt((cost / 2 * direction) ** 2 + (across * direction[::-1]) ** 2)
     middle = (inner[0] + inner[-1])[:2] / 2

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._trig import atan2, cos, sin
+
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.refine.ompl.messages import Query
@@ -65,10 +67,10 @@ class Poses:
         steps = max(int(_AHEAD_M / self._resolution_m), 1)
         ahead = self._centres[min(index + steps, len(self._centres) - 1)]
         ahead = ahead - self._centres[max(index - steps, 0)]
-        heading = math.atan2(ahead[1], ahead[0])
+        heading = atan2(ahead[1], ahead[0])
         for aside in _ASIDE_CELLS:
             offset_m = aside * self._resolution_m
-            at_x, at_y = x - offset_m * math.sin(heading), y + offset_m * math.cos(heading)
+            at_x, at_y = x - offset_m * sin(heading), y + offset_m * cos(heading)
             for turn in _TURNS:
                 if self._check.state_valid(at_x, at_y, heading + turn):
                     return np.array([at_x, at_y, math.remainder(heading + turn, math.tau)])
