@@ -218,6 +218,17 @@ def test_a_gap_that_only_a_thinner_robot_could_pass_is_a_reason_to_look_again() 
     assert narrow_spots(nothing_beyond, (5, 2)).tolist() == []
 
 
+def test_each_gap_is_a_reason_to_look_again_although_others_lead_to_the_same_room() -> None:
+    # Two known rooms, and two doors that the robot's radius closes: see above.
+    cells = np.zeros((30, 20), dtype=np.float32)
+    cells[:, 9], cells[[5, 6, 22, 23], 9] = 1.0, 0.0
+    cells[:, 17:] = np.nan
+    grid = hn.OccupancyGrid(cells, hn.Frame(0.5), robot_radius_m=0.75)
+    first, second = narrow_spots(grid, (5, 2)).tolist()
+    assert first in ([5, 7], [6, 7])
+    assert second in ([22, 7], [23, 7])
+
+
 def test_a_robot_with_a_noisy_laser_looks_again_before_it_ends() -> None:
     noisy = laser_all_round(noise_m=0.05)
     done = explore(flat(radius_m=0.35), START, sensor=noisy, seed=9)

@@ -58,7 +58,8 @@ def narrow_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
 
     A wall may be mapped a cell too thick. So the cells are looked for that a robot could reach in
     addition if its radius were a cell less, two cells or more off the reach, in connected sets with
-    unexplored cells beside. Each set has one spot: the cell in reach nearest to it.
+    unexplored cells beside. Each gap through which they are entered has one spot: the cell in reach
+    nearest to it. A set behind two doors has two, for from one door nothing is seen of the other.
 
     Parameters
     ----------
@@ -76,13 +77,18 @@ def narrow_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
         return np.zeros((0, 2), np.int64)
     thin = replace(grid, robot_radius_m=grid.robot_radius_m - grid.resolution_m)
     reach, more = _connected(grid, cell), _connected(thin, cell)
-    parts, _ = ndimage.label(more & ~ndimage.binary_dilation(reach, _SQUARE))
+    beside = ndimage.binary_dilation(reach, _SQUARE)
+    parts, _ = ndimage.label(more & ~beside)
     leads_on = np.unique(parts[ndimage.binary_dilation(thin.classes == CellClass.UNEXPLORED)])
-    if not leads_on.any():
+    entered = np.isin(parts, leads_on[leads_on > 0]) & ndimage.binary_dilation(beside & more)
+    gaps, _ = ndimage.label(entered, _SQUARE)
+    if not gaps.any():
         return np.zeros((0, 2), np.int64)
     cells_off, nearest = ndimage.distance_transform_edt(~reach, return_indices=True)
-    first = ndimage.minimum_position(cells_off, parts, leads_on[leads_on > 0])
-    rows, cols = np.array(first, np.int64).reshape(-1, 2).T
+    cells = np.argwhere(gaps)
+    order = np.lexsort((cells_off[tuple(cells.T)], gaps[tuple(cells.T)]))
+    _, first = np.unique(gaps[tuple(cells[order].T)], return_index=True)
+    rows, cols = cells[order[first]].T
     spots: LongArray = nearest[:, rows, cols].T.astype(np.int64)
     return spots
 
