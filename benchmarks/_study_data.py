@@ -111,6 +111,7 @@ def part_figures(study: Study) -> Data:
         "pairs": asked,
         "pairs in common": len(common),
         "checks": study.checks,
+        "checked any-angle": study.any_angle_checked,
         "contradictions": len(study.faults),
         "first contradictions": [f"{o.map_name}, {o.label}: {text}" for o, _, text in study.faults][
             :10

@@ -188,6 +188,14 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
         what = ", of what came before" if start > most else ""
         text = f"{start:.2f} at the start{what}, {end:.2f} at the end, {most:.2f} at most, of which"
         facts.append(("load in the timing pass", f"{text} 1 was the study's"))
+    checked = [
+        f"{TITLES[name]} {part['checked any-angle']}"
+        for name, part in data["parts"].items()
+        if part.get("checked any-angle")  # figures of older runs do not state it
+    ]
+    if checked:
+        text = f"{', '.join(checked)} optima, by a search of the visibility graph"
+        facts.append(("checked any-angle", text))
     facts += [
         ("warning", f"{TITLES[name]}: {one.rstrip('.')}")
         for name, part in data["parts"].items()

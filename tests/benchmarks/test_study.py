@@ -97,6 +97,23 @@ def test_consistency_is_that_of_the_records(folder, data, part):
     assert data["parts"][part]["contradictions"] == 0
 
 
+def test_the_study_says_how_many_any_angle_optima_were_checked(folder, data):
+    found = []
+    for name, plan in zip(FIGURES, PARTS, strict=True):
+        lines = (folder / name / "records.jsonl").read_text(encoding="utf-8").splitlines()
+        checked = sum("visibility_optimum_m" in json.loads(line) for line in lines)
+        assert checked == min(plan.pairs, 3) * len(NAMES)
+        found.append(f"{checked} of {data['parts'][name]['pairs']}")
+    assert [data["parts"][name]["checked any-angle"] for name in FIGURES] == found
+    words = "checked any-angle: Lengths {}, Costs {}, OMPL {} optima".format(*found)
+    assert words in page(data)
+    assert words.partition(": ")[2] in (folder / "report.html").read_text(encoding="utf-8")
+    older = copy.deepcopy(data)
+    for part in older["parts"].values():
+        del part["checked any-angle"]
+    assert "checked any-angle" not in page(older)
+
+
 def test_a_longer_path_in_the_records_is_a_larger_loss(folder, data, tmp_path):
     made = tmp_path / "study"
     made.mkdir()

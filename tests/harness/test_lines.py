@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -205,6 +206,33 @@ def test_a_yardstick_that_is_wrong_is_found_out(folder, tmp_path, monkeypatch, f
     assert len(faults) >= 3
     assert all("the any-angle optimum by the mesh is" in fault for fault in faults)
     assert all(words in fault for fault in faults)
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("factor", [1.0, 0.999])
+def test_a_map_of_many_corners_is_checked_like_any_other(tmp_path, monkeypatch, factor):
+    side = 95  # with 4 corners round each of 2,209 blocked cells
+    lines = ["." * side if row % 2 == 0 else ".#" * (side // 2) + "." for row in range(side)]
+    right = AnyAngleOptimum.length_m
+    monkeypatch.setattr(AnyAngleOptimum, "length_m", lambda *endpoints: factor * right(*endpoints))
+    run = tmp_path / "run"
+    evaluate(RunSettings(maps=(str(write_map(tmp_path, lines)),), presets=(), pairs=5), run)
+    faults = [fault for _, _, fault in write_outputs(run).faults]
+    checked = 3 if factor == 1 else 0
+    assert len(faults) == 3 - checked
+    assert all("by a visibility graph" in fault for fault in faults)
+    records = [json.loads(line) for line in (run / "records.jsonl").read_text().splitlines()]
+    both = [
+        (r["any_angle_m"], r["visibility_optimum_m"])
+        for r in records
+        if "visibility_optimum_m" in r
+    ]
+    assert len(both) == checked
+    assert all(one == pytest.approx(other, rel=1e-9) for one, other in both)
+    asked = 5 - len(faults)
+    assert f"Checked any-angle: {checked} of {asked}." in (run / "summary.md").read_text()
+    report = re.sub(r"(\s*<[^>]*>\s*)+", " ", (run / "report.html").read_text())
+    assert f"checked any-angle {checked} of {asked}" in report
 
 
 def test_records_whose_any_angle_lengths_are_not_proved_are_refused(folder, tmp_path):

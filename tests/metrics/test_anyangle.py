@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, Frame, OccupancyGrid
+from hybridnav.io import load_map
 from hybridnav.metrics import (
     ScipyOptimum,
     VisibilityGraph,
@@ -20,6 +22,9 @@ from hybridnav.metrics import (
 )
 from tests.oracle.grid import length_of_points
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 Cell = tuple[int, int]
 
@@ -144,11 +149,21 @@ def test_unexplored_cells_are_crossed_only_when_allowed() -> None:
     assert VisibilityGraph(grid, allow_unexplored=True).shortest((0, 0), (0, 4)).length_m == 4
 
 
-def test_a_map_with_too_many_corners_is_refused_in_one_line() -> None:
-    grid = occupancy_grid(ONE_SQUARE)
-    assert len(VisibilityGraph(grid, max_corners=4).corners) == 4
-    with pytest.raises(InvalidValueError, match="4 corners, more than the limit of 3"):
-        VisibilityGraph(grid, max_corners=3)
+def test_a_map_of_many_corners_has_the_stated_optima(data: Path) -> None:
+    folder = data / "any_angle_optima"
+    grid = load_map(folder / "tsc_y4.map", robot_radius_m=0)
+    graph = VisibilityGraph(grid)
+    assert len(graph.corners) == 19_574
+    stated = (folder / "tsc_y4.csv").read_text(encoding="utf-8").splitlines()
+    for row in list(csv.DictReader(stated))[::25]:
+        start, goal = (
+            (grid.shape[0] - 1 - int(float(row[f"{end}y"])), int(float(row[f"{end}x"])))
+            for end in "sg"
+        )
+        found = graph.shortest(start, goal)
+        assert found.length_m == pytest.approx(float(row["length_cells"]), abs=1e-6)
+        assert found.points is not None
+        assert not segment_faults(grid, found.points)
 
 
 def test_cells_outside_the_map_are_refused() -> None:

@@ -98,6 +98,15 @@ class Study:
         """Queries without an answer."""
         return sum(outcome.failures for outcome in self.outcomes)
 
+    @property
+    def any_angle_checked(self) -> str:
+        """How many of the any-angle optima an independent search confirmed, "3 of 16"; empty if
+        there are none."""
+        records = [r for outcome in self.of_method(REFERENCE) for r in outcome.records]
+        known = [record for record in records if "any_angle_m" in record]
+        checked = sum("visibility_optimum_m" in record for record in known)
+        return f"{checked:,} of {len(known):,}" if known else ""
+
     def pooled(self, label: str, name: str) -> FloatArray:
         """Return an array of a method, such as "losses" or "seconds", over all its maps."""
         arrays = [getattr(outcome, name) for outcome in self.of_method(label)]

@@ -69,10 +69,11 @@ def write_outputs(
 def markdown(overall: Sequence[Row], study: Study) -> str:
     """Return the tables of all maps together, one for consistency, one for the losses over each
     optimum, one for efficiency."""
-    found = len(study.faults)
+    found, checked = len(study.faults), study.any_angle_checked
     text = (
         f"## Consistency\n\n{study.checks:,} answers checked, {found} counter-examples, "
-        f"{study.failures} queries without an answer.\n\n"
+        f"{study.failures} queries without an answer."
+        f"{f' Checked any-angle: {checked}.' if checked else ''}\n\n"
         f"{_table(overall, CONSISTENCY_COLUMNS)}\n"
     )
     text += f"## Methods\n\n{_table(rows_of_methods(study), METHOD_COLUMNS)}\n"

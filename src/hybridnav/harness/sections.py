@@ -91,6 +91,7 @@ def report_of(
         ("pairs", _pairs_text(study)),
         *study.circumstances.facts,
         ("queries without an answer", f"{study.failures:,}"),
+        *([("checked any-angle", checked)] if (checked := study.any_angle_checked) else []),
     ]
     labels = dict.fromkeys(outcome.label for outcome in _drawn(study, study.outcomes))
     several = labels if together else {}

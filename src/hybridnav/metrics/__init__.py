@@ -5,7 +5,7 @@ the grid and its frame, the cells that a line passes, which name a path and judg
 exact comparison of two products, which tests hold against fractions.
 """
 
-from hybridnav.metrics.anyangle import MAX_CORNERS, AnyAnglePath, VisibilityGraph
+from hybridnav.metrics.anyangle import AnyAnglePath, VisibilityGraph
 from hybridnav.metrics.arcs import Chords, chords_of
 from hybridnav.metrics.cheapest import CheapestCost
 from hybridnav.metrics.judge import Verdict, judge_path, segment_faults
@@ -23,7 +23,6 @@ from hybridnav.metrics.statistics import (
 )
 
 __all__ = [
-    "MAX_CORNERS",
     "AnyAnglePath",
     "Buckets",
     "CheapestCost",

@@ -20,6 +20,12 @@ CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
 """Codes of a segment: it stays in the free space, leaves the map, enters a cell that is not free,
 passes between two such cells that meet at a corner, runs along a side that two of them share."""
 
+ACROSS = math.sqrt(2)
+"""Longest way from a position to a corner of its cell, in cells."""
+
+OCTILE_RATIO = math.sqrt(4 - 2 * math.sqrt(2))
+"""Largest ratio of an octile length to the straight one, 1.0824."""
+
 
 @njit(cache=True, nogil=True)
 def _is_free(classes, free_of, row, col):
@@ -166,94 +172,126 @@ def crossed_joints(classes, free_of, positions):
 
 
 @njit(cache=True, nogil=True)
-def _sees(classes, free_of, positions, i, j):
-    """Return whether a segment between two of some positions is legal."""
-    return (
-        segment_code(
-            classes, free_of, positions[i, 0], positions[i, 1], positions[j, 0], positions[j, 1]
-        )
-        == CLEAR
-    )
+def octile_lengths(classes, free_of, start_row, start_col, goal_row, goal_col):
+    """Return the lengths of octile paths from each corner of the lattice to a goal, and from a
+    start; infinite where there is no path, and at corners too far away for a shortest path.
 
-
-@njit(cache=True, nogil=True)
-def visible_pairs(classes, free_of, corners, slopes):
-    """Return the pairs i < j of corners that see each other and can be adjacent on a shortest path.
-
-    A shortest path bends round a corner, so no segment of it points into the blocked cell there
-    or straight away from it: `slopes` is the sign of (row offset * col offset) of that cell.
+    Such a path runs along sides and diagonals of free cells, and turns at corners where no two
+    blocked cells meet alone: it is legal at any angle. A legal segment between two corners has an
+    octile path in the cells that it passes, at most `OCTILE_RATIO` times as long.
     """
-    n = corners.shape[0]
-    pairs = np.empty((1024, 2), np.int32)
-    n_pairs = 0
-    for i in range(n):
-        for j in range(i + 1, n):
-            row, col = corners[j, 0] - corners[i, 0], corners[j, 1] - corners[i, 1]
-            if row * col * slopes[i] > 0 or row * col * slopes[j] > 0:
-                continue
-            if not _sees(classes, free_of, corners, i, j):
-                continue
-            if n_pairs == pairs.shape[0]:
-                larger = np.empty((2 * n_pairs, 2), np.int32)
-                larger[:n_pairs] = pairs
-                pairs = larger
-            pairs[n_pairs, 0], pairs[n_pairs, 1] = i, j
-            n_pairs += 1
-    return pairs[:n_pairs]
-
-
-@njit(cache=True, nogil=True)
-def visible_from(classes, free_of, row, col, corners, slopes):
-    """Return the distance from a position to each corner that it sees, infinite to the others."""
-    distances = np.full(corners.shape[0], np.inf)
-    for i in range(corners.shape[0]):
-        there_row, there_col = corners[i]
-        if (there_row - row) * (there_col - col) * slopes[i] > 0:
-            continue
-        if segment_code(classes, free_of, row, col, there_row, there_col) == CLEAR:
-            distances[i] = math.hypot(there_row - row, there_col - col)
-    return distances
-
-
-@njit(cache=True, nogil=True)
-def cheapest_corners(offsets, heads, lengths, from_start, to_goal, to_goal_bound):
-    """Return the corners on a shortest path between two positions, in order; empty if none.
-
-    The search is A* with the straight distance to the goal as its bound. A shortest path is empty
-    too if it needs no corner.
-
-    `offsets`, int64 (n + 1,), `heads` and `lengths`, float64, are the graph of n corners in CSR
-    form; `from_start`, `to_goal` and `to_goal_bound`, float64 (n,), are distances, infinite where
-    an end does not see the corner. All lengths are in cells.
-    """
-    n = from_start.size
-    best = from_start.copy()
-    came = np.full(n, -1, np.int32)
-    done = np.zeros(n, np.bool_)
-    heap = [(np.inf, np.int32(-1))]
-    for i in range(n):
-        if best[i] < np.inf:
-            heapq.heappush(heap, (best[i] + to_goal_bound[i], np.int32(i)))
-    total, last = np.inf, np.int32(-1)
+    rows, cols = classes.shape
+    lengths = np.full((rows + 1, cols + 1), np.inf)
+    done = np.zeros(lengths.shape, np.bool_)
+    heap = [(np.inf, 0, 0)]
+    for row, col, away in _corners_round(classes, free_of, goal_row, goal_col):
+        lengths[row, col] = away
+        heapq.heappush(heap, (away, row, col))
+    from_start = np.full(lengths.shape, np.inf)
+    for row, col, away in _corners_round(classes, free_of, start_row, start_col):
+        from_start[row, col] = away
+    best = np.inf
     while heap:
-        bound, node = heapq.heappop(heap)
-        if bound >= total or node < 0:
+        length, row, col = heapq.heappop(heap)
+        if length > OCTILE_RATIO * (best + ACROSS) + ACROSS:  # see `lower_bounds`
             break
-        if done[node]:
+        if length == np.inf or done[row, col]:
             continue
-        done[node] = True
-        if best[node] + to_goal[node] < total:
-            total, last = best[node] + to_goal[node], node
-        for k in range(offsets[node], offsets[node + 1]):
-            head = heads[k]
-            length = best[node] + lengths[k]
-            if length < best[head]:
-                best[head], came[head] = length, node
-                heapq.heappush(heap, (length + to_goal_bound[head], head))
-    path = np.empty(n, np.int32)
-    size = 0
-    while last >= 0:
-        path[size] = last
+        done[row, col] = True
+        best = min(best, length + from_start[row, col])
+        for up in range(-1, 2):
+            for right in range(-1, 2):
+                if not _is_step(classes, free_of, row, col, up, right):
+                    continue
+                total = length + math.hypot(up, right)
+                if total < lengths[row + up, col + right]:
+                    lengths[row + up, col + right] = total
+                    heapq.heappush(heap, (total, row + up, col + right))
+    return np.where(done, lengths, np.inf), best
+
+
+@njit(cache=True, nogil=True)
+def _corners_round(classes, free_of, row, col):
+    """Return the corners of the free cells that a position touches, each with its distance; none
+    where two free cells meet alone."""
+    corners = [(0, 0, np.inf)][:0]
+    for r in range(math.ceil(row) - 1, math.floor(row) + 1):
+        for c in range(math.ceil(col) - 1, math.floor(col) + 1):
+            if not _is_free(classes, free_of, r, c):
+                continue
+            for there_row in range(r, r + 2):
+                for there_col in range(c, c + 2):
+                    if crossing_at(classes, free_of, there_row, there_col) == 0:
+                        away = math.hypot(there_row - row, there_col - col)
+                        corners.append((there_row, there_col, away))
+    return corners
+
+
+@njit(cache=True, nogil=True)
+def _is_step(classes, free_of, row, col, up, right):
+    """Return whether an octile path on corners may step by one side or diagonal of a cell."""
+    if up == 0 and right == 0:
+        return False
+    low, left = row + min(up, 0), col + min(right, 0)
+    free = _is_free(classes, free_of, low, left)
+    if up == 0:
+        free = free or _is_free(classes, free_of, low - 1, left)
+    if right == 0:
+        free = free or _is_free(classes, free_of, low, left - 1)
+    return free and crossing_at(classes, free_of, row + up, col + right) == 0
+
+
+@njit(cache=True, nogil=True)
+def shortest_chain(classes, free_of, nodes, blocked, to_goal, most):
+    """Return the nodes on a shortest path from the last but one to the last, in order; empty if no
+    path is at most `most` long.
+
+    The search is A*, and tests only then whether two nodes see each other when their segment is the
+    next to be taken: the first segment to a node that passes the test is on a shortest path to it.
+    A shortest path bends round the blocked cell at each corner, so other segments are left out.
+
+    `nodes`, float64 (n, 2), are the corners that may be on the path, the start and the goal;
+    `blocked`, int64 (n, 2), the signs of the direction to the blocked cell of each, 0 at both ends;
+    `to_goal`, float64 (n,), lower bounds on the ways to the goal. All lengths are in cells.
+    """
+    n = nodes.shape[0]
+    lengths = np.zeros(n)
+    came = np.full(n, -1, np.int64)
+    heap = [(0.0, n - 2, n - 2)]
+    while heap and came[n - 1] < 0:
+        _, node, before = heapq.heappop(heap)
+        if came[node] >= 0:
+            continue
+        row, col = nodes[node]
+        from_row, from_col = row - nodes[before, 0], col - nodes[before, 1]
+        if node != before:
+            code = segment_code(classes, free_of, nodes[before, 0], nodes[before, 1], row, col)
+            if code != CLEAR:
+                continue
+        came[node] = before
+        lengths[node] = lengths[before] + math.hypot(from_row, from_col)
+        side = from_row * blocked[node, 1] - from_col * blocked[node, 0]
+        for head in range(n):
+            if came[head] >= 0:
+                continue
+            to_row, to_col = nodes[head, 0] - row, nodes[head, 1] - col
+            if to_row * to_col * blocked[node, 0] * blocked[node, 1] > 0:
+                continue
+            if to_row * to_col * blocked[head, 0] * blocked[head, 1] > 0:
+                continue
+            if side != 0.0:
+                turn = compare_products(from_row, to_col, from_col, to_row)
+                if turn * side < 0 or from_row * to_row + from_col * to_col < 0:
+                    continue
+            estimate = lengths[node] + math.hypot(to_row, to_col) + to_goal[head]
+            if estimate <= most:
+                heapq.heappush(heap, (estimate, head, node))
+    chain = np.empty(n, np.int64)
+    size, node = 0, n - 1
+    while came[n - 1] >= 0 and size < n:
+        chain[size] = node
         size += 1
-        last = came[last]
-    return path[:size][::-1]
+        if node == n - 2:
+            break
+        node = came[node]
+    return chain[:size][::-1]

@@ -1,4 +1,4 @@
-"""Exact shortest any-angle paths on small maps, by a visibility graph."""
+"""Exact shortest any-angle paths, by a visibility graph that tests sight on demand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.metrics import _segment_kernels as kernels
@@ -17,10 +16,8 @@ if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.grid import OccupancyGrid
 
-MAX_CORNERS = 2000
-"""Default limit of the corners of a visibility graph."""
-
-Point = tuple[int, int]
+ROUNDING = 1e-9
+"""Share by which bounds are slackened, because they are sums of rounded lengths."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +37,7 @@ class VisibilityGraph:
     Free space is the union of the closed squares of the free cells, without the passages between
     two blocked cells that meet at a corner (see `segment_faults`). A shortest path there bends at
     convex corners of blocked cells only: lattice corners with exactly one blocked cell of four.
-    Visibility is tested exactly.
+    Visibility is tested exactly, of those corners alone that a search comes to.
 
     Parameters
     ----------
@@ -48,18 +45,13 @@ class VisibilityGraph:
         The map.
     allow_unexplored
         Whether unexplored cells may be entered.
-    max_corners
-        Most corners of the map; time and memory grow with their square.
-
-    Raises
-    ------
-    InvalidValueError
-        When the map has more corners.
 
     Notes
     -----
     T. Lozano-Perez, M. A. Wesley: An algorithm for planning collision-free paths among polyhedral
-    obstacles, 1979.
+    obstacles, 1979. J. P. Bailey and others: Path-length analysis for grid-based path planning,
+    2021, on the bound of the search: an octile path over corners of the lattice is at most 8.24 %
+    longer.
 
     Examples
     --------
@@ -69,32 +61,11 @@ class VisibilityGraph:
     2.0
     """
 
-    def __init__(
-        self,
-        grid: OccupancyGrid,
-        *,
-        allow_unexplored: bool = False,
-        max_corners: int = MAX_CORNERS,
-    ) -> None:
+    def __init__(self, grid: OccupancyGrid, *, allow_unexplored: bool = False) -> None:
         self._grid = grid
         self._free_of = free_classes(allow_unexplored=allow_unexplored)
-        self.corners, self._slopes = _convex_corners(self._free_of[grid.classes])
+        self.corners, self._blocked = _convex_corners(self._free_of[grid.classes])
         """float64 (n, 2), (row, col) of the corners in grid units, whole numbers."""
-        n = len(self.corners)
-        if n > max_corners:
-            raise InvalidValueError(
-                f"a visibility graph of map {grid.name!r} would have {n} corners, "
-                f"more than the limit of {max_corners}"
-            )
-        pairs = kernels.visible_pairs(grid.classes, self._free_of, self.corners, self._slopes)
-        offset = self.corners[pairs[:, 0]] - self.corners[pairs[:, 1]]
-        lengths = np.hypot(offset[:, 0], offset[:, 1])
-        tails, heads = np.concatenate([pairs, pairs[:, ::-1]]).T
-        # No two corners are at one place, so no length is 0 and every entry is kept.
-        graph = sparse.coo_array((np.tile(lengths, 2), (tails, heads)), shape=(n, n)).tocsr()
-        self._offsets = graph.indptr.astype(np.int64)
-        self._heads = graph.indices.astype(np.int32)
-        self._lengths = graph.data
 
     def shortest(self, start_cell: Cell, goal_cell: Cell) -> AnyAnglePath:
         """Find a shortest path between the centres of two cells.
@@ -136,22 +107,21 @@ class VisibilityGraph:
             return self._path(endpoints[:1])
         if kernels.segment_code(classes, self._free_of, *start, *goal) == kernels.CLEAR:
             return self._path(endpoints)
-        from_start, to_goal = (
-            kernels.visible_from(classes, self._free_of, *end, self.corners, self._slopes)
-            for end in (start, goal)
-        )
-        offset = self.corners - endpoints[1]
-        chain = kernels.cheapest_corners(
-            self._offsets,
-            self._heads,
-            self._lengths,
-            from_start,
-            to_goal,
-            np.hypot(offset[:, 0], offset[:, 1]),
-        )
-        if not len(chain):
+        octile, most = kernels.octile_lengths(classes, self._free_of, *start, *goal)
+        if math.isinf(most):
             return AnyAnglePath(None, math.inf)
-        return self._path(np.concatenate([endpoints[:1], self.corners[chain], endpoints[1:]]))
+        most *= 1 + ROUNDING
+        row, col = self.corners.astype(np.int64).T
+        to_goal = _lower_bounds(octile[row, col], self.corners - endpoints[1])
+        away = self.corners - endpoints[0]
+        near = np.hypot(away[:, 0], away[:, 1]) + to_goal <= most
+        nodes = np.concatenate([self.corners[near], endpoints])
+        blocked = np.concatenate([self._blocked[near], np.zeros((2, 2), np.int64)])
+        straight = np.array([math.dist(start, goal), 0.0])
+        chain = kernels.shortest_chain(
+            classes, self._free_of, nodes, blocked, np.concatenate([to_goal[near], straight]), most
+        )
+        return self._path(nodes[chain])
 
     def _path(self, positions: FloatArray) -> AnyAnglePath:
         steps = np.diff(positions, axis=0)
@@ -160,13 +130,25 @@ class VisibilityGraph:
         return AnyAnglePath(frame.points_of_grid(positions), length * frame.resolution_m)
 
 
+def _lower_bounds(octile: FloatArray, offset: FloatArray) -> FloatArray:
+    """Return lower bounds on paths at any angle by octile lengths, which begin at corners of the
+    goal's cell, and by straight lines."""
+    by_octile = (octile - kernels.ACROSS) / kernels.OCTILE_RATIO - kernels.ACROSS
+    bounds: FloatArray = np.maximum(by_octile, np.hypot(offset[:, 0], offset[:, 1]))
+    return bounds * (1 - ROUNDING)
+
+
 def _convex_corners(free: BoolArray) -> tuple[FloatArray, LongArray]:
-    """Return the lattice corners with one blocked cell of four, and the sign of its diagonal."""
+    """Return the lattice corners with one blocked cell of four, and the signs of the direction to
+    it, int64 (n, 2)."""
     blocked = ~free
     here = blocked[:-1, :-1], blocked[:-1, 1:], blocked[1:, :-1], blocked[1:, 1:]
     row, col = np.nonzero(np.sum(here, axis=0, dtype=np.int8) == 1)
-    slopes = np.where(here[0][row, col] | here[3][row, col], 1, -1).astype(np.int64)
-    return np.stack([row, col], axis=1).astype(np.float64) + 1, slopes
+    is_above, is_right = (
+        np.where(a[row, col] | b[row, col], 1, -1) for a, b in (here[2:], here[1::2])
+    )
+    corners = np.stack([row, col], axis=1).astype(np.float64) + 1
+    return corners, np.stack([is_above, is_right], axis=1).astype(np.int64)
 
 
 def _centre(grid: OccupancyGrid, cell: Cell) -> tuple[float, float]:
