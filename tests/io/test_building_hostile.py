@@ -110,6 +110,28 @@ def test_what_is_no_building_ends_in_one_line(read, name, content, words):
     assert words in read(name, content)
 
 
+@pytest.mark.parametrize(
+    "encoding",
+    ["utf-7", "gb2312", "nonsense", "utf-16", "utf-32", "iso-8859-1", "koi8-r", "hex", "idna",
+     "utf-8-sig", "big5", "cp037", "rot13", "undefined", "x" * 5000],
+)  # fmt: skip
+@pytest.mark.parametrize("name", ["a.osm", "a.graphml"])
+def test_another_encoding_of_xml_ends_in_one_line(tmp_path, name, encoding):
+    (tmp_path / name).write_text(f'<?xml version="1.0" encoding="{encoding}"?><osm>{PLACE}</osm>')
+    load = hn.load_building_graph if name == "a.osm" else hn.load_graph
+    with pytest.raises(hn.MapError) as refused:
+        load(tmp_path / name)
+    assert f"{name}: declares the encoding {encoding[:20]!r}"[:-1] in str(refused.value)
+    assert "expected UTF-8" in str(refused.value)
+    assert len(str(refused.value).replace(str(tmp_path), "")) < 150
+
+
+@pytest.mark.parametrize("encoding", ["UTF-8", "utf-8", "us-ascii"])
+def test_utf_8_may_be_declared(read, encoding):
+    head = f'<?xml version="1.0" encoding="{encoding}"?>'
+    assert len(read("a.osm", f"{head}<osm>{PLACE}{ROUTE}</osm>").floors) == 1
+
+
 def test_what_can_be_read_around_is_a_finding(read):
     text = """levels:
       L1: {vertices: [[0, 0, {name: a}], [1, 0, {name: a}], [null, 2, {}]],

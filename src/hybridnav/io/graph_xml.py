@@ -8,6 +8,7 @@ from xml.parsers import expat
 from hybridnav.errors import MapError
 from hybridnav.graphs.gather import Gathered, edge_text, point_of
 from hybridnav.graphs.waypoint_graph import WaypointGraph
+from hybridnav.io.osm_xml import parse_xml
 
 _DEEPEST = 100
 _MOST_TEXT = 2**20
@@ -34,17 +35,13 @@ def read_graphml(text: str, where: str, name: str) -> WaypointGraph:
         When it is no GraphML, or declares a document type: entities could make it endless.
     """
     reader = _Reader(where, name)
-    parser = expat.ParserCreate(namespace_separator=" ")
+    parser = expat.ParserCreate("utf-8", namespace_separator=" ")
     parser.buffer_text = True
     parser.StartElementHandler = reader.start
     parser.EndElementHandler = reader.end
     parser.CharacterDataHandler = reader.characters
     parser.StartDoctypeDeclHandler = reader.refuse
-    try:
-        parser.Parse(text.encode(), True)
-    except expat.ExpatError as failure:
-        at = f"line {failure.lineno}, column {failure.offset + 1}"
-        raise MapError(f"{where}, {at}: no XML: {expat.ErrorString(failure.code)}") from None
+    parse_xml(parser, text, where)
     if not reader.is_graphml:
         raise MapError(f"{where}: expected GraphML, got other XML")
     return WaypointGraph(**reader.gathered.fields("graphml", reader.name))

@@ -14,6 +14,8 @@ from hybridnav.graphs.gather import number_of, shown
 
 MOST_BYTES = 2**25
 """Most characters of a file: a building of a million edges takes half a gigabyte of memory."""
+_ENCODINGS = ("UTF-8", "UTF8", "US-ASCII", "ASCII")
+"""Those that an XML declaration may state: files are read as UTF-8."""
 _HEAD = 4096
 """Characters in which the first element begins."""
 _DEEPEST = 20
@@ -86,10 +88,31 @@ def read_osm_xml(text: str, where: str) -> OsmData:
     if len(text) > MOST_BYTES:
         raise MapError(f"{where}: XML of OpenStreetMap of more than {MOST_BYTES} bytes is not read")
     reader = _Reader(where)
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("utf-8")
     parser.StartElementHandler = reader.start
     parser.EndElementHandler = reader.end
     parser.StartDoctypeDeclHandler = reader.refuse
+    parse_xml(parser, text, where)
+    return reader.data
+
+
+def parse_xml(parser: expat.XMLParserType, text: str, where: str) -> None:
+    """Parse a text that was read as UTF-8, by a parser for UTF-8.
+
+    Raises
+    ------
+    MapError
+        When it is no XML, or declares another encoding.
+    """
+
+    def check(_version: str, encoding: str | None, _standalone: int) -> None:
+        if encoding is not None and encoding.upper() not in _ENCODINGS:
+            raise MapError(
+                f"{where}: declares the encoding {shown(encoding)!r:.40}, expected UTF-8: save the "
+                "file in that encoding"
+            )
+
+    parser.XmlDeclHandler = check
     try:
         parser.Parse(text.encode(), True)
     except expat.ExpatError as failure:
@@ -97,7 +120,6 @@ def read_osm_xml(text: str, where: str) -> OsmData:
         raise MapError(f"{where}, {at}: no XML: {expat.ErrorString(failure.code)}") from None
     except UnicodeEncodeError:
         raise MapError(f"{where}: not UTF-8 text") from None
-    return reader.data
 
 
 class _Reader:
