@@ -2,10 +2,13 @@
 
 import csv
 import json
+import re
 
 import pytest
 
+from hybridnav.harness.pairs import sample_pairs
 from hybridnav.harness.records import RECORDS_FILE, read_records
+from hybridnav.io import load_map
 from tests.cli.test_commands import FIGURE
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, importable, name_of, run_here, write_map
@@ -89,6 +92,31 @@ def test_corner_cutting_is_a_counter_example(cli, tmp_path):
     done = cli(*query, "--preset", "portals")
     assert done.code == 1
     assert "counter-examples" in done.err
+
+
+def test_a_method_that_forks_has_one_record_a_pair(cli, rooms, tmp_path, monkeypatch):
+    pairs = sample_pairs(load_map(rooms), 6, seed=0)
+    monkeypatch.setenv(faulty.FATAL_PAIR, pairs[3].key.partition(":")[2])
+    out = tmp_path / "run"
+    forks = ("--baseline", name_of(faulty.Forks), "--pairs", 6, "--repeat", 2)
+    done = cli("evaluate", rooms, *forks, "-o", out)
+    assert (done.code, done.err) == (0, "")
+    records = read_records(out)
+    assert len({record["id"] for record in records}) == len(records)
+    answered = [r["status"] for r in records if r["method"] == name_of(faulty.Forks)]
+    assert len(answered) == 1 + 6 + 1
+    assert set(answered) <= {"ready", "solved", "no path"}
+    assert len([r for r in records if r["status"] == "timed"]) == 7
+
+
+@pytest.mark.usefixtures("here")
+def test_texts_of_methods_do_not_steer_the_terminal(cli, rooms, tmp_path):
+    out = tmp_path / "run"
+    done = cli("evaluate", rooms, "--baseline", name_of(faulty.RaisesEscapes), "-o", out)
+    summary = (out / "summary.md").read_text(encoding="utf-8")
+    for text in (done.out, done.err, summary, (out / "report.html").read_text(encoding="utf-8")):
+        assert re.findall("[\x00-\x08\x0b-\x1f\x7f-\x9f]", text) == []
+    assert r"\x1b[2J\x1b]0;owned\x07\x9b31m" in summary
 
 
 @pytest.mark.usefixtures("here")

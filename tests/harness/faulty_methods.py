@@ -375,6 +375,33 @@ class Dies(Sound):
         return super().solve(start, goal)
 
 
+class Forks(Sound):
+    """Forks at each query, and lets both processes return, or the other one raise."""
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        if os.fork() == 0 and _is_fatal(start, goal):
+            raise KeyError((start, goal))
+        return super().solve(start, goal)
+
+
+class DiesBeforeItsChild(Sound):
+    """Takes its whole process along at one pair, but for one that it forked."""
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        if _is_fatal(start, goal):
+            if os.fork() == 0:
+                time.sleep(40)
+            os._exit(3)
+        return super().solve(start, goal)
+
+
+class RaisesEscapes(Sound):
+    """Raises what would clear the terminal and set its title."""
+
+    def solve(self, start: Cell, goal: Cell) -> MethodResult:
+        raise RuntimeError(f"\x1b[2J\x1b]0;owned\x07\x9b31m {start} {goal}")
+
+
 class Hangs(Sound):
     """Never comes back from one pair."""
 

@@ -169,15 +169,18 @@ def test_a_map_that_changed_is_another_map(settings, tmp_path):
 # --- workers that die or hang -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("method", "status"), [(faulty.Dies, "lost"), (faulty.Hangs, "timeout")])
+@pytest.mark.parametrize(
+    ("method", "status"),
+    [(faulty.Dies, "lost"), (faulty.DiesBeforeItsChild, "lost"), (faulty.Hangs, "timeout")],
+)
 def test_a_worker_that_fails_costs_one_query(settings, tmp_path, monkeypatch, method, status):
     pairs = sample_pairs(load_map(settings.maps[0]), N_PAIRS, seed=settings.seed)
     fatal = pairs[N_PAIRS // 2]
     monkeypatch.setenv(faulty.FATAL_PAIR, fatal.key.partition(":")[2])
     # The timeout must leave time for the imports of a process, on a busy machine too.
     only = replace(settings, presets=(), baselines=(name_of(method),), timeout_s=10.0)
-    if method is faulty.Dies:
-        only = replace(only, timeout_s=100.0)
+    if method is not faulty.Hangs:
+        only = replace(only, timeout_s=100.0 if method is faulty.Dies else 20.0)
     assert evaluate(only, tmp_path) == total(2)
     records = timeless(tmp_path).values()
     failed = [record for record in records if record["status"] == status]

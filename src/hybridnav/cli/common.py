@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import hybridnav as hn
-from hybridnav._files import MODEL_SUFFIX, check_replaceable, printable
+from hybridnav._files import MODEL_SUFFIX, check_replaceable, printable, without_controls
 from hybridnav._progress import no_progress
 from hybridnav.cli.errors import UsageError
 from hybridnav.grid import DEFAULT_MAX_CELLS, MAX_CELLS
@@ -31,7 +31,7 @@ _PICTURES = (".pdf", ".png", ".svg")
 
 def complain(message: str) -> None:
     """Print one line on stderr."""
-    sys.stderr.write(f"hybridnav: {' '.join(message.split())}\n")
+    sys.stderr.write(without_controls(f"hybridnav: {' '.join(message.split())}\n"))
 
 
 def answer(text: str) -> None:
@@ -39,7 +39,7 @@ def answer(text: str) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # file names may hold what no encoding can
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        sys.stdout.write(text)
+        sys.stdout.write(without_controls(text))
         sys.stdout.flush()
     except OSError as error:
         # What is still buffered goes nowhere: at exit Python would try, and complain, again.

@@ -6,7 +6,9 @@ import hashlib
 import importlib.metadata
 import inspect
 import json
+import os
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,7 +25,9 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav.baselines import Method
+    from collections.abc import Iterator
+
+    from hybridnav.baselines import Method, MethodResult
     from hybridnav.costs import CostLayer
     from hybridnav.graphs import WaypointGraph
     from hybridnav.grid import OccupancyGrid
@@ -297,6 +301,11 @@ class Prepared:
     is_named: bool = True
     """Whether its name in tables is that of its specification: a class of others names itself."""
 
+    def solve(self, start: tuple[int, int], goal: tuple[int, int]) -> MethodResult:
+        """Return the method's answer; a process that it forked goes no further than this."""
+        with _without_forks():
+            return self.method.solve(start, goal)
+
     def close(self) -> None:
         """End the processes of the method, which answers no more."""
         close = getattr(self.method, "close", None)
@@ -332,13 +341,26 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
             options = options | {"costs": costs}
         if spec.is_named and _takes(made_of, "name"):
             options = {"name": spec.name} | options
-        method = made_of(grid if topology is None else topology, **options)
+        with _without_forks():
+            method = made_of(grid if topology is None else topology, **options)
     by_costs = costs is not None
     if spec.grid:
         method, topology = OnOwnGrid(method, grid), None
     seconds = built - began, time.perf_counter() - built
     is_named = spec.is_named or not spec.source
     return Prepared(method, topology, *seconds, by_costs, is_named)
+
+
+@contextmanager
+def _without_forks() -> Iterator[None]:
+    """End each process that foreign code forks and lets run on: it would work on as a second worker
+    and send the same records."""
+    own = os.getpid()
+    try:
+        yield
+    finally:
+        if os.getpid() != own:
+            os._exit(0)
 
 
 def _takes(made_of: Any, parameter: str) -> bool:

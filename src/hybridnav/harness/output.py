@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hybridnav._files import replace_file
+from hybridnav._files import replace_file, without_controls
 from hybridnav.harness.ahead import ahead_of_presets
 from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.columns import EFFICIENCY_COLUMNS, OPTIMA, YARDSTICKS, loss_columns, shown
@@ -93,7 +93,7 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
     if timed:
         text += f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}\n"
         text += _note(overall, EFFICIENCY_COLUMNS, study)
-    return text.rstrip("\n") + "\n"
+    return without_controls(text.rstrip("\n") + "\n")
 
 
 def _note(rows: Sequence[Row], columns: Sequence[str], study: Study) -> str:

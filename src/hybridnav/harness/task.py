@@ -275,7 +275,7 @@ def _of_pair(name: str, pair: Pair, common: Record) -> Record:
 def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
     began = time.perf_counter()
     try:
-        answer = prepared.method.solve(pair.start, pair.goal)
+        answer = prepared.solve(pair.start, pair.goal)
     except Exception as error:  # noqa: BLE001 - a failing method is a result
         return {
             "status": "error",
@@ -369,7 +369,7 @@ def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
     with suppress(UnsuitableMapError), closing(prepare(spec, grid, layer)) as prepared:
         Judge(grid, prepared, reference=False, costs=layer)
         for goal in ((2, 2), (grid.shape[0] - 3, 12)):
-            prepared.method.solve((2, 2), goal)
+            prepared.solve((2, 2), goal)
     _WARM.add((spec.digest, by_costs))
 
 

@@ -29,8 +29,7 @@ from hybridnav.harness.task import warm_up
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav.baselines import Method
-    from hybridnav.harness.methods import MethodSpec
+    from hybridnav.harness.methods import MethodSpec, Prepared
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
     from hybridnav.harness.scenes import MapSpec
@@ -86,11 +85,11 @@ class TimingTask:
         if scene.digest != self.map_sha:
             raise InvalidValueError(f"map {self.map.path} has changed since the run began")
         with ExitStack() as stack:
-            ready: dict[str, Method] = {}
+            ready: dict[str, Prepared] = {}
             for spec in self.methods:
                 warm_up(spec, by_costs=scene.costs is not None)
-                prepared = stack.enter_context(closing(prepare(spec, scene.grid, scene.costs)))
-                ready[spec.digest] = prepared.method
+                prepared = prepare(spec, scene.grid, scene.costs)
+                ready[spec.digest] = stack.enter_context(closing(prepared))
             yield {**self._common(0), "status": "ready", **circumstances()}
             seen: dict[str, list[float]] = {digest: [] for digest in ready}
             for index, pair in enumerate(self.pairs, start=1):
@@ -105,7 +104,7 @@ class TimingTask:
                 yield {**self._common(index), "status": "timed", "times": times, **circumstances()}
 
     def _times(
-        self, ready: dict[str, Method], pair: Pair, once: set[str]
+        self, ready: dict[str, Prepared], pair: Pair, once: set[str]
     ) -> dict[str, list[float]]:
         """Return the seconds of each query by the digest of its method; some are asked once."""
         asked = [digest for digest in ready if (digest, pair.key) not in self.without]

@@ -79,6 +79,10 @@ class _Worker:
         # After the last one what fails is to send: it must not be tried for ever.
         return turn if turn < len(task.ids) else task.ids.index(self.missing[0])
 
+    def is_alive(self) -> bool:
+        """Return whether its process runs."""
+        return self._process.is_alive()
+
     def stop(self) -> None:
         self.connection.close()
         self._process.kill()
@@ -141,8 +145,11 @@ def run_local(tasks: Sequence[Work], *, workers: int, timeout_s: float) -> Itera
 
 def _listen(worker: _Worker, *, heard: bool) -> tuple[list[Record], bool]:
     """Return what a worker sent, and whether its task ended, well or not."""
-    if not heard:
+    # A process that a method forked may hold the pipe of a dead worker open.
+    if not heard and (worker.is_alive() or worker.connection.poll()):
         return [], False
+    if not heard:
+        return [], True
     try:
         batch: list[Any] = worker.connection.recv()
     except (EOFError, OSError):  # the latter when it died in the middle of a batch
