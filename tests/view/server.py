@@ -11,12 +11,12 @@ from http.client import HTTPConnection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import uvicorn
 
 import hybridnav as hn
 from hybridnav.cli.view_building import building_session
 from hybridnav.view import BuildingSession, Session
 from hybridnav.view.app import make_app
+from hybridnav.view.connections import make_server
 from hybridnav.view.rooms_file import RoomsFile
 
 if TYPE_CHECKING:
@@ -178,8 +178,7 @@ def served(session: Any, folder: Path) -> Iterator[Client]:
         listening.listen()
         port = listening.getsockname()[1]
         app = make_app(session, token=TOKEN, port=port, folder=folder)
-        config = uvicorn.Config(app, lifespan="off", ws="none", log_level="warning")
-        server = uvicorn.Server(config)
+        server = make_server(app)
         thread = threading.Thread(target=lambda: server.run(sockets=[listening]), daemon=True)
         thread.start()
         try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
@@ -338,10 +339,13 @@ async def _body(request: Request) -> Any:
     if request.headers.get("content-type", "").partition(";")[0] != "application/json":
         return _error("expected application/json", _WRONG_KIND)
     body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > _MOST_BYTES:
-            return _error(f"more than {_MOST_BYTES} bytes", _TOO_LARGE)
+    try:
+        async for part in request.stream():
+            body += part
+            if len(body) > _MOST_BYTES:
+                return _error(f"more than {_MOST_BYTES} bytes", _TOO_LARGE)
+    except ClientDisconnect:
+        return Response()  # nobody is there to read it
     try:
         return json.loads(body)
     except (ValueError, RecursionError):

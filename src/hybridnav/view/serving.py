@@ -63,9 +63,8 @@ def serve(
     http://127.0.0.1:
     """
     try:
-        import uvicorn  # noqa: PLC0415 - an extra
-
-        from hybridnav.view.app import make_app  # noqa: PLC0415
+        from hybridnav.view.app import make_app  # noqa: PLC0415 - an extra
+        from hybridnav.view.connections import MOST_CONNECTIONS, make_server  # noqa: PLC0415
     except ModuleNotFoundError as error:
         raise InvalidValueError(
             f"the page needs the package {error.name}, which is not installed: "
@@ -78,18 +77,10 @@ def serve(
             listening.bind(("127.0.0.1", port))
         except OSError as error:
             raise InvalidValueError(f"port {port} cannot be used: {error.strerror}") from None
-        listening.listen(64)
+        listening.listen(MOST_CONNECTIONS)
         port = listening.getsockname()[1]
         app = make_app(shown, token=token, port=port, folder=folder)
-        config = uvicorn.Config(
-            app,
-            lifespan="off",
-            ws="none",
-            log_level="warning",
-            access_log=False,
-            server_header=False,
-        )
-        server = uvicorn.Server(config)
+        server = make_server(app)
         opening = shown if isinstance(shown, Opening | BuildingOpening) else None
         if opening is not None:
             opening.begin(on_failure=lambda: setattr(server, "should_exit", True))
