@@ -7,7 +7,8 @@ The office of `maps/office`; with FOLDER the 12 buildings of `benchmarks.costs` 
 radius 0.25 m, without rooms. `--nodes` are the numbers to aim at, 0 for as many as the routes need.
 Pairs are random free points with a path between them, other ones than those that the graph is
 built with; `from 5 m` leaves out those whose shortest path is shorter. Edges of each graph are
-tested against the cells by the tests of the metrics, which the builder does not use. A wrong edge,
+tested against the cells by the tests of the metrics, which the builder does not use, and by the
+walk from cell to cell of Nav2's collision monitor. A wrong edge,
 or a graph that is cut where free space is not, is listed on stderr, and the exit code is 1.
 """
 
@@ -27,6 +28,7 @@ from scipy import ndimage
 import hybridnav as hn
 from benchmarks.costs import files_of
 from hybridnav.graphs.checked_components import components_of
+from hybridnav.grid.lines import walks_clear
 from hybridnav.harness.tables import to_markdown
 from hybridnav.metrics import segment_faults
 
@@ -68,12 +70,12 @@ def _faults(graph: hn.RouteGraph) -> list[str]:
     wrong = [
         f"edge {k} is not free" for k, end in enumerate(ends) if segment_faults(graph.grid, end)
     ]
-    label, _ = ndimage.label(graph.grid.enterable(allow_unexplored=False))
-    rows, cols = np.minimum(graph.positions.astype(int), np.array(label.shape) - 1).T
-    # A node on a lattice corner may lie beside its part: only those inside cells are compared.
-    inside = (graph.positions % 1 != 0).all(axis=1)
-    part = components_of(graph.n_nodes, graph.edges, "weak")
-    parts, cells = part[inside], label[rows, cols][inside]
+    free = np.ascontiguousarray(graph.grid.enterable(allow_unexplored=False))
+    cells_of = graph.grid.frame.cells_of(graph.points)
+    walks = walks_clear(free, *(cells_of[graph.edges[:, end]] for end in (0, 1)))
+    wrong += [f"Nav2's walk over edge {k} collides" for k in np.flatnonzero(~walks).tolist()]
+    parts = components_of(graph.n_nodes, graph.edges, "weak")
+    cells = ndimage.label(free)[0][tuple(cells_of.T)]
     pairs = {(part, cell) for part, cell in zip(parts.tolist(), cells.tolist(), strict=True)}
     if len({part for part, _ in pairs}) != len(pairs) or len({c for _, c in pairs}) != len(pairs):
         wrong.append("its parts are not those of free space")

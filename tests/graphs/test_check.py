@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,17 @@ def test_an_edge_through_a_wall_is_found_where_it_is_blocked(features, checked):
     where = found.findings[0].examples[0].where
     at = [float(word.rstrip(",")) for word in where.split("blocked at ")[1].split()]
     assert np.allclose(at, point_at(11.5, 9.0), atol=0.01)
+
+
+def test_an_edge_that_the_walk_of_nav2_leaves(features, checked):
+    # Straight through the door of the kitchen; from cell to cell one column farther left.
+    tail, head = near(features, "corridor", 6.05, 2.98), near(features, "kitchen", 9.1, 4.98)
+    join(features, tail, head)
+    counts, found = checked(features)
+    assert counts == {"edge-walk": 2}
+    assert found.is_clear.all()
+    ends = [tuple(one["geometry"]["coordinates"]) for one in (tail, head)]
+    assert found.findings[0].examples[0].points == tuple(ends)
 
 
 def test_components_that_free_space_connects(features, checked):
@@ -299,11 +311,13 @@ def test_free_nodes_and_edges_are_those_of_exact_geometry(classes, data):
         return
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     found = hn.check_graph(topology, graph)
-    for node, point in enumerate(points):
-        assert found.is_free[node] == (not segment_faults(grid, [point, point]))
+    # A point on the side of two cells lies in the one above or to the right, as Nav2 takes it.
+    cells = [(math.floor(y + 1e-9), math.floor(x + 1e-9)) for x, y in points]
+    free = {tuple(cell) for cell in np.argwhere(classes == hn.CellClass.FREE).tolist()}
+    assert found.is_free.tolist() == [cell in free for cell in cells]
     for edge, (tail, head) in enumerate(graph.edges.tolist()):
-        line = [points[tail], points[head]]
-        assert found.is_clear[edge] == (not segment_faults(grid, line))
+        is_clear = not segment_faults(grid, [points[tail], points[head]])
+        assert found.is_clear[edge] == (is_clear and {cells[tail], cells[head]} <= free)
 
 
 def test_maps_that_allow_corner_cutting_are_refused():

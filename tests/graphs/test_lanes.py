@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.metrics import segment_faults
-from tests.drawn_rooms import HOUSE, topology_of
+from tests.drawn_rooms import HOUSE, SIDE, topology_of
 from tests.nav2_reader import read_nav2
 from tests.strategies import class_grids, examples, occupancy_grid
 
@@ -60,10 +60,11 @@ def test_lanes_run_on_the_right_of_their_edge_and_apart(yaw_rad):
         for node in (one, other):
             assert _cross(step, points[node] - points[tail]) < 0  # on the right, y up
             line = shapely.LineString([points[tail], points[head]])
-            assert line.distance(shapely.Point(points[node])) == pytest.approx(APART / 2)
+            away = line.distance(shapely.Point(points[node])) - APART / 2
+            assert -1e-6 <= away <= SIDE / 64 + 1e-6  # off the sides of cells, never nearer
         middles[tail, head] = shapely.LineString([points[one], points[other]])
     for (tail, head), lane in middles.items():
-        assert lane.distance(middles[head, tail]) == pytest.approx(APART)
+        assert -1e-6 <= lane.distance(middles[head, tail]) - APART <= SIDE / 32 + 1e-6
 
 
 def _cross(one, other):

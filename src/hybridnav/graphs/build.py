@@ -124,7 +124,7 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
         stretch,
         spacing_m / cell_m,
         _BEND_M / cell_m,
-        round(2 * _OFF_M / cell_m) / 2,
+        round(_OFF_M / cell_m) + 0.5,
         max(_FIRST_COVER_M, spacing_m) / cell_m,
     )
     progress(1, _STEPS)

@@ -17,6 +17,7 @@ from hybridnav.graphs.space import FreeSpace
 from hybridnav.graphs.waypoint_graph import WaypointGraph
 from hybridnav.grid import CellClass
 from hybridnav.grid.checks import checked_type
+from hybridnav.grid.lines import walks_clear
 from hybridnav.refine import Sight
 from hybridnav.topology import TopologicalMap
 
@@ -79,8 +80,9 @@ def check_graph(
     """Find what is wrong with a graph on a map.
 
     Edges are straight from node to node, as Nav2 drives them, unless stated otherwise. Tests
-    against the cells are exact, for a disc of the map's robot radius. `graphs.KINDS` lists all
-    kinds of findings.
+    against the cells are exact, for a disc of the map's robot radius; a point lies in the cell of
+    `Frame.cells_of`. The edges of a graph of Nav2 are tried by the walk of its collision monitor
+    too. `graphs.KINDS` lists all kinds of findings.
 
     Parameters
     ----------
@@ -202,6 +204,10 @@ def _add_edges(
         ("edge-unexplored", blocked[whole[blocked]]),
     ):
         add(kind, which, _blocked_at(placed, space, which[:MOST_EXAMPLES]))
+    if graph.format == "nav2":
+        driven = np.setdiff1d(np.flatnonzero(is_clear), list(placed.lines))
+        ends = (placed.cells[edges[driven, end]] for end in (0, 1))
+        add("edge-walk", driven[~walks_clear(space.free, *ends)], [])
     is_loop = edges[:, 0] == edges[:, 1]
     add("loop", np.flatnonzero(is_loop), [])
     keys = edges[:, 0] * graph.n_nodes + edges[:, 1]
@@ -234,9 +240,8 @@ def _blocked_at(placed: PlacedGraph, space: FreeSpace, which: LongArray) -> list
 
 def _sees(space: FreeSpace, tails: FloatArray, heads: FloatArray) -> BoolArray:
     """Return which free positions see others, which need not be free."""
-    seen: BoolArray = space.free[
-        tuple(np.clip(space.cells_at(heads), 0, np.array(space.free.shape) - 1).T)
-    ]
+    cells = np.minimum(space.cells_at(heads), np.array(space.free.shape) - 1)
+    seen: BoolArray = space.free[tuple(cells.T)]
     seen[seen] = space.sight.clear(tails[seen], heads[seen])
     return seen
 

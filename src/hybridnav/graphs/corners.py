@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridnav._trig import sines_and_cosines
 from hybridnav.graphs._spanner_kernels import log_uniform
+from hybridnav.graphs.space import RIM_CELLS
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray
@@ -49,6 +50,11 @@ class Corners:
         which = beside[:, at[0], at[1]].argmax(axis=0)
         sides = np.stack([which // 2, which % 2], axis=1) * 2.0 - 1.0
         return cls((np.stack(at, axis=1) + 1).astype(np.float64), sides)
+
+    @property
+    def nodes(self) -> FloatArray:
+        """float64 (n, 2), where nodes lie nearest to each, in the free cell across."""
+        return self.positions - RIM_CELLS * self.blocked
 
     def where(self, chosen: BoolArray) -> Corners:
         """Return some of the corners, bool (n,)."""

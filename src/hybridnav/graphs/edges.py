@@ -22,7 +22,7 @@ _TRIED = 8
 
 
 class SightPairs:
-    """Which nodes near each other see each other; a pair is tested once, while nodes are added."""
+    """Which nodes near each other edges may join; a pair is tested once, while nodes are added."""
 
     def __init__(self, nodes: Nodes) -> None:
         self._nodes = nodes
@@ -30,7 +30,7 @@ class SightPairs:
         self._seen = np.empty(0, dtype=np.bool_)
 
     def among(self, needed: LongArray) -> LongArray:
-        """Return the pairs in sight of each other among the nearest nodes of each.
+        """Return the pairs that edges may join among the nearest nodes of each.
 
         Parameters
         ----------
@@ -60,7 +60,7 @@ class SightPairs:
         is_known[is_known] = self._keys[at[is_known]] == keys[is_known]
         seen[is_known] = self._seen[at[is_known]]
         new = ~is_known
-        seen[new] = self._nodes.space.sight.clear(positions[tails[new]], positions[heads[new]])
+        seen[new] = self._nodes.space.joins(positions[tails[new]], positions[heads[new]])
         self._keys, self._seen = keys, seen
         return np.stack([tails[seen], heads[seen]], axis=1)
 
@@ -115,8 +115,8 @@ def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
     Returns
     -------
     list of FloatArray
-        For each part but the largest in its part of free space, the shortest path to one of the
-        nearest nodes of another part, (row, col) in grid units.
+        For each part but the largest in its part of free space, stops on the shortest path to one
+        of the nearest nodes of another part, (row, col) in grid units.
     """
     positions = nodes.positions
     part = components_of(len(positions), edges, "weak")
@@ -140,4 +140,5 @@ def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
     for k, start in enumerate(starts):
         known = best.get(int(part[start]), k)
         best[int(part[start])] = min(known, k, key=lambda at: paths.length_cells[at])
-    return [paths.positions[paths.path_start[k] : paths.path_start[k + 1]] for k in best.values()]
+    lines = np.split(paths.positions, paths.path_start[1:-1])
+    return [nodes.space.stops(lines[k]) for k in best.values()]

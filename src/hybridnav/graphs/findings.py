@@ -26,6 +26,7 @@ KINDS = {
     "node-unexplored": "nodes in unexplored space",
     "edge-through-wall": "edges that the robot cannot follow",
     "edge-unexplored": "edges through unexplored space",
+    "edge-walk": "edges that are free, and on which Nav2's walk from cell to cell meets an obstacle",
     "loop": "edges from a node to itself",
     "repeated-edge": "edges beside another one from the same node to the same node",
     "same-point": "nodes at the point of another node",

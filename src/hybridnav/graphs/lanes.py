@@ -21,12 +21,18 @@ _SHORTEST = 4.0
 """Least length of an edge with lanes, in distances of a lane from the edge: one to enter, one to
 leave, and two side by side."""
 _FRACTION = 2.0**24
+_ASIDE_CELLS = 2.0**-6
+"""How much farther off its edge a lane runs: nodes of lanes along rows and columns would often lie
+on sides of cells."""
+_LEAST_CELLS = 2.0**-10
+"""Least distance of these nodes from the sides of their cell."""
 
 
 def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -> RouteGraph:
     """Give each direction of an edge a lane of its own, where two robots fit side by side.
 
-    A lane runs parallel to the edge, on its right by half of `apart_m`. It leaves the first node
+    A lane runs parallel to the edge, on its right by half of `apart_m` and a 64th of a cell, so
+    that its nodes lie inside cells. It leaves the first node
     and joins the second one at 45 degrees, by two nodes of its own, and is free for the robot by
     exact tests. Edges between walls that are too near, and edges shorter than twice `apart_m`, stay
     as they are: a graph with few nodes, or with a large `spacing_m`, gets more lanes. Where nodes
@@ -70,7 +76,7 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
             f"topology of {grid.name!r}: build it again"
         )
     space = FreeSpace.of(grid)
-    off = apart_m / 2 / grid.resolution_m
+    off = apart_m / 2 / grid.resolution_m + _ASIDE_CELLS
     edges, positions = graph.edges, graph.positions
     first, second = _lane(positions, edges, off)
     fits = _fits(space, positions, edges, (first, second), off)
@@ -121,13 +127,11 @@ def _fits(
     steps = heads - tails
     fits = np.asarray(np.hypot(steps[:, 0], steps[:, 1]) >= _SHORTEST * off, dtype=np.bool_)
     for end in lane:
-        fits &= ((end >= 0) & (end <= space.free.shape)).all(axis=1)
-        cells = space.cells_at(end[fits])
-        inside = np.asarray((cells < space.free.shape).all(axis=1), dtype=np.bool_)
-        inside[inside] = space.free[tuple(cells[inside].T)]
-        fits[fits] = inside
+        inside = (end > 0) & (end < space.free.shape) & (abs(end % 1 - 0.5) < 0.5 - _LEAST_CELLS)
+        fits &= inside.all(axis=1)
+        fits[fits] = space.free[tuple(space.cells_at(end[fits]).T)]
     for one, other in ((tails, lane[0]), lane, (lane[1], heads)):
-        fits[fits] = space.sight.clear(one[fits], other[fits])
+        fits[fits] = space.joins(one[fits], other[fits])
     return fits
 
 

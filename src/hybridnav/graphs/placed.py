@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.graphs.attach import Network
-from hybridnav.graphs.space import free_cells_at
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
@@ -29,8 +28,7 @@ class PlacedGraph:
     positions: FloatArray
     """float64 (n, 2), (row, col), rounded."""
     cells: LongArray
-    """int64 (n, 2), a cell whose closed square contains the node, one that may be entered if there
-    is one; -1 for nodes outside the map."""
+    """int64 (n, 2), the cell that the node lies in, -1 for nodes outside the map."""
     is_inside: BoolArray
     """bool (n,), nodes on the map."""
     is_free: BoolArray
@@ -91,10 +89,10 @@ class PlacedGraph:
 
     def _is_clear(self, line: FloatArray, sight: Sight) -> bool:
         """Return whether a polyline stays in free space."""
-        if not ((line >= 0) & (line <= self.free.shape)).all():
+        if not ((line >= 0) & (line < self.free.shape)).all():
             return False
-        cells = np.minimum(free_cells_at(self.free, line), np.array(self.free.shape) - 1)
-        return bool(self.free[tuple(cells.T)].all() and sight.clear(line[:-1], line[1:]).all())
+        is_free = self.free[tuple(line.astype(np.int64).T)].all()
+        return bool(is_free and sight.clear(line[:-1], line[1:]).all())
 
     def network(self, sight: Sight, edges: LongArray) -> Network:
         """Return the graph with some of its edges, ready for routes.
@@ -126,17 +124,15 @@ def placed_points(
     Returns
     -------
     tuple
-        float64 (n, 2) positions, rounded; int64 (n, 2) a cell whose closed square contains each, a
-        free one if there is one, -1 outside the map; bool (n,), whether it is free.
+        float64 (n, 2) positions, rounded; int64 (n, 2) the cell that each lies in, by the rule of
+        `Frame.cells_of`, -1 outside the map; bool (n,), whether it is free.
     """
-    positions = _rounded(grid, points)
-    within = (positions >= 0) & (positions <= free.shape)
-    inside = np.asarray(within.all(axis=1), dtype=np.bool_)
-    cells = np.full(positions.shape, -1, dtype=np.int64)
-    cells[inside] = np.minimum(free_cells_at(free, positions[inside]), np.array(free.shape) - 1)
-    is_free = inside.copy()
-    is_free[inside] = free[tuple(cells[inside].T)]
-    return positions, cells, is_free
+    cells = grid.frame.cells_of(points)
+    is_inside = ((cells >= 0) & (cells < free.shape)).all(axis=1)
+    cells[~is_inside] = -1
+    is_free = np.asarray(is_inside, dtype=np.bool_)
+    is_free[is_inside] = free[tuple(cells[is_inside].T)]
+    return _rounded(grid, points), cells, is_free
 
 
 def _rounded(grid: OccupancyGrid, points: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 from hybridnav.graphs.attach import MANY_CANDIDATES, Network
 from hybridnav.graphs.corners import Corners, is_among
 from hybridnav.graphs.nodes import bends_of
+from hybridnav.graphs.space import RIM_CELLS
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
@@ -53,11 +54,11 @@ def bend_round_corners(
     space = chosen.space
     reach = _NEAREST_CELLS, max(_FARTHEST_M / space.grid.resolution_m, 2.0)
     corners = Corners.of(space.free)
-    corners = corners.where(is_kept[space.components_at(corners.positions)])
+    corners = corners.where(is_kept[space.components_at(corners.nodes)])
     spacing, off = bends_cells
     pairs = np.empty((0, 2)), np.empty((0, 2)), np.empty(0)
     for _ in range(_ROUNDS):
-        left = corners.where(~is_among(corners.positions, chosen.positions))
+        left = corners.where(~is_among(corners.nodes, chosen.positions))
         if len(chosen) >= chosen.most or not len(left.positions):
             return
         draws = int(np.clip(_ALL_DRAWS // len(left.positions), *_DRAWS))
@@ -70,7 +71,7 @@ def bend_round_corners(
         chosen.add(space.moved_off(bends, off), "bend", max(spacing, _LEAST_CELLS))
         if spacing <= _LEAST_CELLS and len(chosen) - before <= _SETTLED * len(corners.positions):
             return
-        spacing, off = spacing * _NEARER, 0.0
+        spacing, off = spacing * _NEARER, RIM_CELLS
 
 
 def bend_paths(chosen: Nodes, edges: LongArray, pairs: tuple[FloatArray, FloatArray]) -> None:
@@ -91,4 +92,5 @@ def bend_paths(chosen: Nodes, edges: LongArray, pairs: tuple[FloatArray, FloatAr
     network = Network.of(space.sight, chosen.positions, both).with_candidates(MANY_CANDIDATES)
     lengths = network.join(*pairs).best()
     is_long = lengths > (1 + _LONG) * paths.length_cells
-    chosen.add(bends_of(paths, np.flatnonzero(is_long).tolist()), "bend", _LEAST_CELLS)
+    bends = bends_of(paths, np.flatnonzero(is_long).tolist())
+    chosen.add(space.moved_off(bends, RIM_CELLS), "bend", _LEAST_CELLS)

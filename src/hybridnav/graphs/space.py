@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.lines import cells_of_line, walks_clear
 from hybridnav.mesh import MeshSearch, build_mesh, shortest_paths
 from hybridnav.mesh.search import rounded_into
 from hybridnav.refine import Sight
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
     from hybridnav.grid import OccupancyGrid
     from hybridnav.mesh import MeshPaths
 
-_BESIDE = np.array([[0, 0], [0, -1], [-1, 0], [-1, -1]])
-"""From a lattice corner to the four cells round it."""
+RIM_CELLS = 0.125
+"""Least distance of a node from the sides of its cell, in cells: a point on a side belongs to the
+cell above or to the right, which may be blocked, and numbers lose digits in files. From here,
+half a cell nearer to a corner than the middle of the cell, ways of two cells round it are at most
+6 % too long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +58,63 @@ class FreeSpace:
         return cls(grid, free, component_of, Sight(free), MeshSearch(mesh))
 
     def cells_at(self, positions: FloatArray) -> LongArray:
-        """Return a free cell whose closed square contains each position, int64 (n, 2)."""
-        return free_cells_at(self.free, positions)
+        """Return the cell that each position lies in, int64 (n, 2)."""
+        return np.floor(positions).astype(np.int64)
+
+    def joins(self, tails: FloatArray, heads: FloatArray) -> BoolArray:
+        """Return which positions an edge may join, there and back.
+
+        Parameters
+        ----------
+        tails, heads
+            float64 (n, 2), positions inside free cells, as for `Sight.clear`.
+
+        Returns
+        -------
+        BoolArray
+            bool (n,), whether the segment stays in free space, and Nav2's walks between the cells
+            of its ends too.
+        """
+        joined = self.sight.clear(tails, heads)
+        ends = self.cells_at(tails), self.cells_at(heads)
+        for one, other in (ends, ends[::-1]):
+            joined[joined] = walks_clear(self.free, one[joined], other[joined])
+        return joined
+
+    def stops(self, path: FloatArray) -> FloatArray:
+        """Return positions on the cells of a path that edges may join one after the other.
+
+        Parameters
+        ----------
+        path
+            float64 (n, 2), a path in free space; its ends lie inside cells.
+
+        Returns
+        -------
+        FloatArray
+            float64 (k, 2), both ends, and as few centres of cells as are found between.
+        """
+        centres = cells_of_line(self.free, path) + 0.5
+        chain = np.concatenate([path[:1], centres, path[-1:]])
+        kept = [0]
+        while kept[-1] < len(chain) - 1:
+            rest = chain[kept[-1] + 1 :]
+            # An edge may always join neighbours: no step past a corner has two blocked cells beside.
+            seen = self.joins(np.repeat(chain[kept[-1:]], len(rest), axis=0), rest)
+            kept.append(kept[-1] + 1 + int(np.flatnonzero(seen)[-1]))
+        found: FloatArray = chain[kept]
+        return found
 
     def moved_off(self, bends: FloatArray, away_cells: float) -> FloatArray:
-        """Move positions off the blocked cell that paths bend round there, where there is room.
+        """Move positions off the blocked cell that paths bend round there, into a free cell.
 
         Parameters
         ----------
         bends
             float64 (n, 2), lattice corners with one blocked cell of four.
         away_cells
-            How far along rows, and along columns; a multiple of 0.5.
+            How far along rows, and along columns, where there is room, and elsewhere `RIM_CELLS`;
+            no whole number.
 
         Returns
         -------
@@ -76,20 +125,9 @@ class FreeSpace:
         below = ~(self.free[row - 1, col - 1] & self.free[row - 1, col])
         left = ~(self.free[row - 1, col - 1] & self.free[row, col - 1])
         off = np.stack([np.where(below, 1.0, -1.0), np.where(left, 1.0, -1.0)], axis=1)
-        moved = np.clip(bends + away_cells * off, 0.0, self.free.shape)
-        fits = self.sight.clear(bends, moved) & ~self._is_pinched(moved)
-        return np.where(fits[:, None], moved, bends)
-
-    def _is_pinched(self, positions: FloatArray) -> BoolArray:
-        """Return which positions are lattice corners at which two blocked cells meet: no path leads
-        through, though free cells on both sides see them."""
-        row, col = positions.astype(np.int64).T
-        padded = np.pad(self.free, 1)
-        low, right = padded[row, col], padded[row, col + 1]
-        left, high = padded[row + 1, col], padded[row + 1, col + 1]
-        is_corner = (positions % 1 == 0).all(axis=1)
-        found: BoolArray = is_corner & (low == high) & (left == right) & (low != left)
-        return found
+        near = bends + RIM_CELLS * off
+        moved = np.clip(bends + away_cells * off, RIM_CELLS, np.array(self.free.shape) - RIM_CELLS)
+        return np.where(self.sight.clear(near, moved)[:, None], moved, near)
 
     def components_at(self, positions: FloatArray) -> IntArray:
         """Return the connected part of free space that each position lies in, int32 (n,)."""
@@ -138,40 +176,14 @@ class FreeSpace:
         return centres[first], centres[other]
 
 
-def free_cells_at(free: BoolArray, positions: FloatArray) -> LongArray:
-    """Return a cell whose closed square contains each position.
-
-    Parameters
-    ----------
-    free
-        bool (rows, cols).
-    positions
-        float64 (n, 2), (row, col) in grid units.
-
-    Returns
-    -------
-    LongArray
-        int64 (n, 2), a free cell if one contains the position; else it may lie outside the map.
-    """
-    cells = np.floor(positions).astype(np.int64)
-    found = cells.copy()
-    missing = np.ones(len(cells), dtype=np.bool_)
-    for beside in _BESIDE:
-        tried = cells + np.where(positions == cells, beside, 0)
-        inside = (tried >= 0).all(axis=1) & (tried < free.shape).all(axis=1)
-        fits = missing & inside
-        fits[fits] = free[tuple(tried[fits].T)]
-        found[fits] = tried[fits]
-        missing &= ~fits
-    return found
-
-
 def checked_position(space: FreeSpace, point: tuple[float, float]) -> FloatArray | None:
-    """Return the position of a point in metres in grid units, None where it is not free."""
+    """Return the position of a point in metres in grid units, moved off the sides of its cell, None
+    where it is not free."""
     cell = np.array(space.grid.frame.cell_of(*point))
     rows, cols = space.free.shape
     if not (0 <= cell[0] < rows and 0 <= cell[1] < cols and space.free[tuple(cell)]):
         return None
     at = np.array([space.grid.frame.position_of(*point)])
+    at = np.clip(at, cell + RIM_CELLS, cell + 1 - RIM_CELLS)
     found: FloatArray = rounded_into(cell[None], at)[0]
     return found

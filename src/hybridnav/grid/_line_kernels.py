@@ -87,6 +87,35 @@ def passed_cells(free, positions):
     return cells[:n].copy()
 
 
+@guarded
+@njit(cache=True, nogil=True)
+def walks_clear(free, tails, heads):
+    """Return which walks from cell to cell meet free cells only, bool (n,).
+
+    The walk is that of Nav2's collision monitor, Bresenham's line as its `LineIterator` visits it:
+    one cell for each step along the longer axis. Backwards it may visit others.
+
+    Parameters
+    ----------
+    free
+        bool (rows, cols).
+    tails, heads
+        int64 (n, 2), cells of the grid.
+    """
+    clear = np.ones(len(tails), np.bool_)
+    for i in range(len(tails)):
+        row, col = tails[i, 0], tails[i, 1]
+        down, across = abs(heads[i, 0] - row), abs(heads[i, 1] - col)
+        up, right = (1 if heads[i, 0] >= row else -1), (1 if heads[i, 1] >= col else -1)
+        steps = max(down, across, 1)
+        for k in range(max(down, across) + 1):
+            here = row + up * ((steps // 2 + k * down) // steps)
+            if not free[here, col + right * ((steps // 2 + k * across) // steps)]:
+                clear[i] = False
+                break
+    return clear
+
+
 @njit(cache=True, nogil=True)
 def polyline_length(points):
     """Return the length of a line through points, float64 (n, 2)."""

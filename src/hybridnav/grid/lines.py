@@ -6,12 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid._line_kernels import passed_cells, polyline_length, polyline_lengths
+from hybridnav.grid._line_kernels import (
+    passed_cells,
+    polyline_length,
+    polyline_lengths,
+    walks_clear,
+)
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
 
-__all__ = ["cells_of_line", "passed_cells", "polyline_length", "polyline_lengths"]
+__all__ = ["cells_of_line", "passed_cells", "polyline_length", "polyline_lengths", "walks_clear"]
 
 
 def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:
