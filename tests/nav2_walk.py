@@ -1,8 +1,8 @@
 """Nav2's collision walk over an edge of a route graph, and nothing of hybridnav's.
 
 It follows `LineIterator` of nav2_util and the collision monitor of nav2_route: the ends of an edge
-become cells by a floor, and every cell between them that Bresenham's line visits must cost less than
-that of the inscribed radius.
+become cells by a floor, and every cell that Bresenham's line visits between them must cost less
+than one within the inscribed radius.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def test_floors_are_matched_and_findings_left_out(cli, house, graph):
     graph.write_text(graph.read_text().replace('"2"', '"L2"').replace("'2'", "'L2'"))
     done = cli("check", house, graph, *POINT, "--pairs", "0")
     assert done.code == 1
-    assert "found      1 floors of the building that the graph does not have" in done.out
+    assert "warning    1 floors of the building that the graph does not have" in done.out
     assert "           floor L2\n" in done.out
     kinds = ("floor-missing", "floor-unknown", "stop-missing")
     done = cli(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
+from unittest.mock import ANY
 
 import pytest
 
-from tests.harness.small_runs import run_here
+from hybridnav.graphs import KINDS
+from tests.harness.small_runs import run_here, write_map
 
 FIGURE = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 POINT = ("--robot-radius", "0")
@@ -56,8 +59,62 @@ def test_a_faulty_graph(cli, faulty, tmp_path):
     assert "http" not in text
     assert plot.read_bytes().startswith(b"\x89PNG")
     done = cli("check", FIGURE, faulty, *POINT)
-    assert "found      1 nodes outside the map (node-outside)\n" in done.out
+    assert "\nerror      1 nodes outside the map (node-outside)\n" in done.out
+    (counts,) = [line for line in done.out.splitlines() if line.startswith("found ")]
+    assert re.fullmatch(r"found      \d+ errors(, \d+ warnings?)?(, \d+ notes?)?", counts)
     assert "           node 0\n" in done.out
+
+
+LEVELS = ("error", "warning", "note", "never")
+
+
+def codes(cli, path):
+    """The exit code for each level of --fail-on, and for none."""
+    levels = [cli("check", FIGURE, path, *POINT, "--fail-on", level).code for level in LEVELS]
+    return [*levels, cli("check", FIGURE, path, *POINT).code]
+
+
+def test_errors_warnings_and_notes_fail_from_the_level_asked_for(cli, sound, faulty, tmp_path):
+    assert codes(cli, sound) == [0, 0, 0, 0, 0]
+    assert codes(cli, faulty) == [1, 1, 1, 0, 1]
+    whole = json.loads(sound.read_text())
+    edges = [one for one in whole["features"] if one["geometry"]["type"] == "LineString"]
+    twice = whole["features"] + [edges[0] | {"properties": edges[0]["properties"] | {"id": 99_999}}]
+    path = tmp_path / "some.geojson"
+    path.write_text(json.dumps(whole | {"features": twice}))
+    assert codes(cli, path) == [0, 1, 1, 0, 1]
+    assert cli("check", FIGURE, path, *POINT, "--json").answer["findings"] == {
+        "repeated-edge": {
+            "severity": "warning",
+            "count": 1,
+            "text": KINDS["repeated-edge"],
+            "cases": [{"where": ANY, "points": ANY}],
+        }
+    }
+    # A closet without nodes is a note.
+    closet = write_map(tmp_path, ["#######", "#..#..#", "#..#..#", "#######"])
+    nodes = [{"id": 1, "x": 1.5, "y": 1.5}, {"id": 2, "x": 2.5, "y": 2.5}]
+    path = tmp_path / "few.json"
+    path.write_text(json.dumps({"nodes": nodes, "links": [{"source": 1, "target": 2}]}))
+    done = cli("check", closet, path, *POINT)
+    assert done.code == 0
+    assert "\nfound      2 notes\nnote       1 rooms that the robot fits in" in done.out
+    assert cli("check", closet, path, *POINT, "--fail-on", "note").code == 1
+    refused = cli("check", FIGURE, path, *POINT, "--fail-on", "walls")
+    assert refused.refuses(2, "--fail-on", "error, warning, note, never")
+
+
+def test_files_of_unknown_formats_say_so_in_one_line(cli, tmp_path):
+    for name, content in {
+        "graph.dot": b"digraph { a -> b }",
+        "graph.csv": b"x,y\n1,2\n",
+        "graph.zip": b"PK\x03\x04\x00\xff",
+        "graph": b"\x00\x01",
+    }.items():
+        (tmp_path / name).write_bytes(content)
+        done = cli("check", FIGURE, tmp_path / name)
+        suffix = Path(name).suffix
+        assert done.refuses(3, f"unknown format '{suffix}'", "GeoJSON of Nav2", "GraphML", "LIF")
 
 
 def test_findings_that_are_ignored_are_no_failure(cli, faulty):

@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.graphs import KINDS
+from hybridnav.graphs import BUILDING_KINDS, KINDS, SEVERITIES, Finding
+from hybridnav.graphs.findings import Findings
 from hybridnav.metrics import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -104,7 +105,8 @@ def test_a_graph_of_the_map_has_no_findings(features, checked):
     assert counts == {}
     assert found.is_free.all()
     assert found.is_clear.all()
-    assert found.doors == (5, 5)
+    assert found.doors == (6, 6)  # with the opening of the hall, which has a node of its own
+    assert found.doors[1] == len(set(SOUND.doors[SOUND.doors > 0].tolist()))
     assert found.rooms == (len(HERE.rooms.names),) * 2
     assert found.in_sight > 0.99
 
@@ -170,7 +172,8 @@ def test_a_door_that_no_edge_passes(features, checked):
     assert counts["missing-door"] == 1
     (missing,) = [each for each in found.findings if each.kind == "missing-door"]
     assert missing.examples[0].where.startswith(f"door {number} between ")
-    assert found.doors == (4, 5)
+    assert missing.severity == "note"
+    assert found.doors == (5, 6)
 
 
 def test_a_room_without_a_node(features, checked):
@@ -257,8 +260,12 @@ def test_an_edge_to_a_node_that_is_not_there(features, checked):
 
 @pytest.mark.parametrize("cost", [-0.1, float("nan"), "dear"])
 def test_a_cost_that_is_none(features, checked, cost):
-    edges_of(features)[0]["properties"]["cost"] = cost
-    assert checked(features)[0] == {"bad-cost": 1}
+    edge = edges_of(features)[0]
+    edge["properties"]["cost"] = cost
+    counts, found = checked(features)
+    assert counts == {"bad-cost": 1}
+    points = list(map(tuple, edge["geometry"]["coordinates"]))
+    assert list(found.findings[0].examples[0].points) == points
 
 
 def test_null_in_metadata(features, checked):
@@ -287,6 +294,15 @@ def test_unexplored_space_and_parts_without_nodes():
         "missing-part": 1,
     }
     assert found.is_free.tolist() == [True, True, False]
+
+
+def test_errors_come_first():
+    severities = [Finding(kind, 1, ()).severity for kind in (*KINDS, *BUILDING_KINDS)]
+    assert set(severities) == set(SEVERITIES)
+    findings = Findings()
+    for kind in ("missing-door", "loop", "node-in-wall"):
+        findings.add(kind, "here")
+    assert [found.severity for found in findings.collected()] == list(SEVERITIES)
 
 
 def test_every_kind_of_finding_is_planted_here():

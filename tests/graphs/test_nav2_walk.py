@@ -18,7 +18,6 @@ from hybridnav.grid.lines import walks_clear
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.nav2_reader import read_nav2
 from tests.nav2_walk import Costmap, line_cells
-
 from tests.strategies import class_grids, examples, occupancy_grid
 
 ROOT = Path(__file__).parents[2]

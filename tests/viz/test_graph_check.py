@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import networkx as nx
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
+from matplotlib.quiver import Quiver
 
 import hybridnav as hn
 from hybridnav.viz import plot_graph_check
 from hybridnav.viz.style import PATH
 
 
-def checked(points, edges):
+def checked(points, edges, *, directed=False):
     cells = np.zeros((20, 40), dtype=np.float32)
     cells[:15, 20] = 1.0
     grid = hn.OccupancyGrid(cells, robot_radius_m=0, name="hall")
-    plain: nx.Graph[Any] = nx.Graph(name="drawn")
+    plain: Any = nx.DiGraph(name="drawn") if directed else nx.Graph(name="drawn")
     for node, (x, y) in points.items():
         plain.add_node(node, x=x, y=y)
     plain.add_edges_from(edges)
@@ -26,8 +30,22 @@ def checked(points, edges):
     return hn.check_graph(topology, hn.WaypointGraph.from_networkx(plain))
 
 
+def checked_links(nodes, links):
+    whole = {"directed": True, "nodes": nodes, "links": links}
+    grid = hn.OccupancyGrid(np.zeros((20, 40)), robot_radius_m=0, name="hall")
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=8.0))
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "graph.json")
+        path.write_text(json.dumps(whole))
+        return hn.check_graph(topology, hn.load_graph(path))
+
+
 def names(ax):
     return {text.get_text() for text in ax.get_legend().get_texts()}
+
+
+def marks(ax):
+    return {tuple(point) for line in ax.lines for point in np.asarray(line.get_xydata()).tolist()}
 
 
 def red_lines(ax):
@@ -54,11 +72,50 @@ def test_blocked_edges_and_nodes_are_drawn_where_they_are():
     assert sorted(red_lines(ax)) == wanted
     assert names(ax) >= {
         "edges that the robot cannot follow",
-        "nodes where the robot does not fit",
-        "not connected",
+        "error: nodes outside the map",
+        "error: nodes where the robot does not fit",
+        "error: edges that the robot cannot follow",
+        "warning: nodes without edges",
     }
-    marked = {tuple(point) for line in ax.lines for point in np.asarray(line.get_xydata()).tolist()}
+    marked = marks(ax)
     assert {(20.5, 5.0), (48.0, 5.0), (5.0, 12.0)} <= marked
+    assert {(12.75, 5.0), (20.0, 5.0), (41.5, 5.0)} <= marked  # the middles of blocked edges
     assert ax.get_xlim()[1] > 48
     assert "hall" in ax.get_title()
     assert plot_graph_check(checked(points, []), title="").get_title() == ""
+
+
+def test_every_finding_is_marked_or_said_not_to_be_drawn():
+    points = {"a": (5, 5), "b": (5, 15), "c": (5, 15), "d": (8, 15), "e": (9, 9)}
+    edges = [("a", "b"), ("b", "a"), ("b", "c"), ("c", "b"), ("d", "d"), ("a", "gone")]
+    nodes = [{"id": name, "x": x, "y": y} for name, (x, y) in points.items()]
+    nodes += [{"id": "f", "x": 500, "y": 5}, {"id": "no"}]
+    links = [{"source": tail, "target": head} for tail, head in edges]
+    links[0]["cost"] = -1
+    check = checked_links(nodes, links)
+    ax = plot_graph_check(check)
+    legend = {name.removesuffix(": not drawn") for name in names(ax)}
+    for found in check.findings:
+        assert f"{found.severity}: {found.text.partition(',')[0]}" in legend
+    assert {name for name in names(ax) if name.endswith("not drawn")} == {
+        "error: nodes without coordinates: not drawn"
+    }
+    marked = marks(ax)
+    assert {(5.0, 10.0), (8.0, 15.0), (5.0, 15.0), (9.0, 9.0), (5.0, 5.0)} <= marked
+    # A node far away is marked at the rim of the picture.
+    (right, top), (left, low) = *[(ax.get_xlim()[1], ax.get_ylim()[1])], (0.0, 0.0)
+    assert all(left <= x <= right and low <= y <= top for x, y in marked if (x, y) != (500.0, 5.0))
+    assert max(x for x, _ in marked) > 35
+
+
+def test_edges_that_lead_one_way_have_an_arrow_on_them():
+    points = {"a": (5, 5), "b": (5, 15), "c": (15, 15)}
+    edges = [("a", "b"), ("b", "c"), ("c", "b")]
+    ax = plot_graph_check(checked(points, edges, directed=True))
+    (arrows,) = [each for each in ax.collections if isinstance(each, Quiver)]
+    assert np.asarray(arrows.get_offsets()).tolist() == [[5.0, 10.0]]
+    assert arrows.U[0] == 0
+    assert arrows.V[0] > 0
+    assert "edges that lead one way" in names(ax)
+    both = plot_graph_check(checked(points, edges))
+    assert not [each for each in both.collections if isinstance(each, Quiver)]

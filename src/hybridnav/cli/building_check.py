@@ -13,16 +13,33 @@ from hybridnav._files import printable
 from hybridnav.cli.building import BuildingSource
 from hybridnav.cli.common import answer, stage, timings
 from hybridnav.cli.errors import UsageError
-from hybridnav.cli.findings import SHOWN, found_figures, found_lines, write_page
+from hybridnav.cli.findings import (
+    SHOWN,
+    count_line,
+    fails,
+    found_figures,
+    found_lines,
+    write_page,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from hybridnav.building import BuildingGraphCheck, BuildingGraphReport
+    from hybridnav.graphs import Finding
 
 CHECK_OPTIONS = frozenset(
     {
-        *("map_file", "graph_file", "out", "ignore", "preset", "robot_radius_m", "max_cells"),
+        *(
+            "map_file",
+            "graph_file",
+            "out",
+            "ignore",
+            "fail_on",
+            "preset",
+            "robot_radius_m",
+            "max_cells",
+        ),
         *("align", "match", "pairs", "no_stairs", "as_json"),
     }
 )
@@ -71,7 +88,7 @@ class BuildingOptions:
 
 
 def check_building(given: Mapping[str, Any], how: BuildingOptions) -> bool:
-    """Check the graph of a building, print a summary, and return whether nothing is wrong.
+    """Check the graph of a building, print a summary, and return whether that is a failure.
 
     Parameters
     ----------
@@ -115,8 +132,10 @@ def check_building(given: Mapping[str, Any], how: BuildingOptions) -> bool:
         from hybridnav.harness.check_page import render_building_check  # noqa: PLC0415 - on demand
 
         write_page(render_building_check(found, report), given["out"])
-    is_consistent = report is None or not report.contradictions
-    return is_consistent and not any(_wrong(found, ignored).values())
+    # An answer that the building contradicts is an error.
+    is_refuted = report is not None and bool(report.contradictions)
+    level = given["fail_on"]
+    return (is_refuted and level != "never") or fails(_all(_wrong(found, ignored)), level)
 
 
 def _names_of(texts: Sequence[str]) -> dict[str, str]:
@@ -132,13 +151,17 @@ def _names_of(texts: Sequence[str]) -> dict[str, str]:
     return names
 
 
-def _wrong(found: BuildingGraphCheck, ignored: Collection[str]) -> dict[str, list[Any]]:
+def _wrong(found: BuildingGraphCheck, ignored: Collection[str]) -> dict[str, list[Finding]]:
     """Return the findings that count, by the name of their floor; those of the whole by ""."""
     whole = {"": found.findings} | {name: one.findings for name, one in found.floors.items()}
     return {
         name: [each for each in findings if each.kind not in ignored]
         for name, findings in whole.items()
     }
+
+
+def _all(wrong: Mapping[str, list[Finding]]) -> list[Finding]:
+    return [each for findings in wrong.values() for each in findings]
 
 
 def _summary(
@@ -148,10 +171,9 @@ def _summary(
 
     lines = [f"{name:<10} {printable(text)}" for name, text in building_facts(found, report)]
     wrong = _wrong(found, ignored)
+    lines.append(count_line(_all(wrong)))
     for name, findings in wrong.items():
         lines += found_lines(findings, f" on floor {name}" if name else "")
-    if not any(wrong.values()):
-        lines.append("found      nothing")
     cases = () if report is None else report.contradictions
     for number, text in enumerate(cases[:SHOWN]):
         lines.append(f"{'' if number else 'routes':<10} {printable(text)}")

@@ -34,7 +34,16 @@ from hybridnav.cli.common import (
     timings,
 )
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
-from hybridnav.cli.findings import found_figures, found_lines, write_page
+from hybridnav.cli.findings import (
+    FAIL_ON,
+    FailOnOption,
+    check_level,
+    count_line,
+    fails,
+    found_figures,
+    found_lines,
+    write_page,
+)
 from hybridnav.cli.options import (
     FreeOption,
     GraphFloorOption,
@@ -86,6 +95,7 @@ def check(
     out: PageOption = None,
     floor: GraphFloorOption = None,
     ignore: IgnoreOption = None,
+    fail_on: FailOnOption = FAIL_ON,
     along_lines: LinesOption = False,
     rooms_file: RoomsOption = None,
     preset: PresetOption = None,
@@ -105,15 +115,17 @@ def check(
     connected, doors that no edge passes, damaged entries. On a building, find that on all floors
     and links, and compare routes over all floors with the shortest ones.
 
-    Exits with 1 when something is wrong.
+    Exits with 0 when no error or warning is found, with 1 otherwise (--fail-on), with 2 when it is
+    called wrongly, and with 3 when a file cannot be read.
     """
+    check_level(fail_on)
     check_output(out, "--out", (".html",))
     check_picture(plot)
     if is_building_file(map_file):
         _check_kinds(ignore, is_building=True)
         check_options(refused_options(ctx, CHECK_OPTIONS))
         how = BuildingOptions(align, match or (), pairs, stairs=not no_stairs)
-        if not check_building(ctx.params, how):
+        if check_building(ctx.params, how):
             raise typer.Exit(EXIT_NOT_SOLVED)
         return
     _check_kinds(ignore, is_building=False)
@@ -142,7 +154,7 @@ def check(
         from hybridnav.viz import plot_graph_check, save_figure  # noqa: PLC0415 - on demand
 
         save_figure(plot_graph_check(found), plot)
-    if wrong:
+    if fails(wrong, fail_on):
         raise typer.Exit(EXIT_NOT_SOLVED)
 
 
@@ -159,7 +171,7 @@ def _summary(found: GraphCheck, wrong: list[Finding]) -> list[str]:
     from hybridnav.harness.check_page import check_facts  # noqa: PLC0415 - on demand
 
     lines = [f"{name:<10} {printable(text)}" for name, text in check_facts(found)]
-    return [*lines, *found_lines(wrong)] if wrong else [*lines, "found      nothing"]
+    return [*lines, count_line(wrong), *found_lines(wrong)]
 
 
 def _figures(found: GraphCheck, wrong: list[Finding]) -> dict[str, Any]:

@@ -3,8 +3,10 @@ from .check import GraphCheck as GraphCheck, check_graph as check_graph
 from .findings import (
     BUILDING_KINDS as BUILDING_KINDS,
     KINDS as KINDS,
+    SEVERITIES as SEVERITIES,
     Example as Example,
     Finding as Finding,
+    Severity as Severity,
 )
 from .judge import (
     Excess as Excess,

@@ -64,7 +64,7 @@ def add_rooms_and_doors(  # noqa: PLR0913, PLR0917 - one call, all of it needed
     wanted = [
         door
         for door in rooms.listed_doors
-        if door.passable and not door.is_opening and is_kept[rooms.cells_beside(door.number)].any()
+        if door.passable and is_kept[rooms.cells_beside(door.number)].any()
     ]
     for door in wanted:
         if door.number not in passed:

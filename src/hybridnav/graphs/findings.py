@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
 Point = tuple[float, float]
+Severity = Literal["error", "warning", "note"]
+"""Errors stop a robot or a reader, warnings may; notes are what graphs leave out on purpose too."""
+SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 MOST_EXAMPLES = 1000
 """Examples of each kind that are kept: a damaged file may have a million."""
@@ -26,7 +29,7 @@ KINDS = {
     "node-unexplored": "nodes in unexplored space",
     "edge-through-wall": "edges that the robot cannot follow",
     "edge-unexplored": "edges through unexplored space",
-    "edge-walk": "edges that are free, and on which Nav2's walk from cell to cell meets an obstacle",
+    "edge-walk": "edges on which Nav2's walk over cells meets an obstacle, though they are free",
     "loop": "edges from a node to itself",
     "repeated-edge": "edges beside another one from the same node to the same node",
     "same-point": "nodes at the point of another node",
@@ -51,6 +54,15 @@ BUILDING_KINDS = {
     "pieces": "pieces of the whole graph that nothing connects, though the building does",
 }
 """Kinds of findings on the graph of a whole building, beside those of its floors."""
+
+_WARNINGS = frozenset(
+    {
+        *("line-elsewhere", "node-unexplored", "edge-unexplored", "edge-walk", "loop"),
+        *("repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
+        *("link-missing", "link-kind", "stop-missing"),
+    }
+)
+_NOTES = frozenset({"missing-door", "missing-room", "missing-part"})
 
 
 @dataclass(frozen=True)
@@ -93,6 +105,11 @@ class Finding:
         """What is counted."""
         return (KINDS | BUILDING_KINDS)[self.kind]
 
+    @property
+    def severity(self) -> Severity:
+        """Whether it is an error, a warning or a note."""
+        return "note" if self.kind in _NOTES else "warning" if self.kind in _WARNINGS else "error"
+
 
 @dataclass
 class Findings:
@@ -100,13 +117,23 @@ class Findings:
 
     _counts: dict[str, int] = field(default_factory=dict)
     _examples: dict[str, list[Example]] = field(default_factory=dict)
+    _nodes: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)
+    """Ids of the nodes at which examples are that have no point yet."""
 
-    def add(self, kind: str, where: str, *points: Point) -> None:
-        """Add a case."""
+    def add(self, kind: str, where: str, *points: Point, nodes: tuple[Any, ...] = ()) -> None:
+        """Add a case, at points, or at nodes by their ids until `locate`."""
         self._counts[kind] = self._counts.get(kind, 0) + 1
         examples = self._examples.setdefault(kind, [])
         if len(examples) < MOST_EXAMPLES:
+            if nodes:
+                self._nodes[kind, len(examples)] = nodes
             examples.append(Example(where, points))
+
+    def locate(self, point_of: Callable[[Any], Point | None]) -> None:
+        """Give the cases that are at nodes the points of these, as far as they have one."""
+        for (kind, at), nodes in self._nodes.items():
+            points = tuple(point for node in nodes if (point := point_of(node)) is not None)
+            self._examples[kind][at] = replace(self._examples[kind][at], points=points)
 
     def add_all(self, findings: Iterable[Finding]) -> None:
         """Add what has been found before."""
@@ -115,9 +142,10 @@ class Findings:
             self._examples.setdefault(found.kind, []).extend(found.examples)
 
     def collected(self) -> tuple[Finding, ...]:
-        """Return all findings, in the order of `KINDS` and `BUILDING_KINDS`."""
-        return tuple(
+        """Return all findings, errors first, then in the order of `KINDS` and `BUILDING_KINDS`."""
+        found = [
             Finding(kind, self._counts[kind], tuple(self._examples[kind]))
             for kind in KINDS | BUILDING_KINDS
             if kind in self._counts
-        )
+        ]
+        return tuple(sorted(found, key=lambda each: SEVERITIES.index(each.severity)))

@@ -182,7 +182,7 @@ class Gathered:
         stated = math.nan if cost is None else number_of(cost)
         if cost is not None and not stated >= 0:
             shown = f"{cost!r:.60}"
-            self.findings.add("bad-cost", f"{self._text(edge)}: {shown}")
+            self.findings.add("bad-cost", f"{self._text(edge)}: {shown}", nodes=(tail, head))
         self._costs.append(stated)
         if facts:
             self._edge_facts[edge] = dict(facts)
@@ -191,7 +191,10 @@ class Gathered:
 
     def _add_line(self, edge: int, points: list[Point | None]) -> None:
         if None in points:
-            self.findings.add("line-elsewhere", f"{self._text(edge)}: no line of points")
+            ends = tuple(self._endpoints[-2:])
+            self.findings.add(
+                "line-elsewhere", f"{self._text(edge)}: no line of points", nodes=ends
+            )
             return
         endpoints = [self._index.get(name) for name in self._endpoints[-2:]]
         if points != [None if node is None else self._point(node) for node in endpoints]:
@@ -212,11 +215,12 @@ class Gathered:
         if not directed and endpoints[0] != endpoints[1]:
             self.add_edge((endpoints[1], endpoints[0]), rest, cost=cost)
 
-    def check_edge_name(self, name: Any, text: str) -> None:
+    def check_edge_name(self, name: Any, endpoints: tuple[Any, Any]) -> None:
         """Add a finding if an edge before has the same id."""
-        name = name_of(name)
+        name, (tail, head) = name_of(name), map(name_of, endpoints)
         if name in self.edge_ids:
-            self.findings.add("repeated-id", text)
+            text = edge_text(name, tail, head)
+            self.findings.add("repeated-id", text, nodes=(tail, head))
         self.edge_ids.add(name)
 
     def _text(self, edge: int) -> str:
@@ -247,6 +251,7 @@ class Gathered:
                 f"{self.where}: no node has a point, expected nodes with x and y in metres"
             )
         index = self._index
+        self.findings.locate(self._point_named)
         endpoints = np.array(
             [index.get(name, -1) for name in self._endpoints], dtype=np.int64
         ).reshape(-1, 2)
@@ -274,6 +279,9 @@ class Gathered:
             "edge_facts": {place[edge]: facts[edge] for edge in facts if edge in place},
             "findings": self.findings.collected(),
         }
+
+    def _point_named(self, name: Name) -> Point | None:
+        return self._point(self._index[name]) if name in self._index else None
 
     def _point(self, node: int) -> Point:
         return self._points[2 * node], self._points[2 * node + 1]

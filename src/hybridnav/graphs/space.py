@@ -99,7 +99,7 @@ class FreeSpace:
         kept = [0]
         while kept[-1] < len(chain) - 1:
             rest = chain[kept[-1] + 1 :]
-            # An edge may always join neighbours: no step past a corner has two blocked cells beside.
+            # Neighbours are always joined: no step past a corner has two blocked cells beside.
             seen = self.joins(np.repeat(chain[kept[-1:]], len(rest), axis=0), rest)
             kept.append(kept[-1] + 1 + int(np.flatnonzero(seen)[-1]))
         found: FloatArray = chain[kept]

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from hybridnav._files import printable
 from hybridnav.config.yaml_file import parse_document
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
+from hybridnav.graphs import WaypointGraph
 from hybridnav.io import graph_yaml
 from hybridnav.io.building_files import (
     JSON,
@@ -25,7 +26,13 @@ from hybridnav.io.rmf_in import is_rmf
 
 if TYPE_CHECKING:
     from hybridnav._typing import PathLike
-    from hybridnav.graphs import WaypointGraph
+    from hybridnav.building import BuildingGraph
+
+_TEXTS = (".yaml", ".yml", ".tmap", ".tmap2", ".tplg", ".tpl")
+_KNOWN = (
+    "GeoJSON of Nav2, node-link JSON, GraphML, topological maps of STRANDS and LCAS, Open-RMF, "
+    "OpenStreetMap, LIF"
+)
 
 
 def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
@@ -73,25 +80,36 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
     >>> graph.format, graph.n_edges  # undirected: an edge in each direction
     ('node-link', 2)
     """
-    suffix, name = Path(path).suffix.lower(), Path(path).stem
-    where, text = f"graph {printable(path)}", read_graph_text(path)
+    suffix, where = Path(path).suffix.lower(), f"graph {printable(path)}"
     try:
-        building = floors_of_text(text, suffix, where, name)
-        if building is not None:
-            return floor_in(building, floor, where)
-        if suffix in JSON:
-            graph = read_json_graph(text, where, name)
-        elif suffix in XML:
-            graph = read_graphml(text, where, name)
-        elif is_text_graph(text):
-            graph = read_text_graph(text, where, name)
-        else:
-            data = parse_document(text, where, MapError, graph_yaml.LIMITS)
-            if is_rmf(data):
-                return floor_in(read_open_rmf(data, where, name), floor, where)
-            graph = read_yaml_graph(data, where, name)
+        found = _read(path, suffix, where)
     except InvalidValueError as error:
         raise MapError(str(error)) from None
+    except MapNotFoundError:
+        raise
+    except MapError as error:
+        if suffix in (*JSON, *XML, *_TEXTS):
+            raise
+        ending = printable(repr(suffix))[:20]
+        raise MapError(f"{error}; unknown format {ending}, known are {_KNOWN}") from None
+    if not isinstance(found, WaypointGraph):
+        return floor_in(found, floor, where)
     if floor is not None:
-        raise MapError(f"{where}: a {graph.format} graph has no floors: leave out {floor!r:.60}")
-    return graph
+        raise MapError(f"{where}: a {found.format} graph has no floors: leave out {floor!r:.60}")
+    return found
+
+
+def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:
+    """Read a graph in the format that its ending or its text shows."""
+    name, text = Path(path).stem, read_graph_text(path)
+    building = floors_of_text(text, suffix, where, name)
+    if building is not None:
+        return building
+    if suffix in JSON:
+        return read_json_graph(text, where, name)
+    if suffix in XML:
+        return read_graphml(text, where, name)
+    if is_text_graph(text):
+        return read_text_graph(text, where, name)
+    data = parse_document(text, where, MapError, graph_yaml.LIMITS)
+    return read_open_rmf(data, where, name) if is_rmf(data) else read_yaml_graph(data, where, name)

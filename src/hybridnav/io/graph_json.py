@@ -98,7 +98,7 @@ class Features:
             raise MapError(f"{where}: a node has no id")
         point = pair_of(geometry.get("coordinates"))
         text = f"node {shown(name_of(facts['id']))}"
-        self._check(facts, text, _OF_NODE)
+        self._check(facts, text, _OF_NODE, (facts["id"],))
         self._gathered.add_node(facts["id"], point, _without(facts, _OF_NODE))
         self._node_ids.add(name_of(facts["id"]))
         if not self._frame and isinstance(facts.get("frame"), str):
@@ -110,9 +110,9 @@ class Features:
                 raise MapError(f"{where}: an edge has no {key}")
         endpoints = facts["startid"], facts["endid"]
         text = edge_text(name_of(facts.get("id")), *map(name_of, endpoints))
-        self._check(facts, text, _OF_EDGE[:1])
+        self._check(facts, text, _OF_EDGE[:1], endpoints)
         if "id" in facts:
-            self._gathered.check_edge_name(facts["id"], text)
+            self._gathered.check_edge_name(facts["id"], endpoints)
         line = geometry.get("coordinates")
         self._gathered.add_edge(
             endpoints,
@@ -122,19 +122,23 @@ class Features:
             line=_points_of(line) if isinstance(line, list) else None,
         )
 
-    def _check(self, facts: dict[str, Any], text: str, ids: tuple[str, ...]) -> None:
-        """Add findings on ids, and on null, which stops Nav2's loader."""
+    def _check(
+        self, facts: dict[str, Any], text: str, ids: tuple[str, ...], at: tuple[Any, ...]
+    ) -> None:
+        """Add findings at some nodes on ids, and on null, which stops Nav2's loader."""
+        nodes = tuple(map(name_of, at))
         for key in ids:
             value = facts.get(key)
             if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= MOST_ID:
-                self._gathered.findings.add("bad-id", text)
+                self._gathered.findings.add("bad-id", text, nodes=nodes)
         if any(_holds_null(facts[key]) for key in _READ if key in facts):
-            self._gathered.findings.add("null", text)
+            self._gathered.findings.add("null", text, nodes=nodes)
 
     def fields(self, name: str) -> dict[str, Any]:
         """Return the fields of the graph."""
         for both in self._gathered.edge_ids & self._node_ids:
-            self._gathered.findings.add("repeated-id", f"node and edge {shown(both)}")
+            text = f"node and edge {shown(both)}"
+            self._gathered.findings.add("repeated-id", text, nodes=(both,))
         return self._gathered.fields("nav2", name, self._frame) | {"others": tuple(self._others)}
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from xml.parsers import expat
 
 from hybridnav.errors import MapError
-from hybridnav.graphs.gather import Gathered, edge_text, point_of
+from hybridnav.graphs.gather import Gathered, point_of
 from hybridnav.graphs.waypoint_graph import WaypointGraph
 from hybridnav.io.osm_xml import parse_xml
 
@@ -125,7 +125,7 @@ class _Reader:
             raise MapError(f"{self._where}: an edge has no source or no target")
         endpoints, name = (given["source"], given["target"]), given.get("id")
         if name is not None:
-            self.gathered.check_edge_name(name, edge_text(name, *endpoints))
+            self.gathered.check_edge_name(name, endpoints)
         stated = given.get("directed")
         directed = self._is_directed[-1] if stated is None else stated in _TRUE
         self.gathered.add_link(endpoints, facts, directed=directed, name=name)

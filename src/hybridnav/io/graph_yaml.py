@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hybridnav._trig import atan2, cos, sin
 from hybridnav.config.yaml_file import Limits
 from hybridnav.errors import MapError
-from hybridnav.graphs.gather import Gathered, edge_text, name_of, number_of, pair_of
+from hybridnav.graphs.gather import Gathered, number_of, pair_of
 from hybridnav.graphs.waypoint_graph import WaypointGraph
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _add_node(gathered: Gathered, entry: Any, pose_of: _Poses, where: str) -> No
         endpoints, name = (node["name"], edge["node"]), edge.get("edge_id")
         name = None if name == "" else name
         if name is not None:
-            gathered.check_edge_name(name, edge_text(name_of(name), *map(name_of, endpoints)))
+            gathered.check_edge_name(name, endpoints)
         rest = {key: value for key, value in edge.items() if key not in {"node", "edge_id"}}
         gathered.add_edge(endpoints, rest, name=name)
 

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from hybridnav.graphs import GraphCheck
     from hybridnav.viz.layout import Entry
 
-_BAD_NODES = ("node-outside", "node-in-wall", "node-unexplored")
-_MARKS = (
-    (("alone", "components", "one-way"), "not connected", style.PARALLEL, "o"),
-    (("missing-door",), "doors that no edge passes", style.HOLE, "D"),
-    (("missing-room", "missing-part"), "rooms and parts without nodes", style.OUTSIDE, "^"),
-    (_BAD_NODES, "nodes where the robot does not fit", style.PATH, "s"),
-)
-"""Kinds of findings, their name, colour and mark, the least important first."""
+_COLOURS = {"error": style.PATH, "warning": style.HOLE, "note": style.PARALLEL}
+_MARKS = "sD^vo<>phP"
+"""Marks of the kinds of findings, again from the first where there are more."""
+_SMALLEST, _LARGER, _LARGEST = 4.0, 0.8, 9.0
+"""Size of the first mark, and how much larger the next are, up to a limit, in line widths: marks at
+one point are all seen."""
+_ARROW_IN = 0.07
+"""Length of the arrow on an edge that leads one way, in inches."""
 _MARGIN_M = 0.5
 
 
@@ -92,7 +92,9 @@ def plot_graph_check(
             look: dict[str, Any] = {"color": colour, "linewidth": width * line}
             canvas.add_lines(drawn, colors=colour, linewidths=width * line, zorder=2)
             entries.append((Line2D([], [], **look), name))
+    entries += _draw_arrows(canvas, check, line)
     entries += _draw_nodes(canvas, check, line)
+    entries += _draw_findings(canvas, check, line)
     what = f"{check.count:,} findings" if check.findings else "nothing found"
     counts = [f"{graph.n_nodes:,} nodes", f"{graph.n_edges:,} edges", what]
     words = [f"{graph.name} on {grid.name}", *counts] if title is None else [title]
@@ -101,20 +103,72 @@ def plot_graph_check(
 
 
 def _draw_nodes(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
-    """Draw the nodes, and the findings that lie at points."""
+    """Draw the nodes where the robot fits."""
+    points = check.graph.points[check.is_free]
+    if not len(points):
+        return []
+    look: dict[str, Any] = {"color": style.INK, "marker": "o", "linestyle": "none"}
+    look["markersize"] = 2.2 * line
+    canvas.ax.plot(*points.T, markeredgewidth=0, zorder=3, **look)
+    return [(Line2D([], [], **look), "nodes")]
+
+
+def _draw_arrows(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
+    """Draw an arrow on each edge that leads one way only."""
+    graph = check.graph
+    both = set(map(tuple, graph.edges.tolist()))
+    bent = graph.lines if check.along_lines else {}
+    lines = [
+        bent.get(edge, graph.points[[tail, head]])
+        for edge, (tail, head) in enumerate(graph.edges.tolist())
+        if tail != head and (head, tail) not in both
+    ]
+    if not lines:
+        return []
+    # In the middle of the edge, on polylines of the segment there.
+    at = np.array([each[(len(each) - 2) // 2 : (len(each) - 2) // 2 + 2] for each in lines])
+    steps = at[:, 1] - at[:, 0]
+    along = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
+    heads = {"headwidth": 6, "headlength": 8, "headaxislength": 8, "minlength": 0}
+    size = {"units": "inches", "scale_units": "inches", "width": _ARROW_IN * line / 8}
+    canvas.ax.quiver(
+        *at.mean(axis=1).T,
+        *(along * _ARROW_IN * line).T,
+        angles="xy",
+        pivot="mid",
+        scale=1.0,
+        color=style.INK,
+        zorder=3.5,
+        **heads,
+        **size,
+    )
+    look: dict[str, Any] = {"color": style.INK, "linestyle": "none", "markersize": 5.0 * line}
+    return [(Line2D([], [], marker=">", **look), "edges that lead one way")]
+
+
+def _draw_findings(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
+    """Mark each finding: at its point, or in the middle of its edge."""
     entries: list[Entry] = []
-
-    def draw(points: Any, name: str, **look: Any) -> None:
-        look |= {"linestyle": "none"}
-        canvas.ax.plot(*np.reshape(points, (-1, 2)).T, markeredgewidth=0, **look)
-        entries.append((Line2D([], [], **look), name))
-
-    sound = check.graph.points[check.is_free]
-    if len(sound):
-        draw(sound, "nodes", color=style.INK, marker="o", markersize=2.2 * line, zorder=3)
-    examples = {found.kind: found.examples for found in check.findings}
-    for kinds, name, colour, mark in _MARKS:
-        points = [each.points[0] for kind in kinds for each in examples.get(kind, ())]
+    # What lies far outside is marked at the rim.
+    low, high = canvas.view.low + _MARGIN_M, canvas.view.high - _MARGIN_M
+    for number, found in enumerate(check.findings):
+        points = [
+            np.clip(np.mean(each.points, axis=0), low, high)
+            for each in found.examples
+            if each.points
+        ]
+        look: dict[str, Any] = {
+            "color": _COLOURS[found.severity],
+            "marker": _MARKS[number % len(_MARKS)],
+            "markersize": min(_SMALLEST + number * _LARGER, _LARGEST) * line,
+            "markerfacecolor": "none",
+            "markeredgewidth": 1.1 * line,
+            "linestyle": "none",
+        }
+        name = found.text.partition(",")[0]
         if points:
-            draw(points, name, color=colour, marker=mark, markersize=4.0 * line, zorder=4)
+            canvas.ax.plot(*np.array(points).T, zorder=4, **look)
+        else:
+            name, look["marker"] = f"{name}: not drawn", "None"
+        entries.append((Line2D([], [], **look), f"{found.severity}: {name}"))
     return entries
