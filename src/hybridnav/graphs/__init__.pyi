@@ -6,7 +6,6 @@ from .findings import (
     SEVERITIES as SEVERITIES,
     Example as Example,
     Finding as Finding,
-    Severity as Severity,
 )
 from .judge import (
     Excess as Excess,

@@ -115,7 +115,7 @@ def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
     Returns
     -------
     list of FloatArray
-        For each part but the largest in its part of free space, stops on the shortest path to one
+        For each part but the largest in its part of free space, positions on the shortest path to one
         of the nearest nodes of another part, (row, col) in grid units.
     """
     positions = nodes.positions
@@ -141,4 +141,4 @@ def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
         known = best.get(int(part[start]), k)
         best[int(part[start])] = min(known, k, key=lambda at: paths.length_cells[at])
     lines = np.split(paths.positions, paths.path_start[1:-1])
-    return [nodes.space.stops(lines[k]) for k in best.values()]
+    return [nodes.space.joinable(lines[k]) for k in best.values()]

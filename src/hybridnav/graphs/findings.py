@@ -12,6 +12,7 @@ Point = tuple[float, float]
 Severity = Literal["error", "warning", "note"]
 """Errors stop a robot or a reader, warnings may; notes are what graphs leave out on purpose too."""
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+"""Severities of findings, the worst first."""
 
 MOST_EXAMPLES = 1000
 """Examples of each kind that are kept: a damaged file may have a million."""

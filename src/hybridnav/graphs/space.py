@@ -81,7 +81,7 @@ class FreeSpace:
             joined[joined] = walks_clear(self.free, one[joined], other[joined])
         return joined
 
-    def stops(self, path: FloatArray) -> FloatArray:
+    def joinable(self, path: FloatArray) -> FloatArray:
         """Return positions on the cells of a path that edges may join one after the other.
 
         Parameters
