@@ -32,7 +32,7 @@ def checked(points, edges, *, directed=False):
 
 def checked_links(nodes, links):
     whole = {"directed": True, "nodes": nodes, "links": links}
-    grid = hn.OccupancyGrid(np.zeros((20, 40)), robot_radius_m=0, name="hall")
+    grid = hn.OccupancyGrid(np.zeros((20, 40), np.float32), robot_radius_m=0, name="hall")
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=8.0))
     with TemporaryDirectory() as folder:
         path = Path(folder, "graph.json")
@@ -88,9 +88,9 @@ def test_blocked_edges_and_nodes_are_drawn_where_they_are():
 def test_every_finding_is_marked_or_said_not_to_be_drawn():
     points = {"a": (5, 5), "b": (5, 15), "c": (5, 15), "d": (8, 15), "e": (9, 9)}
     edges = [("a", "b"), ("b", "a"), ("b", "c"), ("c", "b"), ("d", "d"), ("a", "gone")]
-    nodes = [{"id": name, "x": x, "y": y} for name, (x, y) in points.items()]
+    nodes: list[Any] = [{"id": name, "x": x, "y": y} for name, (x, y) in points.items()]
     nodes += [{"id": "f", "x": 500, "y": 5}, {"id": "no"}]
-    links = [{"source": tail, "target": head} for tail, head in edges]
+    links: list[Any] = [{"source": tail, "target": head} for tail, head in edges]
     links[0]["cost"] = -1
     check = checked_links(nodes, links)
     ax = plot_graph_check(check)
@@ -103,9 +103,8 @@ def test_every_finding_is_marked_or_said_not_to_be_drawn():
     marked = marks(ax)
     assert {(5.0, 10.0), (8.0, 15.0), (5.0, 15.0), (9.0, 9.0), (5.0, 5.0)} <= marked
     # A node far away is marked at the rim of the picture.
-    (right, top), (left, low) = *[(ax.get_xlim()[1], ax.get_ylim()[1])], (0.0, 0.0)
-    assert all(left <= x <= right and low <= y <= top for x, y in marked if (x, y) != (500.0, 5.0))
-    assert max(x for x, _ in marked) > 35
+    right = ax.get_xlim()[1]
+    assert any(right - 1.0 <= x <= right and y == 5.0 for x, y in marked)
 
 
 def test_edges_that_lead_one_way_have_an_arrow_on_them():
@@ -114,8 +113,8 @@ def test_edges_that_lead_one_way_have_an_arrow_on_them():
     ax = plot_graph_check(checked(points, edges, directed=True))
     (arrows,) = [each for each in ax.collections if isinstance(each, Quiver)]
     assert np.asarray(arrows.get_offsets()).tolist() == [[5.0, 10.0]]
-    assert arrows.U[0] == 0
-    assert arrows.V[0] > 0
+    assert np.asarray(arrows.U).tolist() == [0.0]
+    assert (np.asarray(arrows.V) > 0).all()
     assert "edges that lead one way" in names(ax)
     both = plot_graph_check(checked(points, edges))
     assert not [each for each in both.collections if isinstance(each, Quiver)]

@@ -115,8 +115,8 @@ def missing_bends(nodes: Nodes, edges: LongArray) -> list[FloatArray]:
     Returns
     -------
     list of FloatArray
-        For each part but the largest in its part of free space, positions on the shortest path to one
-        of the nearest nodes of another part, (row, col) in grid units.
+        For each part but the largest in its part of free space, positions on the shortest path to
+        one of the nearest nodes of another part, (row, col) in grid units.
     """
     positions = nodes.positions
     part = components_of(len(positions), edges, "weak")

@@ -83,17 +83,10 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
     suffix, where = Path(path).suffix.lower(), f"graph {printable(path)}"
     try:
         found = _read(path, suffix, where)
+        if not isinstance(found, WaypointGraph):
+            return floor_in(found, floor, where)
     except InvalidValueError as error:
         raise MapError(str(error)) from None
-    except MapNotFoundError:
-        raise
-    except MapError as error:
-        if suffix in (*JSON, *XML, *_TEXTS):
-            raise
-        ending = printable(repr(suffix))[:20]
-        raise MapError(f"{error}; unknown format {ending}, known are {_KNOWN}") from None
-    if not isinstance(found, WaypointGraph):
-        return floor_in(found, floor, where)
     if floor is not None:
         raise MapError(f"{where}: a {found.format} graph has no floors: leave out {floor!r:.60}")
     return found
@@ -101,6 +94,16 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
 
 def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:
     """Read a graph in the format that its ending or its text shows."""
+    try:
+        return _read_known(path, suffix, where)
+    except MapError as error:
+        if isinstance(error, MapNotFoundError) or suffix in (*JSON, *XML, *_TEXTS):
+            raise
+        ending = printable(repr(suffix))[:20]
+        raise MapError(f"{error}; unknown format {ending}, known are {_KNOWN}") from None
+
+
+def _read_known(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:
     name, text = Path(path).stem, read_graph_text(path)
     building = floors_of_text(text, suffix, where, name)
     if building is not None:

@@ -129,21 +129,21 @@ def _draw_arrows(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
     at = np.array([each[(len(each) - 2) // 2 : (len(each) - 2) // 2 + 2] for each in lines])
     steps = at[:, 1] - at[:, 0]
     along = steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None]
-    heads = {"headwidth": 6, "headlength": 8, "headaxislength": 8, "minlength": 0}
-    size = {"units": "inches", "scale_units": "inches", "width": _ARROW_IN * line / 8}
+    look: dict[str, Any] = {"color": style.INK}
+    shape: dict[str, Any] = {"headwidth": 6, "headlength": 8, "headaxislength": 8, "minlength": 0}
+    shape |= {"units": "inches", "scale_units": "inches", "width": _ARROW_IN * line / 8}
     canvas.ax.quiver(
         *at.mean(axis=1).T,
         *(along * _ARROW_IN * line).T,
         angles="xy",
         pivot="mid",
         scale=1.0,
-        color=style.INK,
         zorder=3.5,
-        **heads,
-        **size,
+        **look,
+        **shape,
     )
-    look: dict[str, Any] = {"color": style.INK, "linestyle": "none", "markersize": 5.0 * line}
-    return [(Line2D([], [], marker=">", **look), "edges that lead one way")]
+    mark = Line2D([], [], marker=">", linestyle="none", markersize=5.0 * line, **look)
+    return [(mark, "edges that lead one way")]
 
 
 def _draw_findings(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
