@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 RADIUS_M = 0.25
 OWN = ("figure1/figure1.yaml", "office/office.yaml")
 OTHERS = ("aws_small_warehouse/005/map.yaml", "strands/g4s/g4s_y2.yaml", "turtlebot4/depot.yaml")
-DEEP_CELLS = 0.1
+DEEP_CELLS = 0.01
 """Least depth of a node in its cell: more than the 32-bit numbers of Nav2's loader lose."""
 
 

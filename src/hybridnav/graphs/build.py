@@ -14,7 +14,7 @@ from hybridnav.graphs.edges import SightPairs, missing_bends, sight_edges
 from hybridnav.graphs.facts import described
 from hybridnav.graphs.nodes import Nodes, add_landmarks, bends_of
 from hybridnav.graphs.rounds import bend_paths, bend_round_corners
-from hybridnav.graphs.space import FreeSpace
+from hybridnav.graphs.space import RIM_CELLS, FreeSpace
 from hybridnav.grid.checks import checked_between, checked_type
 from hybridnav.topology import TopologicalMap
 
@@ -124,7 +124,7 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
         stretch,
         spacing_m / cell_m,
         _BEND_M / cell_m,
-        round(_OFF_M / cell_m) + 0.5,
+        round(_OFF_M / cell_m) + RIM_CELLS,
         max(_FIRST_COVER_M, spacing_m) / cell_m,
     )
     progress(1, _STEPS)

@@ -10,7 +10,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.graphs.facts import described
 from hybridnav.graphs.nodes import Nodes
 from hybridnav.graphs.route_graph import LANE, RouteGraph
-from hybridnav.graphs.space import FreeSpace
+from hybridnav.graphs.space import RIM_CELLS, FreeSpace
 from hybridnav.grid.checks import checked_between, checked_type
 from hybridnav.topology import TopologicalMap
 
@@ -21,11 +21,8 @@ _SHORTEST = 4.0
 """Least length of an edge with lanes, in distances of a lane from the edge: one to enter, one to
 leave, and two side by side."""
 _FRACTION = 2.0**24
-_ASIDE_CELLS = 2.0**-6
-"""How much farther off its edge a lane runs: nodes of lanes along rows and columns would often lie
-on sides of cells."""
 _LEAST_CELLS = 2.0**-10
-"""Least distance of these nodes from the sides of their cell."""
+"""Least distance of nodes of lanes from the sides of their cell."""
 
 
 def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -> RouteGraph:
@@ -76,7 +73,8 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
             f"topology of {grid.name!r}: build it again"
         )
     space = FreeSpace.of(grid)
-    off = apart_m / 2 / grid.resolution_m + _ASIDE_CELLS
+    # Nodes of lanes along rows and columns would often lie on sides of cells.
+    off = apart_m / 2 / grid.resolution_m + RIM_CELLS
     edges, positions = graph.edges, graph.positions
     first, second = _lane(positions, edges, off)
     fits = _fits(space, positions, edges, (first, second), off)

@@ -25,7 +25,7 @@ _LEAST_CELLS = 0.5
 """Least distance between bends, in cells: corners are one cell apart, so each may become a node."""
 _DRAWS = (3, 100)
 """Least and greatest number of draws round a corner, most of which are no pair that bends there."""
-_ALL_DRAWS = 40_000
+_ALL_DRAWS = 150_000
 """Draws of all corners of a round, within these."""
 _NEAREST_CELLS, _FARTHEST_M = 0.7, 4.0
 """Distances of the ends of these pairs from the corner, in cells and in metres."""
