@@ -294,7 +294,143 @@ def test_costs_of_a_preset_are_those_of_the_map_now() -> None:
     assert found.cost == pytest.approx(expected.cost, rel=1e-9)
     planner.prepare()
     assert planner.plan(*ends).lower_bound <= expected.cost * (1 + 1e-9)
-    layer = hn.CostLayer(np.full(grid.shape, 2.0, np.float32))
-    given = hn.HybridPlanner(topology, preset="robot", costs=layer)
-    with pytest.raises(hn.InvalidValueError, match="make a new planner"):
-        given.update(topology=now)
+
+
+def with_speckles(grid: hn.OccupancyGrid, rng: np.random.Generator) -> hn.OccupancyGrid:
+    """The map with some obstacles elsewhere."""
+    return replace(grid, probability=(rng.random(grid.shape) < 0.12).astype(np.float32))
+
+
+def factors_of(grid: hn.OccupancyGrid, rng: np.random.Generator) -> hn.CostLayer:
+    """A layer of random factors that closes some cells."""
+    return hn.CostLayer(rng.uniform(1, 6, grid.shape), rng.random(grid.shape) < 0.05)
+
+
+@pytest.mark.parametrize("preset", ["robot", "portals", "paper", "grid-astar"])
+@settings(max_examples=examples(6), deadline=None)
+@given(SEEDS, st.booleans())
+def test_given_costs_stay_with_their_cells_on_a_changed_map(
+    preset: str,
+    seed: int,
+    prepared: bool,  # noqa: FBT001 - drawn
+) -> None:
+    """A planner that followed answers as one that is made of the map and the costs of now."""
+    rng = np.random.default_rng(seed)
+    blank = hn.OccupancyGrid(np.zeros((20, 30), np.float32), hn.Frame(0.1), robot_radius_m=0)
+    grid = with_speckles(blank, rng)
+    factors, closed = np.ones(grid.shape), np.zeros(grid.shape, np.bool_)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    for turn in range(4):
+        if prepared:
+            planner.prepare()
+        given = factors_of(grid, rng)
+        if turn != 1:  # the second turn brings no costs
+            rows = slice(0, 20) if turn == 0 else slice(5, 12)
+            factors[rows] = given.factors[rows]
+            closed[rows] = False if given.closed is None else given.closed[rows]
+        grid = with_speckles(grid, rng) if turn != 2 else grid  # the third one no map
+        planner.update(
+            costs=None if turn == 1 else given,
+            topology=None if turn == 2 else topology_of(grid),
+            changed=(0.0, 0.5, 3.0, 1.2) if turn == 2 else None,
+        )
+        if turn == 3:
+            factors, closed = given.factors, given.closed
+        fresh = hn.HybridPlanner(
+            topology_of(grid), preset=preset, costs=hn.CostLayer(factors, closed)
+        )
+        assert planner.costs is not None
+        assert fresh.costs is not None
+        assert planner.costs.digest == fresh.costs.digest
+        cells = np.argwhere(grid.enterable())
+        for ends in grid.frame.points_of(cells[rng.integers(len(cells), size=8)]).reshape(4, 2, 2):
+            found, expected = planner.plan(*ends), fresh.plan(*ends)
+            assert found.status is expected.status
+            # The overlay counts in integers; which of two equally cheap paths it cuts short varies.
+            found, expected = (each.plan(*ends, smooth="none") for each in (planner, fresh))
+            assert found.cost == pytest.approx(expected.cost, rel=1e-4)
+            assert found.lower_bound <= expected.cost * (1 + 1e-9)
+
+
+def test_costs_of_an_area_stay_when_the_map_changes_beside_it() -> None:
+    grid = hn.OccupancyGrid(np.zeros((20, 40), np.float32), hn.Frame(0.1), robot_radius_m=0)
+    planner = hn.HybridPlanner(topology_of(grid), preset="robot")
+    slow = hn.CostLayer(np.full(grid.shape, 5.0))
+    planner.update(costs=slow, changed=(1.0, 0.0, 2.0, 1.0))
+    probability = np.zeros(grid.shape, np.float32)
+    probability[15:, 30] = 1.0
+    now = topology_of(replace(grid, probability=probability))
+    planner.update(topology=now)
+    expected = hn.CostLayer.clearance(now.grid).factors.copy()
+    expected[:10, 10:20] = np.maximum(expected[:10, 10:20], 5.0)
+    assert planner.costs is not None
+    assert np.array_equal(planner.costs.factors, expected)
+
+
+BAD_UPDATES: dict[str, tuple[dict[str, Any], str]] = {
+    "costs of another map": ({"costs": hn.CostLayer(np.ones((3, 3)))}, "costs of 3 x 3 cells"),
+    "no costs": ({"costs": np.ones((20, 30))}, "expected a CostLayer"),
+    "no area": ({"changed": "all of it"}, "expected an area in metres"),
+    "an area elsewhere": ({"changed": (50.0, 50.0, 51.0, 51.0)}, "cells changed outside"),
+    "a mask of another map": ({"changed": np.ones((3, 3), np.bool_)}, "a mask of shape"),
+    "no grid": ({"grid": np.ones((20, 30))}, "expected an OccupancyGrid"),
+    "no topology": ({"topology": "office"}, "expected a TopologicalMap"),
+}
+
+
+@pytest.mark.parametrize("bad", BAD_UPDATES)
+@pytest.mark.parametrize("preset", [*FOLLOWING, *REBUILT, "robot"])
+@pytest.mark.parametrize("is_prepared", [False, True])
+def test_a_refused_update_changes_nothing(
+    preset: str,
+    bad: str,
+    is_prepared: bool,  # noqa: FBT001 - of the table
+) -> None:
+    rng = np.random.default_rng(1)
+    blank = hn.OccupancyGrid(np.zeros((20, 30), np.float32), hn.Frame(0.1), robot_radius_m=0)
+    before = topology_of(with_speckles(blank, rng))
+    by_costs = preset not in {"shortest", "octile"}
+    costs = factors_of(blank, rng) if by_costs else None
+    planner = hn.HybridPlanner(before, preset=preset, costs=costs)
+    cells = np.argwhere(before.grid.enterable())
+    pairs = before.grid.frame.points_of(cells[rng.integers(len(cells), size=12)]).reshape(6, 2, 2)
+    if is_prepared:
+        planner.prepare()
+    plans = [planner.plan(*pair) for pair in pairs]
+    state = planner.topology, planner.costs, planner.prepared
+    now = topology_of(with_speckles(blank, rng))
+    given: dict[str, Any] = {"topology": now, "grid": now.grid}
+    if by_costs:
+        given["costs"] = factors_of(blank, rng)
+    if preset in FOLLOWING:
+        del given["topology"]
+    wrong, message = BAD_UPDATES[bad]
+    if not by_costs and bad == "costs of another map":
+        message = "costs of 3 x 3 cells|cannot plan by costs"
+    with pytest.raises(hn.InvalidValueError, match=message):
+        planner.update(**{**given, **wrong})
+    held = planner.topology, planner.costs, planner.prepared
+    assert all(one is other for one, other in zip(held, state, strict=True))
+    for pair, plan in zip(pairs, plans, strict=True):
+        again = planner.plan(*pair)
+        assert (again.status, again.cost) == (plan.status, plan.cost)
+        assert again.lower_bound == plan.lower_bound
+        assert again.settings == plan.settings
+        assert (again.route is None) == (plan.route is None)
+    planner.update(**given)
+    fresh = hn.HybridPlanner(now, preset=preset, costs=given.get("costs"))
+    for pair in pairs:
+        assert planner.plan(*pair).status is fresh.plan(*pair).status
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
+def test_costs_that_a_preset_cannot_plan_by_refuse_the_map_too(preset: str) -> None:
+    grid = hn.OccupancyGrid(np.zeros((6, 6), np.float32), robot_radius_m=0)
+    planner = hn.HybridPlanner(topology_of(grid), preset=preset)
+    probability = np.zeros((6, 6), np.float32)
+    probability[:, 3] = 1.0
+    now = replace(grid, probability=probability)
+    with pytest.raises(hn.InvalidValueError, match="cannot plan by costs"):
+        planner.update(grid=now, costs=hn.CostLayer(np.ones((6, 6))))
+    assert planner.plan((0.5, 0.5), (5.5, 0.5)).cost == 5
+    assert planner.topology.grid is grid

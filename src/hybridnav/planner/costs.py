@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -50,31 +51,21 @@ class PlannerCosts:
         self._named: CostLayer | None = None
         if named is not None and named.clearance is not None:
             self._named = CostLayer.clearance(grid, **named.clearance.model_dump())
+        self.given = given
+        """The layer given to the planner, which stays with its cells when the map changes."""
         self.layer = self._named
         """The layer of the larger factors; None where neither has costs."""
         if given is not None:
-            self.check(given)
+            self._check(given)
             self.layer = given if self._named is None else self._named | given
 
     def on(self, grid: OccupancyGrid) -> PlannerCosts:
-        """Return the costs on the same map after its cells changed.
+        """Return the costs on the same map after its cells changed: those of the preset are
+        computed anew, and given ones stay with their cells."""
+        return PlannerCosts(grid, self._preset, self.given)
 
-        Raises
-        ------
-        InvalidValueError
-            When costs computed from the map are joined with given ones.
-        """
-        if self._named is None:
-            return PlannerCosts(grid, self._preset, self.layer)
-        if self.layer is not self._named:
-            raise InvalidValueError(
-                f"costs were given that are joined with those that preset {self._preset.name} "
-                "computes from the map, which changed: make a new planner of the map now"
-            )
-        return PlannerCosts(grid, self._preset, None)
-
-    def changed(self, given: CostLayer, box: Box) -> CostLayer:
-        """Return the layer with the cells in a box as another given layer has them.
+    def changed(self, given: CostLayer, box: Box) -> PlannerCosts:
+        """Return the costs with the cells in a box as another given layer has them.
 
         Parameters
         ----------
@@ -88,18 +79,20 @@ class PlannerCosts:
         InvalidValueError
             As for the first one.
         """
-        self.check(given)
-        layer = (
-            CostLayer(np.ones(self._grid.shape, np.float32)) if self.layer is None else self.layer
-        )
+        self._check(given)
+        none = CostLayer(np.ones(self._grid.shape, np.float32))
+        costs = copy(self)
+        costs.given = own = none if self.given is None else self.given
+        costs.layer = layer = own if self.layer is None else self.layer
         if box[0] >= box[1] or box[2] >= box[3]:
-            return layer
+            return costs
         part = given.part(box)
+        costs.given = costs.layer = own.changed(part, box[0], box[2])
         if self._named is not None:
-            part = self._named.part(box) | part
-        return layer.changed(part, box[0], box[2])
+            costs.layer = layer.changed(self._named.part(box) | part, box[0], box[2])
+        return costs
 
-    def check(self, given: CostLayer) -> None:
+    def _check(self, given: CostLayer) -> None:
         """Raise `InvalidValueError` if a planner cannot plan by a layer."""
         checked_type("costs", given, CostLayer).check_fits(self._grid)
         if why := self._preset.planner.refusal_of_costs():

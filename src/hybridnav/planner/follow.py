@@ -61,21 +61,28 @@ def built_of(topology: TopologicalMap) -> DualGraphPyramid:
     return topology.built if isinstance(topology, StalePlaces) else topology.pyramid
 
 
-class MapChange(NamedTuple):
-    """What an update of the map gives to a planner."""
+class Change(NamedTuple):
+    """What an update gives to a planner: at least one of the first three."""
 
+    costs: CostLayer | None
+    """The new costs, None to keep those given before."""
     grid: OccupancyGrid | None
     """The map now, None to take that of `topology`."""
     topology: TopologicalMap | None
-    """The places of the map now, None for a grid alone; one of both is given."""
+    """The places of the map now, None for a grid alone."""
     box: Box
     """First row, last row + 1, first column, last column + 1 of the cells that may have changed."""
+
+    @property
+    def is_of_map(self) -> bool:
+        """Whether the map changes, and not the costs alone."""
+        return self.grid is not None or self.topology is not None
 
 
 def change_of(
     costs: CostLayer | None, grid: OccupancyGrid | None, topology: TopologicalMap | None, box: Box
-) -> MapChange | None:
-    """Return the change of the map that an update was given, None for costs alone.
+) -> Change:
+    """Return the change that an update was given.
 
     Raises
     ------
@@ -86,14 +93,11 @@ def change_of(
         checked_type("topology", topology, TopologicalMap)
     if grid is not None:
         checked_type("grid", grid, OccupancyGrid)
-    if topology is None and grid is None:
-        if costs is None:
-            raise InvalidValueError(
-                "update was given no costs, grid or topology, expected one of them: pass what "
-                "changed"
-            )
-        return None
-    return MapChange(grid, topology, box)
+    if costs is None and topology is None and grid is None:
+        raise InvalidValueError(
+            "update was given no costs, grid or topology, expected one of them: pass what changed"
+        )
+    return Change(costs, grid, topology, box)
 
 
 def followed(
@@ -101,7 +105,7 @@ def followed(
     preset: Preset,
     cells: CellPlanner,
     costs: PlannerCosts,
-    change: MapChange,
+    change: Change,
 ) -> tuple[TopologicalMap, CellPlanner, PlannerCosts]:
     """Return the places, the planner of cell paths, and the costs after a change of the map.
 
@@ -110,12 +114,12 @@ def followed(
     topology, preset, cells, costs
         Those of a planner; unchanged.
     change
-        The map now.
+        The map now, and new costs on it if there are any.
 
     Raises
     ------
     InvalidValueError
-        When the planner cannot follow, or the grid is one of another map.
+        When the planner cannot follow, or the grid or the costs are those of another map.
     """
     settings, places, grid = preset.planner, change.topology, change.grid
     if settings.refine == "ompl":
@@ -140,6 +144,8 @@ def followed(
     if places is None:
         places = cast("TopologicalMap", StalePlaces(grid, built_of(topology)))
     costs = costs.on(grid)
+    if change.costs is not None:
+        costs = costs.changed(change.costs, change.box)
     if isinstance(cells, Following):
         return places, cells.followed(grid, changed), costs
     if isinstance(cells, Carried):

@@ -13,7 +13,7 @@ from hybridnav.grid.areas import box_of_area
 from hybridnav.planner.cell_planner import Carried, Updatable
 from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import read_points
-from hybridnav.planner.follow import MapChange, change_of, followed
+from hybridnav.planner.follow import Change, change_of, followed
 from hybridnav.planner.queries import Queries
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
@@ -272,7 +272,8 @@ class HybridPlanner:
         costs at once; searches leave stale tables above these out until `prepare` renews them.
         `shortest`, `octile` and `grid-astar` follow a changed grid alone. Their results have no
         route, and names, places and doors are refused, until an update brings the places of the map
-        now. All other presets need these at once.
+        now. All other presets need these at once. Costs that were given stay with their cells on a
+        changed map; those that the preset computes from the map are computed anew.
 
         Parameters
         ----------
@@ -311,15 +312,17 @@ class HybridPlanner:
         before = self.topology.grid
         box = box_of_area(changed, before.frame, before.shape)
         change = change_of(costs, grid, topology, box)
-        if change is not None:
-            self._preparing.alone(partial(self._follow, change))
-        if costs is not None:
-            self._preparing.alone(partial(self._update, costs, box))
+        self._preparing.alone(partial(self._update, change))
 
-    def _follow(self, change: MapChange) -> None:
+    def _update(self, change: Change) -> None:
+        """Check all of a change, then make it."""
         self._turns.alone(self._complete)
-        made = followed(self.topology, self.preset, self._cells, self._costs, change)
-        self._begun = partial(self._take_map, *made)
+        if change.is_of_map:
+            made = followed(self.topology, self.preset, self._cells, self._costs, change)
+            self._begun = partial(self._take_map, *made)
+        elif change.costs is not None:
+            costs = self._costs.changed(change.costs, change.box)
+            self._begun = partial(self._take_costs, costs, change.box)
         self._turns.alone(self._complete)
 
     def _take_map(self, topology: TopologicalMap, cells: CellPlanner, costs: PlannerCosts) -> None:
@@ -328,23 +331,18 @@ class HybridPlanner:
             cells.catch_up()
         self._queries = self._made_queries()
 
-    def _update(self, costs: CostLayer, box: Box) -> None:
-        self._turns.alone(self._complete)
-        self._begun = partial(self._take_costs, self._costs.changed(costs, box), box)
-        self._turns.alone(self._complete)
-
     def _complete(self) -> None:
         """Make an update that has begun, also one that was interrupted."""
         if self._begun is not None:
             self._begun()
             self._begun = None
 
-    def _take_costs(self, layer: CostLayer, box: Box) -> None:
-        self._costs.layer = layer
-        if isinstance(self._cells, Updatable):
-            self._cells.update(layer, box)
+    def _take_costs(self, costs: PlannerCosts, box: Box) -> None:
+        self._costs = costs
+        if isinstance(self._cells, Updatable) and costs.layer is not None:
+            self._cells.update(costs.layer, box)
         else:
-            self._cells = cell_planner(self.topology, self.preset.planner, None, layer)
+            self._cells = cell_planner(self.topology, self.preset.planner, None, costs.layer)
         self._queries.take(self._cells, self.costs)
 
     def close(self) -> None:
