@@ -373,3 +373,28 @@ def test_closed_cells_that_make_paths_too_long_leave_the_search_of_the_grid() ->
     graph = weighted(move_graph(~closed), factors.astype(float))
     least = distances(graph, grid.shape, (0, 0))[0, 199] * grid.resolution_m
     assert planner.plan(*ends, smooth="none").cost >= least * (1 - 1e-9)
+
+
+@ON_OVERLAY
+@pytest.mark.parametrize("shut_by", ["costs", "nothing"])
+def test_a_map_without_a_free_cell_opens_after_preparation(preset: str, shut_by: str) -> None:
+    """Prepared while no cell may be entered, opened by a map, and then by costs."""
+    walls = grid_of(np.ones((12, 16)), robot_radius_m=0)
+    ones = np.ones(walls.shape, np.float32)
+    shut = layer_of(ones, np.full(walls.shape, shut_by == "costs"))
+    planner = hn.HybridPlanner(topology_of(walls), preset=preset_of(preset), costs=shut)
+    planner.prepare()
+    grid = grid_of(np.zeros((12, 16)), robot_radius_m=0)
+    planner.update(topology=topology_of(grid))
+    twice = layer_of(2 * ones)
+    planner.update(costs=twice)
+    for _ in range(3):
+        result = planner.plan((0.5, 0.5), (15.5, 11.5))
+        least = optimum_m(grid, twice, grid.enterable(), (0, 0))[11, 15]
+        check(result, least, grid.enterable())
+        planner.prepare()
+    planner.update(topology=topology_of(walls))
+    assert planner.plan((0.5, 0.5), (15.5, 11.5)).status is hn.PlanStatus.START_OCCUPIED
+    planner.prepare()
+    planner.update(topology=topology_of(grid), costs=twice)
+    check(planner.plan((0.5, 0.5), (15.5, 11.5)), least, grid.enterable())

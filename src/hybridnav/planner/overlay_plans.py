@@ -11,7 +11,6 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav._progress import no_progress
-from hybridnav.errors import InvalidValueError
 from hybridnav.overlay import OverlaySearch, PathsTooLongError, prepare_overlay
 from hybridnav.planner.cell_planner import CellPlan
 from hybridnav.planner.cell_plans import WholeMap, round_closed
@@ -62,7 +61,8 @@ class OverOverlay:
         self._epsilon = settings.epsilon or 0.0
         self._take(refiner)
         self._built: tuple[Overlay, OverlaySearch] | None = None
-        self._cannot_build = topology.grid.corner_cutting
+        self._is_too_long = False
+        """Whether the costs of paths inside a field do not fit, as with factors of hundreds."""
         self._overdue: Box | None = None
         """Box of the cells that are other ones than in the overlay."""
         self._expanded = 0
@@ -96,8 +96,15 @@ class OverOverlay:
     def _build_or_renew(self, progress: Progress) -> None:
         if self._built is not None:
             self._built[0].renew(progress)
-        elif not self._cannot_build:
+        elif self._can_build:
             self._build(progress)
+
+    @property
+    def _can_build(self) -> bool:
+        """Whether an overlay of the map could be built: one needs a cell that may be entered."""
+        grid = self._topology.grid
+        is_open = grid.enterable(allow_unexplored=self._allow_unexplored)
+        return not (self._is_too_long or grid.corner_cutting) and bool(is_open.any())
 
     def _build(self, progress: Progress) -> None:
         costs, allowed = self._refiner.costs, self._allow_unexplored
@@ -115,8 +122,8 @@ class OverOverlay:
             if now is not costs and now is not None:  # a progress callback has changed them
                 new: Any = now.factors
                 overlay.update(new, closed=now.closed)
-        except PathsTooLongError:  # as with factors of hundreds in large fields
-            self._cannot_build = True
+        except PathsTooLongError:
+            self._is_too_long = True
             return
         self._built = overlay, OverlaySearch(overlay)
 
@@ -128,13 +135,13 @@ class OverOverlay:
         allowed = self._allow_unexplored
         self._take(GridRefiner(self._topology.grid, allow_unexplored=allowed, costs=costs))
         if self._built is None:
-            self._cannot_build = self._topology.grid.corner_cutting
+            self._is_too_long = False
             return
         factor: Any = costs.factors
         try:
             self._built[0].update(factor, closed=costs.closed, changed=box)
         except PathsTooLongError:
-            self._built, self._cannot_build = None, True
+            self._built, self._is_too_long = None, True
 
     def carried(self, topology: TopologicalMap, costs: CostLayer | None) -> OverOverlay:
         """Return the planner of a changed map, which takes the overlay over; see `Carried`."""
@@ -168,9 +175,7 @@ class OverOverlay:
         try:
             self._built[0].update(factor, enterable=enterable, closed=closed, changed=self._overdue)
         except PathsTooLongError:
-            self._built, self._cannot_build = None, True
-        except InvalidValueError:  # there was no free cell when it was built
-            self._built = None
+            self._built, self._is_too_long = None, True
         self._overdue = None
 
     def plan(self, query: CellQuery) -> CellPlan:
