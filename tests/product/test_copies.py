@@ -242,6 +242,27 @@ def test_a_result_travels_without_its_planner(preset: str) -> None:
         again.path.points[0] = 0.0
 
 
+@WAYS
+@pytest.mark.parametrize("preset", QUICK)
+def test_a_draft_travels_without_its_planner(preset: str, copied: Any) -> None:
+    shut = {"cells": np.argwhere(~topology().grid.enterable())}
+    for ends in ((START, GOAL), (START, START), (START, (99.0, 0.0)), (START, "east")):
+        draft, plan = (
+            ask(*ends, blocked=shut) for ask in (planner(preset).draft, planner(preset).plan)
+        )
+        other = copied(draft)
+        assert (other.status, other.cost, other.lower_bound) == (
+            draft.status,
+            draft.cost,
+            draft.lower_bound,
+        )
+        assert told(other.result()) == told(plan)
+        assert other.result() is not draft.result()
+        assert b"HybridPlanner" not in pickle.dumps(draft)
+        assert b"OverMesh" not in pickle.dumps(draft)
+        assert told(copied(other).result()) == told(plan)
+
+
 def test_a_result_is_read_where_there_is_no_map(tmp_path: Path) -> None:
     result = planner("shortest").plan(START, GOAL)
     (tmp_path / "result").write_bytes(pickle.dumps(result))

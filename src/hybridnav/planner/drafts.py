@@ -32,6 +32,10 @@ class PlanDraft:
         """Return the draft of a result that is made already."""
         return cls(result.status, result.cost, result.lower_bound, result.stats, lambda: result)
 
+    def __reduce__(self) -> tuple[Callable[[PlanResult], PlanDraft], tuple[PlanResult]]:
+        """Make the result, with which copies travel without the planner and its map."""
+        return PlanDraft.of, (self.result(),)
+
 
 def draft_on_mesh(
     cells: OverMesh, query: CellQuery, result_of: Callable[[CellPlan], PlanResult]
