@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import tracemalloc
 import zlib
 from typing import TYPE_CHECKING, Any
 
@@ -195,6 +196,33 @@ def test_a_packed_log_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path: Path) 
     damaged[len(whole) // 2 :] = rng.bytes(len(whole) - len(whole) // 2)
     path.write_bytes(bytes(damaged))
     assert len(list(log)) >= 100
+
+
+@pytest.mark.parametrize("content", [b"\0", b"#" * 1000 + b"\n"], ids=["zeros", "lines"])
+def test_a_packed_log_is_unpacked_no_further_than_a_limit(tmp_path: Path, content: bytes) -> None:
+    """200 MB in a file of 0.2 to 1 MB: 64 MiB of them are read."""
+    path, block = tmp_path / "a.log", content * (2**20 // len(content))
+    with gzip.open(path, "wb", compresslevel=1) as file:
+        for _ in range(200):
+            file.write(block)
+    log = hn.CarmenLog(path)
+    tracemalloc.start()
+    with pytest.raises(hn.MapError, match="unpacks to more than 64 MiB, expected at most") as error:
+        for _ in log:
+            pass
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2**23
+    assert log.bytes_read < log.size_bytes * 0.4
+    assert "\n" not in str(error.value)
+    assert "gunzip" in str(error.value)
+
+
+def test_a_small_log_may_unpack_to_any_multiple(tmp_path: Path) -> None:
+    lines = [flaser([2.0] * 1000, time=k) for k in range(500)]
+    log = log_of(tmp_path, *lines, packed=True)
+    assert log.size_bytes * 50 < sum(map(len, lines))
+    assert len(list(log)) == 500
 
 
 @pytest.mark.parametrize("cut", [1, 4, 8, -10])

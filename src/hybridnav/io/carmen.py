@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from hybridnav._files import printable
 from hybridnav.config.yaml_file import open_file
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.io.scan_log import ScanLog
@@ -28,6 +29,11 @@ if TYPE_CHECKING:
 _GZIP = b"\x1f\x8b"
 _MOST_BYTES = 2**20
 """Bytes of a line that are read; longer lines are damaged."""
+_MOST_UNPACKED = 2**26
+"""Bytes that any packed log may unpack to."""
+_MOST_TIMES = 50
+"""How many times as large as the file that may be, where it is more; public logs unpack to 3 to 6
+times their size, zeros to 1,000 times."""
 _MOST_BEAMS = 100_000
 _KNOWN_STEPS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
 """Degrees between the beams of a SICK LMS by their number. FLASER does not state them."""
@@ -48,7 +54,8 @@ class CarmenLog(ScanLog):
 
     Lines that are cut off or hold no numbers, and scans that do not follow from those before (see
     `ScanSequence`), are left out and counted. The file is read line by line: memory does not grow
-    with its size.
+    with its size. A packed log that unpacks to more than 64 MiB, and to more than 50 times its
+    size, is refused when it is read so far.
 
     Parameters
     ----------
@@ -102,7 +109,8 @@ class CarmenLog(ScanLog):
         """Yield the lines of the log, an empty one for each that is too long."""
         is_packed = file.read(2) == _GZIP
         file.seek(0)
-        readable = _Readable(gzip.GzipFile(fileobj=file) if is_packed else file)
+        most = max(_MOST_UNPACKED, _MOST_TIMES * self.size_bytes) if is_packed else self.size_bytes
+        readable = _Readable(gzip.GzipFile(fileobj=file) if is_packed else file, most)
         stream = io.BufferedReader(readable)
         while line := stream.readline(_MOST_BYTES):
             self.bytes_read = file.tell()
@@ -112,17 +120,25 @@ class CarmenLog(ScanLog):
             self.skipped["line too long"] += 1
             while line and not line.endswith(b"\n"):
                 line = stream.readline(_MOST_BYTES)
+        if readable.is_cut:
+            raise MapError(
+                f"log {printable(self._path)}: unpacks to more than {most / 2**20:,.0f} MiB, "
+                f"expected at most that for a file of {self.size_bytes / 2**20:,.1f} MiB: unpack "
+                "it by gunzip if it is sound"
+            )
         if readable.is_damaged:
             self.notes.append("the rest of the file is damaged")
         self.bytes_read = self.size_bytes
 
 
 class _Readable(io.RawIOBase):
-    """The bytes of a file as far as they can be read."""
+    """The bytes of a file as far as they can be read, and no more than a number of them."""
 
-    def __init__(self, file: io.BufferedReader | gzip.GzipFile) -> None:
-        self._file = file
+    def __init__(self, file: io.BufferedReader | gzip.GzipFile, most_bytes: int) -> None:
+        self._file, self._left = file, most_bytes
         self.is_damaged = False
+        self.is_cut = False
+        """Whether there are more bytes."""
 
     def readable(self) -> bool:
         return True
@@ -134,6 +150,9 @@ class _Readable(io.RawIOBase):
             some = self._file.read1(len(there))  # what is there before damage, too
         except (EOFError, OSError, zlib.error):
             self.is_damaged, some = True, b""
+        self._left -= len(some)
+        if self._left < 0:
+            self.is_cut, some = True, b""
         there[: len(some)] = some
         return len(some)
 
