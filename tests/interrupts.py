@@ -21,15 +21,18 @@ class Struck(BaseException):
     """An interrupt of these tests, which nothing may catch but they."""
 
 
-def lines_of(call: Callable[[], object], *, strike_at: int | None = None) -> int:
-    """Run a call and count the lines of the package that it runs; raise `Struck` before one."""
+def lines_of(
+    call: Callable[[], object], *, strike_at: int | None = None, within: str = _PACKAGE
+) -> int:
+    """Run a call and count the lines of a folder that it runs, those of the package unless told
+    otherwise; raise `Struck` before one."""
     count = 0
 
     def trace(frame: FrameType, event: str, _: Any) -> Any:
         nonlocal count
         name = frame.f_code.co_filename
         # Kernels are no lines where they are compiled.
-        if not name.startswith(_PACKAGE) or name.endswith("kernels.py"):
+        if not name.startswith(within) or name.endswith("kernels.py"):
             return None
         if event == "line":
             count += 1

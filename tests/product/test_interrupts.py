@@ -185,6 +185,41 @@ def test_kernels_that_return_several_values_to_python_are_guarded() -> None:
     assert [name for name, decorators in found.items() if decorators[0] != "guarded"] == []
 
 
+def test_an_interrupt_inside_numpy_stays_one() -> None:
+    """numpy turns what is raised while it compares records into a TypeError of its own."""
+    other, numpy = grid_with_rooms(seed=9, side=45), str(Path(np.__file__).parent)
+    planner = hn.HybridPlanner(grown(), preset="shortest")
+
+    def answer() -> Any:
+        result = planner.plan(START, GOAL)
+        return result.status, result.cost
+
+    def follow(at: int = 0) -> int:
+        """Open and close many cells; strike before a line of numpy."""
+        planner.update(grid=GRID)
+        return lines_of(partial(planner.update, grid=other), strike_at=at, within=numpy)
+
+    before, n_lines = answer(), [follow() for _ in range(2)][1]
+    expected = {before, answer()}
+    for at in range(1, n_lines + 1):
+        with pytest.raises(Struck):
+            follow(at)
+        assert answer() in expected
+
+
+def test_rows_are_compared_without_records() -> None:
+    """`numpy.unique` with an axis makes records of them; see `unique_rows`."""
+    package = Path(hn.__file__).parent
+    found = [
+        f"{path.name}:{node.lineno}"
+        for path in package.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "np.unique"
+        if "axis" in {keyword.arg for keyword in node.keywords}
+    ]
+    assert found == []
+
+
 @pytest.mark.full
 def test_hundreds_of_signals_inside_the_kernels_of_a_build() -> None:
     assert strike_builds(400) > 0

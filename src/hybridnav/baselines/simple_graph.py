@@ -11,6 +11,7 @@ from hybridnav._copies import copies_alike
 from hybridnav.baselines.protocol import CUT_CORNERS
 from hybridnav.baselines.regions import RegionPlanner, free_fields
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 from hybridnav.search.arc_search import ArcSearch
 
 if TYPE_CHECKING:
@@ -65,5 +66,5 @@ def first_arcs(level: Level) -> LongArray:
     """Return the arcs that a simple graph keeps, the lowest index between each two vertices."""
     plain = np.flatnonzero(~level.is_self_loop)
     endpoints = np.sort(level.arcs[plain], axis=1)
-    _, first = np.unique(endpoints, axis=0, return_index=True)
+    first = unique_rows(endpoints).first
     return np.sort(plain[first])

@@ -157,10 +157,12 @@ def _describe_level(level: hn.Level) -> str:
     """Return one line on a level; a simple graph would lose its parallel arcs: second doors."""
     import numpy as np  # noqa: PLC0415 - help and wrong usage can do without
 
+    from hybridnav.grid.runs import unique_rows  # noqa: PLC0415
+
     free = int(np.count_nonzero(level.classes == hn.CellClass.FREE))
     largest_m2 = int(level.areas.max(initial=0)) * level.grid.resolution_m**2
     plain = np.sort(level.arcs[~level.is_self_loop], axis=1)
-    parallel = len(plain) - len(np.unique(plain, axis=0))
+    parallel = len(plain) - len(unique_rows(plain).rows)
     vertices = f"{free:,} free and {level.n_vertices - free:,} unexplored vertices"
     return (
         f"level {level.index:<4} {vertices}, "

@@ -18,6 +18,7 @@ from hybridnav.graphs.waypoint_graph import WaypointGraph
 from hybridnav.grid import CellClass
 from hybridnav.grid.checks import checked_type
 from hybridnav.grid.lines import walks_clear
+from hybridnav.grid.runs import unique_rows
 from hybridnav.refine import Sight
 from hybridnav.topology import TopologicalMap
 
@@ -164,7 +165,7 @@ def _add_nodes(
     unexplored = grid.classes[tuple(placed.cells[within].T)] == CellClass.UNEXPLORED
     add("node-in-wall", within[~unexplored])
     add("node-unexplored", within[unexplored])
-    _, first = np.unique(placed.positions, axis=0, return_index=True)
+    first = unique_rows(placed.positions).first
     add("same-point", np.delete(np.arange(graph.n_nodes), first))
     has_edge = np.zeros(graph.n_nodes, dtype=np.bool_)
     has_edge[graph.edges[graph.edges[:, 0] != graph.edges[:, 1]].ravel()] = True

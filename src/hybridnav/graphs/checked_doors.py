@@ -8,6 +8,7 @@ import numpy as np
 
 from hybridnav.graphs.facts import DoorsPassed
 from hybridnav.grid.lines import cells_of_line
+from hybridnav.grid.runs import unique_rows
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray
@@ -58,7 +59,7 @@ def add_rooms_and_doors(  # noqa: PLR0913, PLR0917 - one call, all of it needed
     passed: set[int] = set()
     clear = np.flatnonzero(is_clear)
     # Both directions of a straight edge pass the same doors.
-    _, first = np.unique(np.sort(placed.edges[clear], axis=1), axis=0, return_index=True)
+    first = unique_rows(np.sort(placed.edges[clear], axis=1)).first
     for edge in {*clear[first].tolist(), *placed.lines} & set(clear.tolist()):
         passed |= set(passes.passed(cells_of_line(space.free, placed.line_of(edge))))
     wanted = [

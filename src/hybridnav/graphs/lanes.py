@@ -12,6 +12,7 @@ from hybridnav.graphs.nodes import Nodes
 from hybridnav.graphs.route_graph import LANE, RouteGraph
 from hybridnav.graphs.space import RIM_CELLS, FreeSpace
 from hybridnav.grid.checks import checked_between, checked_type
+from hybridnav.grid.runs import unique_rows
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
@@ -81,9 +82,7 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
     fits &= fits[_opposite(edges, graph.n_nodes)]
     lanes = np.flatnonzero(fits)
     # Two lanes may have a node in common.
-    new, place = np.unique(
-        np.concatenate([first[lanes], second[lanes]]), axis=0, return_inverse=True
-    )
+    new, _, place, _ = unique_rows(np.concatenate([first[lanes], second[lanes]]))
     entries, exits = (graph.n_nodes + place).reshape(2, -1)
     parts = [
         edges[~fits],
@@ -91,7 +90,7 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
         np.stack([entries, exits], axis=1),
         np.stack([exits, edges[lanes, 1]], axis=1),
     ]
-    chosen = np.unique(np.concatenate(parts), axis=0).astype(np.int64)
+    chosen = unique_rows(np.concatenate(parts)).rows.astype(np.int64)
     nodes = Nodes(
         space,
         graph.n_nodes + len(new),

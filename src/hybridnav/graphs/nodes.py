@@ -9,6 +9,7 @@ import numpy as np
 
 from hybridnav.graphs.space import checked_position
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -139,6 +140,6 @@ def bends_of(paths: MeshPaths, which: Iterable[int]) -> FloatArray:
     parts = [paths.positions[paths.path_start[k] + 1 : paths.path_start[k + 1] - 1] for k in which]
     if not parts:
         return np.empty((0, 2))
-    bends, count = np.unique(np.concatenate(parts), axis=0, return_counts=True)
-    found: FloatArray = bends[np.argsort(-count, kind="stable")]
+    bends = unique_rows(np.concatenate(parts))
+    found: FloatArray = bends.rows[np.argsort(-bends.count, kind="stable")]
     return found

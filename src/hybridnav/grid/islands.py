@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.grid.classes import CellClass
+from hybridnav.grid.runs import unique_rows
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
@@ -103,6 +104,6 @@ def _free_neighbours(island_of: IntArray, free_of: IntArray) -> LongArray:
         for one, other in ((island[:-1], free[1:]), (island[1:], free[:-1])):
             beside = (one > 0) & (other > 0)
             pairs.append(np.stack([one[beside], other[beside]], axis=1))
-    islands = np.unique(np.concatenate(pairs), axis=0)[:, 0]
+    islands = unique_rows(np.concatenate(pairs)).rows[:, 0]
     counts = np.bincount(islands, minlength=int(island_of.max(initial=0)) + 1)
     return counts.astype(np.int64, copy=False)

@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 from hybridnav.search.moves import legal_moves, moves_along
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class Consistency:
             crossings, arcs = self._arc_crossings(topology)
         keys = self._keys(self._region[crossings])
         components = np.sort(self._component[crossings], axis=1)
-        _, one = np.unique(np.column_stack([keys, arcs, components]), axis=0, return_index=True)
+        one = unique_rows(np.column_stack([keys, arcs, components])).first
         # One crossing for each arc and pair of components, sorted by pair of regions, then arc.
         self._arc, self._crossings, crossing_keys = arcs[one], crossings[one], keys[one]
         self._key = crossing_keys

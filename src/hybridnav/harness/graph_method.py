@@ -11,6 +11,7 @@ from hybridnav.baselines import AnyAngleResult, MethodResult
 from hybridnav.baselines.regions import array_bytes
 from hybridnav.errors import InvalidValueError
 from hybridnav.graphs.placed import PlacedGraph
+from hybridnav.grid.runs import unique_rows
 from hybridnav.refine import Sight
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class GraphMethod:
             edges = edges[placed.clear_edges(sight)]
         self.name = graph.name
         self.n_nodes = graph.n_nodes
-        self.n_edges = len(np.unique(np.sort(edges, axis=1), axis=0))
+        self.n_edges = len(unique_rows(np.sort(edges, axis=1)).rows)
         self._frame, self._resolution_m = grid.frame, grid.resolution_m
         self._network = placed.network(sight, edges)
         self._free = free

@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -134,7 +135,7 @@ def _stratified(
     starts = np.searchsorted(stratum[order], np.arange(STRATA))
     turn[order] = np.arange(len(allowed)) - starts[stratum[order]]
     best = draws[allowed[np.lexsort((stratum, turn))]]
-    first = np.sort(np.unique(best, axis=0, return_index=True)[1])[:count]
+    first = np.sort(unique_rows(best).first)[:count]
     chosen: LongArray = best[first]
     return chosen
 

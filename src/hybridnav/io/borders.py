@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from hybridnav.grid.runs import unique_rows
+
 if TYPE_CHECKING:
     from shapely import LineString
     from shapely.geometry.base import BaseGeometry
@@ -76,7 +78,7 @@ class Borders:
         points, chain = shapely.get_coordinates(chains, return_index=True)
         begins = np.searchsorted(chain, np.arange(len(chains)))
         ends = np.append(begins[1:], len(chain)) - 1
-        corners, at = np.unique(points[[begins, ends]].reshape(-1, 2), axis=0, return_inverse=True)
+        corners, _, at, _ = unique_rows(points[[begins, ends]].reshape(-1, 2))
         begin, end = at.reshape(2, -1)
         short = (shapely.length(chains) <= at_most) & (begin != end)
         group = _joined(len(corners), begin[short], end[short])

@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from hybridnav.errors import RoomsError
 from hybridnav.grid import NO_ROOM, CellClass
-from hybridnav.grid.runs import in_runs
+from hybridnav.grid.runs import in_runs, unique_rows
 from hybridnav.io.rooms_cells import NAMELESS
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[i
     ):
         beside = small[part_of[one]] & (taken[other] != NO_ROOM)
         pairs.append(np.stack([part_of[one][beside], taken[other][beside]], axis=1))
-    found, length = np.unique(np.concatenate(pairs), axis=0, return_counts=True)
+    found, _, _, length = unique_rows(np.concatenate(pairs))
     is_beside = np.isin(found[:, 0], found[np.isin(found[:, 1], list(rooms)), 0])
     found, length = found[is_beside], length[is_beside]
     room_of = np.full(n_parts + 1, NO_ROOM, dtype=np.int32)

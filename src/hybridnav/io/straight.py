@@ -10,6 +10,7 @@ import shapely
 
 from hybridnav._trig import atan2, cos, sin
 from hybridnav._trig import directions as directions_of
+from hybridnav.grid.runs import unique_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,10 +52,9 @@ def straightened(
         The chains in the same order; the same object if no corner has moved.
     """
     flat, chain = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
-    points, of_corner = np.unique(flat, axis=0, return_inverse=True)
-    of_corner = of_corner.reshape(-1)
+    points, _, of_corner, _ = unique_rows(flat)
     sides = np.stack([of_corner[:-1], of_corner[1:]], axis=1)[chain[1:] == chain[:-1]]
-    sides = np.unique(np.sort(sides, axis=1), axis=0)
+    sides = unique_rows(np.sort(sides, axis=1)).rows
     if not len(sides) or not directions:
         return lines
     moved = _in_line(points, sides, directions, resolution_m)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav.grid.runs import unique_rows
 from hybridnav.online import _move_kernels, _removal_kernels
 from hybridnav.online._cell_kernels import box_round
 from hybridnav.online._merge_kernels import merge_pairs
@@ -117,7 +118,7 @@ class CellDraft:
         )
         window.write()
         while len(beyond):
-            beyond = np.concatenate([self._merge(pair) for pair in np.unique(beyond, axis=0)])
+            beyond = np.concatenate([self._merge(pair) for pair in unique_rows(beyond).rows])
 
     def _merge(self, pair: LongArray) -> LongArray:
         """Merge a pair of places if they may merge, and what may merge with them then."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 from hybridnav.online.shift import placed, shift_of
 
 if TYPE_CHECKING:
@@ -98,9 +99,9 @@ def _causes(old: IntArray, new: IntArray, areas: LongArray, now: IntArray) -> tu
     """Return how many cells flip as their places merge, and as they are cut off."""
     is_now = np.zeros(len(areas), np.bool_)
     is_now[now[now >= 0]] = True
-    pairs, cells = np.unique(np.stack([old, new]), axis=1, return_counts=True)
-    is_cut = is_now[pairs[0]]
-    is_merged = ~is_cut & (2 * cells > areas[pairs[0]])
+    pairs, _, _, cells = unique_rows(np.stack([old, new], axis=1))
+    is_cut = is_now[pairs[:, 0]]
+    is_merged = ~is_cut & (2 * cells > areas[pairs[:, 0]])
     return int(cells[is_merged].sum()), int(cells[is_cut].sum())
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import ndimage
 
+from hybridnav.grid.runs import unique_rows
 from hybridnav.overlay import _cost_kernels as kernels
 from hybridnav.overlay.layout import (
     CellCosts,
@@ -105,12 +106,10 @@ def _numbered(
     own = field_of[near][tuple(nearest[:, rows - near[0].start, cols - near[1].start])]
     parent = levels.parent[:n_finest]
     squares = np.stack([parent[own], rows // _BLOCK, cols // _BLOCK], axis=1)
-    _, first, square, count = np.unique(
-        squares, axis=0, return_index=True, return_inverse=True, return_counts=True
-    )
+    _, first, square, count = unique_rows(squares)
     is_field = count >= _LEAST_CELLS
     number = n_finest + np.cumsum(is_field) - 1
-    own = np.where(is_field[square.ravel()], number[square.ravel()], own)
+    own = np.where(is_field[square], number[square], own)
     parents = np.concatenate([parent, squares[first[is_field], 0]])
     order = np.argsort(parents, kind="stable")
     rank = np.empty(len(order), dtype=np.int32)

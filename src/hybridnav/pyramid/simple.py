@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav.grid.runs import unique_rows
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -118,7 +120,7 @@ def simple_graph(
     plain = np.flatnonzero(arcs[:, 0] != arcs[:, 1])
     # Stable: among arcs with an equal through_m, the lowest index is kept.
     by_length = plain[np.argsort(through_m[plain], kind="stable")]
-    pairs, first = np.unique(np.sort(arcs[by_length], axis=1), axis=0, return_index=True)
+    pairs, first, _, _ = unique_rows(np.sort(arcs[by_length], axis=1))
     for (low, high), arc in zip(pairs.tolist(), by_length[first].tolist(), strict=True):
         graph.add_edge(
             low,
@@ -149,9 +151,9 @@ def _groups(arcs: IntArray, mask: BoolArray) -> list[ArcGroup]:
     """Return the arcs of a mask in groups with the same two endpoints, in the order of the
     endpoints."""
     index: LongArray = np.flatnonzero(mask)
-    pairs, group_of = np.unique(np.sort(arcs[index], axis=1), axis=0, return_inverse=True)
-    order = np.argsort(group_of.ravel(), kind="stable")
-    bounds = np.cumsum(np.bincount(group_of.ravel(), minlength=len(pairs)))[:-1]
+    pairs, _, group_of, counts = unique_rows(np.sort(arcs[index], axis=1))
+    order = np.argsort(group_of, kind="stable")
+    bounds = np.cumsum(counts)[:-1]
     members = np.split(index[order], bounds) if len(pairs) else []
     return [
         ArcGroup((low, high), tuple(group.tolist()))

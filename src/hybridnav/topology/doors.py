@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._trig import cos, sin, sines_and_cosines
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.grid.clearance import clearance_cells
+from hybridnav.grid.runs import unique_rows
 from hybridnav.pyramid.cracks import endpoints_of, find_cracks, middles_of, sides_of
 from hybridnav.pyramid.start import kinds_of
 
@@ -270,9 +271,8 @@ def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> Lon
 
     count = len(labels)
     squares = np.floor(sides / _THIN_M).astype(np.int64)
-    _, thin = np.unique(np.column_stack([boundary_of, squares]), axis=0, return_index=True)
-    _, pair_of = np.unique(np.sort(labels, axis=1), axis=0, return_inverse=True)
-    pair = pair_of.reshape(-1)[boundary_of[thin]]
+    thin = unique_rows(np.column_stack([boundary_of, squares])).first
+    pair = unique_rows(np.sort(labels, axis=1)).number_of[boundary_of[thin]]
     # Boundaries of other rooms are far away in a third dimension.
     near = KDTree(np.column_stack([sides[thin], 2 * _ROW_M * pair])).query_pairs(
         _ROW_M, output_type="ndarray"
@@ -293,10 +293,8 @@ def _jambs(
     corners = _corners(edges, free.shape[1])
     of = boundary_of.repeat(2)
     # Corners inside a boundary belong to two of its cracks.
-    _, first, count = np.unique(
-        np.column_stack([of, corners]), axis=0, return_index=True, return_counts=True
-    )
-    ends = first[count == 1]
+    found = unique_rows(np.column_stack([of, corners]))
+    ends = found.first[found.count == 1]
     has_jamb = ~blocks[tuple(corners[ends].T)] | is_near[ends // 2]
     jambs: LongArray = np.bincount(
         of[ends][has_jamb], minlength=int(boundary_of.max(initial=-1)) + 1

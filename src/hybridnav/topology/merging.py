@@ -10,6 +10,8 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import ConvexHull, QhullError
 
+from hybridnav.grid.runs import unique_rows
+
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray, IntArray
 
@@ -189,8 +191,9 @@ def _common_sides(label_of: IntArray) -> dict[tuple[int, int], int]:
     for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
         between = (tail >= 0) & (head >= 0) & (tail != head)
         pairs.append(np.sort(np.stack([tail[between], head[between]], axis=1), axis=1))
-    found, counts = np.unique(np.concatenate(pairs), axis=0, return_counts=True)
-    return {(u, v): n for (u, v), n in zip(found.tolist(), counts.tolist(), strict=True)}
+    found = unique_rows(np.concatenate(pairs))
+    counted = zip(found.rows.tolist(), found.count.tolist(), strict=True)
+    return {(u, v): n for (u, v), n in counted}
 
 
 def _hulls(label_of: IntArray, n_segments: int) -> list[FloatArray]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
+from hybridnav.grid.runs import unique_rows
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.layout import finish
@@ -86,7 +87,7 @@ def plot_graph_check(
         bent = graph.lines if check.along_lines else {}
         straight = chosen.copy()
         straight[list(bent)] = False
-        ends = np.unique(np.sort(graph.edges[straight], axis=1), axis=0)
+        ends = unique_rows(np.sort(graph.edges[straight], axis=1)).rows
         drawn = [*graph.points[ends], *(bent[edge] for edge in bent if chosen[edge])]
         if drawn:
             look: dict[str, Any] = {"color": colour, "linewidth": width * line}

@@ -12,6 +12,7 @@ from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
 
+from hybridnav.grid.runs import unique_rows
 from hybridnav.viz.fields import smoothed
 
 if TYPE_CHECKING:
@@ -53,8 +54,8 @@ class Loops:
         low, high = self._cells_beside(loop)
         # Ends of the sides between two cells, each named by the cell to its upper right.
         corners = np.concatenate([high, high + (high - low)[:, ::-1]])
-        found, count = np.unique(corners, axis=0, return_counts=True)
-        rows, cols = found[count == 1].T
+        found = unique_rows(corners)
+        rows, cols = found.rows[found.count == 1].T
         around = np.stack([self.hole_of[rows - i, cols - j] for i in (0, 1) for j in (0, 1)])
         return [int(hole) for hole in around.max(axis=0)]
 

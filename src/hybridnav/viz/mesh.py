@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 from hybridnav.mesh import build_mesh
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
@@ -130,7 +131,7 @@ def draw_intervals(canvas: Canvas, grid: OccupancyGrid, trace: SearchTrace) -> l
     shades = _ORDER(np.linspace(0, 1, max(n, 2))[:n])
     cones = PolyCollection(list(rings), facecolors=shades, linewidths=0, zorder=2, gid="views")
     ax.add_collection(cones, autolim=False)
-    x, y = grid.frame.points_of_grid(np.unique(trace.roots, axis=0)).T
+    x, y = grid.frame.points_of_grid(unique_rows(trace.roots).rows).T
     ax.scatter(x, y, s=(2.4 * line) ** 2, c=style.HOLE, linewidths=0, zorder=5, gid="roots")
     swatches = tuple(Patch(fc=_ORDER(share)) for share in (0.0, 0.5, 1.0))
     dot = Line2D([], [], ls="", marker="o", ms=3.5 * line, mfc=style.HOLE, mec="none")

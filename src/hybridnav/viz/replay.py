@@ -14,6 +14,7 @@ from PIL import Image
 from hybridnav._files import replace_file
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view, new_figure
 from hybridnav.viz.room_map import DOOR_POINTS
@@ -244,7 +245,7 @@ class _Colours:
             between = (tail != head) & (tail >= 0) & (head >= 0)
             pairs.append(np.stack([tail[between], head[between]], axis=1))
         beside: dict[int, set[int]] = {}
-        for one, other in np.unique(np.concatenate(pairs), axis=0).tolist():
+        for one, other in unique_rows(np.concatenate(pairs)).rows.tolist():
             beside.setdefault(one, set()).add(other)
             beside.setdefault(other, set()).add(one)
         numbers = np.flatnonzero(np.bincount(number_of.ravel() + 1)[1:])

@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import NO_ROOM
+from hybridnav.grid.runs import unique_rows
 from hybridnav.topology import Rooms, TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
@@ -161,7 +162,7 @@ def _colours(label_of: IntArray, n_rooms: int, strength: float) -> ByteArray:
     for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
         between = (tail != head) & (tail != NO_ROOM) & (head != NO_ROOM)
         pairs.append(np.stack([tail[between], head[between]], axis=1))
-    arcs = np.unique(np.concatenate(pairs), axis=0).astype(np.int32)
+    arcs = unique_rows(np.concatenate(pairs)).rows.astype(np.int32)
     index = colour_vertices(arcs, n_rooms)
     return np.concatenate(
         [style.rgb(*style.PLACES, strength=strength)[index], style.rgb(style.FREE)]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
+from hybridnav.grid.runs import unique_rows
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.layout import finish
@@ -67,7 +68,7 @@ def plot_route_graph(
     classes = (style.BLOCKED, style.FREE, style.UNEXPLORED)
     draw_cells(canvas, grid, grid.classes, style.rgb(*classes))
     ends = np.sort(graph.edges, axis=1)
-    ends = np.unique(ends, axis=0)
+    ends = unique_rows(ends).rows
     line = canvas.sizes.line
     canvas.add_lines(graph.points[ends], colors=style.ARC, linewidths=0.35 * line, zorder=2)
     entries: list[Entry] = [(Line2D([], [], color=style.ARC, linewidth=0.5 * line), "edges")]

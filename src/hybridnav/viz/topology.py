@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass
+from hybridnav.grid.runs import unique_rows
 from hybridnav.pyramid.simple import report_of
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
@@ -210,7 +211,7 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
     width, metre = 1.1 * sizes.line, sizes.points_per_metre
     look = {"linewidths": width, "capstyle": "round", "joinstyle": "round", "zorder": 3}
     if simple:
-        pairs = np.unique(np.sort(level.arcs[graph.plain], axis=1), axis=0)
+        pairs = unique_rows(np.sort(level.arcs[graph.plain], axis=1)).rows
         canvas.add_lines(graph.positions[pairs], colors=style.INK, **look, gid="edges")
     else:
         curves = graph.curves(_CLEARANCE * sizes.line / metre)
