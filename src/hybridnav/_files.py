@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 MODEL_SUFFIX = ".hnm"
 """Suffix of the name of a model."""
 
+_MOST_SHOWN_OF_PATH, _MOST_SHOWN_OF_NAME = 255, 80
+"""Characters of a path in a message, and of a name in it; of more, 80 are shown."""
+
 _unfinished: set[Path] = set()
 
 
@@ -124,7 +127,8 @@ def without_controls(text: str) -> str:
 
 
 def printable(path: str | os.PathLike[str]) -> str:
-    """Return the text of a path for a message, escaped if it would break the line.
+    """Return the text of a path for a message, escaped if it would break the line, and cut if it
+    is longer, or has a longer name, than file systems and people use.
 
     Parameters
     ----------
@@ -137,4 +141,7 @@ def printable(path: str | os.PathLike[str]) -> str:
         One line.
     """
     text = str(path)
+    longest = max(map(len, text.split("/")))
+    if len(text) > _MOST_SHOWN_OF_PATH or longest > _MOST_SHOWN_OF_NAME:
+        text = f"{text[:38]}...{text[-39:]}"
     return text if text.isprintable() else repr(text)

@@ -1,5 +1,26 @@
 """Errors and warnings; each message states the given value, the expected one, and the place."""
 
+from __future__ import annotations
+
+import reprlib
+from typing import Any
+
+_MOST_SHOWN = 80
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = _MOST_SHOWN
+
+
+def brief(value: Any) -> str:
+    """Return the text of a given value for a message: one line of at most 80 characters.
+
+    Every message quotes what it was given by this, or by a format that cuts it, such as `!r:.80`.
+    """
+    try:
+        text = " ".join(_SHORT.repr(value).split())
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        return f"a huge {type(value).__name__}"
+    return text if len(text) <= _MOST_SHOWN else f"{text[:38]}...{text[-39:]}"
+
 
 class HybridNavError(Exception):
     """Base of every error that hybridnav raises on purpose; its text is one line."""

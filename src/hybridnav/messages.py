@@ -5,12 +5,11 @@ from __future__ import annotations
 import importlib
 import math
 import operator
-import reprlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from hybridnav._trig import asin, atan2, cos, sin
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
@@ -68,7 +67,7 @@ def number_of(message: Any, path: str, what: str) -> float:
         except (TypeError, ValueError, OverflowError):
             number = math.nan
     if not math.isfinite(number):
-        raise InvalidValueError(f"{what}: {path} must be a finite number, got {_brief(value)}")
+        raise InvalidValueError(f"{what}: {path} must be a finite number, got {brief(value)}")
     return number
 
 
@@ -82,7 +81,7 @@ def count_of(message: Any, path: str, what: str) -> int:
         number = 0
     if number < 1:
         raise InvalidValueError(
-            f"{what}: {path} must be a whole number of 1 or more, got {_brief(value)}"
+            f"{what}: {path} must be a whole number of 1 or more, got {brief(value)}"
         )
     return number
 
@@ -228,7 +227,7 @@ def header_message(frame_id: str, stamp_ns: int) -> dict[str, Any]:
     """
     if not isinstance(frame_id, str) or not frame_id:
         raise InvalidValueError(
-            f"frame_id must be the name of a frame, such as map, got {_brief(frame_id)}"
+            f"frame_id must be the name of a frame, such as map, got {brief(frame_id)}"
         )
     try:
         stamp = operator.index(stamp_ns)
@@ -237,7 +236,7 @@ def header_message(frame_id: str, stamp_ns: int) -> dict[str, Any]:
     if not 0 <= stamp < _MOST_STAMP_NS:
         raise InvalidValueError(
             f"stamp_ns must be whole nanoseconds since 1970, 0 to {_MOST_STAMP_NS - 1}, "
-            f"got {_brief(stamp_ns)}"
+            f"got {brief(stamp_ns)}"
         )
     return {
         "stamp": {"sec": stamp // _NANO, "nanosec": stamp % _NANO},
@@ -334,8 +333,3 @@ def _element_type(message: Any, name: str) -> Any:
     kind = message.get_fields_and_field_types()[name]
     package, _, short = kind.removeprefix("sequence<").removesuffix(">").partition("/")
     return getattr(importlib.import_module(f"{package}.msg"), short)
-
-
-def _brief(value: Any) -> str:
-    """Return a short text of a value on one line."""
-    return " ".join(reprlib.repr(value).split())[:80]

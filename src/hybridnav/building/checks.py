@@ -80,7 +80,7 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
         checked_type("links", link, Link)
         if not link.name.strip() or not link.name.isprintable():
             raise InvalidValueError(
-                f"a link needs a name of one printable line, got {link.name!r:.90}"
+                f"a link needs a name of one printable line, got {link.name!r:.80}"
             )
         if link.name in seen:
             raise InvalidValueError(f"link {link.name}: the name is given twice")
@@ -99,7 +99,7 @@ def check_ends(link: Link, floors: Mapping[str, Floor]) -> None:
     for end in link.ends:
         if end.floor not in floors:
             raise InvalidValueError(
-                f"link {link.name}: no floor is called {end.floor!r:.90}"
+                f"link {link.name}: no floor is called {end.floor!r:.80}"
                 f"{did_you_mean(end.floor, tuple(floors))}"
             )
         if link.admits(floors[end.floor].planner.topology.grid.robot_radius_m):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hybridnav.building.search import Endpoint
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid.names import did_you_mean, place_of_name
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point
 from hybridnav.planner.named import check_names
@@ -68,11 +68,11 @@ def _floor_of_name(name: str, floors: Sequence[Floor]) -> int:
     if not found:
         known = tuple(dict.fromkeys(each for names in names_of for each in names))
         hint = did_you_mean(name, known) if known else ": no floor has rooms"
-        raise InvalidValueError(f"no room or point of the building is called {name!r:.90}{hint}")
+        raise InvalidValueError(f"no room or point of the building is called {name!r:.80}{hint}")
     on = " and ".join(floors[number].name for number in found[:3])
     raise InvalidValueError(
-        f"{name!r:.90} is a name on floors {on}: give the floor too, as "
-        f"({floors[found[0]].name!r}, {name!r:.90})"
+        f"{name!r:.80} is a name on floors {on}: give the floor too, as "
+        f"({brief(floors[found[0]].name)}, {name!r:.80})"
     )
 
 

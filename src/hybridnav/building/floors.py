@@ -53,10 +53,10 @@ class Floor:
         """Refuse names that no line can hold, and heights that are not numbers."""
         name = self.name
         if not isinstance(name, str) or not name.strip() or not name.isprintable():
-            raise InvalidValueError(f"a floor needs a name of one printable line, got {name!r:.90}")
+            raise InvalidValueError(f"a floor needs a name of one printable line, got {name!r:.80}")
         if len(name) > _MAX_NAME:
             raise InvalidValueError(
-                f"the name of a floor has at most {_MAX_NAME} characters, got {name!r:.90}"
+                f"the name of a floor has at most {_MAX_NAME} characters, got {name!r:.80}"
             )
         if not math.isfinite(self.elevation_m):
             raise InvalidValueError(

@@ -86,7 +86,7 @@ def parsed_closing(texts: list[str] | None) -> Closing:
         kind, colon, name = text.partition(":")
         if not text or (colon and kind in _KINDS and not name.strip()):
             kinds = "door:N, room:NAME, keepout:FILE"
-            raise UsageError(f"--blocked must be {kinds} or a file, got {text!r:.90}")
+            raise UsageError(f"--blocked must be {kinds} or a file, got {text!r:.80}")
         if colon and kind == "door":
             doors.append(_number(name))
         elif colon and kind == "room":
@@ -120,5 +120,5 @@ def _number(text: str) -> int:
     except ValueError:
         raise UsageError(
             f"--blocked door: expected the number of a door, as hybridnav rooms MAP --plot draws "
-            f"it, got {text!r:.90}"
+            f"it, got {text!r:.80}"
         ) from None

@@ -89,7 +89,7 @@ def build(
     MAP may be a building; `hybridnav plan` takes its model.
     """
     if not is_model_file(out):
-        raise UsageError(f"--out must end in {MODEL_SUFFIX}, got {str(out)!r}")
+        raise UsageError(f"--out must end in {MODEL_SUFFIX}, got '{printable(out)}'")
     if rooms_file is not None and find_rooms:
         raise UsageError("--find-rooms is for maps without a file of rooms, --rooms names one")
     check_writable(out, "--out")

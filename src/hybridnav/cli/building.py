@@ -214,7 +214,7 @@ class BuildingRequest:
             if not colon or not rest.strip():
                 raise UsageError(
                     "--blocked must be link:NAME, or FLOOR: and what is closed there, as 2:door:7, "
-                    f"got {text!r:.90}"
+                    f"got {text!r:.80}"
                 )
             if kind == "link":
                 links.append(building.link(rest).name)
@@ -296,11 +296,11 @@ def _endpoint(text: str, building: hn.Building) -> Any:
             if point is None:
                 return name, rest
             if len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
-                raise UsageError(f"expected FLOOR:X,Y, finite numbers of metres, got {text!r:.90}")
+                raise UsageError(f"expected FLOOR:X,Y, finite numbers of metres, got {text!r:.80}")
             return name, point
     if read_point(text) is not None:
         raise UsageError(
-            f"a point of a building needs its floor, as {floors[0]}:{text}, got {text!r:.90}"
+            f"a point of a building needs its floor, as {floors[0]}:{text}, got {text!r:.80}"
         )
     floor, colon, _ = text.partition(":")
     if colon:

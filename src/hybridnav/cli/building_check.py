@@ -144,9 +144,9 @@ def _names_of(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         name, equals, own = text.rpartition("=")
         if not equals or not name or not own:
-            raise UsageError(f"--match must be NAME=FLOOR, got {text!r:.90}")
+            raise UsageError(f"--match must be NAME=FLOOR, got {text!r:.80}")
         if name in names:
-            raise UsageError(f"--match has floor {name!r:.90} of the graph twice, expected once")
+            raise UsageError(f"--match has floor {name!r:.80} of the graph twice, expected once")
         names[name] = own
     return names
 

@@ -164,15 +164,15 @@ def check_output(path: Path | None, option: str, endings: Sequence[str]) -> None
     if path is None:
         return
     if path.suffix.lower() not in endings:
-        raise UsageError(f"{option} must end in {', '.join(endings)}, got {str(path)!r}")
+        raise UsageError(f"{option} must end in {', '.join(endings)}, got '{printable(path)}'")
     try:
         in_folder, is_folder = path.parent.is_dir(), path.is_dir()
     except OSError as error:  # a name that is too long
-        raise UsageError(f"{option} {str(path)!r}: {error.strerror}") from None
+        raise UsageError(f"{option} '{printable(path)}': {error.strerror}") from None
     if not in_folder:
-        raise UsageError(f"{option}: there is no folder {str(path.parent)!r}")
+        raise UsageError(f"{option}: there is no folder '{printable(path.parent)}'")
     if is_folder:
-        raise UsageError(f"{option} must name a file, {str(path)!r} is a folder")
+        raise UsageError(f"{option} must name a file, '{printable(path)}' is a folder")
     check_writable(path, option)
 
 
@@ -181,11 +181,11 @@ def check_new(path: Path, option: str) -> None:
     try:
         is_taken, in_folder = path.exists(), path.parent.is_dir()
     except OSError as error:  # a name that is too long
-        raise UsageError(f"{option} {str(path)!r}: {error.strerror}") from None
+        raise UsageError(f"{option} '{printable(path)}': {error.strerror}") from None
     if is_taken:
-        raise UsageError(f"{option}: {str(path)!r} exists, expected a new name")
+        raise UsageError(f"{option}: '{printable(path)}' exists, expected a new name")
     if not in_folder:
-        raise UsageError(f"{option}: there is no folder {str(path.parent)!r}")
+        raise UsageError(f"{option}: there is no folder '{printable(path.parent)}'")
 
 
 def check_writable(path: Path, option: str) -> None:
@@ -193,7 +193,7 @@ def check_writable(path: Path, option: str) -> None:
     try:
         check_replaceable(path)
     except OSError as error:
-        raise UsageError(f"{option}: cannot write {str(path)!r}: {error.strerror}") from None
+        raise UsageError(f"{option}: cannot write '{printable(path)}': {error.strerror}") from None
 
 
 @dataclass(frozen=True)

@@ -169,7 +169,7 @@ def _rule(text: str) -> By:
 def _point(text: str) -> tuple[float, float]:
     point = read_point(text)
     if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
-        raise UsageError(f"--start must be two finite numbers X,Y in metres, got {text!r:.90}")
+        raise UsageError(f"--start must be two finite numbers X,Y in metres, got {text!r:.80}")
     return point[0], point[1]
 
 
@@ -182,7 +182,7 @@ def _check_kept(map_file: Path, out: Path) -> None:
         kept |= {file.resolve() for file in files_of(map_file)}
     if not kept.isdisjoint({out.resolve(), out.with_suffix(".pgm").resolve()}):
         raise UsageError(
-            f"--out {str(out)!r:.90} would replace the floor plan, expected another name: "
+            f"--out {str(out)!r:.80} would replace the floor plan, expected another name: "
             "choose one"
         )
 

@@ -93,4 +93,4 @@ def write_page(page: str, out: Path) -> None:
     try:
         replace_file(out, page.encode())
     except OSError as error:
-        raise UsageError(f"--out: cannot write {str(out)!r}: {error.strerror}") from None
+        raise UsageError(f"--out: cannot write '{printable(out)}': {error.strerror}") from None

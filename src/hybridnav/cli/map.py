@@ -123,12 +123,12 @@ def map(  # noqa: A001 - the command's name
 ) -> None:
     """Make a map of the laser scans in LOG, whose poses are taken as given, or of its own map."""
     if out.suffix.lower() not in {".yaml", ".yml"}:
-        raise UsageError(f"--out must end in .yaml or .yml, got {str(out)!r}")
+        raise UsageError(f"--out must end in .yaml or .yml, got '{printable(out)}'")
     for file in (out, out.with_suffix(".pgm")):
         check_writable(file, "--out")
         if file.resolve() == log_file.resolve():
             raise UsageError(
-                f"--out {str(out)!r:.90} would replace the log, expected another name: choose one"
+                f"--out {str(out)!r:.80} would replace the log, expected another name: choose one"
             )
     if topic is not None and is_bag(log_file) and _write_kept(log_file, topic, out, as_json):
         return

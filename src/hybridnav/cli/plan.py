@@ -45,6 +45,7 @@ from hybridnav.cli.options import (
     SmoothOption,
 )
 from hybridnav.cli.request import Request
+from hybridnav.errors import brief
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 from hybridnav.sentences import check_language, languages
@@ -61,9 +62,11 @@ def _point(text: str) -> Point | str:
     if point is None and ":" in text:
         return text  # of a building: FLOOR:X,Y
     if point is None:
-        raise typer.BadParameter(f"expected X,Y in metres, or X,Y,YAW, got {text!r}")
+        raise typer.BadParameter(f"expected X,Y in metres, or X,Y,YAW, got {brief(text)}")
     if not all(map(math.isfinite, point)):
-        raise typer.BadParameter(f"expected finite numbers of metres and radians, got {text!r}")
+        raise typer.BadParameter(
+            f"expected finite numbers of metres and radians, got {brief(text)}"
+        )
     return point
 
 
@@ -262,7 +265,7 @@ def _one_of(option: str, point: Any, other: str, text: str | None) -> Waypoint:
         what = "missing option" if point is None else "only one is taken, of"
         raise UsageError(f"{what} '--{option}' or '--{other}'; see hybridnav plan --help")
     if isinstance(point, str):
-        raise UsageError(f"--{option}: expected X,Y in metres, or X,Y,YAW, got {point!r:.90}")
+        raise UsageError(f"--{option}: expected X,Y in metres, or X,Y,YAW, got {point!r:.80}")
     return _parsed_waypoint(text) if text is not None else point
 
 
@@ -272,7 +275,7 @@ def _parsed_waypoint(text: str) -> Waypoint:
     if point is None:
         return text
     if not all(map(math.isfinite, point)):
-        raise UsageError(f"expected a name, or finite numbers X,Y or X,Y,YAW, got {text!r:.90}")
+        raise UsageError(f"expected a name, or finite numbers X,Y or X,Y,YAW, got {text!r:.80}")
     return point
 
 

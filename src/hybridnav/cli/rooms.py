@@ -191,7 +191,7 @@ def _asked_point(text: str | None, out: Path | None, plot: Path | None) -> Point
         raise UsageError("--at prints one room: leave out --out and --plot")
     point = read_point(text)
     if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
-        raise UsageError(f"--at must be two finite numbers X,Y in metres, got {text!r:.90}")
+        raise UsageError(f"--at must be two finite numbers X,Y in metres, got {text!r:.80}")
     return point[0], point[1]
 
 

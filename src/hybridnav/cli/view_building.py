@@ -133,7 +133,7 @@ def _query(text: str, session: BuildingSession) -> FloorsPlanQuery:
     if found is None:
         raise UsageError(
             "--route of a building must be FLOOR:X,Y:FLOOR:X,Y, floors of "
-            f"{', '.join(names):.200}, got {text!r:.90}"
+            f"{', '.join(names):.200}, got {text!r:.80}"
         )
     ends = []
     for name, typed in (found.group(1, 2), found.group(3, 4)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import reprlib
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
@@ -24,7 +23,7 @@ from pydantic_core import PydanticCustomError
 from hybridnav._files import printable
 from hybridnav.config.ompl import OmplSettings  # noqa: TC001 - pydantic reads it
 from hybridnav.config.yaml_file import parse_value, read_yaml
-from hybridnav.errors import PresetError, PresetNotFoundError
+from hybridnav.errors import PresetError, PresetNotFoundError, brief
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -50,9 +49,6 @@ _REFINED_BY = {
 
 _REFINERS = ("grid-astar", "ompl", "none")
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
-
-_MAX_SHOWN = 80
-"""Characters of a setting that a message quotes."""
 
 
 def _no_boolean(value: Any) -> Any:
@@ -342,7 +338,7 @@ def _find(source: PathLike) -> Path:
     if name in preset_names():
         return next(file for f in _FOLDERS if (file := f / f"{name}.yaml").is_file())
     raise PresetNotFoundError(
-        f"no preset is called {name!r}: there are {', '.join(preset_names())}; "
+        f"no preset is called {brief(name)}: there are {', '.join(preset_names())}; "
         "a file is given by its path, with .yaml"
     )
 
@@ -353,7 +349,7 @@ def _apply(tree: dict[str, Any], override: str) -> None:
     if not (equals and dot and name and isinstance(tree.get(section), dict)):
         sections = " or ".join(key for key, value in tree.items() if isinstance(value, dict))
         raise PresetError(
-            f"setting {override[:_MAX_SHOWN]!r}: expected section.key=value, section {sections}"
+            f"setting {brief(override)}: expected section.key=value, section {sections}"
         )
     *inner, name = name.split(".")
     branch = tree[section]
@@ -366,7 +362,7 @@ def _apply(tree: dict[str, Any], override: str) -> None:
         branch[name] = parse_value(text)
     except (yaml.YAMLError, ValueError, RecursionError):
         raise PresetError(
-            f"setting {printable(key)}: the value is not YAML: {text[:_MAX_SHOWN]!r}"
+            f"setting {printable(key)}: the value is not YAML: {brief(text)}"
         ) from None
 
 
@@ -390,7 +386,7 @@ def _first_problem(error: ValidationError) -> str:
         expected = text[:1].lower() + text[1:]
     if isinstance(given, dict):  # a check of several keys names what it found itself
         return f"{key}: {expected.removeprefix('input ')}"
-    shown = "nothing" if given is None else reprlib.repr(given)
+    shown = "nothing" if given is None else brief(given)
     return f"{key}: {expected.removeprefix('input ')}, got {shown}"
 
 

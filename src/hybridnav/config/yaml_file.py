@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 import stat
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from yaml.composer import ComposerError
 from yaml.constructor import ConstructorError
 
 from hybridnav._files import printable
+from hybridnav.errors import brief
 
 if TYPE_CHECKING:
     from yaml.nodes import MappingNode, Node
@@ -133,11 +133,11 @@ def read_marked(
     )
     data, root = _constructed(text, where, error, limits)
     if not isinstance(data, dict):
-        given = "nothing" if data is None else reprlib.repr(data)
+        given = "nothing" if data is None else brief(data)
         raise error(f"{where}: expected a mapping of keys to values, got {given}")
     for key in data:
         if not isinstance(key, str):
-            raise error(f"{where}: every key must be text, got {reprlib.repr(key)}")
+            raise error(f"{where}: every key must be text, got {brief(key)}")
     return Marked(data, text, root)
 
 
@@ -320,7 +320,7 @@ class _LimitedLoader(_PlainLoader):
         return node
 
     def _problem(self, event: Any, height: int) -> str | None:
-        name = reprlib.repr(event.anchor)
+        name = brief(event.anchor)
         if event.anchor is not None and not self._limits.aliases:
             return f"anchors and aliases are not supported, got {name}"
         problem = None
@@ -328,7 +328,7 @@ class _LimitedLoader(_PlainLoader):
             if event.anchor in self._open:
                 problem = f"alias {name} stands for what contains it"
         elif event.tag is not None:
-            problem = f"tags are not supported, got {reprlib.repr(event.tag)}"
+            problem = f"tags are not supported, got {brief(event.tag)}"
         elif isinstance(event, yaml.ScalarEvent) and len(event.value) > _MAX_CHARACTERS:
             problem = f"a value has more than {_MAX_CHARACTERS} characters"
         if self._depth + height >= _MAX_DEPTH:
@@ -344,7 +344,7 @@ class _LimitedLoader(_PlainLoader):
             if not isinstance(key, yaml.ScalarNode):
                 continue
             if (key.tag, key.value) in seen:
-                problem = f"key {reprlib.repr(key.value)} is given twice"
+                problem = f"key {brief(key.value)} is given twice"
                 raise ComposerError(None, None, problem, key.start_mark)
             seen.add((key.tag, key.value))
         return node

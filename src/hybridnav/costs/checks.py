@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav.costs.inflation import HIGHEST
-from hybridnav.errors import InvalidValueError
-from hybridnav.grid.checks import brief
+from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

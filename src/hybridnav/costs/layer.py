@@ -23,8 +23,8 @@ from hybridnav.costs.checks import (
 )
 from hybridnav.costs.inflation import HIGHEST, inflated_costs
 from hybridnav.costs.sources import changed_source, joined_source
-from hybridnav.errors import InvalidValueError
-from hybridnav.grid.checks import brief, checked_cell, checked_type
+from hybridnav.errors import InvalidValueError, brief
+from hybridnav.grid.checks import checked_cell, checked_type
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._progress import no_progress
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.edges import SightPairs, missing_bends, sight_edges
 from hybridnav.graphs.facts import described
 from hybridnav.graphs.nodes import Nodes, add_landmarks, bends_of
@@ -134,7 +134,7 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
     add_landmarks(chosen, topology, is_kept, min(wanted.bend, wanted.spacing))
     if not len(chosen):
         raise InvalidValueError(
-            f"map {grid.name!r} has no free part of {LEAST_AREA_M2:g} m² or more for a robot "
+            f"map {brief(grid.name)} has no free part of {LEAST_AREA_M2:g} m² or more for a robot "
             f"radius of {grid.robot_radius_m:g} m: give a smaller radius"
         )
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.attach import MANY_CANDIDATES, Network
 from hybridnav.graphs.route_graph import RouteGraph
 from hybridnav.graphs.space import FreeSpace
@@ -103,7 +103,7 @@ def judge_route_graph(
     starts, goals, optimum = starts[counts], goals[counts], optimum[counts]
     if not len(starts):
         raise InvalidValueError(
-            f"map {graph.grid.name!r} has no pair of free points {least_m:g} m apart: "
+            f"map {brief(graph.grid.name)} has no pair of free points {least_m:g} m apart: "
             "lower least_m or the robot's radius"
         )
     network = Network.of(space.sight, graph.positions, graph.edges)

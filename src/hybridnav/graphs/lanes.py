@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.facts import described
 from hybridnav.graphs.nodes import Nodes
 from hybridnav.graphs.route_graph import LANE, RouteGraph
@@ -70,8 +70,8 @@ def keep_right(topology: TopologicalMap, graph: RouteGraph, *, apart_m: float) -
     checked_between("apart_m", apart_m, max(2 * grid.robot_radius_m, 1e-3), 100)
     if graph.grid is not grid:
         raise InvalidValueError(
-            f"the graph is one of map {graph.grid.name!r}, expected one that was built from this "
-            f"topology of {grid.name!r}: build it again"
+            f"the graph is one of map {brief(graph.grid.name)}, expected one that was built from "
+            f"this topology of {brief(grid.name)}: build it again"
         )
     space = FreeSpace.of(grid)
     # Nodes of lanes along rows and columns would often lie on sides of cells.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._copies import frozen
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.attach import adjacency, shortest_routes
 from hybridnav.graphs.metadata import edge_metadata, node_metadata
 from hybridnav.graphs.route_graph import RouteGraph
@@ -64,7 +64,7 @@ def merge_bends(graph: RouteGraph, *, stretch: float = 1.05) -> WaypointGraph:
     checked_between("stretch", stretch, 1, 1e6)
     if graph.is_lane.any():
         raise InvalidValueError(
-            f"the graph of map {graph.grid.name!r} has lanes, whose edges are straight: merge "
+            f"the graph of map {brief(graph.grid.name)} has lanes, whose edges are straight: merge "
             "bends of the graph without lanes"
         )
     kept = np.array([node for node, kind in enumerate(graph.kinds) if kind in _LANDMARKS])

@@ -7,17 +7,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 
 _T = TypeVar("_T")
-
-
-def brief(value: Any) -> str:
-    """Return the begin of the text of a value, on one line."""
-    try:
-        return " ".join(f"{value!r:.60}".split())
-    except ValueError:  # Python writes no integer of more than 4300 digits
-        return f"a huge {type(value).__name__}"
 
 
 def checked_type(name: str, value: Any, kind: type[_T]) -> _T:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from typing import Literal
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 
 MAX_NAME = 80
 """Characters of a name at most."""
@@ -30,15 +30,15 @@ def check_names(names: tuple[str, ...]) -> None:
     seen: set[str] = set()
     for name in names:
         if not isinstance(name, str) or not name.strip() or not name.isprintable():
-            raise InvalidValueError(f"a room needs a name of one printable line, got {name!r:.90}")
+            raise InvalidValueError(f"a room needs a name of one printable line, got {name!r:.80}")
         if len(name) > MAX_NAME:
-            raise InvalidValueError(f"a name has at most {MAX_NAME} characters, got {name!r:.90}")
+            raise InvalidValueError(f"a name has at most {MAX_NAME} characters, got {name!r:.80}")
         if read_point(name) is not None:
             raise InvalidValueError(
-                f"a name must not read as a point, got {name!r}: a plan could not go there"
+                f"a name must not read as a point, got {brief(name)}: a plan could not go there"
             )
         if name in seen:
-            raise InvalidValueError(f"room {name!r}: the name is given twice")
+            raise InvalidValueError(f"room {brief(name)}: the name is given twice")
         seen.add(name)
 
 
@@ -75,7 +75,7 @@ def place_of_name(name: str, known: tuple[str, ...], what: str) -> int:
     """
     if name in known:
         return known.index(name)
-    raise InvalidValueError(f"no {what} is called {name!r:.90}{did_you_mean(str(name), known)}")
+    raise InvalidValueError(f"no {what} is called {name!r:.80}{did_you_mean(str(name), known)}")
 
 
 def check_number(number: int) -> int:

@@ -81,8 +81,8 @@ class RoomLabels:
             )
         label_of.flags.writeable = False
         check_names(tuple(self.points))
-        points = {name: _point(f"point {name!r:.90}", at) for name, at in self.points.items()}
-        doors = {check_number(n): _point(f"door {n!r:.90}", at) for n, at in self.doors.items()}
+        points = {name: _point(f"point {name!r:.80}", at) for name, at in self.points.items()}
+        doors = {check_number(n): _point(f"door {n!r:.80}", at) for n, at in self.doors.items()}
         for name, value in (
             ("names", names),
             ("label_of", label_of),
@@ -101,7 +101,7 @@ class RoomLabels:
         """
         if name in self.names:
             return self.names.index(name)
-        raise InvalidValueError(f"no room is called {name!r:.90}{did_you_mean(name, self.names)}")
+        raise InvalidValueError(f"no room is called {name!r:.80}{did_you_mean(name, self.names)}")
 
     def at(self, point: Point, grid: OccupancyGrid) -> str | None:
         """Return the name of the room that a point lies in.

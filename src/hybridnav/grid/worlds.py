@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hybridnav._files import replace_file
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid.frame import Frame
 from hybridnav.grid.limits import MAX_CELLS
 from hybridnav.grid.worlds_base import FREE, OCCUPIED, UNEXPLORED, World
@@ -165,7 +165,7 @@ def write_world(world: World, folder: PathLike, name: str) -> Path:
     """
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name):
         raise InvalidValueError(
-            f"a map's name must be a plain file name without an ending, got {name!r}"
+            f"a map's name must be a plain file name without an ending, got {brief(name)}"
         )
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.own_grid import checked_grid
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def baseline_name(name: str, known: Iterable[str]) -> str:
     near = difflib.get_close_matches(found, [*names, *ALIASES], n=1)
     hint = f" (did you mean {near[0]}?)" if near else ""
     raise InvalidValueError(
-        f"no baseline is called {name!r}{hint}: there are {', '.join(names)}, or module:class"
+        f"no baseline is called {brief(name)}{hint}: there are {', '.join(names)}, or module:class"
     )
 
 
@@ -203,10 +203,12 @@ def read_methods(path: PathLike) -> tuple[NamedMethod, ...]:
 
 def _entry(entry: Any, where: str) -> NamedMethod:
     if not isinstance(entry, dict):
-        raise InvalidValueError(f"{where}: expected keys and values, got {entry!r}")
+        raise InvalidValueError(f"{where}: expected keys and values, got {brief(entry)}")
     unknown = [key for key in entry if key not in _KEYS]
     if unknown:
-        raise InvalidValueError(f"{where}: no key {unknown[0]!r}: there are {', '.join(_KEYS)}")
+        raise InvalidValueError(
+            f"{where}: no key {brief(unknown[0])}: there are {', '.join(_KEYS)}"
+        )
     kinds = [key for key in _SOURCES if key in entry]
     if len(kinds) != 1:
         raise InvalidValueError(f"{where}: expected one of {', '.join(_SOURCES)}, got {kinds}")
@@ -214,7 +216,7 @@ def _entry(entry: Any, where: str) -> NamedMethod:
     if not isinstance(source, str) or not isinstance(name, str):
         raise InvalidValueError(f"{where}: {kinds[0]} and name must be texts")
     if kinds[0] == "class" and ":" not in source:
-        raise InvalidValueError(f"{where}: class {source!r} must be written module:class")
+        raise InvalidValueError(f"{where}: class {brief(source)} must be written module:class")
     settings = entry.get("settings") or {}
     if not isinstance(settings, dict) or not all(isinstance(key, str) for key in settings):
         raise InvalidValueError(f"{where}: settings must be keys with values")

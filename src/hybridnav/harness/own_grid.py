@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.baselines import MethodResult
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import CellClass
 
 if TYPE_CHECKING:
@@ -30,15 +30,15 @@ def checked_grid(given: Any) -> dict[str, Any]:
     """
     if not isinstance(given, dict) or given.keys() - {"robot_radius_m", "corner_cutting"}:
         raise InvalidValueError(
-            f"grid has the keys robot_radius_m, in metres, and corner_cutting, got {given!r}"
+            f"grid has the keys robot_radius_m, in metres, and corner_cutting, got {brief(given)}"
         )
     radius = given.get("robot_radius_m", 0)
     is_number = isinstance(radius, (int, float)) and not isinstance(radius, bool)
     if not is_number or not 0 <= radius <= _MOST_RADIUS_M:
-        raise InvalidValueError(f"grid: robot_radius_m is a number of metres, got {radius!r}")
+        raise InvalidValueError(f"grid: robot_radius_m is a number of metres, got {brief(radius)}")
     if not isinstance(given.get("corner_cutting", False), bool):
         raise InvalidValueError(
-            f"grid: corner_cutting is true or false, got {given['corner_cutting']!r}"
+            f"grid: corner_cutting is true or false, got {brief(given['corner_cutting'])}"
         )
     return dict(given)
 

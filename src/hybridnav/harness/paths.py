@@ -67,7 +67,7 @@ def decode_path(start: Cell, text: str) -> LongArray:
         step = STEPS[[_LETTERS.index(letter)]] if letter else np.array([[int(rows), int(cols)]])
         runs.append((step, int(count or 1)))
     if end != len(text):
-        raise InvalidValueError(f"no path: {text[end : end + 20]!r} at character {end}")
+        raise InvalidValueError(f"no path: {text[end : end + 20]!r:.80} at character {end}")
     steps = [np.repeat(step, times, axis=0) for step, times in runs]
     cells: LongArray = np.cumsum(np.concatenate([np.array([start]), *steps]), axis=0)
     return cells

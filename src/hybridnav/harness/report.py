@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, StrictUndefined
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -36,7 +36,7 @@ class Table:
         for row in self.rows:
             if len(row) != len(self.columns):
                 raise InvalidValueError(
-                    f"table {self.caption!r}: a row has {len(row)} cells, "
+                    f"table {brief(self.caption)}: a row has {len(row)} cells, "
                     f"expected {len(self.columns)}"
                 )
 

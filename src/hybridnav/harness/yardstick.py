@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, get_args
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import CellClass
 from hybridnav.mesh import MeshSearch, build_mesh
 
@@ -27,7 +27,7 @@ def check_yardstick(metric: str) -> None:
     """Raise `InvalidValueError` if there is no such yardstick."""
     if metric not in get_args(Yardstick):
         known = ", ".join(get_args(Yardstick))
-        raise InvalidValueError(f"losses refer to one of {known}, got metric {metric!r}")
+        raise InvalidValueError(f"losses refer to one of {known}, got metric {brief(metric)}")
 
 
 class AnyAngleOptimum:

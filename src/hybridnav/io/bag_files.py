@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import reprlib
 from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybridnav._files import printable
-from hybridnav.errors import HybridNavError, MapError, MapNotFoundError
+from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, brief
 from hybridnav.io.bag_limits import TooLargeError, bound_rosbags
 
 if TYPE_CHECKING:
@@ -105,7 +104,7 @@ class Bag:
             return found[0]
         if topic in found:
             return str(topic)
-        named = "a topic" if topic is None else f"topic {reprlib.repr(topic)}"
+        named = "a topic" if topic is None else f"topic {brief(topic)}"
         if not found:
             raise MapError(f"{self.where}: expected {named} of {short}, got no topic of that type")
         raise MapError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import reprlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ import shapely
 
 from hybridnav._files import printable
 from hybridnav.config.yaml_file import Limits, open_file
-from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 from hybridnav.io.image import read_raster
 from hybridnav.io.masks import load_keepout_mask
 from hybridnav.planner.areas import parts_on
@@ -194,22 +193,22 @@ def _geometries(data: Any, where: str) -> Iterator[tuple[str, Any]]:
     elif kind == "FeatureCollection":
         features = data.get("features")
         if not isinstance(features, list):
-            raise MapError(f"{where}: features must be a list, got {reprlib.repr(features)}")
+            raise MapError(f"{where}: features must be a list, got {brief(features)}")
         for number, feature in enumerate(features, start=1):
             at = f"{where}: feature {number}"
             if not isinstance(feature, dict) or feature.get("type") != "Feature":
-                raise MapError(f"{at}: expected a Feature, got {reprlib.repr(feature)}")
+                raise MapError(f"{at}: expected a Feature, got {brief(feature)}")
             yield at, feature.get("geometry")
     elif isinstance(data, dict):
         yield where, data
     else:
-        raise MapError(f"{where}: expected a GeoJSON object, got {reprlib.repr(data)}")
+        raise MapError(f"{where}: expected a GeoJSON object, got {brief(data)}")
 
 
 def _area(geometry: Any, at: str) -> BaseGeometry:
     kind = geometry.get("type") if isinstance(geometry, dict) else None
     if kind not in _KINDS:
-        given = reprlib.repr(geometry if kind is None else kind)
+        given = brief(geometry if kind is None else kind)
         raise MapError(f"{at}: expected a geometry of {', '.join(_KINDS)}, got {given}")
     coordinates = geometry.get("coordinates")
     if kind == "LineString":
@@ -236,7 +235,7 @@ def _points(positions: Any, kind: str, at: str) -> list[tuple[float, float]]:
 
 def _list_of(value: Any, at: str) -> list[Any]:
     if not isinstance(value, list) or not value:
-        raise MapError(f"{at}: coordinates must be lists of positions, got {reprlib.repr(value)}")
+        raise MapError(f"{at}: coordinates must be lists of positions, got {brief(value)}")
     return value
 
 
@@ -247,8 +246,7 @@ def _point(position: Any, at: str) -> tuple[float, float]:
         x, y = (_number(value) for value in position[:2])
     if not (math.isfinite(x) and math.isfinite(y)):
         raise MapError(
-            f"{at}: a position must be [x, y], finite numbers of metres, "
-            f"got {reprlib.repr(position)}"
+            f"{at}: a position must be [x, y], finite numbers of metres, got {brief(position)}"
         )
     return x, y
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import reprlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, get_args
 
 from hybridnav._files import printable
 from hybridnav.building import LinkKind
 from hybridnav.config.yaml_file import Limits, Marked, read_marked
-from hybridnav.errors import MapError, MapNotFoundError
+from hybridnav.errors import MapError, MapNotFoundError, brief
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -129,7 +128,7 @@ def _floor(item: Any, at: str) -> FloorEntry:
     name, elevation_m = values.name("name", needed=True), values.number("elevation_m")
     rooms_file, find = values.text("rooms"), values.given.get("find_rooms", False)
     if not isinstance(find, bool):
-        raise MapError(f"{at}: find_rooms must be true or false, got {reprlib.repr(find)}")
+        raise MapError(f"{at}: find_rooms must be true or false, got {brief(find)}")
     if find and rooms_file is not None:
         raise MapError(f"{at}: rooms and find_rooms are both given: leave one out")
     map_file = values.text("map")
@@ -145,9 +144,7 @@ def _link(marked: Marked, where: str, item: Any, index: int) -> LinkEntry:
     kind: Any = values.given.get("kind")
     known = get_args(LinkKind)
     if kind not in known:
-        raise MapError(
-            f"{at}: link {name}: kind must be {', '.join(known)}, got {reprlib.repr(kind)}"
-        )
+        raise MapError(f"{at}: link {name}: kind must be {', '.join(known)}, got {brief(kind)}")
     ends = values.list_of("ends", MOST_FLOORS)
     numbers = {key: values.number(key) for key in _LINK_KEYS[3:]}
     return LinkEntry(
@@ -168,7 +165,7 @@ def _end(item: Any, at: str) -> EndEntry:
     at = f"{at}: its end on floor {floor}"
     door, point = values.given.get("door"), values.given.get("at")
     if door is not None and (isinstance(door, bool) or not isinstance(door, int)):
-        raise MapError(f"{at}: door must be the number of a door, got {reprlib.repr(door)}")
+        raise MapError(f"{at}: door must be the number of a door, got {brief(door)}")
     if point is not None and door is not None:
         raise MapError(f"{at}: at and door are both given: leave one out")
     if point is None and door is None and room is None:
@@ -176,7 +173,7 @@ def _end(item: Any, at: str) -> EndEntry:
     xy = None
     if point is not None:
         if not isinstance(point, list) or len(point) != 2:  # noqa: PLR2004
-            raise MapError(f"{at}: at must be [x, y] in metres, got {reprlib.repr(point)}")
+            raise MapError(f"{at}: at must be [x, y] in metres, got {brief(point)}")
         x, y = (_number(number, f"{at}: at") for number in point)
         xy = x, y
     return EndEntry(floor, xy, room, door, values.number("yaw_rad"), at)
@@ -188,10 +185,10 @@ class _Values:
     def __init__(self, given: Any, at: str, known: tuple[str, ...]) -> None:
         if not isinstance(given, dict):
             expected = f"expected a mapping with {', '.join(known[:3])}"
-            raise MapError(f"{at}: {expected}, got {reprlib.repr(given)}")
+            raise MapError(f"{at}: {expected}, got {brief(given)}")
         for key in given:
             if key not in known:
-                shown = reprlib.repr(key)
+                shown = brief(key)
                 raise MapError(f"{at}: unknown key {shown}; known are {', '.join(known)}")
         self.given, self._at = given, at
 
@@ -201,7 +198,7 @@ class _Values:
         if value is None:
             return []
         if not isinstance(value, list):
-            raise MapError(f"{self._at}: {key} must be a list, got {reprlib.repr(value)}")
+            raise MapError(f"{self._at}: {key} must be a list, got {brief(value)}")
         if len(value) > most:
             raise MapError(f"{self._at}: {key} has {len(value)} items, at most {most} are read")
         return value
@@ -210,7 +207,7 @@ class _Values:
         """Return a text, None if it is not given."""
         value = self.given.get(key)
         if value is not None and (not isinstance(value, str) or not value):
-            raise MapError(f"{self._at}: {key} must be a text, got {reprlib.repr(value)}")
+            raise MapError(f"{self._at}: {key} must be a text, got {brief(value)}")
         return value
 
     def name(self, key: str, *, needed: bool = False) -> str | None:
@@ -223,7 +220,7 @@ class _Values:
         if isinstance(value, float):
             raise MapError(f'{self._at}: {key} {value} is a number: write it as "{value}"')
         if not isinstance(value, str) or not value.strip() or not value.isprintable():
-            raise MapError(f"{self._at}: {key} must be a name, got {reprlib.repr(value)}")
+            raise MapError(f"{self._at}: {key} must be a name, got {brief(value)}")
         return value
 
     def number(self, key: str) -> float | None:
@@ -237,5 +234,5 @@ def _number(value: Any, at: str) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = float(value) if abs(value) <= _FARTHEST else math.nan
     if not math.isfinite(number):
-        raise MapError(f"{at} must be a finite number, got {reprlib.repr(value)}")
+        raise MapError(f"{at} must be a finite number, got {brief(value)}")
     return number

@@ -130,7 +130,7 @@ class _Scanner:
 
     def _take(self, mark: str) -> None:
         if not self._skip(mark):
-            raise self._error(f"expected {mark!r}", self._at)
+            raise self._error(f"expected {mark!r:.80}", self._at)
 
     def _error(self, words: str, at: int) -> json.JSONDecodeError:
         return json.JSONDecodeError(words, self._text, at)

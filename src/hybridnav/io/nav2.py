@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs import RouteGraph, WaypointGraph
 from hybridnav.graphs.metadata import edge_metadata, node_metadata
 from hybridnav.grid.checks import checked_type
@@ -64,8 +64,8 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
         raise InvalidValueError("frame must be the name of the map frame, got an empty text")
     if not graph.n_edges:
         raise InvalidValueError(
-            f"the route graph {name!r} has no edge, and Nav2 refuses such a file: give it more "
-            "nodes"
+            f"the route graph {brief(name)} has no edge, and Nav2 refuses such a file: give it "
+            "more nodes"
         )
     if graph.n_nodes + graph.n_edges > MOST_ID:
         raise InvalidValueError(

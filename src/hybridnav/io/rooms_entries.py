@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import reprlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ import numpy as np
 import shapely
 
 from hybridnav.config.yaml_file import Limits
-from hybridnav.errors import InvalidValueError, RoomsError
+from hybridnav.errors import InvalidValueError, RoomsError, brief
 from hybridnav.grid.names import check_number
 from hybridnav.grid.occupancy import extent
 from hybridnav.io.rooms_cells import fingerprint
@@ -68,7 +67,7 @@ class Read:
     def of(self, room: int, line: int = 0) -> str:
         """Return the file, the line and the room, as a message about the room begins."""
         line = line or (self.lines[room] if self.lines else 0)
-        return f"{self.where}{f', line {line}' if line else ''}: room {self.names[room]!r}"
+        return f"{self.where}{f', line {line}' if line else ''}: room {brief(self.names[room])}"
 
 
 def read_entries(marked: Marked, where: str, grid: OccupancyGrid) -> Read:
@@ -87,7 +86,7 @@ def read_entries(marked: Marked, where: str, grid: OccupancyGrid) -> Read:
         line = marked.line("rooms", number)
         at = f"{where}, line {line}: room {number + 1}"
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
-            raise RoomsError(f"{at}: expected a mapping with a name, got {reprlib.repr(entry)}")
+            raise RoomsError(f"{at}: expected a mapping with a name, got {brief(entry)}")
         _read_room(read, entry, line, grid)
     _check_beside(read, grid)
     taken = {*read.points, *read.names}
@@ -96,9 +95,11 @@ def read_entries(marked: Marked, where: str, grid: OccupancyGrid) -> Read:
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
             raise RoomsError(f"{at}: points: expected a name and a point, got {entry!r:.80}")
         if entry["name"] in taken:
-            raise RoomsError(f"{at}: point {entry['name']!r}: the name is given twice")
+            raise RoomsError(f"{at}: point {brief(entry['name'])}: the name is given twice")
         taken.add(entry["name"])
-        read.points[entry["name"]] = xy_of(entry.get("point"), f"{at}: point {entry['name']!r}")
+        read.points[entry["name"]] = xy_of(
+            entry.get("point"), f"{at}: point {brief(entry['name'])}"
+        )
     read.doors = _doors(marked, where)
     read.cells = list_of(values.get("cells", []), f"{where}: cells")
     return read
@@ -179,7 +180,7 @@ def _doors(marked: Marked, where: str) -> dict[int, tuple[float, float]]:
         for index, entry in enumerate(list_of(value, f"{where}: doors")):
             at = f"{where}, line {marked.line('doors', index)}: doors"
             if not isinstance(entry, dict) or "number" not in entry:
-                raise RoomsError(f"{at}: expected a number and a point, got {reprlib.repr(entry)}")
+                raise RoomsError(f"{at}: expected a number and a point, got {brief(entry)}")
             check_keys(entry, ("number", "point"), f"{at}: door {entry['number']!r:.20}")
             each.append((at, entry["number"], entry.get("point")))
     doors: dict[int, tuple[float, float]] = {}
@@ -230,7 +231,7 @@ def check_keys(values: dict[Any, Any], known: tuple[str, ...], at: str) -> None:
 def list_of(value: Any, at: str) -> list[Any]:
     """Return a value that must be a list."""
     if not isinstance(value, list):
-        raise RoomsError(f"{at}: expected a list, got {reprlib.repr(value)}")
+        raise RoomsError(f"{at}: expected a list, got {brief(value)}")
     return value
 
 
@@ -246,12 +247,12 @@ def number_of(value: Any, at: str) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool):
         number = float(value) if abs(value) <= _FARTHEST else math.nan
     if not math.isfinite(number):
-        raise RoomsError(f"{at}: expected a number, got {reprlib.repr(value)}")
+        raise RoomsError(f"{at}: expected a number, got {brief(value)}")
     return number
 
 
 def xy_of(value: Any, at: str) -> tuple[float, float]:
     """Return a value that must be two finite numbers."""
     if not isinstance(value, list) or len(value) != 2:  # noqa: PLR2004
-        raise RoomsError(f"{at}: expected [x, y] in metres, got {reprlib.repr(value)}")
+        raise RoomsError(f"{at}: expected [x, y] in metres, got {brief(value)}")
     return number_of(value[0], at), number_of(value[1], at)

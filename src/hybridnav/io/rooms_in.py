@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,13 @@ import numpy as np
 
 from hybridnav._files import printable
 from hybridnav.config.yaml_file import read_marked, read_yaml
-from hybridnav.errors import InvalidValueError, MapNotFoundError, RoomsError, RoomsNotFoundError
+from hybridnav.errors import (
+    InvalidValueError,
+    MapNotFoundError,
+    RoomsError,
+    RoomsNotFoundError,
+    brief,
+)
 from hybridnav.grid import NO_ROOM, CellClass, RoomLabels
 from hybridnav.grid.names import check_names
 from hybridnav.grid.occupancy import extent
@@ -167,7 +172,7 @@ def _locations(values: dict[str, Any], path: Path, where: str, grid: OccupancyGr
 
 def _label_image(data: Any, path: Path, where: str, grid: OccupancyGrid, n_rooms: int) -> IntArray:
     if not isinstance(data, str) or not data:
-        raise RoomsError(f"{where}: data must be the path of an image, got {reprlib.repr(data)}")
+        raise RoomsError(f"{where}: data must be the path of an image, got {brief(data)}")
 
     def check_size(cols: int, rows: int) -> None:
         if (rows, cols) != grid.shape:
@@ -203,7 +208,7 @@ def _seeded(read: Read, label_of: IntArray, grid: OccupancyGrid) -> IntArray:
             raise RoomsError(f"{read.of(room)}: the seed lies in no free cell")
         other = seeded.get((row, col), int(label_of[row, col]))
         if other != NO_ROOM:
-            raise RoomsError(f"{read.of(room)}: the seed lies in room {read.names[other]!r}")
+            raise RoomsError(f"{read.of(room)}: the seed lies in room {brief(read.names[other])}")
         if found[row, col] == NO_ROOM:
             raise RoomsError(f"{read.of(room)}: no room is found round the seed, draw a polygon")
         seeded[row, col] = room
@@ -242,10 +247,11 @@ def check_points(points: Mapping[str, Point], where: str, grid: OccupancyGrid) -
         row, col = grid.frame.cell_of(*point)
         if not (0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]):
             raise RoomsError(
-                f"{where}: point {name!r}: ({point[0]:.10g}, {point[1]:.10g}) lies outside the "
-                f"map, which spans {extent(grid)}"
+                f"{where}: point {brief(name)}: ({point[0]:.10g}, {point[1]:.10g}) lies outside "
+                f"the map, which spans {extent(grid)}"
             )
         if grid.measured[row, col] == CellClass.OCCUPIED:
             raise RoomsError(
-                f"{where}: point {name!r}: ({point[0]:.10g}, {point[1]:.10g}) lies in an obstacle"
+                f"{where}: point {brief(name)}: ({point[0]:.10g}, {point[1]:.10g}) lies in an "
+                "obstacle"
             )

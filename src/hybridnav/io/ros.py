@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import reprlib
 import warnings
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +13,7 @@ import numpy as np
 
 from hybridnav._files import printable
 from hybridnav.config.yaml_file import read_yaml
-from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning, brief
 from hybridnav.grid import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.io.image import Raster, read_raster
 from hybridnav.io.size import check_max_cells, check_size
@@ -227,7 +226,7 @@ def _number(value: Any, key: str, where: str) -> float:
         except (ValueError, OverflowError):
             number = math.nan
     if not math.isfinite(number):
-        raise MapError(f"{where}: {key} must be a finite number, got {reprlib.repr(value)}")
+        raise MapError(f"{where}: {key} must be a finite number, got {brief(value)}")
     return number
 
 
@@ -242,7 +241,7 @@ def _frame(values: dict[str, Any], where: str) -> Frame:
     resolution = _number(values["resolution"], "resolution", where)
     origin = values["origin"]
     if not isinstance(origin, list) or len(origin) != 3:  # noqa: PLR2004
-        raise MapError(f"{where}: origin must be [x, y, yaw], got {reprlib.repr(origin)}")
+        raise MapError(f"{where}: origin must be [x, y, yaw], got {brief(origin)}")
     x, y, yaw = (_number(value, "origin", where) for value in origin)
     try:
         return Frame(resolution, (x, y), yaw)
@@ -253,22 +252,20 @@ def _frame(values: dict[str, Any], where: str) -> Frame:
 def _mode(value: Any, where: str) -> str:
     mode = value.lower() if isinstance(value, str) else value
     if mode not in _MODES:
-        raise MapError(
-            f"{where}: mode must be one of {', '.join(_MODES)}, got {reprlib.repr(value)}"
-        )
+        raise MapError(f"{where}: mode must be one of {', '.join(_MODES)}, got {brief(value)}")
     return str(mode)
 
 
 def _negate(value: Any, where: str) -> bool:
     negate = _BOOLEANS.get(value.lower()) if isinstance(value, str) else value
     if not isinstance(negate, int) or negate not in {0, 1}:
-        raise MapError(f"{where}: negate must be 0 or 1, got {reprlib.repr(value)}")
+        raise MapError(f"{where}: negate must be 0 or 1, got {brief(value)}")
     return bool(negate)
 
 
 def _image_path(value: Any, path: Path, where: str) -> Path:
     if not isinstance(value, str) or not value:
-        raise MapError(f"{where}: image must be the path of a file, got {reprlib.repr(value)}")
+        raise MapError(f"{where}: image must be the path of a file, got {brief(value)}")
     try:
         image = Path(value).expanduser()
     except RuntimeError:  # no such user: an ordinary name

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.grid.runs import unique_rows
 from hybridnav.mesh import _cut_kernels as kernels
 from hybridnav.mesh._block_kernels import blocks_of
 from hybridnav.mesh._corner_kernels import MANY, NO_CORNER

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._copies import copies_alike, frozen
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import OccupancyGrid
 from hybridnav.grid.areas import box_of_area, class_reach, class_rules
 from hybridnav.grid.checks import checked_cell, checked_type
@@ -91,8 +91,8 @@ class OnlinePyramid:
             )
         if pyramid.linkage != "radius":
             raise InvalidValueError(
-                f"the pyramid was built with the linkage {pyramid.linkage!r}, expected 'radius', "
-                "the default: places of other linkages do not follow a map"
+                f"the pyramid was built with the linkage {brief(pyramid.linkage)}, expected "
+                "'radius', the default: places of other linkages do not follow a map"
             )
         check_sides(pyramid.grid)
         # Loading a version needs no decimation.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._copies import copies_alike, frozen
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.grid.checks import checked_type
 from hybridnav.grid.names import check_names
@@ -258,13 +258,13 @@ class OnlineRooms:
         numbered = _NUMBERED.fullmatch(name)
         if numbered and int(numbered[1]) != number:
             raise InvalidValueError(
-                f"room {number} cannot be called {name!r}, the name of room {numbered[1]} as long "
-                "as it has no other: choose another name"
+                f"room {number} cannot be called {brief(name)}, the name of room {numbered[1]} as "
+                "long as it has no other: choose another name"
             )
         others = {n: other for n, other in self.names.items() if n != number}
         if name in others.values():
             raise InvalidValueError(
-                f"another room is called {name!r:.90}, expected names that differ: choose another "
+                f"another room is called {name!r:.80}, expected names that differ: choose another "
                 "name"
             )
         names = others if numbered else {**others, number: name}

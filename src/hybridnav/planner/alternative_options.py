@@ -46,8 +46,8 @@ def check_used(by: str, given: Mapping[str, object]) -> None:
     for name in idle:
         if name in given:
             raise InvalidValueError(
-                f"{name}={given[name]!r:.80} was given with by={by!r}, and it is for alternatives "
-                f"with {where}: leave it out"
+                f"{name}={given[name]!r:.80} was given with by={by!r:.80}, and it is for "
+                f"alternatives with {where}: leave it out"
             )
 
 

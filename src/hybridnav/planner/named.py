@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 import numpy as np
 
 from hybridnav._trig import atan2
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
 from hybridnav.grid.names import did_you_mean
@@ -141,11 +141,11 @@ def check_waypoints(
         if waypoint not in rooms.names:
             known = (*rooms.names, *rooms.points)
             raise InvalidValueError(
-                f"no room or point is called {waypoint!r:.90}{did_you_mean(waypoint, known)}"
+                f"no room or point is called {waypoint!r:.80}{did_you_mean(waypoint, known)}"
             )
         if not (grid.classes[rooms.label_of == rooms.index(waypoint)] == CellClass.FREE).any():
             raise InvalidValueError(
-                f"room {waypoint!r} has no free cell for this robot radius, "
+                f"room {brief(waypoint)} has no free cell for this robot radius, "
                 f"{grid.robot_radius_m:g} m: "
                 "choose a smaller one, or another room"
             )

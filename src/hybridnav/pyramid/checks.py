@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.pyramid.record import Linkage
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def checked_settings(merge_distance_m: float, linkage: str, seed: int) -> int:
         )
     if linkage not in get_args(Linkage):
         raise InvalidValueError(
-            f"linkage must be one of {', '.join(get_args(Linkage))}, got {linkage!r}"
+            f"linkage must be one of {', '.join(get_args(Linkage))}, got {brief(linkage)}"
         )
     try:
         return operator.index(seed)

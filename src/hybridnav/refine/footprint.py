@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from hybridnav._copies import copies_alike
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
@@ -104,8 +104,7 @@ def _polygon_of(corners_m: Any) -> shapely.Polygon:
         corners = np.empty(0)
     if corners.ndim != 2 or corners.shape[1] != 2 or not 3 <= len(corners) <= MAX_CORNERS + 1:  # noqa: PLR2004
         raise InvalidValueError(
-            f"a footprint needs 3 to {MAX_CORNERS} corners [x, y] in metres, "
-            f"got {str(corners_m)[:60]!r}"
+            f"a footprint needs 3 to {MAX_CORNERS} corners [x, y] in metres, got {brief(corners_m)}"
         )
     # NaN fails this comparison too.
     if not (np.abs(corners) <= _FARTHEST_M).all():
