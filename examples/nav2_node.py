@@ -71,7 +71,7 @@ class PlanningNode(Node):
         if not goal.use_start:
             found = self.transforms.lookup_transform("map", self.base, Time())
             poses.insert(0, transform_of(found, "transform", "robot"))
-        return [pose[: 2 + self.planner.needs_headings] for pose in poses]
+        return poses  # with yaw: Nav2 takes the last pose of a path as the goal
 
 
 if __name__ == "__main__":  # python nav2_node.py --ros-args -p model:=floor.hnm -p preset:=robot

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,11 +33,16 @@ class Motion:
     curved
         Whether the robot drives an arc of a circle from each pose to the next, tangent to both
         headings; else a straight line, on which it turns evenly.
+    start_rad, goal_rad
+        Heading from which it turns on the spot at the first point, and to which at the last one;
+        None for no turn.
     """
 
     points: FloatArray
     headings_rad: FloatArray | None
     curved: bool
+    start_rad: float | None = None
+    goal_rad: float | None = None
 
     @property
     def _steps(self) -> FloatArray:
@@ -45,11 +50,16 @@ class Motion:
         return steps
 
     @property
+    def _chords(self) -> FloatArray:
+        chords: FloatArray = np.hypot(*self._steps.T)
+        return chords
+
+    @property
     def _travel(self) -> FloatArray:
         """Direction of each step; a step without length has that of the step before, or behind."""
         steps = self._steps
         travel = directions(steps[:, 1], steps[:, 0])
-        return _filled(travel, np.hypot(steps[:, 0], steps[:, 1]) > 0)
+        return _filled(travel, self._chords > 0)
 
     @property
     def _turns(self) -> FloatArray:
@@ -61,7 +71,7 @@ class Motion:
     @property
     def lengths_m(self) -> FloatArray:
         """float64 (n - 1,), metres driven on each step."""
-        chords: FloatArray = np.hypot(*self._steps.T)
+        chords = self._chords
         return chords / _chord_of_arc(self._turns / 2) if self.curved else chords
 
     @property
@@ -79,12 +89,17 @@ class Motion:
     def spot_turns(self) -> LongArray:
         """int64, indices of points at which the robot turns on the spot.
 
-        These are bends of straight lines without headings, and with headings the points that differ
-        from the next one in heading alone.
+        These are bends of straight lines without headings, with headings the points that differ
+        from the next one in heading alone, and endpoints with another heading of their own.
         """
+        turns = np.zeros(len(self.points), dtype=np.bool_)
         if self.headings_rad is None:
-            return np.flatnonzero(np.abs(wrapped(np.diff(self._travel))) > _BEND) + 1
-        return np.flatnonzero((self.lengths_m == 0) & (np.abs(self._turns) > _BEND))
+            turns[1:-1] = np.abs(wrapped(np.diff(self._travel))) > _BEND
+        else:
+            turns[:-1] = (self.lengths_m == 0) & (np.abs(self._turns) > _BEND)
+        for end, heading in ((0, self.start_rad), (-1, self.goal_rad)):
+            turns[end] |= heading is not None and _differ(heading, self._faced[end])
+        return np.flatnonzero(turns)
 
     @property
     def max_curvature_per_m(self) -> float:
@@ -94,13 +109,32 @@ class Motion:
         return float((turns[bent] / lengths[bent]).max(initial=0.0)) if self.curved else 0.0
 
     @property
-    def headings_at_points(self) -> FloatArray:
-        """float64 (n,), the headings, or the direction of travel after each point, before the last
-        one; 0 without motion."""
+    def _faced(self) -> FloatArray:
+        """The headings of the motion itself, between the turns at its ends; of a path of one point,
+        the one that the robot has or takes there."""
+        if len(self.points) == 1 and (self.start_rad is not None or self.goal_rad is not None):
+            return np.array([self.goal_rad if self.start_rad is None else self.start_rad])
         if self.headings_rad is not None:
             return self.headings_rad
         travel = self._travel
         return np.append(travel, travel[-1]) if len(travel) else np.zeros(1)
+
+    @property
+    def headings_at_points(self) -> FloatArray:
+        """float64 (n,), the headings, or the direction of travel after each point, before the last
+        one; 0 without motion. At an endpoint with a heading of its own, that one."""
+        faced = self._faced.copy()
+        for end, heading in ((0, self.start_rad), (-1, self.goal_rad)):
+            if heading is not None:
+                faced[end] = heading
+        return faced
+
+    @property
+    def is_left(self) -> BoolArray:
+        """bool (n,), whether the robot leaves a point, by a drive or a turn on the spot, before it
+        is at the next one; true at the last one. All others repeat the next pose."""
+        leaves: BoolArray = np.append((self._chords > 0) | (np.abs(self._turns) > _BEND), True)
+        return leaves
 
     def bends(self) -> LongArray:
         """Return the indices of points that even spacing must keep, with both endpoints, int64."""
@@ -120,13 +154,19 @@ class Motion:
     def spread(self, spacing_m: float) -> tuple[FloatArray, SignArray]:
         """Return poses at most `spacing_m` apart, float64 (m, 3), and their directions, int8 (m,).
 
-        The direction is that after each pose, at the last one that before it.
+        The direction is that after each pose, at the last one that before it. No pose occurs twice
+        in a row; a turn on the spot is two poses at one point.
 
         Raises
         ------
         InvalidValueError
             When the spacing is not positive, or there would be more than ten million poses.
         """
+        left = self.is_left
+        if not left.all():
+            headings = None if self.headings_rad is None else self.headings_rad[left]
+            distinct = replace(self, points=self.points[left], headings_rad=headings)
+            return distinct.spread(spacing_m)
         lengths = self.lengths_m
         total_m = float(lengths.sum())
         if not spacing_m > 0 or total_m / spacing_m > _MAX_POSES:
@@ -135,7 +175,8 @@ class Motion:
                 f"{total_m:.4g} m, got {spacing_m}: increase it"
             )
         if len(lengths) == 0:
-            return np.append(self.points[0], self.headings_at_points)[None], np.ones(1, np.int8)
+            pose = np.append(self.points[0], wrapped(self._faced))[None]
+            return self._turned_at_ends(pose, np.ones(1, np.int8))
         along = np.concatenate([[0.0], np.cumsum(lengths)])
         bends = self.bends()
         steps, parts = [], []
@@ -148,7 +189,20 @@ class Motion:
             parts.append(_part(wanted - along[step], lengths[step]))
         step = np.append(np.concatenate(steps), len(lengths) - 1)
         part = np.append(np.concatenate(parts), 1.0)
-        return self._poses(step, part), self.directions[step]
+        return self._turned_at_ends(self._poses(step, part), self.directions[step])
+
+    def _turned_at_ends(self, poses: FloatArray, ahead: SignArray) -> tuple[FloatArray, SignArray]:
+        """Return poses and directions with the turns on the spot at both ends."""
+        for end, heading in ((0, self.start_rad), (-1, self.goal_rad)):
+            if heading is None:
+                continue
+            turned = poses[end].copy()
+            turned[2:] = wrapped(np.array([heading]))
+            if _differ(turned[2], poses[end, 2]):
+                at = len(poses) if end else 0
+                poses, ahead = np.insert(poses, at, turned, 0), np.insert(ahead, at, ahead[end])
+            poses[end] = turned
+        return poses, ahead
 
     def _poses(self, step: LongArray, part: FloatArray) -> FloatArray:
         """Return the poses at shares of some steps."""
@@ -183,6 +237,11 @@ def _chord_of_arc(half_rad: FloatArray) -> FloatArray:
     """Return the ratios of chords to arcs, given half of the turn."""
     sines = sines_and_cosines(half_rad)[0]
     return np.divide(sines, half_rad, out=np.ones_like(sines), where=half_rad != 0)
+
+
+def _differ(one_rad: float, other_rad: float) -> bool:
+    """Return whether a robot turns from one heading to the other."""
+    return bool(np.abs(wrapped(np.array([one_rad - other_rad])))[0] > _BEND)
 
 
 def wrapped(angles_rad: FloatArray) -> FloatArray:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any, cast
 
+import pytest
 from rosbags.highlevel import AnyReader
 
 import hybridnav as hn
@@ -132,6 +134,31 @@ def test_a_path_is_written_as_a_line(cli, tmp_path):
     assert line["geometry"]["coordinates"] == done.answer["points"]
     assert line["properties"]["length_m"] == done.answer["length_m"]
     assert cli(*query, "--poses", tmp_path / "path.gpx").refuses(2, ".csv, .json, .geojson")
+
+
+def test_the_yaw_of_start_and_goal_is_in_every_file(cli, tmp_path):
+    """In CSV, JSON, GeoJSON and a bag, by a preset that plans without headings."""
+    ends = ("--start", "0.5,0.5,2.5", "--goal", "2.0,2.5,-1.57")
+    query = ("plan", FIGURE, "--robot-radius", 0, *ends, "--json")
+    done = cli(*query, "--poses", tmp_path / "path.csv", "--bag", tmp_path / "bag")
+    assert done.code == 0
+    assert (done.answer["start"], done.answer["goal"]) == ([0.5, 0.5, 2.5], [2.0, 2.5, -1.57])
+    assert [done.answer["headings_rad"][at] for at in (0, -1)] == [2.5, -1.57]
+    lines = (tmp_path / "path.csv").read_text().splitlines()
+    assert (lines[1], lines[-1]) == ("0.5,0.5,2.5,1", "2.0,2.5,-1.57,1")
+    for ending in ("json", "geojson"):
+        assert cli(*query, "--poses", tmp_path / f"path.{ending}").code == 0
+    poses = json.loads((tmp_path / "path.json").read_text())["poses"]
+    assert (poses[0], poses[-1]) == ([0.5, 0.5, 2.5, 1], [2.0, 2.5, -1.57, 1])
+    (line,) = json.loads((tmp_path / "path.geojson").read_text())["features"]
+    assert [line["properties"]["headings_rad"][at] for at in (0, -1)] == [2.5, -1.57]
+    with AnyReader([tmp_path / "bag"]) as reader:
+        (plan,) = [each for each in reader.connections if each.topic == "/plan"]
+        ((_, _, raw),) = reader.messages([plan])
+        poses = cast("Any", reader.deserialize(raw, plan.msgtype)).poses
+        turned = [poses[at].pose.orientation for at in (0, -1)]
+    assert [2 * math.atan2(q.z, q.w) for q in turned] == pytest.approx([2.5, -1.57])
+    assert cli("plan", FIGURE, "--start", "0.5,0.5,nan", "--goal", "2,2").refuses(2, "radians")
 
 
 def test_a_plan_is_written_into_a_bag(cli, tmp_path, monkeypatch):

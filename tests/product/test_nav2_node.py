@@ -20,6 +20,7 @@ from tests.nav2_reader import read_nav2
 
 FILE = Path(__file__).parents[2] / "examples" / "nav2_node.py"
 RADIUS_M = 0.1
+START_YAW, GOAL_YAW = 0.5, -1.57
 
 
 @pytest.fixture(scope="module")
@@ -60,10 +61,10 @@ def node(
     return module.PlanningNode()
 
 
-def posed(node: Any, row: float, col: float, yaw: float = 0.5) -> Any:
-    """A stamped pose at a position in cells."""
+def posed(node: Any, at: Any, yaw: float) -> Any:
+    """A stamped pose at a position (row, col) in cells."""
     found: Any = ros_stand_in.message("geometry_msgs/PoseStamped")()
-    x, y = node.planner.topology.grid.frame.points_of_grid([row, col]).tolist()
+    x, y = node.planner.topology.grid.frame.points_of_grid(at).tolist()
     found.pose.position.x, found.pose.position.y = x, y
     found.pose.orientation.z, found.pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
     found.header.frame_id = "map"
@@ -74,7 +75,8 @@ def asked(action: Any, node: Any, start: Any, goal: Any, **fields: Any) -> Any:
     """A goal between two positions in cells."""
     found = action.Goal()
     found.use_start = True
-    found.start, found.goal = posed(node, *start), posed(node, *goal)
+    found.start = posed(node, start, START_YAW)
+    found.goal = posed(node, goal, GOAL_YAW)
     for name, value in fields.items():
         setattr(found, name, value)
     return found
@@ -102,9 +104,13 @@ def test_a_path_is_that_of_the_planner(actions: Any, node: Any) -> None:
     )
     expected = planner.plan(start, end).path
     assert expected is not None
-    assert np.allclose([place(pose.pose.position) for pose in poses], expected.poses()[:, :2])
     turns = [2 * math.atan2(pose.pose.orientation.z, pose.pose.orientation.w) for pose in poses]
-    assert np.allclose(np.cos(turns - expected.poses()[:, 2]), 1)
+    # The robot turns on the spot at the start, from its yaw, and at the goal, to that of the goal.
+    assert (turns[0], turns[-1]) == pytest.approx((START_YAW, GOAL_YAW))
+    assert (place(poses[0].pose.position), place(poses[-1].pose.position)) == (start, end)
+    between = poses[1:-1]
+    assert np.allclose([place(pose.pose.position) for pose in between], expected.poses()[:, :2])
+    assert np.allclose(np.cos(turns[1:-1] - expected.poses()[:, 2]), 1)
     assert result.path.header.frame_id == "map"
     assert result.path.header.stamp.sec == 1_700_000_000
     assert (result.planning_time.sec, result.planning_time.nanosec) == (0, 10**6)
@@ -161,13 +167,14 @@ def test_the_robot_is_the_start_unless_one_is_given(
     assert (status, result.error_code) == ("aborted", actions.ComputePathToPose.Result.TF_ERROR)
     assert "base_link" in result.error_msg
     at: Any = ros_stand_in.message("geometry_msgs/TransformStamped")()
-    start = posed(node, 25.5, 20.5).pose
+    start = posed(node, (25.5, 20.5), START_YAW).pose
     at.transform.translation.x, at.transform.translation.y = place(start.position)
     at.transform.rotation = start.orientation
     monkeypatch.setattr(ros_stand_in.Buffer, "known", {("map", "base_link"): at})
     status, result = call(node, "compute_path_to_pose", goal)
     assert status == "succeeded"
     assert place(result.path.poses[0].pose.position) == pytest.approx(place(start.position))
+    assert result.path.poses[0].pose.orientation.z == pytest.approx(start.orientation.z)
 
 
 @pytest.mark.parametrize("name", ["start", "goal"])

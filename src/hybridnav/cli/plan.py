@@ -73,17 +73,17 @@ def _point(text: str) -> Point | str:
 StartOption = Annotated[
     Any,
     typer.Option(
-        metavar="X,Y",
+        metavar="X,Y[,YAW]",
         parser=_point,
-        help="Start in metres; ,YAW in radians for OMPL; FLOOR:X,Y in a building.",
+        help="Start in metres; YAW in radians; FLOOR:X,Y in a building.",
     ),
 ]
 GoalOption = Annotated[
     Any,
     typer.Option(
-        metavar="X,Y",
+        metavar="X,Y[,YAW]",
         parser=_point,
-        help="Goal in metres; ,YAW in radians for OMPL; FLOOR:X,Y in a building.",
+        help="Goal in metres; YAW in radians; FLOOR:X,Y in a building.",
     ),
 ]
 FromOption = Annotated[

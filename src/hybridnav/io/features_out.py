@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import math
 from pathlib import Path
@@ -43,7 +44,8 @@ def export_path(
     """Write the path of a plan, or of all plans of a tour one after the other.
 
     CSV has a line of names and a line for each pose: x, y in metres, yaw in radians, and the
-    direction in which the robot leaves it, 1 for ahead, -1 for backwards. JSON is one object, with
+    direction in which the robot leaves it, 1 for ahead, -1 for backwards. No pose occurs twice in a
+    row; a turn on the spot, and nothing else, is two poses at one point. JSON is one object, with
     a list of the same four numbers for each pose. GeoJSON has a `LineString` for each plan, through
     the points of the path, or through the poses where the path is curved, with `headings_rad`,
     `length_m`, `cost`, `metric`, `start`, `goal` and `preset`. Without a path there are no poses
@@ -86,7 +88,7 @@ def export_path(
     if file.suffix.lower() in _FEATURES:
         _write(file, _collection([_line(result, spacing_m) for result in planned], frame))
         return
-    rows = [row for result in planned for row in _poses(result, spacing_m)]
+    rows = _distinct([row for result in planned for row in _poses(result, spacing_m)])
     if file.suffix.lower() == _PLAIN:
         _write(file, json.dumps({"names": _POSE, "poses": rows}, allow_nan=False) + "\n")
     else:
@@ -211,6 +213,12 @@ def _poses(result: PlanResult, spacing_m: float) -> list[list[float]]:
         [*(_rounded(value) for value in pose), direction]
         for pose, direction in zip(poses, directions, strict=True)
     ]
+
+
+def _distinct(rows: list[list[float]]) -> list[list[float]]:
+    """Return the rows but those whose pose the next one repeats, as where two plans meet."""
+    pairs = itertools.pairwise(rows)
+    return [row for row, after in pairs if row[:3] != after[:3]] + rows[-1:]
 
 
 def _line(result: PlanResult, spacing_m: float) -> dict[str, Any]:

@@ -190,10 +190,13 @@ class ClassTours:
     ) -> PlanResult:
         """Return the result of a path of cells."""
         topology = self._planner.topology
+        assert like.start is not None  # noqa: S101 - the plan is solved
+        assert like.goal is not None  # noqa: S101
+        path = Path(cells, topology.grid.frame.points_of(cells), length_m)
         return replace(
             like,
             metric="octile",
-            path=Path(cells, topology.grid.frame.points_of(cells), length_m),
+            path=path.turned_at_ends(like.start, like.goal),
             route_source=RouteOfCells(topology, RouteFinder(topology), cells),
             instruction_source=(),
             lower_bound=bound_m,
@@ -211,7 +214,8 @@ class ClassTours:
         assert result.start is not None  # noqa: S101 - the plan is solved
         assert result.goal is not None  # noqa: S101
         sight = LineOfSight(grid, allow_unexplored=self._allowed, closed=closed)
-        points = sight.shorten(other.cells, np.array(result.start), np.array(result.goal))
+        start, goal = (np.array(end[:2]) for end in (result.start, result.goal))
+        points = sight.shorten(other.cells, start, goal)
         passed = cells_of_line(
             self._search.classes.enterable_cells, grid.frame.positions_of(points)
         )
@@ -221,7 +225,7 @@ class ClassTours:
         return replace(
             found,
             metric=result.metric,
-            path=Path(other.cells, points, length_m),
+            path=Path(other.cells, points, length_m).turned_at_ends(result.start, result.goal),
             lower_bound=min(bound_m, length_m),
         )
 

@@ -71,34 +71,32 @@ def read_point(name: str, point: ArrayLike) -> FloatArray:
     return xy
 
 
-def read_pose(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray:
-    """Return a position and heading, float64 (3,); the heading is 0 if none is needed or given."""
+def read_end(name: str, given: ArrayLike, *, needs_heading: bool) -> FloatArray:
+    """Return a position, float64 (2,), or a pose, (3,), where one is given or needed."""
     pose = _numbers(given)
-    if pose.size != 3 and not needs_heading:  # noqa: PLR2004
-        return np.append(read_point(name, given), 0.0)
+    if pose.shape == (2,) and not needs_heading and np.isfinite(pose).all():
+        return pose
     if pose.shape != (3,) or not np.isfinite(pose).all():
+        pair = "" if needs_heading else "two finite coordinates (x, y) in metres, or "
         raise InvalidValueError(
-            f"{name} must be three finite numbers (x, y, yaw) in metres and radians, "
+            f"{name} must be {pair}three finite numbers (x, y, yaw) in metres and radians, "
             f"got {given!r:.80}"
         )
     return pose
 
 
-def read_end(name: str, given: ArrayLike, *, needs_heading: bool | None) -> FloatArray:
-    """Return a position, float64 (2,), or with OMPL a pose, (3,); None stands for no OMPL."""
-    if needs_heading is None:
-        return read_point(name, given)
-    return read_pose(name, given, needs_heading=needs_heading)
-
-
 def read_points(name: str, points: ArrayLike, *, needs_heading: bool = False) -> FloatArray:
-    """Return positions, float64 (n, 2), or with headings (n, 3); n may be 0."""
+    """Return positions, float64 (n, 2), or with headings (n, 3); n may be 0.
+
+    Headings that are given and not needed are left out: nothing of a batch depends on them.
+    """
     rows, width = _numbers(points), 3 if needs_heading else 2
-    if rows.shape in {(0,), (0, width)}:
+    if rows.shape in {(0,), (0, 2), (0, 3)}:
         return np.empty((0, width))
-    if rows.ndim != 2 or rows.shape[1] != width or not np.isfinite(rows).all():  # noqa: PLR2004
-        what = "poses (x, y, yaw) in metres and radians" if needs_heading else "(x, y) in metres"
+    if rows.ndim != 2 or rows.shape[1] not in {width, 3} or not np.isfinite(rows).all():  # noqa: PLR2004
+        pair = "" if needs_heading else "coordinates (x, y) in metres, shape (n, 2), or "
         raise InvalidValueError(
-            f"{name} must be finite coordinates {what}, shape (n, {width}), got {points!r:.80}"
+            f"{name} must be finite {pair}poses (x, y, yaw) in metres and radians, shape (n, 3), "
+            f"got {points!r:.80}"
         )
-    return rows
+    return rows[:, :width]

@@ -102,9 +102,10 @@ class Finish:
         points, metric = plan.points, self._cells.metric
         if metric == "octile" and smooth == "line-of-sight":
             began = time.perf_counter()
-            points, metric = self._sight(closed).shorten(plan.cells, *poses), "any-angle"
+            ends = poses[0][:2], poses[1][:2]
+            points, metric = self._sight(closed).shorten(plan.cells, *ends), "any-angle"
             plan.stats.seconds["smooth"] = time.perf_counter() - began
-            bound = self._cells.bound(plan, poses)
+            bound = self._cells.bound(plan, ends)
         if points is None:
             points = grid.frame.points_of(plan.cells)
         if metric == "octile":

@@ -16,6 +16,7 @@ from hybridnav._copies import copies_alike
 from hybridnav._trig import directions
 from hybridnav.grid.lines import cells_of_line
 from hybridnav.planner.cell_planner import CellQuery
+from hybridnav.poses import Motion
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.differential import driven
@@ -264,9 +265,22 @@ class OmplPlanner:
                 segments.append(curve.poses(step_m)[1:])
             states = np.concatenate(segments)
         headings = states[:, 2].copy() if self.ompl.has_heading else None
-        points = states[:, :2].copy()
-        passed, is_curved = self._passed(points, cells), radius_m is not None
-        return Path(passed, points, reply.length_m, headings, is_curved)
+        points, is_curved = states[:, :2].copy(), radius_m is not None
+        return self._path_through(points, headings, cells, reply.length_m, is_curved=is_curved)
+
+    def _path_through(
+        self,
+        points: FloatArray,
+        headings: FloatArray | None,
+        cells: LongArray,
+        length_m: float,
+        *,
+        is_curved: bool = False,
+    ) -> Path:
+        """Return the path through some poses, each once."""
+        left = Motion(points, headings, is_curved).is_left
+        points, headings = points[left], None if headings is None else headings[left]
+        return Path(self._passed(points, cells), points, length_m, headings, is_curved)
 
     def _passed(self, points: FloatArray, cells: LongArray) -> LongArray:
         """Return the cells that a path passes.
@@ -294,12 +308,12 @@ class OmplPlanner:
         steps = np.diff(points, axis=0)
         length_m = math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
         if not self.ompl.has_heading:
-            return Path(self._passed(points, cells), points, length_m)
+            return self._path_through(points, None, cells, length_m)
         poses = self._poses_along(points, endpoints, closed)
         if not len(poses):
             return None
         points, headings = poses[:, :2].copy(), poses[:, 2].copy()
-        return Path(self._passed(points, cells), points, length_m, headings)
+        return self._path_through(points, headings, cells, length_m)
 
     def _poses_along(
         self, points: FloatArray, endpoints: tuple[FloatArray, FloatArray], closed: LongArray | None

@@ -76,7 +76,7 @@ class Outcomes:
             PlanStatus.SOLVED,
             poses,
             metric=metric,
-            path=path,
+            path=path.turned_at_ends(*poses),
             route_source=plan.route or self.route_of(path),
             lower_bound=bound_m,
             weighted_cost=weighted_cost,
@@ -88,11 +88,14 @@ class Outcomes:
         bound = max(found.lower_bound, bound_m)
         if found.path is not None and found.status is PlanStatus.SOLVED:
             bound = min(bound, found.weighted_cost or found.path.length_m)
+        path = found.path
+        if path is not None and path.headings_rad is None and found.status is PlanStatus.SOLVED:
+            path = path.turned_at_ends(*poses)
         return self.answer(
             found.status,
             poses,
             metric=found.metric,
-            path=found.path,
+            path=path,
             route_source=self.route_of(found.path),
             lower_bound=bound,
             weighted_cost=found.weighted_cost,

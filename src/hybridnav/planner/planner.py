@@ -130,7 +130,7 @@ class HybridPlanner:
 
     @property
     def needs_headings(self) -> bool:
-        """Whether endpoints are `(x, y, yaw)`, as with OMPL in a space with headings."""
+        """Whether endpoints must be `(x, y, yaw)`, as with OMPL in a space with headings."""
         return self._queries.needs_headings
 
     def plan(
@@ -149,9 +149,10 @@ class HybridPlanner:
         start, goal
             `(x, y)` in metres, map frame. The path runs between the centres of their cells, an
             any-angle one between the points; nothing is snapped to free space. On a map with rooms
-            also the name of a room or of a named point. With OMPL in a space with headings `(x, y,
-            yaw)`, radians counter-clockwise from the x axis, and named endpoints face along the
-            path; in other spaces the third number is ignored.
+            also the name of a room or of a named point. Or `(x, y, yaw)`, radians counter-clockwise
+            from the x axis: the robot turns on the spot, at the start from its yaw into the path,
+            at the goal to that of the goal. OMPL in a space with headings needs the yaw, and plans
+            with it; there named endpoints face along the path.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one, by costs without raising them;
             `"arcs"` rounds the bends of such a path by costs too; None as in the preset. Without
@@ -172,8 +173,8 @@ class HybridPlanner:
         Raises
         ------
         InvalidValueError
-            When a point is not two finite numbers, a name is not known, or a closed item is not on
-            the map.
+            When a point is not two or three finite numbers, a name is not known, or a closed item
+            is not on the map.
         """
         with self._query():
             return self._queries.plan(start, goal, smooth, blocked, at)
@@ -220,8 +221,9 @@ class HybridPlanner:
         Parameters
         ----------
         starts, goals
-            `(x, y)` in metres, map frame, shape (n, 2) each; with OMPL in a space with headings
-            `(x, y, yaw)`, shape (n, 3).
+            `(x, y)` in metres, map frame, shape (n, 2) each, or `(x, y, yaw)`, shape (n, 3). OMPL
+            in a space with headings needs the yaw; with others it changes no point of a path, and
+            arrays of points do not hold it.
         smooth, blocked
             As in `plan`.
 

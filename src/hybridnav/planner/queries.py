@@ -7,12 +7,14 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+
 from hybridnav._copies import copies_alike
 from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.drafts import PlanDraft, draft_on_mesh
-from hybridnav.planner.endpoints import cells_of_endpoints, read_end, read_point
+from hybridnav.planner.endpoints import cells_of_endpoints, read_end
 from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.follow import is_stale
 from hybridnav.planner.outcome import Outcomes
@@ -86,7 +88,7 @@ class Queries:
 
     @property
     def needs_headings(self) -> bool:
-        """Whether endpoints are `(x, y, yaw)`, as with OMPL in a space with headings."""
+        """Whether endpoints must be `(x, y, yaw)`, as with OMPL in a space with headings."""
         return self._ompl is not None and self._ompl.ompl.has_heading
 
     def closed(self, blocked: Closable | ClosedCells | None) -> ClosedCells | None:
@@ -123,8 +125,7 @@ class Queries:
                 closed=self.closed_for_all(blocked),
                 costs=self._costs,
             )
-        headings = None if self._ompl is None else self.needs_headings
-        read = partial(read_end, needs_heading=headings)
+        read = partial(read_end, needs_heading=self.needs_headings)
         poses = read("start", start), read("goal", goal)
         finish = self._finish.checked(smooth, self._preset.planner.smooth)
         result = self._between(poses, finish, self.closed(blocked), began)
@@ -141,7 +142,8 @@ class Queries:
         named = isinstance(start, str) or isinstance(goal, str)
         if named or self._ompl is not None or self._preset.planner.coarse != "mesh":
             return PlanDraft.of(self.plan(start, goal, None, blocked, at))
-        poses = read_point("start", start), read_point("goal", goal)
+        read = partial(read_end, needs_heading=False)
+        poses = read("start", start), read("goal", goal)
         closed = self.closed(blocked)
         query = self._query_of(poses, closed)
         if isinstance(query, PlanStatus):
@@ -197,7 +199,8 @@ class Queries:
             return self._outcomes.no_path(plan, poses, self._cells.metric)
         if self._ompl is not None:
             now, flat = time.perf_counter(), None if closed is None else closed.flat
-            found = self._ompl.plan(plan.cells, poses, flat, spent_s=now - began)
+            first, last = (pose if len(pose) > 2 else np.append(pose, 0.0) for pose in poses)  # noqa: PLR2004
+            found = self._ompl.plan(plan.cells, (first, last), flat, spent_s=now - began)
             plan.stats.seconds["ompl"] = time.perf_counter() - now
             bound = self._cells.bound(plan, endpoints)
             return self._outcomes.by_ompl(found, plan, poses, bound)

@@ -211,8 +211,9 @@ def plan_tour(
     planner
         Planner of each part.
     waypoints
-        Two or more: points `(x, y)` in metres, names of rooms or of named points. With OMPL in a
-        space with headings, points are `(x, y, yaw)`, and names face along the path.
+        Two or more: points `(x, y)` in metres, or `(x, y, yaw)` with the heading in radians that
+        the robot has there, names of rooms or of named points. OMPL in a space with headings needs
+        the yaw, and names face along the path.
     at
         Position in a room: `"anywhere"`, chosen for all waypoints together so that the whole cell
         path is cheapest, or at the room's `"point"`.
@@ -227,8 +228,8 @@ def plan_tour(
     Raises
     ------
     InvalidValueError
-        When there are fewer than two waypoints, a name is not known, a point is not two finite
-        numbers, or a closed item is not on the map.
+        When there are fewer than two waypoints, a name is not known, a point is not two or
+        three finite numbers, or a closed item is not on the map.
 
     Examples
     --------

@@ -25,6 +25,8 @@ _LARGEST = 4.0
 """Largest radius of an arc, in those asked for."""
 _SMALLEST_TURN = 1e-9
 """Radians; also the rounding of lengths, relative."""
+_LEAST_SPOT_TURN = 1e-6
+"""Radians; a line that turns by less goes on."""
 _ROUNDS = 6
 """Passes over a line that merge bends."""
 
@@ -128,9 +130,15 @@ def _towards(first, last, distance):
 
 
 @njit(cache=True, nogil=True)
+def _differ(a, c):
+    """Return whether two positions differ."""
+    return a[0] != c[0] or a[1] != c[1]
+
+
+@njit(cache=True, nogil=True)
 def _is_legal(free, a, c):
     """Return whether the straight line between two positions is legal, or none."""
-    if a[0] == c[0] and a[1] == c[1]:
+    if not _differ(a, c):
         return True
     return is_legal(free, a[0], a[1], c[0], c[1], _FREE, _FREE)
 
@@ -149,7 +157,7 @@ def _merged(free, factors, line, n, i, spare):
     added cost, infinite if nothing was done.
     """
     a, c = line[i - 1], line[i + 2]
-    if a[0] == c[0] and a[1] == c[1]:
+    if not _differ(a, c):
         return np.inf
     before = 0.0
     for k in range(i - 1, i + 2):
@@ -208,8 +216,9 @@ def round_bends(free, factors, line, radius, spare):
 
     Directions are unit vectors, float64 (m, 2) as the points. Between two points the path is
     straight if they have the same direction, else an arc; two equal points are a turn on the spot,
-    where no arc of the radius fits. An arc has at least the radius, and at most four times that.
-    Bends too close to each other for that are merged first.
+    where no arc of the radius fits. No point occurs twice with one direction. An arc has at least
+    the radius, and at most four times that. Bends too close to each other for that are merged
+    first.
 
     Parameters
     ----------
@@ -251,16 +260,25 @@ def round_bends(free, factors, line, radius, spare):
                 spare -= added
                 break
             a, c, arc = bend, bend, 0.0
-            if most <= radius * half:
+            if most <= radius * half + 2 * _MARGIN:  # less would leave a line of no length
                 break
             most = max(most / 2, radius * half)
         cost += segment_cost(factors, last[0], last[1], a[0], a[1]) + arc
         length += math.hypot(a[0] - last[0], a[1] - last[1])
         length += math.hypot(c[0] - a[0], c[1] - a[1]) * (turn / 2) / sin(turn / 2)
-        points[size], directions[size] = a, directions[size - 1]
-        points[size + 1], directions[size + 1] = c, _direction(line, i)
-        size, last = size + 2, c
-    points[size], directions[size] = line[n - 1], directions[size - 1]
+        # An arc that begins where the one before ends has no line before it, and a line that goes
+        # on at a bend has one point there.
+        if turn > _LEAST_SPOT_TURN:
+            if _differ(points[size - 1], a):
+                points[size], directions[size] = a, directions[size - 1]
+                size += 1
+        elif not _differ(points[size - 1], c):
+            size -= 1
+        points[size], directions[size] = c, _direction(line, i)
+        size, last = size + 1, c
+    if _differ(points[size - 1], line[n - 1]):
+        points[size], directions[size] = line[n - 1], directions[size - 1]
+        size += 1
     cost += segment_cost(factors, last[0], last[1], line[n - 1, 0], line[n - 1, 1])
     length += math.hypot(line[n - 1, 0] - last[0], line[n - 1, 1] - last[1])
-    return points[: size + 1].copy(), directions[: size + 1].copy(), cost, length
+    return points[:size].copy(), directions[:size].copy(), cost, length

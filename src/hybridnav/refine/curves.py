@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 Pose = tuple[float, float, float]
 """`(x, y, yaw)`, metres and radians, map frame."""
 _MAX_POSES = 10_000_000
+_NOTHING_M = 1e-10
+"""Segments no longer than this are what rounding leaves of a word with fewer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +39,8 @@ class Curve:
         return math.fsum(np.abs(self.lengths_m).tolist())
 
     def poses(self, step_m: float) -> FloatArray:
-        """Return poses along the curve, at most a step apart, including the endpoints of segments.
+        """Return poses along the curve, at most a step apart, including the endpoints of segments,
+        each once.
 
         Parameters
         ----------
@@ -62,15 +65,15 @@ class Curve:
             )
         segments = [np.array([self.start])]
         for kind, length_m in zip(self.kinds.tolist(), self.lengths_m.tolist(), strict=True):
+            if abs(length_m) <= _NOTHING_M:
+                continue
             count = math.ceil(abs(length_m) / step_m)
-            along = length_m * np.arange(1, count + 1) / max(count, 1)
+            along = length_m * np.arange(1, count + 1) / count
             segments.append(self._ahead(segments[-1][-1], kind, along))
         return np.concatenate(segments)
 
     def _ahead(self, pose: FloatArray, kind: int, along_m: FloatArray) -> FloatArray:
         """Return the poses at some metres along an arc or a straight line."""
-        if not len(along_m):
-            return pose[None]
         x, y, yaw = pose.tolist()
         if kind == 0:
             xs, ys = x + along_m * cos(yaw), y + along_m * sin(yaw)

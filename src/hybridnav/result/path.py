@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,11 @@ from hybridnav.messages import path_message
 from hybridnav.poses import Motion
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from hybridnav._typing import FloatArray, LongArray, SignArray
+
+    End = Sequence[float] | FloatArray
 
 
 @copies_alike
@@ -50,6 +54,10 @@ class Path:
     is_curved: bool = False
     """Whether the robot drives an arc of a circle from each point to the next, as in the spaces
     `dubins` and `reeds-shepp`; else a straight line."""
+    start_heading_rad: float | None = None
+    """Heading from which the robot turns on the spot before it sets out; None for no turn."""
+    goal_heading_rad: float | None = None
+    """Heading to which the robot turns on the spot once it is there; None for no turn."""
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False
@@ -59,12 +67,27 @@ class Path:
 
     @cached_property
     def _motion(self) -> Motion:
-        return Motion(self.points, self.headings_rad, self.is_curved)
+        ends = self.start_heading_rad, self.goal_heading_rad
+        return Motion(self.points, self.headings_rad, self.is_curved, *ends)
+
+    def turned_at_ends(self, start: End, goal: End) -> Path:
+        """Return the path with turns on the spot from the yaw of its start, and to that of its
+        goal.
+
+        Parameters
+        ----------
+        start, goal
+            `(x, y)`, no turn, or `(x, y, yaw)`, metres and radians, map frame.
+        """
+        first, last = (float(end[2]) if len(end) > 2 else None for end in (start, goal))  # noqa: PLR2004
+        if first is None and last is None:
+            return self
+        return replace(self, start_heading_rad=first, goal_heading_rad=last)
 
     @property
     def headings_at_points(self) -> FloatArray:
         """float64 (m,), `headings_rad`, or the direction of travel after each point, before the
-        last one; 0 without motion."""
+        last one; 0 without motion. At an endpoint with a heading of its own, that one."""
         return self._motion.headings_at_points
 
     def poses(self, spacing_m: float = 0.05) -> FloatArray:
@@ -83,8 +106,9 @@ class Path:
             float64 (n, 3), `(x, y, yaw)`, metres and radians in [-pi, pi), map frame, from first to
             last point. Without `headings_rad` the yaw is the direction of travel: at a bend the one
             after it, at the end the one before it, 0 without motion. With `headings_rad` it is the
-            heading of the robot, as it turns along the path; a turn on the spot is two poses at one
-            point.
+            heading of the robot, as it turns along the path. With `start_heading_rad` that is the
+            yaw of the first pose, with `goal_heading_rad` that of the last one. No pose occurs
+            twice in a row: a turn on the spot, and nothing else, is two poses at one point.
 
         Raises
         ------
@@ -142,7 +166,8 @@ class Path:
     @property
     def spot_turns(self) -> LongArray:
         """int64, indices of points at which the robot turns on the spot: bends of straight lines,
-        and points that differ from the next one in heading alone."""
+        points that differ from the next one in heading alone, and endpoints with another heading
+        than the path."""
         return self._motion.spot_turns
 
     @property
