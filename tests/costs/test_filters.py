@@ -34,17 +34,17 @@ def info(kind: Any, base: Any, multiplier: Any) -> Any:
 def test_type_base_and_multiplier_are_read(of: Any, full: Any, expected: list[float]) -> None:
     layer = filter_costs(GRID, of, MASK, full_speed_mps=full)
     assert (np.abs(layer.factors[0] - expected) <= UNIT).all()
-    closes = layer.closed is not None
+    closes = layer.keepout is not None
     assert closes == (of.type == 0)
-    if layer.closed is not None:
-        assert layer.closed.tolist() == [[False, False, False, True]]
+    if layer.keepout is not None:
+        assert layer.keepout.tolist() == [[False, False, False, True]]
 
 
 def test_the_frame_of_the_mask_has_a_pose() -> None:
     # Half a turn about (4, 1): the last cell of the mask lies on the first one of the map.
     layer = filter_costs(GRID, info(0, 0, 1), MASK, pose=(4.0, 1.0, math.pi))
-    assert layer.closed is not None
-    assert layer.closed.tolist() == [[True, False, False, False]]
+    assert layer.keepout is not None
+    assert layer.keepout.tolist() == [[True, False, False, False]]
 
 
 @pytest.mark.parametrize(

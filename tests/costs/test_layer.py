@@ -126,9 +126,9 @@ def test_speed_masks_cost_the_time_that_they_take() -> None:
 def test_keepout_masks_close_cells_and_weigh_lanes() -> None:
     grid = grid_of(np.zeros((1, 5)), robot_radius_m=0)
     layer = hn.CostLayer.keepout_mask(grid, [[0, 20, 99, 100, -1]])
-    assert layer.closed is not None
+    assert layer.keepout is not None
     # round(2.54 * 20) = 51, round(2.54 * 99) = 251, 254 is lethal.
-    assert layer.closed.tolist() == [[False, False, False, True, False]]
+    assert layer.keepout.tolist() == [[False, False, False, True, False]]
     assert layer.closed_flat.tolist() == [3]
     assert layer.factors.tolist() == [[1, factor(51), factor(251), 1, 1]]
 

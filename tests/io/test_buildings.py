@@ -134,7 +134,7 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "door by name": (with_end(floor="2", door="front"), "door must be the number of a door"),
     "unknown floor": (with_end(floor="3", at=[1, 1]), "no floor is called '3': there are 1, 2"),
     "unknown room": (with_end(floor="2", room="haal"), "no room is called 'haal': did you mean"),
-    "unknown door": (with_end(floor="2", door=7), "no door has the number 7: there are 1"),
+    "unknown door": (with_end(floor="2", door=7), "no door has the number 7: the doors are 1;"),
     "wrong room": (with_end(floor="2", at=[1.2, 1.2], room="hall"), "lies in room lab, expected"),
     "in a wall": (with_end(floor="2", at=[0.2, 0.2]), "(0.2, 0.2) on floor 2 lies in an occupied"),
     "two links of a name": (

@@ -80,7 +80,7 @@ def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(
     path = write_mask(tmp_path_factory.mktemp("mask"), values, frame)
     slow = hn.load_speed_mask(path, grid, pose=pose)
     zones = hn.load_keepout_mask(path, grid, multiplier=4.0, pose=pose)
-    closed = np.zeros(grid.shape, bool) if zones.closed is None else zones.closed
+    closed = np.zeros(grid.shape, bool) if zones.keepout is None else zones.keepout
     may_close = np.zeros(grid.shape, bool)
     unsure = np.zeros(grid.shape, bool)
     for row, col in np.argwhere(values >= 100).tolist():
@@ -139,8 +139,8 @@ def test_limits_are_those_of_the_speed_filter(
 def test_a_mask_may_have_another_size_in_the_frame_of_the_map() -> None:
     grid = grid_of(np.zeros((2, 4)), hn.Frame(0.5, (1.0, 1.0)), robot_radius_m=0)
     small = hn.CostLayer.keepout_mask(grid, [[0, 100]], grid.frame)
-    assert small.closed is not None
-    assert small.closed.tolist() == [[False, True, False, False], [False] * 4]
+    assert small.keepout is not None
+    assert small.keepout.tolist() == [[False, True, False, False], [False] * 4]
     with pytest.raises(hn.InvalidValueError, match="give the frame of the mask"):
         hn.CostLayer.keepout_mask(grid, [[0, 100]])
 
@@ -152,8 +152,8 @@ def test_no_thin_zone_of_a_fine_mask_is_lost_between_centres(offset: float) -> N
     line = np.zeros((20, 20), np.int8)
     line[:, 5 + round(offset * 10)] = 100
     layer = hn.CostLayer.keepout_mask(grid, line, hn.Frame(0.1))
-    assert layer.closed is not None
-    assert layer.closed.tolist() == [[False, True, False, False]] * 4
+    assert layer.keepout is not None
+    assert layer.keepout.tolist() == [[False, True, False, False]] * 4
 
 
 @pytest.mark.parametrize("pose", [(1.0, 2.0), "abc", (math.nan, 0.0, 0.0), (1e12, 0, 0), None])
@@ -200,9 +200,9 @@ def test_the_zone_lies_where_it_was_drawn(floor: Any) -> None:
     expected = shut_of(grid)
     assert 20 < expected.sum() < 40
     layer = hn.load_keepout_mask(path, grid, pose=POSE)
-    assert layer.closed is not None
-    assert (layer.closed == expected).all()
-    blocked = hn.load_blocked(path, grid, pose=POSE)
+    assert layer.keepout is not None
+    assert (layer.keepout == expected).all()
+    blocked = hn.load_blocked(path, grid, keepout=True, pose=POSE)
     assert (np.asarray(blocked.cells) == np.argwhere(expected)).all()
 
 
@@ -220,7 +220,7 @@ def test_every_preset_keeps_out(floor: Any, preset: str) -> None:
     settings_ = hn.load_preset(preset, overrides=["pyramid.robot_radius_m=0.1"])
     planner = hn.HybridPlanner(topology, preset=settings_)
     plain = planner.plan(START, GOAL)
-    around = planner.plan(START, GOAL, blocked=hn.load_blocked(path, grid, pose=POSE))
+    around = planner.plan(START, GOAL, blocked=hn.load_blocked(path, grid, keepout=True, pose=POSE))
     planner.close()
     assert plain.path is not None
     assert around.path is not None
@@ -260,7 +260,7 @@ def test_a_mask_that_closes_nothing_here_is_refused(floor: Any) -> None:
 def test_a_pose_goes_with_masks_alone(floor: Any, tmp_path: Path) -> None:
     line = tmp_path / "line.geojson"
     line.write_text('{"type": "LineString", "coordinates": [[1, 1], [2, 2]]}')
-    with pytest.raises(hn.InvalidValueError, match="goes with a keepout mask"):
+    with pytest.raises(hn.InvalidValueError, match="goes with a mask of map_server"):
         hn.load_blocked(line, floor[0], pose=POSE)
 
 
@@ -315,8 +315,8 @@ def test_masks_that_people_drew_close_their_cells(data: Path, mask: str) -> None
     top, left = max(row0, 0), max(col0, 0)
     expected[top : top + part.shape[0], left : left + part.shape[1]] = part
     assert expected.any()
-    assert layer.closed is not None
-    assert (layer.closed == expected).all()
+    assert layer.keepout is not None
+    assert (layer.keepout == expected).all()
 
 
 @pytest.mark.filterwarnings("ignore::hybridnav.MapWarning")

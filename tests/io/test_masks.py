@@ -67,8 +67,8 @@ def test_masks_become_layers_of_the_map(tmp_path: Path) -> None:
     expected = np.repeat([1, 2, 100 / 11, 10, 1, 1, 1, 1, 1, 1, 1, 1], 2)
     assert np.abs(slow.factors - expected).max() < 2**-14
     zones = hn.load_keepout_mask(path, grid)
-    assert zones.closed is not None
-    assert zones.closed.any(axis=0).tolist() == np.repeat(np.array(GREYS) == 100, 2).tolist()
+    assert zones.keepout is not None
+    assert zones.keepout.any(axis=0).tolist() == np.repeat(np.array(GREYS) == 100, 2).tolist()
 
 
 def test_unreadable_masks_are_refused(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The option `--blocked`: closed doors, rooms, areas in files, and keepout masks."""
+"""The option `--blocked`: closed doors and rooms, obstacles and keepout zones in files."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ BlockedOption = Annotated[
     typer.Option(
         "--blocked",
         metavar="WHAT",
-        help="Close door:N, room:NAME, keepout:FILE[,x=X,y=Y,yaw=A] (a mask of Nav2), or the areas "
-        "of a GeoJSON file or mask image; may be repeated.",
+        help="Close door:N, room:NAME, or the areas of a GeoJSON FILE or mask: obstacles, off "
+        "which the robot keeps its radius. keepout:FILE[,x=X,y=Y,yaw=A] keeps out its centre alone, as "
+        "Nav2 takes its masks. May be repeated.",
     ),
 ]
 
@@ -40,7 +41,7 @@ class Closing:
     rooms: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
     masks: tuple[CostSpec, ...] = ()
-    """Keepout masks of Nav2."""
+    """Files of zones for the centre of the robot."""
 
     @property
     def needs_rooms(self) -> bool:
@@ -63,7 +64,7 @@ class Closing:
         for path in self.files:
             closed |= load_blocked(path, grid)
         for mask in self.masks:
-            closed |= load_blocked(mask.file, grid, pose=mask.pose)
+            closed |= load_blocked(mask.file, grid, keepout=True, pose=mask.pose)
         return closed
 
 

@@ -318,7 +318,7 @@ def grow_topology(
     with stage("building the pyramid", seconds, "pyramid"):
         topology = model.grown(preset.pyramid, rooms)
     for number in closing.doors if closing is not None else ():
-        topology.rooms.door(number)
+        topology.rooms.listed_door(number)
     return topology
 
 

@@ -86,6 +86,14 @@ MaxCellsOption = Annotated[
 RoomsOption = Annotated[
     Path | None,
     typer.Option(
+        "--rooms",
+        metavar="FILE",
+        help="Rooms as YAML; without it they are found, or are those of a model.",
+    ),
+]
+BesideRoomsOption = Annotated[
+    Path | None,
+    typer.Option(
         "--rooms", metavar="FILE", help="Rooms as YAML; else rooms.yaml beside the map, if there."
     ),
 ]

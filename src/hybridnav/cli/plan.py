@@ -30,6 +30,7 @@ from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, UsageError
 from hybridnav.cli.keep import KeepInOption, KeepOption, Source
 from hybridnav.cli.options import (
+    BesideRoomsOption,
     FreeOption,
     JsonOption,
     LeastIslandOption,
@@ -39,7 +40,6 @@ from hybridnav.cli.options import (
     PlotOption,
     PresetOption,
     RadiusOption,
-    RoomsOption,
     SeedOption,
     SetOption,
     SmoothOption,
@@ -151,7 +151,7 @@ def plan(
     to: ToOption = None,
     via: ViaOption = None,
     at: AtOption = "anywhere",
-    rooms_file: RoomsOption = None,
+    rooms_file: BesideRoomsOption = None,
     alternatives: AlternativesOption = 1,
     by: ByOption = None,
     max_overlap: OverlapOption = None,

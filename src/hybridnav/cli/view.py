@@ -22,6 +22,7 @@ from hybridnav.cli.common import (
 from hybridnav.cli.costs import PRESET, CostsOption, parsed_costs
 from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
+    BesideRoomsOption,
     FreeOption,
     LeastIslandOption,
     MapArgument,
@@ -29,7 +30,6 @@ from hybridnav.cli.options import (
     OccupiedOption,
     PresetOption,
     RadiusOption,
-    RoomsOption,
     SeedOption,
     SetOption,
 )
@@ -83,7 +83,7 @@ def view(
     routes: RouteOption = None,
     port: PortOption = 0,
     browser: BrowserOption = True,
-    rooms_file: RoomsOption = None,
+    rooms_file: BesideRoomsOption = None,
     costs: CostsOption = None,
     preset: PresetOption = None,
     overrides: SetOption = None,

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._copies import frozen
 from hybridnav.costs.inflation import HIGHEST
 from hybridnav.errors import InvalidValueError, brief
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from hybridnav._typing import AnyArray
+    from hybridnav._typing import AnyArray, BoolArray
     from hybridnav.grid.areas import Box
 
 UNIT_BITS = 14
@@ -56,6 +57,42 @@ def checked_factors(given: ArrayLike) -> NDArray[np.float32]:
             f"({row}, {col}): close a cell with `closed`, or scale the factors"
         )
     return rounded(numbers)
+
+
+def checked_cells(name: str, given: ArrayLike | None, shape: tuple[int, int]) -> BoolArray | None:
+    """Return closed cells of a layer of some rows and columns, None for none.
+
+    Raises
+    ------
+    InvalidValueError
+        When they are no bool array of this shape.
+    """
+    if given is None:
+        return None
+    cells = np.array(given)
+    if cells.dtype != np.bool_ or cells.shape != shape:
+        raise InvalidValueError(
+            f"{name} cells must be bool of the shape {shape} of the factors, got {cells.dtype} of "
+            f"shape {cells.shape}"
+        )
+    return frozen(cells) if cells.any() else None
+
+
+def changed_cells(
+    cells: BoolArray | None, part: BoolArray | None, box: Box, shape: tuple[int, int]
+) -> BoolArray | None:
+    """Return closed cells with those in a box as in a part; None stands for none."""
+    if cells is None and part is None:
+        return None
+    changed = np.zeros(shape, np.bool_) if cells is None else cells.copy()
+    changed[box[0] : box[1], box[2] : box[3]] = False if part is None else part
+    return frozen(changed) if changed.any() else None
+
+
+def joined_cells(*given: BoolArray | None) -> BoolArray | None:
+    """Return the cells that some layers close, None for none."""
+    known = [cells for cells in given if cells is not None]
+    return np.logical_or.reduce(known) if known else None
 
 
 def checked_setting(name: str, value: Any) -> float:

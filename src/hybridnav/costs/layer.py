@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,16 +15,20 @@ from hybridnav.costs import masks
 from hybridnav.costs.checks import (
     MOST_FACTOR,
     UNIT_BITS,
+    changed_cells,
     checked_box,
+    checked_cells,
     checked_factors,
     checked_multiplier,
     checked_setting,
+    joined_cells,
     rounded,
 )
 from hybridnav.costs.inflation import HIGHEST, inflated_costs
 from hybridnav.costs.sources import changed_source, joined_source
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid.checks import checked_cell, checked_type
+from hybridnav.grid.clearance import within_radius
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -53,10 +57,14 @@ class CostLayer:
         Shape `(rows, cols)`, row 0 at the lowest y: numbers from 1 to 1000. Rounded down to
         multiples of 2^-14, so that integers can count costs exactly.
     closed
-        bool (rows, cols), cells that may not be entered, as in a keepout zone; None for none.
+        bool (rows, cols), obstacles such as pallets and shut doors: a planner keeps the robot's
+        radius off these cells, as off occupied ones; None for none.
     source
         Origin of the factors, which results record: plain values for JSON. After changes it lists
         the first one and the last seven, and counts the others as `left_out`.
+    keepout
+        bool (rows, cols), cells that the *centre* of the robot does not enter, as in a keepout zone
+        of Nav2: nothing is added to them; None for none.
 
     Raises
     ------
@@ -75,18 +83,15 @@ class CostLayer:
     factors: NDArray[np.float32]
     closed: BoolArray | None = None
     source: dict[str, Any] = field(default_factory=lambda: {"kind": "array"})
+    keepout: BoolArray | None = None
 
     def __post_init__(self) -> None:
         factors = checked_factors(self.factors)
         object.__setattr__(self, "factors", frozen(factors))
-        if self.closed is not None:
-            closed = np.array(self.closed)
-            if closed.dtype != np.bool_ or closed.shape != factors.shape:
-                raise InvalidValueError(
-                    f"closed cells must be bool of the shape {factors.shape} of the factors, got "
-                    f"{closed.dtype} of shape {closed.shape}"
-                )
-            object.__setattr__(self, "closed", frozen(closed) if closed.any() else None)
+        rows, cols = factors.shape
+        for name in ("closed", "keepout"):
+            cells = checked_cells(name, getattr(self, name), (rows, cols))
+            object.__setattr__(self, name, cells)
 
     @classmethod
     def clearance(
@@ -212,11 +217,11 @@ class CostLayer:
         """Make the layer of a keepout mask of Nav2: closed zones, and lanes of preference.
 
         A value costs round(2.54 value), as Nav2's `KeepoutFilter` converts it. Cells that cost 253
-        or more are closed; the others have the factor 1 + multiplier * cost / 252. Unknown values
-        (-1) and cells outside the mask cost nothing. The robot's centre keeps out of closed cells;
-        its radius is not added. The value at the centre of a map cell counts, as in Nav2; a cell is
-        also closed, other than in Nav2, if the centre of a closed cell of a finer mask lies in it,
-        so that no thin zone is lost.
+        or more are `keepout`; the others have the factor 1 + multiplier * cost / 252. Unknown
+        values (-1) and cells outside the mask cost nothing. The robot's *centre* keeps out of a
+        zone, and its radius is not added, as Nav2 lays filters over its inflation. The value at the
+        centre of a map cell counts, as in Nav2; a cell is also closed, other than in Nav2, if the
+        centre of a closed cell of a finer mask lies in it, so that no thin zone is lost.
 
         Parameters
         ----------
@@ -236,7 +241,7 @@ class CostLayer:
         --------
         >>> grid = hn.OccupancyGrid(np.zeros((1, 3)), robot_radius_m=0)
         >>> layer = hn.CostLayer.keepout_mask(grid, [[0, 50, 100]])
-        >>> layer.factors.round(2), layer.closed
+        >>> layer.factors.round(2), layer.keepout
         (array([[1.  , 2.01, 1.  ]], dtype=float32), array([[False, False,  True]]))
         """
         value = checked_multiplier(checked_setting("multiplier", multiplier))
@@ -247,7 +252,7 @@ class CostLayer:
         closed = (costs > HIGHEST)[on_map]
         closed |= masks.holding_centres(grid, (costs > HIGHEST)[given], frame)
         source = {"kind": "keepout mask", "multiplier": value}
-        return cls(factor_of[on_map], closed, source)
+        return cls(factor_of[on_map], source=source, keepout=closed)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -263,14 +268,39 @@ class CostLayer:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the factors and of the closed cells, for layers whose sources are alike."""
-        closed = b"" if self.closed is None else np.packbits(self.closed).tobytes()
-        return hashlib.sha256(repr(self.shape).encode() + self.units.tobytes() + closed).hexdigest()
+        made = hashlib.sha256(repr(self.shape).encode() + self.units.tobytes())
+        for name in ("closed", "keepout"):
+            cells = getattr(self, name)
+            made.update(b"" if cells is None else name.encode() + np.packbits(cells).tobytes())
+        return made.hexdigest()
 
     @cached_property
     def closed_flat(self) -> LongArray:
-        """int64 (n,), the closed cells as `row * cols + col`, in order."""
-        closed = np.empty(0, dtype=np.int64) if self.closed is None else np.flatnonzero(self.closed)
-        return frozen(closed)
+        """int64 (n,), the cells of `closed` and `keepout` as `row * cols + col`, in order."""
+        shut = joined_cells(self.closed, self.keepout)
+        return frozen(np.empty(0, dtype=np.int64) if shut is None else np.flatnonzero(shut))
+
+    def inflated(self, grid: OccupancyGrid) -> CostLayer:
+        """Return the layer with `keepout` alone: all cells that the robot's centre may not enter.
+
+        Parameters
+        ----------
+        grid
+            The map of the layer; cells within the robot's radius of closed ones are added, as they
+            are round occupied ones.
+
+        Examples
+        --------
+        >>> grid = hn.OccupancyGrid(np.zeros((1, 4)), robot_radius_m=1)
+        >>> layer = hn.CostLayer(np.ones((1, 4)), np.array([[True, False, False, False]]))
+        >>> layer.inflated(grid).keepout
+        array([[ True,  True, False, False]])
+        """
+        if self.closed is None:
+            return self
+        near = within_radius(self.closed, radius_cells=grid.robot_radius_m / grid.resolution_m)
+        keepout = joined_cells(near, self.keepout)
+        return replace(self, closed=None, keepout=keepout)
 
     def check_fits(self, grid: OccupancyGrid) -> None:
         """Raise `InvalidValueError` if a map has another number of cells."""
@@ -317,8 +347,10 @@ class CostLayer:
         """
         top, bottom, left, right = checked_box(box, self.shape)
         inside = slice(top, bottom), slice(left, right)
-        closed = None if self.closed is None else self.closed[inside]
-        return CostLayer(self.factors[inside], closed, self.source)
+        closed, keepout = (
+            None if cells is None else cells[inside] for cells in (self.closed, self.keepout)
+        )
+        return CostLayer(self.factors[inside], closed, self.source, keepout)
 
     def changed(self, part: CostLayer, row: int, col: int) -> CostLayer:
         """Return the layer with some of its cells as in another one; the time is that of a copy.
@@ -349,16 +381,14 @@ class CostLayer:
                 f"costs of {self.shape[1]} x {self.shape[0]} cells: give a box of this map"
             )
         inside = slice(row, row + rows), slice(col, col + cols)
-        factors, closed = self.factors.copy(), None
+        factors, box = self.factors.copy(), (row, row + rows, col, col + cols)
         factors[inside] = part.factors
-        if self.closed is not None or part.closed is not None:
-            closed = np.zeros(self.shape, np.bool_) if self.closed is None else self.closed.copy()
-            closed[inside] = False if part.closed is None else part.closed
         # Made without the checks of all cells: both layers have passed them.
         layer = object.__new__(CostLayer)
         object.__setattr__(layer, "factors", frozen(factors))
-        kept = None if closed is None or not closed.any() else frozen(closed)
-        object.__setattr__(layer, "closed", kept)
+        for name in ("closed", "keepout"):
+            cells = changed_cells(getattr(self, name), getattr(part, name), box, self.shape)
+            object.__setattr__(layer, name, cells)
         object.__setattr__(layer, "source", changed_source(self.source, part.source))
         return layer
 
@@ -380,6 +410,8 @@ class CostLayer:
             )
         first, second = self.factors.astype(np.float64), other.factors.astype(np.float64)
         factors = np.maximum(first, second) if how == "maximum" else first * second
-        closed = [each.closed for each in (self, other) if each.closed is not None]
-        union = np.logical_or.reduce(closed) if closed else None
-        return CostLayer(rounded(factors), union, joined_source(self.source, other.source, how))
+        source = joined_source(self.source, other.source, how)
+        closed = joined_cells(self.closed, other.closed)
+        return CostLayer(
+            rounded(factors), closed, source, joined_cells(self.keepout, other.keepout)
+        )

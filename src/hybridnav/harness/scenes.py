@@ -84,9 +84,10 @@ def read_scene(spec: MapSpec) -> Scene:
     if layer is None:
         return Scene(grid, None)
     layer.check_fits(grid)
-    if layer.closed is None:
+    layer = layer.inflated(grid)
+    if layer.keepout is None:
         return Scene(grid, layer)
-    classes = np.where(layer.closed, np.uint8(CellClass.OCCUPIED), grid.classes)
+    classes = np.where(layer.keepout, np.uint8(CellClass.OCCUPIED), grid.classes)
     open_grid = OccupancyGrid.restored(**vars(grid) | {"classes": classes})
     return Scene(open_grid, CostLayer(layer.factors, source=layer.source))
 

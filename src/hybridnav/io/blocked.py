@@ -13,6 +13,7 @@ import shapely
 from hybridnav._files import printable
 from hybridnav.config.yaml_file import Limits, open_file
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
+from hybridnav.grid.clearance import within_radius
 from hybridnav.io.image import read_raster
 from hybridnav.io.masks import load_keepout_mask
 from hybridnav.planner.areas import parts_on
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from shapely.geometry.base import BaseGeometry
 
-    from hybridnav._typing import PathLike
+    from hybridnav._typing import BoolArray, PathLike
     from hybridnav.grid import OccupancyGrid
 
 LIMITS = Limits(max_bytes=2**22, max_values=100_000)
@@ -39,31 +40,39 @@ _FEWEST = {"LineString": 2, "Polygon": 3}
 
 
 def load_blocked(
-    path: PathLike, grid: OccupancyGrid, *, pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    path: PathLike,
+    grid: OccupancyGrid,
+    *,
+    keepout: bool = False,
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Blocked:
     """Read the closed areas of a map from a file.
+
+    They are obstacles, such as pallets: the robot keeps its radius off them. With `keepout` they
+    are zones for the *centre* of the robot, to which nothing is added: as Nav2 takes the mask of
+    its keepout filter, which it lays over the inflated map.
 
     Parameters
     ----------
     path
-        A GeoJSON file (`.geojson`, `.json`), a keepout mask of Nav2 (`.yaml`) or an image. GeoJSON
-        is a `FeatureCollection`, a `Feature` or a geometry, of `Polygon`, `MultiPolygon`,
-        `LineString` and `MultiLineString`; coordinates are `[x, y]` in metres, map frame, and the
-        robot keeps its radius off the areas. A keepout mask closes cells as
-        `CostLayer.keepout_mask` does, also for presets that know no costs. An image is a mask of
-        one pixel a cell, in the orientation of the map's image: a pixel closes its cell when it is
-        opaque and its darkness, 1 - brightness in [0, 1], is at least the map's occupied threshold;
-        lighter and transparent pixels close nothing. The centre of the robot does not enter the
-        cells of a mask.
+        A GeoJSON file (`.geojson`, `.json`), a mask of map_server (`.yaml`) or an image. GeoJSON is
+        a `FeatureCollection`, a `Feature` or a geometry, of `Polygon`, `MultiPolygon`, `LineString`
+        and `MultiLineString`; coordinates are `[x, y]` in metres, map frame. A mask of map_server
+        closes cells as `CostLayer.keepout_mask` does, also for presets that know no costs. An image
+        is a mask of one pixel a cell, in the orientation of the map's image: a pixel closes its
+        cell when it is opaque and its darkness, 1 - brightness in [0, 1], is at least the map's
+        occupied threshold; lighter and transparent pixels close nothing.
     grid
         The map.
+    keepout
+        Whether only the centre of the robot keeps out.
     pose
-        `(x, y, yaw)` of the frame of a keepout mask in the map frame, in metres and radians.
+        `(x, y, yaw)` of the frame of a mask of map_server in the map frame, in metres and radians.
 
     Returns
     -------
     Blocked
-        The closed areas, with `polygons` or with `cells`.
+        The closed areas, with `polygons`, `keepout` or `cells`.
 
     Raises
     ------
@@ -73,7 +82,7 @@ def load_blocked(
         When the file cannot be read, closes nothing, an area closes no cell of the map, or a mask
         is not of the map's size.
     InvalidValueError
-        When the pose is out of range, or given for a file that is no keepout mask.
+        When the pose is out of range, or given for a file that is no mask of map_server.
 
     Examples
     --------
@@ -85,26 +94,39 @@ def load_blocked(
     """
     suffix = Path(path).suffix.lower()
     if suffix in _MASKS:
-        return _keepout(path, grid, pose)
+        return _mask(path, grid, pose, keepout=keepout)
     if any(pose):
         raise InvalidValueError(
-            f"blocked {printable(path)}: a pose goes with a keepout mask ({', '.join(_MASKS)}) "
-            "alone: leave it out"
+            f"blocked {printable(path)}: a pose goes with a mask of map_server "
+            f"({', '.join(_MASKS)}) alone: leave it out"
         )
-    return _areas(path, grid) if suffix in _GEOJSON else _image(path, grid)
+    if suffix not in _GEOJSON:
+        return _image(path, grid, keepout=keepout)
+    areas = _areas(path, grid)
+    return Blocked(keepout=areas) if keepout else Blocked(polygons=areas)
 
 
-def _keepout(path: PathLike, grid: OccupancyGrid, pose: tuple[float, float, float]) -> Blocked:
-    closed = load_keepout_mask(path, grid, pose=pose).closed
+def _closing(cells: BoolArray, grid: OccupancyGrid, *, keepout: bool) -> Blocked:
+    """Return the closure of some cells, as obstacles or for the centre of the robot."""
+    radius_m = 0.0 if keepout else grid.robot_radius_m
+    return Blocked(
+        cells=np.argwhere(within_radius(cells, radius_cells=radius_m / grid.resolution_m))
+    )
+
+
+def _mask(
+    path: PathLike, grid: OccupancyGrid, pose: tuple[float, float, float], *, keepout: bool
+) -> Blocked:
+    closed = load_keepout_mask(path, grid, pose=pose).keepout
     if closed is None:
         raise MapError(
             f"blocked {printable(path)}: the mask closes no cell of the map, expected occupied "
             "cells on it: check its origin"
         )
-    return Blocked(cells=np.argwhere(closed))
+    return _closing(closed, grid, keepout=keepout)
 
 
-def _image(path: PathLike, grid: OccupancyGrid) -> Blocked:
+def _image(path: PathLike, grid: OccupancyGrid, *, keepout: bool) -> Blocked:
     where = f"blocked {printable(path)}"
 
     def check_size(cols: int, rows: int) -> None:
@@ -126,10 +148,10 @@ def _image(path: PathLike, grid: OccupancyGrid) -> Blocked:
             f"{where}: the mask closes nothing, expected pixels with a darkness of at least "
             f"{grid.occupied_threshold:g} where it is closed"
         )
-    return Blocked(cells=np.argwhere(closed))
+    return _closing(closed, grid, keepout=keepout)
 
 
-def _areas(path: PathLike, grid: OccupancyGrid) -> Blocked:
+def _areas(path: PathLike, grid: OccupancyGrid) -> list[BaseGeometry]:
     where = f"blocked {printable(path)}"
     found: list[BaseGeometry] = []
     outline_cells = 0.0
@@ -148,7 +170,7 @@ def _areas(path: PathLike, grid: OccupancyGrid) -> Blocked:
         found.append(area)
     if not found:
         raise MapError(f"{where}: closes nothing, expected at least one feature")
-    return Blocked(polygons=found)
+    return found
 
 
 def _outline_cells(parts: list[BaseGeometry], grid: OccupancyGrid) -> float:

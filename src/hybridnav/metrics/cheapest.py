@@ -56,8 +56,7 @@ class CheapestCost:
         if layer is not None:
             checked_type("layer", layer, CostLayer).check_fits(grid)
             factors = layer.factors.astype(np.float64)
-            if layer.closed is not None:
-                free &= ~layer.closed
+            free.flat[layer.inflated(grid).closed_flat] = False
         self._factors = np.pad(np.where(free, factors, 0.0), 1)
         self._cuts_corners = grid.corner_cutting
         self._shape = grid.shape

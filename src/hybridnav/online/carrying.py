@@ -82,7 +82,10 @@ def carry_costs(layer: CostLayer, before: OccupancyGrid, after: OccupancyGrid) -
     if layer.source["kind"] == "clearance":
         return CarriedCosts(CostLayer.clearance(after, **_settings(layer.source)), nothing)
     factors = placed(layer.factors, after.shape, shift, 1)
-    closed = None if layer.closed is None else placed(layer.closed, after.shape, shift, 0)
+    closed, keepout = (
+        None if cells is None else placed(cells, after.shape, shift, 0)
+        for cells in (layer.closed, layer.keepout)
+    )
     reach_m = max((part["inflation_radius_m"] for part in _clearances(layer.source)), default=None)
     if reach_m is None:
         outdated = nothing
@@ -93,7 +96,7 @@ def carry_costs(layer: CostLayer, before: OccupancyGrid, after: OccupancyGrid) -
         cells = math.ceil(reach_m / after.resolution_m)
         outdated = within_radius(was != is_occupied, radius_cells=cells)
         outdated |= new & within_radius(is_occupied, radius_cells=cells)
-    return CarriedCosts(CostLayer(factors, closed, layer.source), outdated)
+    return CarriedCosts(CostLayer(factors, closed, layer.source, keepout), outdated)
 
 
 def _settings(source: dict[str, Any]) -> dict[str, Any]:

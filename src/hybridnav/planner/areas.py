@@ -70,15 +70,17 @@ def _polygon(corners: ArrayLike) -> BaseGeometry:
     return shapely.Polygon(points)
 
 
-def runs_of(area: BaseGeometry, grid: OccupancyGrid) -> LongArray:
+def runs_of(area: BaseGeometry, grid: OccupancyGrid, *, radius_m: float) -> LongArray:
     """Find the flat cells that an area closes on a map, as runs `[start, stop)`, shape (n, 2).
+
+    The robot keeps the radius off the area; 0 for its centre alone.
 
     Raises
     ------
     InvalidValueError
         When the area closes no cell.
     """
-    radius_cells = grid.robot_radius_m / grid.resolution_m
+    radius_cells = radius_m / grid.resolution_m
     parts = parts_on(area, grid)
     runs = np.concatenate([_runs_near(part, grid.shape, radius_cells) for part in parts])
     if not len(runs):

@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 class Blocked:
     """Closures for one query: doors, rooms, arcs, places, cells, and areas in metres.
 
-    Areas are obstacles: the robot keeps its radius (`grid.robot_radius_m`) off them, as off
-    occupied cells. Everything else closes single cells: the centre of the robot does not enter
-    them. All items must be on the map: an unknown number or name, and an area that closes no cell
-    of the map, are refused. `first | second` is the union of two closures.
+    Areas are obstacles, such as pallets: the robot keeps its radius (`grid.robot_radius_m`) off
+    them, as off occupied cells, unless they are given as `keepout`. That and everything else closes
+    cells for the centre of the robot alone, which may pass beside them. All items must be on the
+    map: an unknown number or name, and an area that closes no cell of the map, are refused. `first
+    | second` is the union of two closures.
 
     Parameters
     ----------
@@ -54,11 +55,14 @@ class Blocked:
         radius of 0, meets it. A line has no inside: with a radius of 0, a line along a side between
         two cells closes the cell with the higher index (as in `Frame.cells_of`), so that no path
         passes a line at any position.
+    keepout
+        Areas as in `polygons` that the *centre* of the robot does not enter: their cells are those
+        of a robot of radius 0.
     doors
-        Numbers of doors, or `Door` objects of this map: no move crosses their boundaries, which
-        close like those of arcs. Other doors between the same rooms stay open. If corners may be
-        cut, all cells on both sides close. A diagonal between two cells that were measured as
-        occupied crosses no door.
+        Numbers of doors as lists show them (gaps are not listed), or `Door` objects of this map: no
+        move crosses their boundaries, which close like those of arcs. Other doors between the same
+        rooms stay open. If corners may be cut, all cells on both sides close. A diagonal between
+        two cells that were measured as occupied crosses no door.
     rooms
         Names of rooms; all their cells are closed.
 
@@ -81,13 +85,15 @@ class Blocked:
     polygons: Sequence[BaseGeometry | ArrayLike] = ()
     doors: Sequence[int | Door] = ()
     rooms: Sequence[str] = ()
+    keepout: Sequence[BaseGeometry | ArrayLike] = ()
 
     def __post_init__(self) -> None:
         checked = {
             "arcs": _checked_ids("arcs", self.arcs, LevelArc),
             "places": _checked_ids("places", self.places),
             "cells": _checked_cells(self.cells),
-            "polygons": _checked_areas(self.polygons),
+            "polygons": _checked_areas("polygons", self.polygons),
+            "keepout": _checked_areas("keepout", self.keepout),
             "doors": _checked_ids("doors", self.doors, Door),
             "rooms": _checked_names(self.rooms),
         }
@@ -109,9 +115,12 @@ class Blocked:
     @property
     def key(self) -> tuple[object, ...]:
         """Key for look-ups, equal for equal closures."""
-        areas = tuple(area.wkb for area in cast("Sequence[BaseGeometry]", self.polygons))
+        areas = [
+            tuple(area.wkb for area in cast("Sequence[BaseGeometry]", given))
+            for given in (self.polygons, self.keepout)
+        ]
         cells = np.asarray(self.cells).tobytes()
-        return tuple(self.arcs), tuple(self.places), cells, areas, self.doors, self.rooms
+        return tuple(self.arcs), tuple(self.places), cells, *areas, self.doors, self.rooms
 
     def cells_of(self, topology: TopologicalMap) -> LongArray:
         """Find the cells that may not be entered; occupied ones may be among them.
@@ -143,7 +152,9 @@ class Blocked:
             ]
         )
         runs = [np.stack([single, single + 1], axis=1)]
-        runs += [runs_of(area, grid) for area in cast("Sequence[BaseGeometry]", self.polygons)]
+        for given, radius_m in ((self.polygons, grid.robot_radius_m), (self.keepout, 0.0)):
+            areas = cast("Sequence[BaseGeometry]", given)
+            runs += [runs_of(area, grid, radius_m=radius_m) for area in areas]
         return _cells_in_runs(np.concatenate(runs))
 
     def _in_places(self, topology: TopologicalMap) -> list[LongArray]:
@@ -227,9 +238,9 @@ def as_blocked(value: Closable) -> Blocked:
 
 
 def _door_on(rooms: Rooms, door: int | Door) -> Door:
-    """Return the door of a map for a number or a door."""
+    """Return the door of a map for a number, as lists show it, or a door."""
     if not isinstance(door, Door):
-        return rooms.door(door)
+        return rooms.listed_door(door)
     own = rooms.door(door.number)
     if (own.rooms, own.position) != (door.rooms, door.position):  # its arcs depend on the robot
         raise InvalidValueError(
@@ -283,9 +294,9 @@ def _checked_names(names: Any) -> tuple[str, ...]:
     return tuple(map(str, given))
 
 
-def _checked_areas(areas: Any) -> tuple[BaseGeometry, ...]:
+def _checked_areas(name: str, areas: Any) -> tuple[BaseGeometry, ...]:
     if isinstance(areas, BaseGeometry | str) or not hasattr(areas, "__iter__"):
-        raise InvalidValueError(f"polygons must be a sequence of areas, got {shown(areas)}")
+        raise InvalidValueError(f"{name} must be a sequence of areas, got {shown(areas)}")
     return tuple(map(checked_area, areas))
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,8 +12,10 @@ import numpy as np
 
 from hybridnav._copies import copies_alike
 from hybridnav.costs import CostLayer, cost_along
+from hybridnav.costs.checks import joined_cells
 from hybridnav.errors import InvalidValueError
 from hybridnav.grid.checks import checked_type
+from hybridnav.grid.clearance import within_radius
 from hybridnav.grid.lines import polyline_length
 from hybridnav.planner.closed import ClosedCells
 from hybridnav.refine import CostLine
@@ -19,7 +23,7 @@ from hybridnav.result import Path
 from hybridnav.search.moves import path_length_in_cells
 
 if TYPE_CHECKING:
-    from hybridnav._typing import FloatArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.config import PlannerSettings, Preset
     from hybridnav.grid import OccupancyGrid
     from hybridnav.grid.areas import Box
@@ -54,18 +58,21 @@ class PlannerCosts:
         self.given = given
         """The layer given to the planner, which stays with its cells when the map changes."""
         self.layer = self._named
-        """The layer of the larger factors; None where neither has costs."""
+        """The layer of the larger factors; None where neither has costs. Its `keepout` holds the
+        cells within the robot's radius of the closed ones too."""
         if given is not None:
             self._check(given)
-            self.layer = given if self._named is None else self._named | given
+            inflated = given.inflated(grid)
+            self.layer = inflated if self._named is None else self._named | inflated
 
     def on(self, grid: OccupancyGrid) -> PlannerCosts:
         """Return the costs on the same map after its cells changed: those of the preset are
         computed anew, and given ones stay with their cells."""
         return PlannerCosts(grid, self._preset, self.given)
 
-    def changed(self, given: CostLayer, box: Box) -> PlannerCosts:
-        """Return the costs with the cells in a box as another given layer has them.
+    def changed(self, given: CostLayer, box: Box) -> tuple[PlannerCosts, Box]:
+        """Return the costs with the cells in a box as another given layer has them, and the box of
+        all cells that this changes: closed ones reach as far as the robot's radius.
 
         Parameters
         ----------
@@ -83,23 +90,60 @@ class PlannerCosts:
         none = CostLayer(np.ones(self._grid.shape, np.float32))
         costs = copy(self)
         costs.given = own = none if self.given is None else self.given
-        costs.layer = layer = own if self.layer is None else self.layer
+        costs.layer = layer = none if self.layer is None else self.layer
         if box[0] >= box[1] or box[2] >= box[3]:
-            return costs
-        part = given.part(box)
-        costs.given = costs.layer = own.changed(part, box[0], box[2])
+            return costs, box
+        part, shape = given.part(box), layer.shape
+        costs.given = own.changed(part, box[0], box[2])
         if self._named is not None:
-            costs.layer = layer.changed(self._named.part(box) | part, box[0], box[2])
-        return costs
+            part = self._named.part(box) | part
+        if own.closed is None and costs.given.closed is None:
+            costs.layer = layer.changed(part, box[0], box[2])
+            return costs, box
+        reach = math.ceil(self._grid.robot_radius_m / self._grid.resolution_m)
+        wide = _grown(box, reach, shape)
+        whole = layer.changed(replace(part, closed=None), box[0], box[2]).part(wide)
+        keepout = self._shut(costs.given, wide, _grown(wide, reach, shape))
+        costs.layer = layer.changed(
+            replace(whole, keepout=keepout, source=part.source), wide[0], wide[2]
+        )
+        return costs, wide
+
+    def _shut(self, given: CostLayer, box: Box, window: Box) -> BoolArray | None:
+        """Return the cells of a box that a layer keeps the robot's centre out of; the closed cells
+        that lie within its radius are in the window."""
+        closed, keepout = (
+            None if cells is None else cells[each[0] : each[1], each[2] : each[3]]
+            for cells, each in ((given.closed, window), (given.keepout, box))
+        )
+        near = None
+        if closed is not None:
+            radius_cells = self._grid.robot_radius_m / self._grid.resolution_m
+            top, left = box[0] - window[0], box[2] - window[2]
+            near = within_radius(closed, radius_cells=radius_cells)
+            near = near[top : top + box[1] - box[0], left : left + box[3] - box[2]]
+        return joined_cells(near, keepout)
 
     def _check(self, given: CostLayer) -> None:
         """Raise `InvalidValueError` if a planner cannot plan by a layer."""
         checked_type("costs", given, CostLayer).check_fits(self._grid)
         if why := self._preset.planner.refusal_of_costs():
-            closes = "" if given.closed is None else "; closed cells alone go as `blocked`"
+            closes = "" if not len(given.closed_flat) else "; closed cells alone go as `blocked`"
             raise InvalidValueError(
                 f"preset {self._preset.name} cannot plan by costs: {why}{closes}"
             )
+
+
+def _grown(box: Box, reach: int, shape: tuple[int, int]) -> Box:
+    """Return a box of cells with those around it, on the map."""
+    top, bottom, left, right = box
+    rows, cols = shape
+    return (
+        max(top - reach, 0),
+        min(bottom + reach, rows),
+        max(left - reach, 0),
+        min(right + reach, cols),
+    )
 
 
 @copies_alike

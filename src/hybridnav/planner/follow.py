@@ -145,7 +145,7 @@ def followed(
         places = cast("TopologicalMap", StalePlaces(grid, built_of(topology)))
     costs = costs.on(grid)
     if change.costs is not None:
-        costs = costs.changed(change.costs, change.box)
+        costs, _ = costs.changed(change.costs, change.box)
     if isinstance(cells, Following):
         return places, cells.followed(grid, changed), costs
     if isinstance(cells, Carried):

@@ -115,13 +115,13 @@ class OverOverlay:
             )
             if costs is not None and len(costs.closed_flat):
                 overlay.update(
-                    factor, closed=costs.closed, changed=_box_of(costs.closed_flat, costs.shape)
+                    factor, closed=costs.keepout, changed=_box_of(costs.closed_flat, costs.shape)
                 )
                 overlay.renew()
             now = self._refiner.costs
             if now is not costs and now is not None:  # a progress callback has changed them
                 new: Any = now.factors
-                overlay.update(new, closed=now.closed)
+                overlay.update(new, closed=now.keepout)
         except PathsTooLongError:
             self._is_too_long = True
             return
@@ -139,7 +139,7 @@ class OverOverlay:
             return
         factor: Any = costs.factors
         try:
-            self._built[0].update(factor, closed=costs.closed, changed=box)
+            self._built[0].update(factor, closed=costs.keepout, changed=box)
         except PathsTooLongError:
             self._built, self._is_too_long = None, True
 
@@ -159,7 +159,7 @@ class OverOverlay:
         """Return the factors of the cells, which may be entered, and which of these are closed."""
         costs, grid = self._refiner.costs, self._topology.grid
         enterable = grid.enterable(allow_unexplored=self._allow_unexplored)
-        closed = None if costs is None else costs.closed
+        closed = None if costs is None else costs.keepout
         factors = np.ones(grid.shape, np.float32) if costs is None else costs.factors
         return factors, enterable, np.zeros(grid.shape, np.bool_) if closed is None else closed
 

@@ -323,8 +323,8 @@ class HybridPlanner:
             made = followed(self.topology, self.preset, self._cells, self._costs, change)
             self._begun = partial(self._take_map, *made)
         elif change.costs is not None:
-            costs = self._costs.changed(change.costs, change.box)
-            self._begun = partial(self._take_costs, costs, change.box)
+            changed = self._costs.changed(change.costs, change.box)
+            self._begun = partial(self._take_costs, *changed)
         self._turns.alone(self._complete)
 
     def _take_map(self, topology: TopologicalMap, cells: CellPlanner, costs: PlannerCosts) -> None:

@@ -77,7 +77,7 @@ class CostLine:
         self._frame = grid.frame
         self._corner_cutting = grid.corner_cutting
         self._factors = layer.factors
-        free = open_cells(grid, layer.closed_flat, allow_unexplored=allow_unexplored)
+        free = open_cells(grid, layer.inflated(grid).closed_flat, allow_unexplored=allow_unexplored)
         self._free = free.view(np.uint8)
 
     def closing(self, closed: LongArray) -> CostLine:

@@ -249,16 +249,27 @@ class Rooms:
         InvalidValueError
             When no door has it; the message lists the existing numbers.
         """
-        found = self._door_of_number.get(number)
-        if found is None:
-            known = "the map has no doors"
-            if self.doors:
-                first, last = self.doors[0].number, self.doors[-1].number
-                known = f"there are {len(self.doors)}, from {first} to {last}"
+        return self._numbered(number, self._door_of_number)
+
+    def listed_door(self, number: int) -> Door:
+        """Return the door with a number that lists and pictures show: gaps are not among them.
+
+        Raises
+        ------
+        InvalidValueError
+            As for `door`.
+        """
+        listed = {door.number: door for door in self.doors if not door.is_gap}
+        return self._numbered(number, listed)
+
+    def _numbered(self, number: int, doors: dict[int, Door]) -> Door:
+        if number not in doors:
+            listed = [door.number for door in self.doors if not door.is_gap]
+            known = f"the doors are {_in_runs(listed)}" if listed else "the map has no doors"
             raise InvalidValueError(
                 f"no door has the number {number!r:.80}: {known}; hybridnav rooms MAP lists them"
             )
-        return found
+        return doors[number]
 
     @cached_property
     def _door_of_number(self) -> dict[int, Door]:
@@ -412,3 +423,11 @@ def room_areas_m2(labels: RoomLabels, grid: OccupancyGrid) -> FloatArray:
     cells = np.bincount(free[free >= 0], minlength=len(labels.names))
     areas: FloatArray = cells * np.float64(grid.cell_area_m2)
     return areas
+
+
+def _in_runs(numbers: list[int]) -> str:
+    """Return numbers in order as text, neighbours as one run: 1-4, 7."""
+    begins = [each for each in numbers if each - 1 not in numbers]
+    ends = [each for each in numbers if each + 1 not in numbers]
+    runs = zip(sorted(begins), sorted(ends), strict=True)
+    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in runs)

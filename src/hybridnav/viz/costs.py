@@ -92,8 +92,7 @@ def draw_query(
         draw_shades(canvas, grid, shades, gid="costs")
         text = f"a metre costs up to {scale.vmax:.3g}"
         entries.append((Patch(fc=colormaps["YlOrRd"](_SHADES[-1])), text))
-        if costs.closed is not None:
-            is_closed |= costs.closed
+        is_closed.flat[costs.inflated(grid).closed_flat] = True
     if blocked is not None:
         is_closed.ravel()[as_blocked(blocked).cells_of(topology)] = True
     is_closed &= is_open
@@ -179,15 +178,14 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
     shades = LinearSegmentedColormap.from_list("factors", colours_of_costs)
     drawn = np.round(scale(layer.factors).clip(0, 1) * (_LEVELS - 1)).astype(np.uint8)
     drawn[grid.classes == CellClass.UNEXPLORED] = _LEVELS
-    if layer.closed is not None:
-        drawn[layer.closed] = _LEVELS + 1
+    drawn.flat[layer.closed_flat] = _LEVELS + 1
     levels = np.round(shades(np.linspace(0, 1, _LEVELS))[:, :3] * 255).astype(np.uint8)
     colours = np.concatenate([levels, style.rgb(style.UNEXPLORED, _CLOSED)])
     draw_cells(canvas, grid, drawn, colours)
     entries = ground_entries(grid)
     if (grid.classes == CellClass.UNEXPLORED).any():
         entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
-    if layer.closed is not None:
+    if len(layer.closed_flat):
         entries.append((Patch(fc=_CLOSED), "closed"))
     entries += _draw_paths(canvas, paths or {})
     words = [grid.name, f"metres cost 1 to {scale.vmax:.3g} times as much"]
