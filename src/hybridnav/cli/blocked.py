@@ -22,8 +22,8 @@ BlockedOption = Annotated[
         "--blocked",
         metavar="WHAT",
         help="Close door:N, room:NAME, or the areas of a GeoJSON FILE or mask: obstacles, off "
-        "which the robot keeps its radius. keepout:FILE[,x=X,y=Y,yaw=A] keeps out its centre alone, as "
-        "Nav2 takes its masks. May be repeated.",
+        "which the robot keeps its radius. keepout:FILE[,x=X,y=Y,yaw=A] keeps out its centre "
+        "alone, as Nav2 takes its masks. May be repeated.",
     ),
 ]
 
