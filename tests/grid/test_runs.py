@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -24,7 +26,7 @@ def test_the_numbers_of_runs_follow_one_another(drawn: list[tuple[int, int]]) ->
 @pytest.mark.parametrize("kind", [np.int32, np.int64, np.float64])
 @given(st.integers(1, 3), st.lists(st.integers(-2, 2), max_size=60))
 def test_distinct_rows_are_those_of_numpy(kind: type, width: int, drawn: list[int]) -> None:
-    rows = np.array(drawn[: len(drawn) // width * width], dtype=kind).reshape(-1, width)
+    rows: Any = np.array(drawn[: len(drawn) // width * width], dtype=kind).reshape(-1, width)
     found = unique_rows(rows)
     if not len(rows):
         assert [len(part) for part in found] == [0, 0, 0, 0]

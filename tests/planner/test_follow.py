@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.metrics import VisibilityGraph, segment_faults
 from tests.interrupts import Struck, lines_of
+from tests.layers import layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.strategies import class_grids, examples, occupancy_grid
 
@@ -303,7 +304,7 @@ def with_speckles(grid: hn.OccupancyGrid, rng: np.random.Generator) -> hn.Occupa
 
 def factors_of(grid: hn.OccupancyGrid, rng: np.random.Generator) -> hn.CostLayer:
     """A layer of random factors that closes some cells."""
-    return hn.CostLayer(rng.uniform(1, 6, grid.shape), rng.random(grid.shape) < 0.05)
+    return layer_of(rng.uniform(1, 6, grid.shape), rng.random(grid.shape) < 0.05)
 
 
 @pytest.mark.parametrize("preset", ["robot", "portals", "paper", "grid-astar"])
@@ -318,7 +319,8 @@ def test_given_costs_stay_with_their_cells_on_a_changed_map(
     rng = np.random.default_rng(seed)
     blank = hn.OccupancyGrid(np.zeros((20, 30), np.float32), hn.Frame(0.1), robot_radius_m=0)
     grid = with_speckles(blank, rng)
-    factors, closed = np.ones(grid.shape), np.zeros(grid.shape, np.bool_)
+    factors: Any = np.ones(grid.shape)
+    closed: Any = np.zeros(grid.shape, np.bool_)
     planner = hn.HybridPlanner(topology_of(grid), preset=preset)
     for turn in range(4):
         if prepared:
@@ -336,9 +338,7 @@ def test_given_costs_stay_with_their_cells_on_a_changed_map(
         )
         if turn == 3:
             factors, closed = given.factors, given.closed
-        fresh = hn.HybridPlanner(
-            topology_of(grid), preset=preset, costs=hn.CostLayer(factors, closed)
-        )
+        fresh = hn.HybridPlanner(topology_of(grid), preset=preset, costs=layer_of(factors, closed))
         assert planner.costs is not None
         assert fresh.costs is not None
         assert planner.costs.digest == fresh.costs.digest
@@ -355,7 +355,7 @@ def test_given_costs_stay_with_their_cells_on_a_changed_map(
 def test_costs_of_an_area_stay_when_the_map_changes_beside_it() -> None:
     grid = hn.OccupancyGrid(np.zeros((20, 40), np.float32), hn.Frame(0.1), robot_radius_m=0)
     planner = hn.HybridPlanner(topology_of(grid), preset="robot")
-    slow = hn.CostLayer(np.full(grid.shape, 5.0))
+    slow = layer_of(np.full(grid.shape, 5.0))
     planner.update(costs=slow, changed=(1.0, 0.0, 2.0, 1.0))
     probability = np.zeros(grid.shape, np.float32)
     probability[15:, 30] = 1.0
@@ -368,7 +368,7 @@ def test_costs_of_an_area_stay_when_the_map_changes_beside_it() -> None:
 
 
 BAD_UPDATES: dict[str, tuple[dict[str, Any], str]] = {
-    "costs of another map": ({"costs": hn.CostLayer(np.ones((3, 3)))}, "costs of 3 x 3 cells"),
+    "costs of another map": ({"costs": layer_of(np.ones((3, 3)))}, "costs of 3 x 3 cells"),
     "no costs": ({"costs": np.ones((20, 30))}, "expected a CostLayer"),
     "no area": ({"changed": "all of it"}, "expected an area in metres"),
     "an area elsewhere": ({"changed": (50.0, 50.0, 51.0, 51.0)}, "cells changed outside"),
@@ -431,6 +431,6 @@ def test_costs_that_a_preset_cannot_plan_by_refuse_the_map_too(preset: str) -> N
     probability[:, 3] = 1.0
     now = replace(grid, probability=probability)
     with pytest.raises(hn.InvalidValueError, match="cannot plan by costs"):
-        planner.update(grid=now, costs=hn.CostLayer(np.ones((6, 6))))
+        planner.update(grid=now, costs=layer_of(np.ones((6, 6))))
     assert planner.plan((0.5, 0.5), (5.5, 0.5)).cost == 5
     assert planner.topology.grid is grid

@@ -247,9 +247,8 @@ def test_a_result_travels_without_its_planner(preset: str) -> None:
 def test_a_draft_travels_without_its_planner(preset: str, copied: Any) -> None:
     shut = {"cells": np.argwhere(~topology().grid.enterable())}
     for ends in ((START, GOAL), (START, START), (START, (99.0, 0.0)), (START, "east")):
-        draft, plan = (
-            ask(*ends, blocked=shut) for ask in (planner(preset).draft, planner(preset).plan)
-        )
+        draft = planner(preset).draft(*ends, blocked=shut)
+        plan = planner(preset).plan(*ends, blocked=shut)
         other = copied(draft)
         assert (other.status, other.cost, other.lower_bound) == (
             draft.status,

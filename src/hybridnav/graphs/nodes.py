@@ -141,5 +141,5 @@ def bends_of(paths: MeshPaths, which: Iterable[int]) -> FloatArray:
     if not parts:
         return np.empty((0, 2))
     bends = unique_rows(np.concatenate(parts))
-    found: FloatArray = bends.rows[np.argsort(-bends.count, kind="stable")]
+    found: FloatArray = bends.rows[np.argsort(-bends.n_times, kind="stable")]
     return found

@@ -20,7 +20,7 @@ class UniqueRows(NamedTuple):
     """int64 (m,), where each stands first."""
     number_of: LongArray
     """int64 (n,), the number of each given row among the distinct ones."""
-    count: LongArray
+    n_times: LongArray
     """int64 (m,), how often each is given."""
 
 
@@ -42,8 +42,8 @@ def unique_rows(rows: AnyArray) -> UniqueRows:
     begin = np.flatnonzero(is_new)
     number_of = np.empty(len(rows), np.int64)
     number_of[order] = np.cumsum(is_new) - 1
-    count = np.diff(begin, append=len(rows))
-    return UniqueRows(ordered[begin], order[begin], number_of, count)
+    n_times = np.diff(begin, append=len(rows))
+    return UniqueRows(ordered[begin], order[begin], number_of, n_times)
 
 
 def in_runs(start: LongArray, length: LongArray) -> LongArray:

@@ -294,7 +294,7 @@ def _jambs(
     of = boundary_of.repeat(2)
     # Corners inside a boundary belong to two of its cracks.
     found = unique_rows(np.column_stack([of, corners]))
-    ends = found.first[found.count == 1]
+    ends = found.first[found.n_times == 1]
     has_jamb = ~blocks[tuple(corners[ends].T)] | is_near[ends // 2]
     jambs: LongArray = np.bincount(
         of[ends][has_jamb], minlength=int(boundary_of.max(initial=-1)) + 1

@@ -192,7 +192,7 @@ def _common_sides(label_of: IntArray) -> dict[tuple[int, int], int]:
         between = (tail >= 0) & (head >= 0) & (tail != head)
         pairs.append(np.sort(np.stack([tail[between], head[between]], axis=1), axis=1))
     found = unique_rows(np.concatenate(pairs))
-    counted = zip(found.rows.tolist(), found.count.tolist(), strict=True)
+    counted = zip(found.rows.tolist(), found.n_times.tolist(), strict=True)
     return {(u, v): n for (u, v), n in counted}
 
 

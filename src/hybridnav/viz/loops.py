@@ -55,7 +55,7 @@ class Loops:
         # Ends of the sides between two cells, each named by the cell to its upper right.
         corners = np.concatenate([high, high + (high - low)[:, ::-1]])
         found = unique_rows(corners)
-        rows, cols = found.rows[found.count == 1].T
+        rows, cols = found.rows[found.n_times == 1].T
         around = np.stack([self.hole_of[rows - i, cols - j] for i in (0, 1) for j in (0, 1)])
         return [int(hole) for hole in around.max(axis=0)]
 
