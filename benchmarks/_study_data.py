@@ -119,7 +119,7 @@ def part_figures(study: Study) -> Data:
         "repeat": about.repeat,
         "dates": list(about.dates),
         "loads": [round(load, 2) for load in _span(about)],
-        "warnings": about.warnings,
+        "warnings": study.warnings,
         "methods": [_row(study, label, common) for label in whole],
         "others": [_other(study, label, whole) for label in rest],
         "settings": {str(r["method"]): r["settings"] for r in rows_of_methods(study)},

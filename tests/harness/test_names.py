@@ -11,6 +11,7 @@ from hybridnav.harness.methods import BASELINES, baseline_spec
 from hybridnav.harness.names import NamedMethod, class_of, read_methods, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
+from hybridnav.harness.rows import rows_of_study
 from hybridnav.harness.run import RunSettings, evaluate, methods_of
 from tests.harness.small_runs import ROOMS, run_here, write_map
 
@@ -96,11 +97,34 @@ def test_a_class_that_was_mended_is_run_again(settings, tmp_path):
     assert study.labels == ["grid-astar", "HPA* of mine"]
     sources = [r["source"] for r in read_records(tmp_path / "run") if "source" in r]
     assert study.of_method("HPA* of mine")[0].preparation["source"] == sources[-1]
+    words = "answers 6 on rooms (asked again)."
+    assert words in (tmp_path / "run" / "summary.md").read_text()
     # Back again: the records are there, and the tables show them.
     (tmp_path / "mine.py").write_text(CLASS)
     assert evaluate(settings, tmp_path / "run") == 0
     study = write_outputs(tmp_path / "run")
     assert study.of_method("HPA* of mine")[0].preparation["source"] == sources[0]
+
+
+def test_answers_before_a_class_was_mended_enter_no_table_with_new_ones(settings, tmp_path):
+    halls = str(write_map(tmp_path, ROOMS[::-1], "halls"))
+    evaluate(replace(settings, maps=(*settings.maps, halls)), tmp_path / "run")
+    (tmp_path / "mine.py").write_text(CLASS.replace("{}", "twice"))
+    evaluate(settings, tmp_path / "run")
+    study = write_outputs(tmp_path / "run")
+    assert [o.map_name for o in study.of_method("HPA* of mine")] == ["rooms"]
+    (row,) = [row for row in rows_of_study(study) if row["method"] == "HPA* of mine"]
+    assert (row["maps"], row["pairs"]) == (1, 5)
+    words = (
+        "Left out, because class mine:Mine was changed after them: answers 6 on rooms (asked "
+        "again), 6 on halls (not asked again)."
+    )
+    assert study.warnings[:1] == [words]
+    for name in ("summary.md", "report.html"):
+        assert words in (tmp_path / "run" / name).read_text()
+    # A run that adds a method does not bring the old answers back.
+    evaluate(replace(settings, maps=(halls,), baselines=("weighted-astar",)), tmp_path / "run")
+    assert write_outputs(tmp_path / "run").warnings == [words]
 
 
 def test_a_class_is_another_one_when_a_file_that_it_imports_was_mended(tmp_path, monkeypatch):

@@ -54,6 +54,13 @@ class Study:
     """What losses refer to."""
     circumstances: Circumstances = field(default_factory=Circumstances)
     """Those of its times."""
+    left_out: list[str] = field(default_factory=list)
+    """Answers that no table shows, in words: of classes before they were mended."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know of the tables: answers left out, and what speaks against the times."""
+        return [*self.left_out, *self.circumstances.warnings]
 
     @property
     def costs(self) -> str:
@@ -162,10 +169,10 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
             preparations[key] = record
         else:
             pairs.setdefault(key, []).append(record)
-    preparations = _latest(preparations, folder)
+    every, preparations = preparations, _latest(preparations, folder)
     together = lay_times(timed, pairs)
     metric = _metric_of(preparations, metric, folder)
-    names = _map_labels(preparations, root)
+    names = _map_labels(every, root)
     own = _own_names(preparations.values())
     digests: dict[str, set[tuple[str, str]]] = {}
     for record in preparations.values():
@@ -194,7 +201,8 @@ def load_study(folder: Path, *, root: Path | None = None, metric: Yardstick = "b
             outcome.label,
         )
     )
-    return Study(outcomes, metric, circumstances_of(timed, outcomes, together, commands_of(folder)))
+    about = circumstances_of(timed, outcomes, together, commands_of(folder))
+    return Study(outcomes, metric, about, _left_out(every, preparations, pairs, names))
 
 
 def _own_names(records: Iterable[Record]) -> dict[str, str]:
@@ -211,18 +219,40 @@ def _own_names(records: Iterable[Record]) -> dict[str, str]:
 def _latest(
     preparations: dict[tuple[str, str], Record], folder: Path
 ) -> dict[tuple[str, str], Record]:
-    """Return the preparations without those of a class before it was mended."""
+    """Return the preparations without those of a class before it was mended, on any map: its last
+    version with records is the one of the last run, else the one whose records came last."""
     sources = latest_sources(folder)
-    kept: dict[tuple[str, str, str], tuple[str, str]] = {}
-    current: set[tuple[str, str] | None] = set()
+    shown: dict[str, str | None] = {}
+    for record in preparations.values():
+        method = record["method"]
+        if method not in shown or shown[method] != sources.get(method):
+            shown[method] = record.get("source")
+    return {
+        key: record
+        for key, record in preparations.items()
+        if record.get("source") == shown[record["method"]]
+    }
+
+
+def _left_out(
+    preparations: dict[tuple[str, str], Record],
+    shown: dict[tuple[str, str], Record],
+    pairs: dict[tuple[str, str], list[Record]],
+    names: dict[str, str],
+) -> list[str]:
+    """Return in words the answers that no table shows, a sentence for each method."""
+    current = {(record["method"], sha) for (sha, _), record in shown.items()}
+    found: dict[str, list[str]] = {}
     for key, record in preparations.items():
-        place = key[0], record["method"], record.get("settings_sha", key[1])
-        is_current = record.get("source") == sources.get(record["method"])
-        if is_current or kept.get(place) not in current:
-            kept[place] = key
-        current |= {key} if is_current else set()
-    shown = set(kept.values())
-    return {key: record for key, record in preparations.items() if key in shown}
+        if key not in shown:
+            method, sha = record["method"], key[0]
+            again = "asked again" if (method, sha) in current else "not asked again"
+            count = f"{len(pairs.get(key, ())):,} on {names[sha]} ({again})"
+            found.setdefault(method, []).append(count)
+    return [
+        f"Left out, because class {method} was changed after them: answers {', '.join(counts)}."
+        for method, counts in found.items()
+    ]
 
 
 def _metric_of(

@@ -88,7 +88,7 @@ def markdown(overall: Sequence[Row], study: Study) -> str:
             columns = loss_columns(optimum)
             text += f"## Loss over {OPTIMA[optimum]}\n\n{_table(rows, columns)}\n"
             text += _note(rows, columns, study)
-    text += "".join(f"{warning}\n\n" for warning in study.circumstances.warnings)
+    text += "".join(f"{warning}\n\n" for warning in study.warnings)
     timed = any(with_values(overall, column) for column in EFFICIENCY_COLUMNS)
     if timed:
         text += f"## Efficiency\n\n{_table(overall, EFFICIENCY_COLUMNS)}\n"

@@ -110,7 +110,7 @@ def report_of(
         overall=together,
         maps=maps,
         failures=failures_of(study),
-        warnings=study.circumstances.warnings,
+        warnings=study.warnings,
         definition=DEFINITION,
         meanings=[(column, MEANINGS[column]) for column in used if column in MEANINGS],
         overall_losses={label: _losses(study.of_method(label), study) for label in several},
