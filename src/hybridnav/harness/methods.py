@@ -8,7 +8,6 @@ import inspect
 import json
 import os
 import time
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -25,8 +24,6 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from hybridnav.baselines import Method, MethodResult
     from hybridnav.costs import CostLayer
     from hybridnav.graphs import WaypointGraph
@@ -303,8 +300,11 @@ class Prepared:
 
     def solve(self, start: tuple[int, int], goal: tuple[int, int]) -> MethodResult:
         """Return the method's answer; a process that it forked goes no further than this."""
-        with _without_forks():
+        own = os.getpid()
+        try:
             return self.method.solve(start, goal)
+        finally:
+            _end_fork_of(own)
 
     def close(self) -> None:
         """End the processes of the method, which answers no more."""
@@ -341,8 +341,11 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
             options = options | {"costs": costs}
         if spec.is_named and _takes(made_of, "name"):
             options = {"name": spec.name} | options
-        with _without_forks():
+        own = os.getpid()
+        try:
             method = made_of(grid if topology is None else topology, **options)
+        finally:
+            _end_fork_of(own)
     by_costs = costs is not None
     if spec.grid:
         method, topology = OnOwnGrid(method, grid), None
@@ -351,16 +354,11 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     return Prepared(method, topology, *seconds, by_costs, is_named)
 
 
-@contextmanager
-def _without_forks() -> Iterator[None]:
-    """End each process that foreign code forks and lets run on: it would work on as a second worker
-    and send the same records."""
-    own = os.getpid()
-    try:
-        yield
-    finally:
-        if os.getpid() != own:
-            os._exit(0)
+def _end_fork_of(own: int) -> None:
+    """End this process if foreign code forked it and let it run on: it would work on as a second
+    worker and send the same records. No context manager: that would be a part of short times."""
+    if os.getpid() != own:
+        os._exit(0)
 
 
 def _takes(made_of: Any, parameter: str) -> bool:
