@@ -81,8 +81,9 @@ def test_areas_say_in_python_which_they_are(hall: hn.TopologicalMap) -> None:
     assert distance_m(planner.plan(START, GOAL, blocked={"keepout": [box]})) < 1e-9
     both = hn.Blocked(keepout=[box]) | hn.Blocked(polygons=[box])
     assert distance_m(planner.plan(START, GOAL, blocked=both)) >= RADIUS_M - 1e-9
+    as_any: Any = box
     with pytest.raises(hn.InvalidValueError, match="keepout must be a sequence of areas"):
-        hn.Blocked(keepout=box)
+        hn.Blocked(keepout=as_any)
     with pytest.raises(hn.InvalidValueError, match="must meet the map"):
         planner.plan(START, GOAL, blocked={"keepout": [shapely.box(8, 8, 9, 9)]})
 
@@ -93,7 +94,7 @@ def test_closed_cells_of_costs_are_obstacles_unless_they_are_keepout(
     hall: hn.TopologicalMap, preset: str, *, by_update: bool
 ) -> None:
     """Given at once, or by an update of the area of the pallet alone."""
-    cells, plain = pallet_cells(hall.grid), np.ones(hall.grid.shape)
+    cells, plain = pallet_cells(hall.grid), np.ones(hall.grid.shape, np.float32)
     for obstacle in (True, False):
         layer = hn.CostLayer(plain, cells) if obstacle else hn.CostLayer(plain, keepout=cells)
         planner = hn.HybridPlanner(
@@ -177,8 +178,16 @@ def office() -> hn.TopologicalMap:
 def test_the_command_says_and_does_which(cli: Any, tmp_path: Path, hall: hn.TopologicalMap) -> None:
     hn.write_ros_map(hall.grid, tmp_path / "hall.yaml")
     by_file("png", tmp_path, hall.grid)
-    query = ("plan", tmp_path / "hall.yaml", "--robot-radius", RADIUS_M, "--json")
-    query = (*query, "--start", "0.55,1.55", "--goal", "4.55,1.55", "--blocked")
+    ends = ("--start", "0.55,1.55", "--goal", "4.55,1.55")
+    query = (
+        "plan",
+        tmp_path / "hall.yaml",
+        "--robot-radius",
+        RADIUS_M,
+        "--json",
+        *ends,
+        "--blocked",
+    )
     for ending in ("png", "yaml", "geojson"):
         lengths = []
         for kind in ("", "keepout:"):

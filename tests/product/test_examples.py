@@ -86,6 +86,7 @@ OTHERS = [
     "CostLayer.changed",
     "CostLayer.clearance",
     "CostLayer.cost_of_cells",
+    "CostLayer.inflated",
     "CostLayer.keepout_mask",
     "CostLayer.speed_mask",
     "Frame.moved",

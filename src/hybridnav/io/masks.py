@@ -99,7 +99,7 @@ def load_keepout_mask(
     Returns
     -------
     CostLayer
-        The factors of the map's cells, and those that are closed.
+        The factors of the map's cells, and in `keepout` those that are closed.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def load_keepout_mask(
     ...     "free_thresh: 0.196, occupied_thresh: 0.65}"
     ... )
     >>> grid = hn.OccupancyGrid(np.zeros((1, 3)), robot_radius_m=0)
-    >>> hn.load_keepout_mask("zones.yaml", grid).closed
+    >>> hn.load_keepout_mask("zones.yaml", grid).keepout
     array([[False,  True, False]])
     """
     values, frame = read_mask(path, max_cells=max_cells)
