@@ -133,8 +133,10 @@ class Motion:
     def is_left(self) -> BoolArray:
         """bool (n,), whether the robot leaves a point, by a drive or a turn on the spot, before it
         is at the next one; true at the last one. All others repeat the next pose."""
-        leaves: BoolArray = np.append((self._chords > 0) | (np.abs(self._turns) > _BEND), True)
-        return leaves
+        leaves = self._chords > 0
+        if self.headings_rad is not None:
+            leaves |= np.diff(self.headings_rad) != 0
+        return np.append(leaves, True)
 
     def bends(self) -> LongArray:
         """Return the indices of points that even spacing must keep, with both endpoints, int64."""
@@ -162,8 +164,8 @@ class Motion:
         InvalidValueError
             When the spacing is not positive, or there would be more than ten million poses.
         """
-        left = self.is_left
-        if not left.all():
+        left = np.append((self._chords > 0) | (np.abs(self._turns) > _BEND), True)
+        if not left.all():  # turns by less than a bend are none
             headings = None if self.headings_rad is None else self.headings_rad[left]
             distinct = replace(self, points=self.points[left], headings_rad=headings)
             return distinct.spread(spacing_m)

@@ -48,7 +48,8 @@ def repeated(poses: Any) -> Any:
 def check_poses(path: hn.Path, spacing_m: float = 0.05) -> None:
     """No pose occurs twice in a row; one place, only where the robot turns on the spot."""
     headings = np.zeros(len(path.points)) if path.headings_rad is None else path.headings_rad
-    assert not len(repeated(np.column_stack([path.points, headings])))
+    points = np.column_stack([path.points, headings])
+    assert (np.diff(points, axis=0) != 0).any(axis=1).all()
     poses = path.poses(spacing_m)
     assert not len(repeated(poses))
     assert len(path.directions(spacing_m)) == len(poses)
