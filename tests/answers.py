@@ -13,7 +13,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from numpy._core._multiarray_umath import (  # type: ignore[attr-defined]
+from numpy._core._multiarray_umath import (  # type: ignore[import-not-found]
     __cpu_dispatch__,
     __cpu_features__,
 )
@@ -68,7 +68,8 @@ def planned(topology: hn.TopologicalMap, preset: str, count: int) -> str:
     cells = np.argwhere(grid.enterable())[:, None].repeat(2, axis=1)
     inside = rng.uniform(0.02, 0.98, size=(count, 2, 2))
     chosen = cells[rng.integers(len(cells), size=(count, 2)), [0, 1]]
-    planner, found = hn.HybridPlanner(topology, preset=preset), []
+    found: list[Any] = []
+    planner = hn.HybridPlanner(topology, preset=preset)
     for start, goal in grid.frame.points_of_grid(chosen + inside):
         result = planner.plan(tuple(start), tuple(goal))
         found += [result.status.value, result.cost, result.lower_bound]

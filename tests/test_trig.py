@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from numba import njit
 
 from hybridnav import _trig
-from hybridnav._jit import njit
 from hybridnav._trig import acos, asin, atan2, cos, exp, log, sin, tan
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def test_values_at_the_ends_of_their_ranges() -> None:
 
 
 @njit()
-def _in_a_kernel(x, y, out):  # type: ignore[no-untyped-def]
+def _in_a_kernel(x, y, out):
     for i in range(len(x)):
         out[i, 0], out[i, 1], out[i, 2] = sin(x[i]), cos(x[i]), tan(x[i])
         out[i, 3], out[i, 4], out[i, 5] = atan2(x[i], y[i]), asin(y[i]), acos(y[i])
@@ -96,7 +96,7 @@ def test_numbers_arrays_and_kernels_have_the_same_bits_on_every_machine() -> Non
 
 
 @njit()
-def _differences(x, squares):  # type: ignore[no-untyped-def]
+def _differences(x, squares):
     return x * x - squares
 
 

@@ -132,7 +132,7 @@ def test_help_is_complete():
     done = _python("-m", "hybridnav", "plan", "--help", **options)
     assert (done.returncode, done.stderr) == (0, "")
     for words in (
-        "--start X,Y ",
+        "--start X,Y[,YAW] ",
         "--goal X,Y ",
         "--preset NAME|FILE ",
         "--set KEY=VALUE ",

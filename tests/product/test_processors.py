@@ -36,11 +36,12 @@ def answers(settings: dict[str, str], *options: str) -> dict[str, str]:
     command = [sys.executable, "-m", "tests.answers", *options]
     environment = {**os.environ, **settings}
     run = subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True)
-    found: dict[str, dict[str, str]] = json.loads(run.stdout)
+    found = json.loads(run.stdout)
     assert found["features"] == [
         name for name in features() if name not in settings.get(_FEATURES_OFF, "").split()
     ]
-    return found["answers"]
+    made: dict[str, str] = found["answers"]
+    return made
 
 
 @pytest.mark.parametrize("options", [(), pytest.param(("--whole",), marks=pytest.mark.full)])

@@ -102,7 +102,9 @@ def test_what_is_listed_is_what_cells_counted_one_by_one_say(scene, radius_m, si
         ]
         depths = cdist(cells, rim).min(axis=1) + 0.5
         is_wide[space] = 4 * depths.mean() * side_m >= 1 - 1e-12
-    joined = {int(parts[c]) for space, cells in spaces.items() if is_wide[space] for c in cells}
+    most = max(map(len, spaces.values()), default=0)
+    begins = [s for s, cells in spaces.items() if is_wide[s] or len(cells) == most]
+    joined = {int(parts[c]) for space in begins for c in spaces[space]}
     enters = {s: any(int(parts[c]) in joined - {0} for c in cells) for s, cells in spaces.items()}
     expected = {
         space: (is_wide[space] or enters[space])
@@ -147,6 +149,16 @@ def test_the_list_leaves_the_ray_out_and_all_shows_it(cli, map_file, tmp_path):
     answer = cli(*query, "--json").answer
     assert [room["is_listed"] for room in answer["rooms"]] == [True, True, False]
     assert answer["is_building"]
+
+
+def test_exports_leave_the_ray_out_and_everything_writes_it(tmp_path):
+    grid, labels = glass()
+    rooms = rooms_of(grid, labels)
+    for everything in (False, True):
+        for ending, mark in (("csv", "room-3,"), ("geojson", '"room-3"')):
+            file = tmp_path / f"rooms.{ending}"
+            hn.export_rooms(rooms, file, everything=everything)
+            assert (mark in file.read_text()) == everything
 
 
 def test_the_picture_leaves_the_ray_out_and_everything_shows_it():

@@ -96,14 +96,20 @@ def export_path(
 
 
 def export_rooms(
-    rooms: Rooms, path: PathLike, *, tolerance_m: float = 0.05, frame: str = "map"
+    rooms: Rooms,
+    path: PathLike,
+    *,
+    tolerance_m: float = 0.05,
+    frame: str = "map",
+    everything: bool = False,
 ) -> None:
     """Write the rooms of a map, and their doors.
 
     CSV has a line for each room: its name, x and y of the point that stands for it, the area of its
     free cells in m², whether the robot fits, and the numbers of its doors. GeoJSON has a `Polygon`
     or `MultiPolygon` for each room with the same properties, and a `Point` in each door, with its
-    `number`, `rooms`, `kind`, `width_m`, `passage_m` and `passable`. Gaps are left out.
+    `number`, `rooms`, `kind`, `width_m`, `passage_m` and `passable`. Narrow rooms that the
+    robot cannot enter, doors to them, and gaps are left out, as in lists.
 
     Parameters
     ----------
@@ -116,6 +122,8 @@ def export_rooms(
         into line with walls, as in `save_rooms`.
     frame
         Name of the map frame, in GeoJSON.
+    everything
+        Whether to write rooms that are not listed and doors to them too; gaps are left out.
 
     Raises
     ------
@@ -147,15 +155,16 @@ def export_rooms(
 
     read = Read(f"rooms {printable(file)}", list(rooms.names))
     check_rooms(read, rooms.labels.label_of, rooms.grid)
-    doors = [door for door in rooms.doors if not door.is_gap]
-    known = [_room(rooms, label, doors) for label in range(len(rooms.names))]
+    doors = [door for door in rooms.doors if not door.is_gap] if everything else rooms.listed_doors
+    shown = [everything or is_listed for is_listed in rooms.is_listed.tolist()]
+    known = [_room(rooms, label, doors) for label, is_one in enumerate(shown) if is_one]
     if file.suffix.lower() == _TABLE:
         _write(file, _table(_ROOM, (_texts(room) for room in known)))
         return
     outlines = Outlines(rooms.labels.label_of, len(rooms.names), rooms.grid).within(tolerance_m)
     features = [
         _feature({"feature": "room"} | room, _area(rings))
-        for room, rings in zip(known, outlines, strict=True)
+        for room, rings in zip(known, itertools.compress(outlines, shown), strict=True)
     ]
     _write(file, _collection(features + [_door(door) for door in doors], frame))
 

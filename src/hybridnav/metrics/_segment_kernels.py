@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from hybridnav._jit import njit
+from hybridnav._jit import guarded, njit
 from hybridnav.search.exact import compare_products
 
 CLEAR, OUTSIDE, BLOCKED, BETWEEN, SEAM = 0, 1, 2, 3, 4
@@ -171,6 +171,7 @@ def crossed_joints(classes, free_of, positions):
     return crossed
 
 
+@guarded
 @njit(cache=True, nogil=True)
 def octile_lengths(classes, free_of, start_row, start_col, goal_row, goal_col):
     """Return the lengths of octile paths from each corner of the lattice to a goal, and from a

@@ -61,7 +61,7 @@ def built_of(topology: TopologicalMap) -> DualGraphPyramid:
     return topology.built if isinstance(topology, StalePlaces) else topology.pyramid
 
 
-class Change(NamedTuple):
+class PlannerChange(NamedTuple):
     """What an update gives to a planner: at least one of the first three."""
 
     costs: CostLayer | None
@@ -81,7 +81,7 @@ class Change(NamedTuple):
 
 def change_of(
     costs: CostLayer | None, grid: OccupancyGrid | None, topology: TopologicalMap | None, box: Box
-) -> Change:
+) -> PlannerChange:
     """Return the change that an update was given.
 
     Raises
@@ -97,7 +97,7 @@ def change_of(
         raise InvalidValueError(
             "update was given no costs, grid or topology, expected one of them: pass what changed"
         )
-    return Change(costs, grid, topology, box)
+    return PlannerChange(costs, grid, topology, box)
 
 
 def followed(
@@ -105,7 +105,7 @@ def followed(
     preset: Preset,
     cells: CellPlanner,
     costs: PlannerCosts,
-    change: Change,
+    change: PlannerChange,
 ) -> tuple[TopologicalMap, CellPlanner, PlannerCosts]:
     """Return the places, the planner of cell paths, and the costs after a change of the map.
 

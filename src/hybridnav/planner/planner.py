@@ -13,7 +13,7 @@ from hybridnav.grid.areas import box_of_area
 from hybridnav.planner.cell_planner import Carried, Updatable
 from hybridnav.planner.costs import PlannerCosts
 from hybridnav.planner.endpoints import read_points
-from hybridnav.planner.follow import Change, change_of, followed
+from hybridnav.planner.follow import PlannerChange, change_of, followed
 from hybridnav.planner.queries import Queries
 from hybridnav.planner.radius import check_radius
 from hybridnav.planner.select import cell_planner
@@ -316,7 +316,7 @@ class HybridPlanner:
         change = change_of(costs, grid, topology, box)
         self._preparing.alone(partial(self._update, change))
 
-    def _update(self, change: Change) -> None:
+    def _update(self, change: PlannerChange) -> None:
         """Check all of a change, then make it."""
         self._turns.alone(self._complete)
         if change.is_of_map:

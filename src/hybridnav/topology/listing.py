@@ -61,7 +61,8 @@ class Listing:
         n_spaces = n_rooms + n_nameless
         areas = np.bincount(space_of[is_free], minlength=n_spaces)
         is_wide = _mean_widths(space_of, areas) * level.grid.resolution_m >= LEAST_WIDTH_M
-        can_enter = _enterable(space_of[tuple(level.cells.T)], level, is_wide)
+        begins = is_wide | (areas == areas.max(initial=0))
+        can_enter = _enterable(space_of[tuple(level.cells.T)], level, begins)
         is_large = areas * level.grid.resolution_m**2 >= _LEAST_AREA_M2
         is_listed = is_wide & can_enter & is_large
         is_own = np.array([_FOUND.fullmatch(name) is None for name in labels.names], dtype=np.bool_)
@@ -84,8 +85,8 @@ def _mean_widths(space_of: IntArray, areas: LongArray) -> FloatArray:
     return widths
 
 
-def _enterable(space_of: IntArray, level: Level, is_wide: BoolArray) -> BoolArray:
-    """Return the spaces that free cells join with a wide one, at the robot's radius.
+def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray:
+    """Return the spaces that free cells join with one in which a robot is, at the robot's radius.
 
     Parameters
     ----------
@@ -93,8 +94,8 @@ def _enterable(space_of: IntArray, level: Level, is_wide: BoolArray) -> BoolArra
         int32 (n_vertices,), the space of each vertex.
     level
         The room level.
-    is_wide
-        bool (n_spaces,), the wide spaces.
+    begins
+        bool (n_spaces,), spaces in which a robot may begin: wide ones, and the largest.
     """
     from scipy.sparse import coo_array  # noqa: PLC0415
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
@@ -105,6 +106,6 @@ def _enterable(space_of: IntArray, level: Level, is_wide: BoolArray) -> BoolArra
     graph = coo_array((np.ones(len(arcs)), (arcs[:, 0], arcs[:, 1])), shape=shape)
     parts = connected_components(graph, directed=False)[1][is_free]
     spaces = space_of[is_free]
-    joined = np.bincount(parts, weights=is_wide[spaces], minlength=1) > 0
-    found: BoolArray = np.bincount(spaces, weights=joined[parts], minlength=len(is_wide)) > 0
+    joined = np.bincount(parts, weights=begins[spaces], minlength=1) > 0
+    found: BoolArray = np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
     return found

@@ -219,8 +219,8 @@ class Rooms:
     @property
     def is_listed(self) -> BoolArray:
         """bool (n_rooms,), rooms in lists and pictures: wider than 1 m in the mean, or the map's
-        robot can enter them, or they have a name of their own. The others are what a laser sees
-        through glass."""
+        robot can enter them from such a one or the largest, or they have a name of their own. The
+        others are what a laser sees through glass."""
         return self._listing.is_listed[: len(self.names)]
 
     @cached_property

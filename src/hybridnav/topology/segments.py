@@ -169,8 +169,9 @@ def main_direction(occupied: BoolArray) -> float:
         return 0.0
     by_row, by_col = np.gradient(smooth)
     # Four times the angle makes walls and their normals, whichever way they face, one direction.
-    steepness = np.hypot(by_row, by_col)
-    by_row, by_col, steepness = (each[steepness > 0] for each in (by_row, by_col, steepness))
+    steepness: FloatArray = np.hypot(by_row, by_col)
+    is_steep = steepness > 0
+    by_row, by_col, steepness = by_row[is_steep], by_col[is_steep], steepness[is_steep]
     ahead, aside = by_col * by_col - by_row * by_row, 2 * by_row * by_col
     rights = (ahead * ahead - aside * aside) / (steepness * steepness * steepness)
     ups = 2 * ahead * aside / (steepness * steepness * steepness)
