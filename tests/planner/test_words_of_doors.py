@@ -27,7 +27,9 @@ def test_the_side_of_a_door_is_that_of_its_wall():
     planner = hn.HybridPlanner(topology_of(ASLANT))
     start, goal = (0.9, 4.9), (12.9, 0.9)
     there, back = planner.plan(start, goal), planner.plan(goal, start)
-    assert there.words()[1] == "after 10 m leave the corridor by door 1 on the right into the hall"
+    assert there.words()[1] == (
+        "after 10 m leave the corridor by door 1 on the right into the hall, then left"
+    )
     assert not any("turn" in line for line in there.words())
     assert back.words()[1] == "after 4 m leave the hall by door 1 into the corridor, then left"
 
@@ -79,7 +81,7 @@ CORNER = (
 def test_a_door_in_the_wall_beside_the_door_before_has_its_side():
     """Nothing bends: but a person who stands in the first door looks past the second."""
     words = hn.HybridPlanner(topology_of(CORNER)).plan((8.4, 1.2), (2.2, 6.3)).words()
-    assert words[1] == "after 4 m leave the kitchen by door 1 into the archive"
+    assert words[1] == "after 4 m leave the kitchen by door 1 into the archive, then left"
     assert words[2] == "after 3 m go through door 2 on the left into the bath"
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridnav._typing import FloatArray
     from hybridnav.result import Path
 
-_LEAST_SLIGHT_RAD = math.radians(35.0)
+LEAST_SLIGHT_RAD = math.radians(35.0)
 """Turn from which a slight bend counts: several that nobody tells lead elsewhere."""
 _TOLERANCE_M = 0.75
 """Deviation below which a path counts as straight: a step round a chair is no bend."""
@@ -114,7 +114,7 @@ class Line:
                 float(headings[run[-1] + 1]),
             )
             for run in _runs(turns, along[1:-1])
-            if abs(turns[run].sum()) >= _LEAST_SLIGHT_RAD
+            if abs(turns[run].sum()) >= LEAST_SLIGHT_RAD
         ]
 
     def _snapped(self, along_m: float) -> float:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav.sentences import Turn
+from hybridnav.sentences.instruction import LEAST_BEND_RAD
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -32,6 +33,8 @@ _AT_WAYPOINT_M = 0.5
 _BEYOND_M = 0.75
 """Distance from a door from which a bend lies clearly before or behind it."""
 _NEARER_RAD = math.radians(10.0)
+_LEAST_HALF_RAD = math.radians(20.0)
+"""Turn from which the path into a door, or out of it, is half of a turn there."""
 
 
 @dataclass(frozen=True)
@@ -182,20 +185,34 @@ def _with_bends(
     """Return a crossing with the bends at it, and the turns that remain.
 
     A single bend in a door leads into it if the path behind it is clearly nearer to the right angle
-    with the door than the path before it; else it lies behind the door.
+    with the door than the path before it; else it lies behind the door. So does a bend before the
+    door that only half leads into it, and half out of it.
     """
     before = [bend for bend in bends if bend.at_m < event.at_m]
     behind = [bend for bend in bends if bend.at_m >= event.at_m]
-    if len(bends) == 1 and abs(bends[0].at_m - event.at_m) < _BEYOND_M and event.door is not None:
+    way = math.nan
+    if event.door is not None:
         way = landmarks.way_out_rad(event.door, is_forward=event.leads_forward)
+    if len(bends) == 1 and abs(bends[0].at_m - event.at_m) < _BEYOND_M and event.door is not None:
         off = [abs(turned(way, heading)) for heading in (bends[0].before_rad, bends[0].after_rad)]
         leads_in = off[1] + _NEARER_RAD < off[0]
         before, behind = (list(bends), []) if leads_in else ([], list(bends))
+    if before and not behind:
+        last = before[-1]
+        if are_halves(turned(last.before_rad, way), turned(way, last.after_rad)):
+            behind = [before.pop()]
     rest = [Event("turn", bend.at_m, event.stretch, turn=bend) for bend in before[:-1]]
     if event.following is not None:
         rest += [Event("turn", bend.at_m, event.following, turn=bend) for bend in behind[1:]]
     turn, after = before[-1] if before else None, behind[0] if behind else None
     return replace(event, turn=turn, behind=after), rest
+
+
+def are_halves(into_rad: float, out_rad: float) -> bool:
+    """Return whether the turns into a door and out of it are one, too slight to be told each."""
+    slighter, greater = sorted((abs(into_rad), abs(out_rad)))
+    is_one_turn = into_rad * out_rad > 0 and slighter + greater >= LEAST_BEND_RAD
+    return is_one_turn and slighter >= _LEAST_HALF_RAD and greater < LEAST_BEND_RAD
 
 
 def turned(heading_rad: float, to_rad: float) -> float:

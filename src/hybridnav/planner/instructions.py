@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from hybridnav.planner.bends import Line
-from hybridnav.planner.events import events_of, stretches_of, turned, without_slivers
+from hybridnav.planner.bends import LEAST_SLIGHT_RAD, Line
+from hybridnav.planner.events import are_halves, events_of, stretches_of, turned, without_slivers
 from hybridnav.sentences import Doorway, Instruction, Turn
 from hybridnav.sentences.instruction import LEAST_BEND_RAD
 
@@ -24,10 +24,8 @@ if TYPE_CHECKING:
 
 _NEAR_EXIT_M = 4.0
 """Distance of the first door up to which a start needs no landmark."""
-_SLIGHT_RAD = math.radians(25.0)
+_STRAIGHT_RAD = math.radians(25.0)
 """Turn below which one passes an opening straight on, however it lies."""
-_ASTRAY_RAD = math.radians(30.0)
-"""Turn in a door from which a person who goes straight on goes astray."""
 _ALONG_M = 6.0
 """Length from which a path that passes an opening aslant leads along its wall before."""
 _LONG_M = 8.0
@@ -38,8 +36,8 @@ _LAST_M = 1.0
 """End of a path that has a direction."""
 _ASIDE_RAD = math.radians(60.0)
 """Angle between two doors from which the second lies at one hand for a person in the first."""
-_LOOK_M, _CLEAR_M = 3.0, 0.5
-"""Stretch of a path beside a door that has a direction: from 0.5 to 3 m off the door."""
+_LOOK_M, _CLEAR_M, _LEAST_M = 3.0, 0.5, 1.0
+"""Stretch of a path beside a door that has a direction: from 0.5 to 3 m off it, and its length."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +52,8 @@ class _Since:
     """Numbers of the doors by which one has entered the room."""
     facing_rad: float = math.nan
     """Direction in which one has passed the last door, and goes on; NaN where another was told."""
+    towards: int | None = None
+    """Number of the door towards which one has started."""
 
 
 def instructions_of(
@@ -82,8 +82,12 @@ def instructions_of(
     yield start
     if heading_rad is None and start.landmark is None and start.heading_rad is None:
         events[0] = replace(events[0], is_oriented=False)
-    since = _Since(entered=_left_behind(start.landmark))
+    mark = start.landmark
+    towards = mark.door if mark is not None and mark.side == "ahead" else None
+    since = _Since(entered=_left_behind(mark), towards=towards)
     for event, following in zip(events, [*events[1:], None], strict=True):
+        if _is_undone(event, since):
+            continue
         until_m = line.length_m if following is None else following.at_m
         instruction = _told(line, event, until_m, since, landmarks)
         yield instruction
@@ -187,78 +191,86 @@ def _doorway(
     Where it lies is told to a person who knows the direction of the path before it. A bend to the
     hand at which the door lies is then told as one who stands in the door sees it.
     """
-    door, at_m = event.door, event.at_m
-    since, until_m = known
-    between_m = since.at_m, until_m
+    door, (since, until_m) = event.door, known
+    doorway = Doorway(following.space, is_first=since.is_first, behind=_turn_of(event.behind))
     if door is None:
-        return Doorway(following.space, is_first=since.is_first, behind=_turn_of(event.behind))
-    doorway = Doorway(
-        following.space,
-        door.number,
-        door.width_m,
-        door.passage_m,
+        return doorway
+    doorway = replace(
+        doorway,
+        door=door.number,
+        width_m=door.width_m,
+        passage_m=door.passage_m,
         is_opening=door.is_opening,
-        is_first=since.is_first,
-        behind=_turn_of(event.behind),
     )
     way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
-    comes = line.heading(max(at_m - _LOOK_M, between_m[0]), max(at_m - _CLEAR_M, between_m[0]))
-    goes = line.heading(min(at_m + _CLEAR_M, between_m[1]), min(at_m + _LOOK_M, between_m[1]))
-    into_rad, out_rad = turned(comes, way), turned(way, goes)
-    is_straight = doorway.is_opening and abs(turned(comes, goes)) < _SLIGHT_RAD
+    before_m, behind_m = event.at_m - since.at_m, until_m - event.at_m
+    comes_rad = _heading(line, event.at_m, -before_m)
+    goes_rad = _heading(line, event.at_m, behind_m)
+    into_rad, out_rad = turned(comes_rad, way), turned(way, goes_rad)
+    faces_rad = comes_rad
+    if before_m <= _KEPT_M and not math.isnan(since.facing_rad):
+        faces_rad = since.facing_rad
     is_beside = event.is_oriented and event.turn is None
-    if is_straight:
-        is_beside = is_beside and at_m - between_m[0] > _ALONG_M
-        return replace(doorway, beside=_hand(into_rad) if is_beside else None)
-    beside, onward = _hand(into_rad) if is_beside else None, _hand(out_rad)
+    is_straight = event.is_oriented and abs(turned(faces_rad, goes_rad)) < _STRAIGHT_RAD
+    if doorway.is_opening and is_straight:
+        is_beside = is_beside and before_m > _ALONG_M
+        return replace(doorway, beside=_hand(into_rad, before_m) if is_beside else None)
     aside_rad = turned(since.facing_rad, way)
-    if is_beside and abs(aside_rad) >= _ASIDE_RAD and at_m - since.at_m <= _KEPT_M:
-        beside = "left" if aside_rad > 0 else "right"
-    behind = doorway.behind
+    if is_beside and abs(aside_rad) >= _ASIDE_RAD and before_m <= _KEPT_M:
+        into_rad = aside_rad
+    elif is_beside and are_halves(into_rad, out_rad):
+        return replace(doorway, behind=doorway.behind or Turn(into_rad + out_rad))
+    seen_m = 0.0 if door.number == since.towards else before_m
+    beside = _hand(into_rad, seen_m) if is_beside else None
+    onward, behind = _hand(out_rad, behind_m), doorway.behind
     if behind is not None and not (beside and beside == onward == behind.hand):
         return replace(doorway, beside=beside)
-    if not (event.turn or beside or onward):
-        is_long = (
-            event.is_oriented and between_m[0] + _LOOK_M < at_m,
-            at_m + _LOOK_M < between_m[1],
-        )
-        beside, onward = _slight_hands(into_rad, out_rad, is_long)
     return replace(doorway, beside=beside, behind=None, onward=onward)
 
 
-def _slight_hands(
-    into_rad: float, out_rad: float, is_long: tuple[bool, bool]
-) -> tuple[Hand | None, Hand | None]:
-    """Return the hands of a door that lies, or leads, slightly aside.
+def _heading(line: Line, at_m: float, length_m: float) -> float:
+    """Return the direction of the path behind a door, or before it if the length is negative.
 
     Parameters
     ----------
-    into_rad
-        Turn from the path before the door to the right angle with its boundary.
-    out_rad
-        Turn from there to the path behind it.
-    is_long
-        Whether the path before it, and that behind it, has a direction.
+    line
+        The path.
+    at_m
+        Where it passes the door.
+    length_m
+        Length from there to the instruction behind it, or, negative, to that before it.
 
     Returns
     -------
-    tuple of (str or None)
-        The hand at which it lies, and the one to which it leads: the greater turn alone, and
-        neither if the two cancel.
+    float
+        Radians, map frame, from 0.5 to 3 m off the door; NaN where the path is shorter.
     """
-    total = into_rad + out_rad
-    hand: Hand = "left" if total > 0 else "right"
-    if abs(into_rad) >= abs(out_rad):
-        return (hand if abs(total) >= _SLIGHT_RAD and is_long[0] else None), None
-    return None, (hand if abs(total) >= _ASTRAY_RAD and is_long[1] else None)
+    sign = math.copysign(1.0, length_m)
+    near_m, far_m = (at_m + sign * min(each, abs(length_m)) for each in (_CLEAR_M, _LOOK_M))
+    return line.heading(min(near_m, far_m), max(near_m, far_m))
+
+
+def _is_undone(event: Event, since: _Since) -> bool:
+    """Return whether a slight bend leads back into the direction of a person who went straight on
+    out of the door before, for the path left it by less than anyone tells."""
+    bend = event.turn
+    is_slight = event.kind == "turn" and bend is not None and Turn(bend.angle_rad).is_slight
+    if bend is None or not is_slight or event.at_m - since.at_m > _KEPT_M:
+        return False
+    angle_rad = turned(since.facing_rad, bend.after_rad)
+    return abs(angle_rad) < LEAST_SLIGHT_RAD or angle_rad * bend.angle_rad < 0
 
 
 def _turn_of(bend: Bend | None) -> Turn | None:
     return None if bend is None else Turn(bend.angle_rad)
 
 
-def _hand(angle_rad: float) -> Hand | None:
-    """Return the hand of a turn; None for ahead, and for NaN."""
-    if not abs(angle_rad) >= LEAST_BEND_RAD:
+def _hand(angle_rad: float, length_m: float) -> Hand | None:
+    """Return the hand of a turn between a door and a part of the path; None for ahead, and for NaN.
+
+    A slight turn counts where the part is long enough to have a direction.
+    """
+    has_direction = length_m - _CLEAR_M >= _LEAST_M
+    if not abs(angle_rad) >= (LEAST_SLIGHT_RAD if has_direction else LEAST_BEND_RAD):
         return None
     return "left" if angle_rad > 0 else "right"
