@@ -5,13 +5,16 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
 
 import hybridnav as hn
 from hybridnav.metrics import VisibilityGraph
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 STEPS = [(0, 1), (1, 0), (1, 1), (1, -1)]
 KINDS = ("lift", "stairs", "ramp")
@@ -62,11 +65,12 @@ def random_building(
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
         planner = hn.HybridPlanner(topology, preset=preset)
         floors.append(hn.Floor(f"floor {number}", planner, elevation_m=3.0 * number))
-    links = [_random_link(f"link {number}", floors, rng) for number in range(rng.integers(1, 6))]
+    links = [random_link(f"link {number}", floors, rng) for number in range(rng.integers(1, 6))]
     return Scene(hn.Building(floors, links, speed_m_s=float(rng.uniform(0.2, 1.0))), rng)
 
 
-def _random_link(name: str, floors: list[hn.Floor], rng: np.random.Generator) -> hn.Link:
+def random_link(name: str, floors: Sequence[hn.Floor], rng: np.random.Generator) -> hn.Link:
+    """A link between some of the floors, whose ends do not line up."""
     count = int(rng.integers(2, len(floors) + 1))
     chosen = sorted(rng.choice(len(floors), size=count, replace=False).tolist())
     ends = []

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,6 +19,7 @@ from tests.building.scenes import (
     optimum_any_angle,
     optimum_on_cells,
     random_building,
+    random_link,
     usable,
 )
 from tests.plans import PLAIN
@@ -116,3 +119,48 @@ def test_cells(preset: str, seed: int) -> None:
             assert plan.solved == math.isfinite(optimum)
             assert plan.cost == pytest.approx(optimum, abs=1e-9)
             assert not plan.gap > 0
+
+
+@pytest.mark.parametrize("charged", [True, False])
+def test_hundreds_of_links(charged: bool) -> None:  # noqa: FBT001 - a parameter of the test
+    """The best of 300 links, also where rides cost nothing and floors have closed cells."""
+    scene = random_building(11, preset="octile", most_floors=4, shape=(24, 28))
+    floors, rng = scene.building.floors, scene.rng
+    links = [random_link(f"link {number}", floors, rng) for number in range(300)]
+    if not charged:
+        links = [replace(link, wait_s=0.0, ride_s=0.0, cost_m=0.0) for link in links]
+    scene = replace(scene, building=hn.Building(floors, links, speed_m_s=0.5))
+    rides = 0
+    for query in range(8):
+        start, goal = scene.somewhere(), scene.somewhere()
+        cells, blocked = [grid.enterable().copy() for grid in scene.grids], {}
+        if query > 3:
+            shut = np.argwhere(cells[0] & (rng.random(cells[0].shape) < 0.1))
+            cells[0][tuple(shut.T)] = False
+            blocked = {floors[0].name: {"cells": shut}}
+            if not all(
+                cells[index][scene.grids[index].frame.cell_of(*point)]
+                for index, point in (start, goal)
+            ):
+                continue
+        plan = scene.building.plan(scene.named(start), scene.named(goal), blocked=blocked)
+        optimum = optimum_on_cells(scene, start, goal, usable(scene, set(), stairs=True), cells)
+        assert plan.cost == pytest.approx(optimum, abs=1e-9)
+        assert plan.lower_bound == pytest.approx(optimum, abs=1e-9)
+        assert plan.solved == math.isfinite(optimum)
+        if plan.solved and not blocked:
+            check_figures(scene, plan, start, goal, usable(scene, set(), stairs=True))
+        rides += len(plan.rides)
+    assert rides > 3
+
+
+def test_a_floor_with_many_ends_is_prepared_without_all_pairs() -> None:
+    """A million plans between the ends of 1,000 links would take minutes."""
+    scene = random_building(11, most_floors=2, shape=(24, 28))
+    floors, rng = scene.building.floors[:2], scene.rng
+    links = [random_link(f"link {number}", floors, rng) for number in range(200)]
+    many, few = (hn.Building(floors, some) for some in (links, links[:10]))
+    many.prepare()
+    few.prepare()
+    assert all(np.isnan(known.cost).all() for known in many.known)
+    assert not any(np.isnan(known.cost[0, 1:]).any() for known in few.known)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,7 +87,7 @@ def test_a_route_that_starts_in_a_doorway_has_its_turn(preset: str) -> None:
     )
 
 
-def sampled(topology: hn.TopologicalMap, count: int, seed: int) -> list[tuple[object, object]]:
+def sampled(topology: hn.TopologicalMap, count: int, seed: int) -> list[tuple[Any, Any]]:
     """Points of the largest connected part, and half as many pairs of rooms by name."""
     grid, rooms = topology.grid, topology.rooms
     labels, _ = ndimage.label(grid.enterable())

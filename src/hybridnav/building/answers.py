@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hybridnav.building.floors import ROUNDED
+from hybridnav.building.network import START
 from hybridnav.building.plan import BuildingPlan, Ride, cost_of, stats_of
-from hybridnav.building.search import START
 from hybridnav.building.words import GuidedRoute
 from hybridnav.planner.itinerary import waypoint_text
 from hybridnav.result import PlanStatus

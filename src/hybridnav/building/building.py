@@ -208,6 +208,9 @@ class Building:
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures of all planners, and the costs between the ends of links, now.
 
+        Floors with more than 128 ends have none computed in advance: queries compute what they
+        need.
+
         Parameters
         ----------
         progress

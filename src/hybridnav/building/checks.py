@@ -175,7 +175,9 @@ def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, Flo
             )
 
 
-def parts_of(floor: Floor, *, allow_unexplored: bool = False) -> LongArray:
+def parts_of(
+    floor: Floor, *, allow_unexplored: bool = False, closed: LongArray | None = None
+) -> LongArray:
     """Return the connected part that each cell of a floor lies in, int64 (rows, cols), -1 where the
     robot may not be.
 
@@ -185,11 +187,17 @@ def parts_of(floor: Floor, *, allow_unexplored: bool = False) -> LongArray:
         The floor.
     allow_unexplored
         Whether the robot enters unexplored cells.
+    closed
+        int64 (n,), flat cells that are closed besides.
     """
     from scipy import ndimage  # noqa: PLC0415 - a plan on one map needs none
 
     grid = floor.planner.topology.grid
-    labels, _ = ndimage.label(grid.enterable(allow_unexplored=allow_unexplored))
+    is_open = grid.enterable(allow_unexplored=allow_unexplored).copy()
+    if closed is not None:
+        is_open.ravel()[closed] = False
+    around = ndimage.generate_binary_structure(2, 2 if grid.corner_cutting else 1)
+    labels, _ = ndimage.label(is_open, structure=around)
     found: LongArray = labels.astype(np.int64) - 1
     return found
 

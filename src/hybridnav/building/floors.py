@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,8 +26,10 @@ ROUNDED = 1.0 - 1e-12
 """Factor on sums and differences of lengths that serve as bounds, because they are rounded."""
 _KEPT = 256
 """Number of plans between ends of links that a floor keeps."""
+_MOST_FILLED = 128
+"""Number of ends on a floor up to which `fill` computes the costs between all: their square counts,
+and queries need few of them."""
 _MAX_NAME = 80
-_versions = itertools.count()
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,27 +112,22 @@ class FloorTable:
             across = positions_m[:, None] - positions_m[None]
             straight = self._safe(np.hypot(across[..., 0], across[..., 1]))
             known = Known(straight, np.full((n, n), np.nan))
-        self.lower: list[list[float]] = known.lower.tolist()
-        """Lists of numbers, for queries read single ones: faster than an array."""
-        self.cost: list[list[float]] = known.cost.tolist()
-        self.version = next(_versions)
-        """Number of what is known, unlike that of any table before."""
+        self.lower: FloatArray = known.lower.copy()
+        """float64 (n, n), proved lower bounds, as in `Known`."""
+        self.cost: FloatArray = known.cost.copy()
+        """float64 (n, n), the costs of plans."""
+        self.expected: FloatArray = np.where(np.isnan(self.cost), self.lower, self.cost)
+        """float64 (n, n), the costs where they are known, else the bounds."""
         self._results: dict[tuple[int, int], PlanResult] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without kept plans, which are made anew."""
         return vars(self) | {"_results": {}}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take over a state; its version is that of another process, and begins anew."""
-        vars(self).update(state)
-        self.version = next(_versions)
-
     @property
     def known(self) -> Known:
         """What is known now, in arrays."""
-        n = len(self.positions_m)
-        return Known(np.reshape(self.lower, (n, n)), np.reshape(self.cost, (n, n)))
+        return Known(self.lower.copy(), self.cost.copy())
 
     @property
     def is_current(self) -> bool:
@@ -156,18 +152,15 @@ class FloorTable:
         return found, False
 
     def fill(self) -> None:
-        """Compute all costs that are not known yet."""
-        missing = [
-            (start, goal)
-            for start, row in enumerate(self.cost)
-            for goal, cost in enumerate(row)
-            if math.isnan(cost) and start != goal
-        ]
-        if missing:
-            pairs = np.array(missing)
-            found = self.floor.planner.plan_many(*self.positions_m[pairs.T])
+        """Compute all costs that are not known yet, if the ends are at most 128."""
+        if len(self.cost) > _MOST_FILLED:
+            return
+        is_missing = np.isnan(self.cost) & ~np.eye(len(self.cost), dtype=np.bool_)
+        missing = np.argwhere(is_missing)
+        if len(missing):
+            found = self.floor.planner.plan_many(*self.positions_m[missing.T])
             costs, bounds = found.cost.tolist(), found.lower_bound.tolist()
-            for (start, goal), cost, bound in zip(missing, costs, bounds, strict=True):
+            for (start, goal), cost, bound in zip(missing.tolist(), costs, bounds, strict=True):
                 self._learn(start, goal, cost, bound)
 
     def _learn(self, start: int, goal: int, cost: float, bound: float) -> None:
@@ -175,30 +168,21 @@ class FloorTable:
 
         The optimum is the same in both directions: planners with headings make no floors.
         """
-        lower = self.lower
-        lower[start][goal] = max(lower[start][goal], bound)
-        lower[goal][start] = max(lower[goal][start], bound)
-        self.cost[start][goal] = cost
-        self.version = next(_versions)
+        for pair in ((start, goal), (goal, start)):
+            self.lower[pair] = max(self.lower[pair], bound)
+            if math.isnan(self.cost[pair]):
+                self.expected[pair] = self.lower[pair]
+        self.cost[start, goal] = self.expected[start, goal] = cost
 
-    def straight_m(self, waypoint: ArrayLike | str) -> list[float]:
-        """Return lower bounds on the costs between a waypoint and each end, in metres.
+    def straight_m(self, waypoint: ArrayLike | str) -> FloatArray:
+        """Return lower bounds on the costs between a waypoint and each end, float64 (n,), metres.
 
         Parameters
         ----------
         waypoint
             A point `(x, y)` in metres, or a name of the floor.
         """
-        if isinstance(waypoint, str):
-            found: list[float] = self._safe(self._distance_m(waypoint, self.positions_m)).tolist()
-            return found
-        # Ends are few: numpy would take ten times as long for them.
-        x, y = np.asarray(waypoint, dtype=np.float64)[:2].tolist()
-        slack_m = self._slack_m
-        return [
-            max(math.hypot(x - end_x, y - end_y) - slack_m, 0.0) * ROUNDED
-            for end_x, end_y in self._positions
-        ]
+        return self._safe(self._distance_m(waypoint, self.positions_m))
 
     def straight_between_m(self, start: ArrayLike | str, goal: ArrayLike | str) -> float:
         """Return a lower bound on the cost between two waypoints in metres; 0 if both are names."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from hybridnav.building.floors import FloorTable
+    from hybridnav._typing import FloatArray, LongArray
     from hybridnav.building.links import Link
 
 Part = tuple[int, int]
@@ -28,7 +29,7 @@ class End(NamedTuple):
 
 
 class ChosenParts(NamedTuple):
-    """A route, or a part of one: its parts in order, between which rides lead."""
+    """A route: its parts in order, between which rides lead."""
 
     cost: float
     """Costs of its parts, and charges of its rides, in metres."""
@@ -36,8 +37,8 @@ class ChosenParts(NamedTuple):
     """Its paths on floors."""
 
 
-Crossings = list[tuple[int, int, ChosenParts]]
-"""The end where a first ride begins, that where a last one ends, and what lies between."""
+START, GOAL = -1, -2
+"""Where the first part of a route begins, and where its last one ends."""
 
 
 class LinkNetwork:
@@ -83,67 +84,111 @@ class LinkNetwork:
             for number, end in enumerate(self.ends)
             for link in (links[end.link],)
         ]
-        self._between: dict[tuple[int, int, bool], tuple[tuple[int, ...], Crossings]] = {}
+        legs = [(tail, head, charge) for tail, to in enumerate(self.rides) for head, charge in to]
+        self._tails, self._heads = (
+            np.array([leg[:2] for leg in legs], dtype=np.int64).reshape(-1, 2).T
+        )
+        self._charges = np.array([leg[2] for leg in legs], dtype=np.float64)
+        self._on_floor = [np.array(ends, dtype=np.int64) for ends in self.on_floor]
+        self._floor_of = np.array([end.floor for end in self.ends], dtype=np.int64)
+        self._at = np.array([end.at for end in self.ends], dtype=np.int64)
 
-    def between(
-        self, floors: tuple[int, int], tables: Sequence[FloorTable], *, lower: bool
-    ) -> Crossings:
-        """Return the cheapest way from each end on a floor to each end on another one, by what the
-        tables know; it is kept until they know more.
+    def cheapest(
+        self, first: FloatArray, last: FloatArray, costs_on: Callable[[int], FloatArray]
+    ) -> ChosenParts | None:
+        """Return the cheapest route with at least one ride; None if there is none.
 
         Parameters
         ----------
-        floors
-            Where the first ride begins, and where the last one ends.
-        tables
-            The table of each floor.
-        lower
-            Whether parts of routes cost their lower bounds, also where their costs are known.
+        first
+            float64 (n_ends,), the cost from the start to each end, infinite on other floors.
+        last
+            float64 (n_ends,), that from each end to the goal.
+        costs_on
+            Returns the costs between the ends on a floor, float64, by their rows in its table.
+
+        Notes
+        -----
+        All ends are relaxed at once, by turns over rides and over floors, until nothing is cheaper
+        (R. Bellman: On a routing problem, 1958; L. Ford: Network flow theory, 1956). A turn costs
+        the square of the ends on a floor, and there are as many as rides on a cheapest route.
         """
-        versions = tuple(table.version for table in tables)
-        kept = self._between.get((*floors, lower))
-        if kept is None or kept[0] != versions:
+        reached, left = first.copy(), np.full(len(first), np.inf)
+        came, rode = np.full((2, len(first)), START)
+        fresh, least_charge = reached < np.inf, self._charges.min(initial=math.inf)
+        while fresh.any():
+            legs = np.flatnonzero(fresh[self._tails])
+            arrived = reached[self._tails[legs]] + self._charges[legs]
+            is_less = arrived < left[self._heads[legs]]
+            legs, arrived = legs[is_less], arrived[is_less]
+            np.minimum.at(left, self._heads[legs], arrived)
+            is_least = arrived == left[self._heads[legs]]
+            heads = self._heads[legs[is_least]]
+            rode[heads] = self._tails[legs[is_least]]
+            # A route that goes on by another ride costs a charge more at least.
+            onward = np.unique(heads[left[heads] + least_charge <= (left + last).min()])
+            fresh = self._walked(onward, left, costs_on, (reached, came))
+        end = int((left + last).argmin()) if len(left) else START
+        if end == START or not left[end] + last[end] < np.inf:
+            return None
+        return self._traced(end, (first, last), (came, rode), costs_on)
 
-            def cost_of(part: Part) -> float:
-                one, other = self.ends[part[0]], self.ends[part[1]]
-                table = tables[one.floor]
-                cost = math.nan if lower else table.cost[one.at][other.at]
-                return table.lower[one.at][other.at] if math.isnan(cost) else cost
+    def _walked(
+        self,
+        onward: LongArray,
+        left: FloatArray,
+        costs_on: Callable[[int], FloatArray],
+        known: tuple[FloatArray, LongArray],
+    ) -> np.ndarray:
+        """Relax the costs of all ends from those at which rides have ended.
 
-            kept = versions, self.crossings(floors, cost_of)
-            self._between[*floors, lower] = kept
-        return kept[1]
+        Parameters
+        ----------
+        onward
+            int64 (k,), these ends.
+        left
+            float64 (n_ends,), the cost at which each is left.
+        costs_on
+            As in `cheapest`.
+        known
+            The cost at which each end is reached, and from which end; both are overwritten.
+        """
+        reached, came = known
+        fresh = np.zeros(len(reached), dtype=np.bool_)
+        for floor in np.unique(self._floor_of[onward]).tolist():
+            ends, rows = self._on_floor[floor], onward[self._floor_of[onward] == floor]
+            sums = costs_on(floor)[np.ix_(self._at[rows], self._at[ends])] + left[rows, None]
+            sums[rows[:, None] == ends] = np.inf
+            best = sums.argmin(axis=0)
+            least = sums[best, np.arange(len(ends))]
+            is_less = least < reached[ends]
+            reached[ends[is_less]] = least[is_less]
+            came[ends[is_less]] = rows[best[is_less]]
+            fresh[ends[is_less]] = True
+        return fresh
 
-    def crossings(self, floors: tuple[int, int], cost_of: Callable[[Part], float]) -> Crossings:
-        """Return the cheapest way from each end on a floor, by which one leaves it, to each end on
-        another one, by which one arrives, by Dijkstra's algorithm."""
-        found = []
-        for first in self.on_floor[floors[0]]:
-            least = self._ways_from(first, cost_of)
-            reached = [end for end in self.on_floor[floors[1]] if end in least]
-            found += [(first, end, ChosenParts(*least[end])) for end in reached]
-        return found
-
-    def _ways_from(
-        self, first: int, cost_of: Callable[[Part], float]
-    ) -> dict[int, tuple[float, tuple[Part, ...]]]:
-        """Return the least cost from an end where a ride begins to the ends where rides end, and
-        the parts between."""
-        least: dict[int, tuple[float, tuple[Part, ...]]] = {}
-        heap: list[tuple[float, int, tuple[Part, ...]]]
-        heap = [(charge, other, ()) for other, charge in self.rides[first]]
-        heapq.heapify(heap)
-        while heap:
-            cost, node, parts = heapq.heappop(heap)
-            if node in least:
-                continue
-            least[node] = cost, parts
-            for end in self.on_floor[self.ends[node].floor]:
-                arrived = cost + cost_of((node, end)) if end != node else math.inf
-                if not arrived < math.inf:
-                    continue
-                for other, charge in self.rides[end]:
-                    if other not in least:
-                        passed = (*parts, (node, end))
-                        heapq.heappush(heap, (arrived + charge, other, passed))
-        return least
+    def _traced(
+        self,
+        end: int,
+        outer: tuple[FloatArray, FloatArray],
+        steps: tuple[LongArray, LongArray],
+        costs_on: Callable[[int], FloatArray],
+    ) -> ChosenParts:
+        """Return the route that ends with a ride to an end, its cost summed from the start."""
+        came, rode = steps
+        parts: list[Part] = [(end, GOAL)]
+        costs = [float(outer[1][end])]
+        while end != START:
+            entered = int(rode[end])
+            before = int(came[entered])
+            charge = dict(self.rides[entered])[end]
+            part = (before, entered)
+            one, other = (self.ends[each] for each in part)
+            cost = outer[0][entered] if before == START else costs_on(one.floor)[one.at, other.at]
+            parts.append(part)
+            costs += [charge, float(cost)]
+            end = before
+        total = 0.0
+        for cost in reversed(costs):
+            total += cost
+        return ChosenParts(total, tuple(reversed(parts)))

@@ -7,8 +7,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from hybridnav.building.checks import parts_of
 from hybridnav.building.floors import ROUNDED
-from hybridnav.building.network import ChosenParts
+from hybridnav.building.network import GOAL, START, ChosenParts
 from hybridnav.planner.drafts import PlanDraft
 from hybridnav.result import PlanStatus
 
@@ -17,13 +20,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from hybridnav._typing import FloatArray
     from hybridnav.building.floors import FloorTable
     from hybridnav.building.network import LinkNetwork, Part
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.named import At
 
-START, GOAL = -1, -2
-"""Where the first part of a route begins, and where its last one ends."""
 _MOST_LABELS = 20_000
 """Labels after which the search for one more route ends."""
 
@@ -34,6 +36,19 @@ class Endpoint:
 
     floor: int
     waypoint: ArrayLike | str
+
+
+@dataclass(frozen=True)
+class _Costs:
+    """Lower bounds on the costs of parts, and the costs of those that were planned, else NaN."""
+
+    lower: FloatArray
+    known: FloatArray
+
+    @property
+    def expected(self) -> FloatArray:
+        """The costs where they are known, else the bounds."""
+        return np.where(np.isnan(self.known), self.lower, self.known)
 
 
 class LinkSearch:
@@ -78,18 +93,21 @@ class LinkSearch:
         """Those made for this query."""
         self.is_complete = True
         """Whether `ranked` has looked at all routes that keep to the limit."""
-        self._lower: dict[Part, float] = {}
-        self._cost: dict[Part, float] = {}
+        self._of_floor: dict[int, _Costs] = {}
+        self._divided: set[int] = set()
         start, goal = endpoints
-        for end, of in ((start, START), (goal, GOAL)):
-            straight = tables[end.floor].straight_m(end.waypoint)
-            for number in network.on_floor[end.floor]:
-                part = (START, number) if of == START else (number, GOAL)
-                self._lower[part] = straight[network.ends[number].at]
+        n = len(network.ends)
+        self._first, self._last = (
+            _Costs(np.full(n, np.inf), np.full(n, np.nan)) for _ in endpoints
+        )
+        for end, costs in ((start, self._first), (goal, self._last)):
+            on_floor = network.on_floor[end.floor]
+            rows = [network.ends[number].at for number in on_floor]
+            costs.lower[on_floor] = tables[end.floor].straight_m(end.waypoint)[rows]
+        direct_m = math.inf
         if start.floor == goal.floor:
-            table = tables[start.floor]
-            straight_m = table.straight_between_m(start.waypoint, goal.waypoint)
-            self._lower[START, GOAL] = straight_m
+            direct_m = tables[start.floor].straight_between_m(start.waypoint, goal.waypoint)
+        self._direct = _Costs(np.array([direct_m]), np.array([math.nan]))
 
     def best(self) -> ChosenParts | None:
         """Return the cheapest route, all of whose parts are planned; None if there is none."""
@@ -143,6 +161,8 @@ class LinkSearch:
             if part not in self.drafts:
                 before = self._expected(part)
                 self._plan(part)
+                if self.drafts[part].status is PlanStatus.NO_PATH:
+                    self._divide(self._floor_of(part))
                 if not self._expected(part) <= before / ROUNDED:
                     return False
         return True
@@ -154,7 +174,7 @@ class LinkSearch:
     def _plan(self, part: Part) -> None:
         """Plan one part, and take over its cost and its bound."""
         start, goal = part
-        floor = self._start.floor if start == START else self._network.ends[start].floor
+        floor = self._floor_of(part)
         table, closed = self._tables[floor], self._closed.get(floor)
         if start != START and goal != GOAL and closed is None:
             rows = self._network.ends[start].at, self._network.ends[goal].at
@@ -162,13 +182,42 @@ class LinkSearch:
             found = PlanDraft.of(result)
         else:
             found, was_kept = self._between(table, part, closed), False
-            self._cost[part] = found.cost
-            self._lower[part] = max(self._bound_of(part), found.lower_bound)
+            costs, key = self._slot(part)
+            costs.known[key] = found.cost
+            costs.lower[key] = max(costs.lower[key], found.lower_bound)
             if closed is None and (start == START) != (goal == GOAL):
                 self._compare(table, part, found)
         self.drafts[part] = found
         if not was_kept:
             self.planned.append(found)
+
+    def _floor_of(self, part: Part) -> int:
+        """Return the floor that a part lies on."""
+        return self._start.floor if part[0] == START else self._network.ends[part[0]].floor
+
+    def _divide(self, floor: int) -> None:
+        """Rule out all paths between connected parts of a floor, once one path was not found: the
+        search would ask for each, and behind a shut door there are as many as ends."""
+        if floor in self._divided:
+            return
+        self._divided.add(floor)
+        table, closed = self._tables[floor], self._closed.get(floor)
+        part_of = parts_of(
+            table.floor,
+            allow_unexplored=table.floor.planner.preset.planner.allow_unexplored,
+            closed=None if closed is None else closed.flat,
+        )
+        frame = table.floor.planner.topology.grid.frame
+        own = part_of[tuple(frame.cells_of(table.positions_m).T)]
+        costs = self._costs_on(floor)
+        for known in (costs.lower, table.expected)[: 1 if floor in self._closed else 2]:
+            known[own[:, None] != own] = np.inf
+        on_floor = np.array(self._network.on_floor[floor])
+        rows = [self._network.ends[number].at for number in on_floor]
+        for end, outer in ((self._start, self._first), (self._goal, self._last)):
+            if end.floor == floor and not isinstance(end.waypoint, str):
+                x, y = np.asarray(end.waypoint, dtype=np.float64)[:2].tolist()
+                outer.lower[on_floor[own[rows] != part_of[frame.cell_of(x, y)]]] = np.inf
 
     def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> PlanDraft:
         start, goal = (
@@ -185,41 +234,54 @@ class LinkSearch:
             return
         is_first = part[0] == START
         number = part[1] if is_first else part[0]
-        ends = self._network.ends
-        row = ends[number].at
-        for other in self._network.on_floor[end.floor]:
-            at = ends[other].at
-            if other == number:
-                continue
-            costs = table.cost[row][at], table.cost[at][row]
-            least = [found.lower_bound - cost for cost in costs if cost < math.inf]
-            if found.cost < math.inf:
-                least.append(table.lower[row][at] - found.cost)
-            compared = (START, other) if is_first else (other, GOAL)
-            bound = max(least, default=0.0) * ROUNDED
-            self._lower[compared] = max(self._lower[compared], bound)
+        others = [other for other in self._network.on_floor[end.floor] if other != number]
+        row, rows = (self._network.ends[number].at, [self._network.ends[o].at for o in others])
+        away = np.fmin(table.cost[row, rows], table.cost[rows, row])
+        least = np.zeros(len(others))
+        is_near = away < np.inf
+        least[is_near] = found.lower_bound - away[is_near]
+        if found.cost < math.inf:
+            least = np.maximum(least, table.lower[row, rows] - found.cost)
+        lower = (self._first if is_first else self._last).lower
+        lower[others] = np.maximum(lower[others], least * ROUNDED)
 
-    def _bound_of(self, part: Part) -> float:
-        """Return the lower bound of a part."""
-        found = self._lower.get(part)
-        if found is None:
-            start, goal = self._network.ends[part[0]], self._network.ends[part[1]]
-            found = self._tables[start.floor].lower[start.at][goal.at]
-        return found
+    def _slot(self, part: Part) -> tuple[_Costs, int | tuple[int, int]]:
+        """Return where the cost and the bound of a part are kept."""
+        start, goal = part
+        if start == START:
+            return (self._direct, 0) if goal == GOAL else (self._first, goal)
+        if goal == GOAL:
+            return self._last, start
+        one, other = self._network.ends[start], self._network.ends[goal]
+        return self._costs_on(one.floor), (one.at, other.at)
+
+    def _costs_on(self, floor: int) -> _Costs:
+        """Return the costs between the ends on a floor: those of its table, or, where cells are
+        closed, its bounds, and the costs of this query."""
+        if floor not in self._of_floor:
+            table = self._tables[floor]
+            is_closed = floor in self._closed
+            cost = np.full_like(table.cost, np.nan) if is_closed else table.cost
+            self._of_floor[floor] = _Costs(table.lower.copy() if is_closed else table.lower, cost)
+        return self._of_floor[floor]
 
     def _cost_of(self, part: Part) -> float | None:
         """Return the cost of a part that was planned, now or for a query before; else None."""
-        start, goal = part
-        if start < 0 or goal < 0 or self._network.ends[start].floor in self._closed:
-            return self._cost.get(part)
-        one, other = self._network.ends[start], self._network.ends[goal]
-        cost = self._tables[one.floor].cost[one.at][other.at]
+        costs, key = self._slot(part)
+        cost = float(costs.known[key])
         return None if math.isnan(cost) else cost
 
     def _expected(self, part: Part) -> float:
         """Return the cost of a part if it is known, else its lower bound."""
         cost = self._cost_of(part)
-        return self._bound_of(part) if cost is None else cost
+        costs, key = self._slot(part)
+        return float(costs.lower[key]) if cost is None else cost
+
+    def _expected_on(self, floor: int) -> FloatArray:
+        """Return the costs between the ends on a floor where they are known, else the bounds."""
+        if floor not in self._closed:
+            return self._tables[floor].expected
+        return self._costs_on(floor).expected
 
     def _parts_from(self, start: int) -> list[Part]:
         """Return the parts that leave the start, or an end at which a ride has ended."""
@@ -232,28 +294,14 @@ class LinkSearch:
     def _least(self, *, lower: bool) -> ChosenParts | None:
         """Return the cheapest route, by the costs of parts where they are known and not `lower`,
         else by lower bounds."""
-        cost_of = self._bound_of if lower else self._expected
-        floors = self._start.floor, self._goal.floor
-        if self._closed:
-            crossings = self._network.crossings(floors, cost_of)
-        else:
-            crossings = self._network.between(floors, self._tables, lower=lower)
-        on_floor, known = self._network.on_floor, {} if lower else self._cost
-        bounds = self._lower
-        first = {end: known.get((START, end), bounds[START, end]) for end in on_floor[floors[0]]}
-        last = {end: known.get((end, GOAL), bounds[end, GOAL]) for end in on_floor[floors[1]]}
-        best, least = None, math.inf
-        for one, other, between in crossings:
-            cost = first[one] + between.cost + last[other]
-            if cost < least:
-                least, best = cost, (one, between.parts, other)
-        if floors[0] == floors[1] and cost_of((START, GOAL)) <= least:
-            least = cost_of((START, GOAL))
-            return ChosenParts(least, ((START, GOAL),)) if least < math.inf else None
-        if best is None:
-            return None
-        one, parts, other = best
-        return ChosenParts(least, ((START, one), *parts, (other, GOAL)))
+        outer = self._first, self._last, self._direct
+        first, last, direct = (costs.lower if lower else costs.expected for costs in outer)
+        on = (lambda floor: self._costs_on(floor).lower) if lower else self._expected_on
+        found = self._network.cheapest(first, last, on)
+        direct_m = float(direct[0])
+        if direct_m < math.inf and (found is None or direct_m <= found.cost):
+            return ChosenParts(direct_m, ((START, GOAL),))
+        return found
 
     def _least_other(self, known: set[tuple[int, ...]], most: float) -> ChosenParts | None:
         """Return the cheapest route with a sequence of links that is not known."""
