@@ -167,7 +167,7 @@ def main_direction(occupied: BoolArray) -> float:
         smooth = ndimage.correlate1d(smooth, weights / weights.sum(), axis)
     if min(occupied.shape) < 2:  # noqa: PLR2004 - no gradient
         return 0.0
-    by_row, by_col = np.gradient(smooth)
+    by_row, by_col = (np.asarray(each) for each in np.gradient(smooth))
     # Four times the angle makes walls and their normals, whichever way they face, one direction.
     steepness: FloatArray = np.hypot(by_row, by_col)
     is_steep = steepness > 0
