@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+import hybridnav.mapping  # noqa: F401 - its kernels make the functions known to numba
 from hybridnav import _trig
 from hybridnav._trig import acos, asin, atan2, cos, exp, log, sin, tan
 
