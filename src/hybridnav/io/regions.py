@@ -33,15 +33,13 @@ def regions_of(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     grid
         The map.
     """
-    is_kept = kept_cells(label_of, grid)
+    is_kept = _kept_cells(label_of, grid)
     return _without_bays(_without_islands(label_of, is_kept, grid), is_kept, grid)
 
 
-def kept_cells(label_of: IntArray, grid: OccupancyGrid) -> BoolArray:
-    """Return the free cells with a room, and those without that are a square metre in one piece.
-
-    A file of rooms keeps them as they are, bool (rows, cols).
-    """
+def _kept_cells(label_of: IntArray, grid: OccupancyGrid) -> BoolArray:
+    """Return the free cells with a room, and those without that are a square metre in one piece,
+    bool (rows, cols): outlines grow over no others."""
     is_free = grid.measured == CellClass.FREE
     part_of, _ = ndimage.label(is_free & (label_of == NO_ROOM))
     is_many = np.bincount(part_of.ravel()) * grid.cell_area_m2 >= _LEAST_NAMELESS_M2

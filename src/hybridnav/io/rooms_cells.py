@@ -1,4 +1,4 @@
-"""The free cells that outlines of few corners miss, packed into a few lines of a file of rooms."""
+"""The cells that outlines of few corners miss, packed into a few lines of a file of rooms."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import base64
 import binascii
 import lzma
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -29,9 +29,21 @@ _LINE = 120
 """Characters in a line."""
 _MOST_BYTES = 2**20
 _BITS = 7
+_BY_RULE = " by rule"
+"""What the signatures of files have more than those of earlier versions."""
 _FORMAT = lzma.FORMAT_RAW
 _FILTERS = [{"id": lzma.FILTER_LZMA2, "dict_size": _MOST_BYTES, "lc": 0, "lp": 0, "pb": 0}]
 """For bytes that are small numbers: no bits of those before, nor of their positions."""
+
+
+class Missed(NamedTuple):
+    """The cells of a file that its outlines miss."""
+
+    runs_of: Mapping[int, Runs]
+    """By the fingerprint of each outline that was written with them."""
+    by_rule: bool = True
+    """Whether cells inside no outline, in walls and in pockets follow `rooms_paint.by_rule`; in
+    files of earlier versions they follow the outlines alone."""
 
 
 def fingerprint(rings: Sequence[FloatArray]) -> int:
@@ -49,7 +61,7 @@ def packed(
     Parameters
     ----------
     missed
-        bool (rows, cols), cells whose room is not the one whose outline holds them.
+        bool (rows, cols), cells whose room is not the one that they would be read with.
     label_of
         int32 (rows, cols), -1 for no room.
     outlines
@@ -72,14 +84,14 @@ def packed(
         lengths.append(np.diff(begins, append=len(mine)))
     # Numbers of a kind beside each other take fewer bytes.
     runs = np.concatenate([*starts, *lengths]).tolist()
-    numbers = [_signature(grid), len(heads) // 2, *heads, *runs]
+    numbers = [_signature(grid, _BY_RULE), len(heads) // 2, *heads, *runs]
     content = lzma.compress(b"".join(map(_varint, numbers)), _FORMAT, filters=_FILTERS)
     text = base64.b64encode(content).decode()
     return [text[at : at + _LINE] for at in range(0, len(text), _LINE)]
 
 
-def unpacked(lines: Sequence[Any], where: str, grid: OccupancyGrid) -> Mapping[int, Runs]:
-    """Return the cells that belong to each outline beyond those inside it.
+def unpacked(lines: Sequence[Any], where: str, grid: OccupancyGrid) -> Missed:
+    """Return the cells that belong to each outline beyond those that it would have.
 
     Parameters
     ----------
@@ -90,27 +102,24 @@ def unpacked(lines: Sequence[Any], where: str, grid: OccupancyGrid) -> Mapping[i
     grid
         The map. If it is not the one that the lines were packed for, there are no cells.
 
-    Returns
-    -------
-    Mapping
-        By the fingerprint of each outline that was written with them.
-
     Raises
     ------
     RoomsError
         When the lines are damaged.
     """
     if not lines:
-        return {}
+        return Missed({})
     damaged = RoomsError(f"{where}: cells: damaged, delete the list: the outlines alone then count")
     try:
         text = "".join(lines)
         reader = lzma.LZMADecompressor(_FORMAT, filters=_FILTERS)
         content = reader.decompress(base64.b64decode(text, validate=True), _MOST_BYTES)
         numbers = _varints(content)
-        if next(numbers) != _signature(grid):
-            return {}
-        return dict(_runs(numbers, grid.shape))
+        signature = next(numbers)
+        by_rule = signature == _signature(grid, _BY_RULE)
+        if not by_rule and signature != _signature(grid):
+            return Missed({})
+        return Missed(dict(_runs(numbers, grid.shape)), by_rule)
     except (TypeError, ValueError, binascii.Error, lzma.LZMAError, StopIteration, RuntimeError):
         raise damaged from None
 
@@ -141,11 +150,11 @@ def _limited(count: int) -> int:
     return count
 
 
-def _signature(grid: OccupancyGrid) -> int:
-    """Return a number of the frame and the size of a map."""
+def _signature(grid: OccupancyGrid, more: str = "") -> int:
+    """Return a number of the frame and the size of a map, and of some text."""
     frame = grid.frame
     values = (*grid.shape, frame.resolution_m, *frame.origin_m, frame.yaw_rad)
-    return zlib.crc32(" ".join(f"{value:.9g}" for value in values).encode())
+    return zlib.crc32((" ".join(f"{value:.9g}" for value in values) + more).encode())
 
 
 def _varint(number: int) -> bytes:

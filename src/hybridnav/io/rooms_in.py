@@ -121,12 +121,12 @@ def rooms_of(read: Read, grid: OccupancyGrid) -> RoomLabels:
 
 def labels_of(read: Read, grid: OccupancyGrid) -> IntArray:
     """Return the room of each cell by the outlines and seeds of a file, int32 (rows, cols)."""
-    runs_of = unpacked(read.cells, read.where, grid)
-    label_of = painted(read, runs_of, grid)
+    missed = unpacked(read.cells, read.where, grid)
+    label_of = painted(read, missed, grid)
     if read.seeds:
         label_of = _seeded(read, label_of, grid)
     if read.lines:
-        by_hand = {o.room for o in read.outlines if o.fingerprint not in runs_of}
+        by_hand = {o.room for o in read.outlines if o.fingerprint not in missed.runs_of}
         label_of = without_slivers(label_of, grid, by_hand | set(read.seeds))
     return label_of
 

@@ -12,18 +12,18 @@ import yaml
 
 from hybridnav._files import printable, replace_file
 from hybridnav.errors import InvalidValueError, RoomsError
+from hybridnav.grid import NO_ROOM, CellClass
 from hybridnav.io.outlines import Outlines, decimals_of
-from hybridnav.io.regions import kept_cells
 from hybridnav.io.rooms_cells import fingerprint, packed
 from hybridnav.io.rooms_entries import LIMITS, Outline, Read, in_cells
 from hybridnav.io.rooms_in import check_points, check_rooms, labels_of
-from hybridnav.io.rooms_paint import painted
+from hybridnav.io.rooms_paint import apart, by_rule, outlined
 from hybridnav.io.rooms_text import HEADER, OldText
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from hybridnav._typing import FloatArray, IntArray, PathLike
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, PathLike
     from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.grid.room_labels import Point
 
@@ -37,10 +37,10 @@ def save_rooms(
 ) -> None:
     """Write rooms as a file that `load_rooms` reads and a person can edit.
 
-    Outlines have few corners, lie along walls, and neighbours share their common border. The free
-    cells that they miss are kept in `cells`, so that every free cell is read with the room that it
-    has; only nameless ones below a square metre may get one. The doors are written with their
-    numbers, so that lists, pictures and plans of the file use the same.
+    Outlines have few corners, lie along walls, and neighbours share their common border. The cells
+    that they miss are kept in `cells`, so that every cell is read with the room that it has, or
+    with none. The doors are written with their numbers, so that lists, pictures and plans of the
+    file use the same.
 
     Where the file exists, outlines that still hold, and all comments, are kept.
 
@@ -103,13 +103,25 @@ class _Draft:
     """Those up to the cells."""
     cells: list[str]
     """Those of the cells."""
-    label_of: IntArray
-    """int32 (rows, cols), the rooms as they are read."""
+    read: Read
+    """What a reader makes of them, before it paints the outlines."""
 
     @property
     def text(self) -> str:
         """The whole text."""
         return "\n".join([*self.lines, *self.cells]) + "\n"
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """What a file has to be read as, but for the outlines that a person has drawn."""
+
+    label_of: IntArray
+    """int32 (rows, cols), -1 where such outlines lie, and for rooms that have no others."""
+    is_drawn: BoolArray
+    """bool (rows, cols), the cells in such outlines."""
+    by_rule: IntArray
+    """int32 (rows, cols), what these labels of free cells make of the others."""
 
 
 class _Writer:
@@ -120,41 +132,52 @@ class _Writer:
         self._grid = grid
         self._where = where
         self._outlines = Outlines(rooms.label_of, len(rooms.names), grid)
-        self._is_kept = kept_cells(rooms.label_of, grid)
+        self._apart = apart(grid)
         self._names = [_name(name) for name in rooms.names]
 
     def fitting(self, old: OldText | None, tolerances_m: Sequence[float]) -> _Draft:
         """Return the finest draft of at most 20 kB that is read as these rooms, else the
         coarsest; tolerances ascend."""
         # Loads scipy and numba.
-        from hybridnav.topology.doors import renumbered  # noqa: PLC0415
+        from hybridnav.topology.doors import numbered  # noqa: PLC0415
 
+        doors = _door_lines(numbered(self._rooms, self._grid), self._grid)
+        most = _MOST_BYTES - sum(len(line.encode()) + 1 for line in doors)
         for kept in [old, None] if old is not None and old.blocks else [None]:
+            target = self._target(kept)
             best: _Draft | None = None
-            doors: list[str] = []
-            low, high, most = 0, len(tolerances_m), 0
+            low, high = 0, len(tolerances_m)
             while low < high:
                 # The coarsest first: it may be the only one.
                 middle = len(tolerances_m) - 1 if best is None else (low + high) // 2
-                draft = self._draft(self._outlines.within(tolerances_m[middle]), kept)
-                if draft is None:
-                    break
-                if best is None:
-                    # Cells are read as they are, so that the doors of all drafts are the same.
-                    found = renumbered(self._rooms, draft.label_of, self._grid)
-                    doors = _door_lines(found, self._grid)
-                    most = _MOST_BYTES - sum(len(line.encode()) + 1 for line in doors)
+                draft = self._draft(self._outlines.within(tolerances_m[middle]), target, kept)
                 fits = len(draft.text.encode()) <= most
                 best = draft if fits or best is None else best
                 low, high = (low, middle) if fits else (middle + 1, high)
-            if best is not None:
+            if best is not None and self._is_right(best):
                 comments = old.comments if kept is None and old is not None else []
                 return replace(best, lines=[*comments, *best.lines, *doors])
         raise AssertionError  # a draft without an old file always holds
 
-    def _draft(self, rings_of: list[list[FloatArray]], old: OldText | None) -> _Draft | None:
+    def _target(self, old: OldText | None) -> _Target:
+        """Return what the cells have to be read as beside what an old file holds."""
+        kept = [] if old is None else old.outlines
+        unchanged = set() if old is None else old.written
+        drawn = [each for each in kept if each.fingerprint not in unchanged]
+        read = Read(self._where, list(self._rooms.names), [1] * len(self._rooms.names), drawn)
+        is_drawn = outlined(read, (), self._grid)[1] != NO_ROOM
+        others = {each.room for each in kept if each.fingerprint in unchanged}
+        without = is_drawn | np.isin(
+            self._rooms.label_of, [each.room for each in drawn if each.room not in others]
+        )
+        label_of = np.where(without, np.int32(NO_ROOM), self._rooms.label_of)
+        return _Target(label_of, is_drawn, by_rule(label_of, self._grid))
+
+    def _draft(
+        self, rings_of: list[list[FloatArray]], target: _Target, old: OldText | None
+    ) -> _Draft:
         """Return a draft without doors, with these outlines for the rooms that the old file does
-        not hold as they are; None if it would be read otherwise."""
+        not hold as they are."""
         rooms, grid = self._rooms, self._grid
         fresh = {
             room: Outline(room, [in_cells(ring, grid) for ring in rings], fingerprint(rings))
@@ -169,13 +192,11 @@ class _Writer:
         unchanged = set() if old is None else old.written
         written = [o for o in outlines if o.room not in done or o.fingerprint in unchanged]
         read = Read(self._where, list(rooms.names), [1] * len(rooms.names), outlines)
-        none = np.empty(0, dtype=np.int64)
-        plain = painted(read, {outline.fingerprint: (none, none) for outline in written}, grid)
-        missed = self._is_kept & (plain != rooms.label_of)
-        cells = packed(missed, rooms.label_of, [(o.room, o.fingerprint) for o in written], grid)
-        label_of = labels_of(replace(read, cells=cells), grid)
-        if (label_of != rooms.label_of)[self._is_kept].any():
-            return None
+        plain, _ = outlined(read, [outline.fingerprint for outline in written], grid)
+        plain[self._apart] = NO_ROOM
+        plain = np.where(grid.measured == CellClass.FREE, plain, target.by_rule)
+        missed = (plain != target.label_of) & ~target.is_drawn
+        cells = packed(missed, target.label_of, [(o.room, o.fingerprint) for o in written], grid)
         entries = {room: self._entry(room, rings) for room, rings in enumerate(rings_of)}
         if old is None:
             lines = [HEADER[0].format(" ".join(grid.name.split())), *HEADER[1:]]
@@ -184,7 +205,11 @@ class _Writer:
             lines += _point_lines(rooms)
         else:
             lines = old.with_entries(entries, _point_lines(rooms))
-        return _Draft(lines, _cell_lines(cells), label_of)
+        return _Draft(lines, _cell_lines(cells), replace(read, cells=cells))
+
+    def _is_right(self, draft: _Draft) -> bool:
+        """Return whether a draft is read as these rooms; outlines of an old file may prevent it."""
+        return bool((labels_of(draft.read, self._grid) == self._rooms.label_of).all())
 
     def _entry(self, room: int, rings: list[FloatArray]) -> list[str]:
         lines = [f"- {self._names[room]}"]

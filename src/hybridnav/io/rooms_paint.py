@@ -15,9 +15,9 @@ from hybridnav.io.rooms_cells import NAMELESS
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from hybridnav._typing import FloatArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
     from hybridnav.grid import OccupancyGrid
-    from hybridnav.io.rooms_cells import Runs
+    from hybridnav.io.rooms_cells import Missed, Runs
     from hybridnav.io.rooms_entries import Outline, Read
 
 _MOST_PAINTED = 4
@@ -29,19 +29,19 @@ _MOST_CROSSINGS = 5_000_000
 cross some ten thousand."""
 
 
-def painted(read: Read, runs_of: Mapping[int, Runs], grid: OccupancyGrid) -> IntArray:
+def painted(read: Read, missed: Missed, grid: OccupancyGrid) -> IntArray:
     """Return for each cell the room whose outline contains its centre, by the even-odd rule.
 
-    Outlines that were written with their cells come first, then the cells that they miss, then the
-    outlines that a person has drawn or changed, in the order of the file: each takes the cells that
-    it contains from those before.
+    Outlines that were written with their cells come first, corrected by the cells that they miss,
+    then the outlines that a person has drawn or changed, in the order of the file: each takes the
+    cells that it contains from those before.
 
     Parameters
     ----------
     read
         The outlines, which may cross themselves and others.
-    runs_of
-        For each outline that was written, by its fingerprint, the cells that it misses.
+    missed
+        The cells that outlines miss; an outline whose fingerprint it lacks was drawn by hand.
     grid
         The map.
 
@@ -55,37 +55,86 @@ def painted(read: Read, runs_of: Mapping[int, Runs], grid: OccupancyGrid) -> Int
     RoomsError
         When the outlines have too many sides, or cover too much, for rooms.
     """
+    written, by_hand = outlined(read, missed.runs_of, grid)
+    outlines = [each for each in read.outlines if each.fingerprint in missed.runs_of]
+    if missed.by_rule and outlines:
+        written[apart(grid)] = NO_ROOM
+        _give(written, outlines, missed.runs_of)
+        written = by_rule(np.where(by_hand == NO_ROOM, written, np.int32(NO_ROOM)), grid)
+    _give(written, outlines, missed.runs_of)
+    return np.where(by_hand == NO_ROOM, written, by_hand)
+
+
+def outlined(
+    read: Read, written: Collection[int], grid: OccupancyGrid
+) -> tuple[IntArray, IntArray]:
+    """Paint the outlines alone: those that were written, and those drawn by hand.
+
+    Parameters
+    ----------
+    read, grid
+        As of `painted`.
+    written
+        Fingerprints of outlines that were written.
+
+    Returns
+    -------
+    tuple of IntArray
+        int32 (rows, cols) each, -1 for no room.
+
+    Raises
+    ------
+    RoomsError
+        As by `painted`.
+    """
     n_crossings = sum(_n_crossings(ring) for outline in read.outlines for ring in outline.rings)
     if n_crossings > _MOST_CROSSINGS:
         raise RoomsError(
             f"{read.where}: the outlines cross {n_crossings:,} rows of the map in all, "
             f"at most {_MOST_CROSSINGS:,} are read"
         )
-    label_of = np.full(grid.shape, NO_ROOM, dtype=np.int32)
-    flat = label_of.ravel()
+    found = [np.full(grid.shape, NO_ROOM, dtype=np.int32) for _ in range(2)]
     n_painted = 0
-    by_hand = [outline for outline in read.outlines if outline.fingerprint not in runs_of]
-    if not read.lines:  # in the form with locations the first one keeps its cells
-        by_hand.reverse()
-    written = [outline for outline in read.outlines if outline.fingerprint in runs_of]
-    for number, outline in enumerate([*written, *by_hand]):
-        if number == len(written):
-            _paint_runs(flat, written, runs_of)
+    # In the form with locations the first one keeps its cells.
+    for outline in read.outlines if read.lines else reversed(read.outlines):
         cells = cells_inside(outline.rings, grid.shape)
         n_painted += len(cells)
-        if n_painted > _MOST_PAINTED * label_of.size:
+        if n_painted > _MOST_PAINTED * found[0].size:
             raise RoomsError(
                 f"{read.of(outline.room, outline.line)}: the outlines up to here cover the map "
                 f"more than {_MOST_PAINTED} times: remove those that lie in others"
             )
-        flat[cells] = outline.room
-    if not by_hand:
-        _paint_runs(flat, written, runs_of)
-    return label_of
+        found[outline.fingerprint not in written].ravel()[cells] = outline.room
+    return found[0], found[1]
 
 
-def _paint_runs(flat: IntArray, written: Sequence[Outline], runs_of: Mapping[int, Runs]) -> None:
+def apart(grid: OccupancyGrid) -> BoolArray:
+    """Return the free cells that are below a square metre in one piece, bool (rows, cols).
+
+    Rooms that are found have none of them. An outline of few corners runs across many, and doors
+    would lead from the part inside into the part outside.
+    """
+    part_of, _ = ndimage.label(grid.measured == CellClass.FREE)
+    small = np.bincount(part_of.ravel()) * grid.resolution_m**2 < _LEAST_NAMELESS_M2
+    small[0] = False
+    found: BoolArray = small[part_of]
+    return found
+
+
+def by_rule(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
+    """Return labels of which those of free cells are kept, and reach into walls as rooms that are
+    found do."""
+    # Loads scipy and numba.
+    from hybridnav.topology.segmentation import reaching  # noqa: PLC0415
+
+    is_free = grid.measured == CellClass.FREE
+    free = np.where(is_free, label_of, np.int32(NO_ROOM))
+    return np.where(is_free, label_of, reaching(free, grid))
+
+
+def _give(label_of: IntArray, written: Sequence[Outline], runs_of: Mapping[int, Runs]) -> None:
     """Give the cells that outlines miss to their rooms, and take away those of no room."""
+    flat = label_of.ravel()
     if NAMELESS in runs_of:
         flat[in_runs(*runs_of[NAMELESS])] = NO_ROOM
     for outline in written:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from hybridnav._files import printable
 from hybridnav.config.yaml_file import read_marked
 from hybridnav.errors import HybridNavError, RoomsError
-from hybridnav.io.regions import kept_cells
 from hybridnav.io.room_measures import measures_of
 from hybridnav.io.rooms_cells import unpacked
 from hybridnav.io.rooms_entries import LIMITS, Outline, Read, read_entries
@@ -154,7 +153,6 @@ def _kept(
     end = spans["rooms"][1]
     # Comments in front of the next key are that key's.
     end = _with_comments(lines, end) if end < len(lines) else end
-    is_kept = kept_cells(rooms.label_of, grid)
     blocks = []
     for (first, last), entry in zip(
         itertools.pairwise([*starts, end]), marked.values["rooms"], strict=True
@@ -166,7 +164,7 @@ def _kept(
         )
         if holds:
             same = (before.label_of == before.names.index(name)) == (rooms.label_of == room)
-            holds = bool(same[is_kept].all())
+            holds = bool(same.all())
         blocks.append(Block(room, name, lines[first:last], holds))
     outlines = []
     for outline in read.outlines:
@@ -183,7 +181,7 @@ def _kept(
         elif first > spans["rooms"][0]:
             part = lines[first:last]
             behind += comments_in(part) if key in ("points", "doors", "cells") else part
-    written = set(unpacked(read.cells, read.where, grid))
+    written = set(unpacked(read.cells, read.where, grid).runs_of)
     return OldText(lines[: starts[0]], blocks, behind, outlines, written, [])
 
 

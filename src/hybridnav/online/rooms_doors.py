@@ -107,7 +107,7 @@ def doors_of(
     labels = RoomLabels(tuple(f"room-{room}" for room in rooms[first:].tolist()), label_of)
     found = RoomBoundaries.of(labels, grid, measured_clearance_m(grid))
     room_of = np.append(rooms[first:], NO_ROOM)
-    numbers = found.numbers(known, {})
+    numbers = found.numbers(known)
     order = np.argsort(found.boundary_of, kind="stable")
     ends = np.cumsum(np.bincount(found.boundary_of, minlength=found.n_boundaries))
     row, col = np.divmod(found.edges >> 1, grid.shape[1])

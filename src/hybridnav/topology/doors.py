@@ -135,15 +135,13 @@ class RoomBoundaries:
             grid.resolution_m,
         )
 
-    def numbers(self, known: Mapping[int, Point], pairs: Mapping[int, list[int]]) -> LongArray:
+    def numbers(self, known: Mapping[int, Point]) -> LongArray:
         """Number the boundaries.
 
         Parameters
         ----------
         known
             A point in metres of each boundary that has a number.
-        pairs
-            For some of these numbers the rooms on both sides, which then have to be the same.
 
         Returns
         -------
@@ -153,16 +151,14 @@ class RoomBoundaries:
             the order of their first edges.
         """
         numbers = np.zeros(self.n_boundaries, dtype=np.int64)
-        for number, boundary in self._nearest(known, pairs):
+        for number, boundary in self._nearest(known):
             numbers[boundary] = number
         fresh = np.flatnonzero(numbers == 0)
         fresh = fresh[np.argsort(self.passages_m[fresh] < LEAST_DOOR_M, kind="stable")]
         numbers[fresh] = np.arange(len(fresh)) + max(known, default=0) + 1
         return numbers
 
-    def _nearest(
-        self, known: Mapping[int, Point], pairs: Mapping[int, list[int]]
-    ) -> list[tuple[int, int]]:
+    def _nearest(self, known: Mapping[int, Point]) -> list[tuple[int, int]]:
         """Return known numbers with their boundaries, each at most once."""
         if not known or not len(self.edges):
             return []
@@ -187,8 +183,7 @@ class RoomBoundaries:
         taken: set[int] = set()
         found: dict[int, int] = {}
         for number, at in candidates:
-            same = number not in pairs or sorted(pairs[number]) == sorted(self.labels[at].tolist())
-            if same and number not in found and at not in taken:
+            if number not in found and at not in taken:
                 found[number] = at
                 taken.add(at)
         return list(found.items())
@@ -319,15 +314,13 @@ def measured_clearance_m(grid: OccupancyGrid) -> FloatArray:
     return np.maximum(cells - 0.5, 0.0) * grid.resolution_m
 
 
-def renumbered(before: RoomLabels, label_of: IntArray, grid: OccupancyGrid) -> dict[int, Point]:
-    """Return the doors of rooms whose borders have moved a little, with the numbers they had.
+def numbered(rooms: RoomLabels, grid: OccupancyGrid) -> dict[int, Point]:
+    """Return the doors of rooms with their numbers, as a file of rooms lists them.
 
     Parameters
     ----------
-    before
-        The rooms as they were.
-    label_of
-        int32 (rows, cols), the same rooms with other borders.
+    rooms
+        The rooms.
     grid
         The map.
 
@@ -338,17 +331,9 @@ def renumbered(before: RoomLabels, label_of: IntArray, grid: OccupancyGrid) -> d
         stay in it, so that no other door takes one. Gaps without a known number are left out: they
         are many, and lists and pictures leave them out too.
     """
-    clearance_m = measured_clearance_m(grid)
-    old = RoomBoundaries.of(before, grid, clearance_m)
-    numbers = old.numbers(before.doors, {}).tolist()
-    known = dict(before.doors) | _by_number(numbers, old.middles)
-    pairs = dict(zip(numbers, old.labels.tolist(), strict=True))
-    new = RoomBoundaries.of(RoomLabels(before.names, label_of), grid, clearance_m)
-    found = _by_number(new.numbers(known, pairs).tolist(), new.middles)
-    is_door = dict(zip(found, (new.passages_m >= LEAST_DOOR_M).tolist(), strict=True))
-    doors = {n: at for n, at in found.items() if is_door[n] or n in before.doors}
-    return dict(sorted((dict(before.doors) | doors).items()))
-
-
-def _by_number(numbers: list[int], middles: FloatArray) -> dict[int, Point]:
-    return {number: (x, y) for number, (x, y) in zip(numbers, middles.tolist(), strict=True)}
+    found = RoomBoundaries.of(rooms, grid, measured_clearance_m(grid))
+    is_door = found.passages_m >= LEAST_DOOR_M
+    doors: dict[int, Point] = dict(rooms.doors)
+    each = zip(found.numbers(rooms.doors).tolist(), found.middles.tolist(), is_door, strict=True)
+    doors |= {n: (x, y) for n, (x, y), door in each if door or n in rooms.doors}
+    return dict(sorted(doors.items()))

@@ -184,7 +184,7 @@ class Rooms:
     @cached_property
     def _numbers(self) -> LongArray:
         """int64 (n_boundaries,), the number of each boundary."""
-        return self._boundaries.numbers(self.labels.doors, {})
+        return self._boundaries.numbers(self.labels.doors)
 
     @cached_property
     def doors(self) -> tuple[Door, ...]:
