@@ -195,4 +195,4 @@ def test_a_file_of_an_earlier_version_is_read_as_before(tmp_path):
     letters = np.array(list("abc."))[rooms.label_of[::-1]]
     assert "".join("".join(row) + "\n" for row in letters.tolist()) == OLD_ROOMS
     assert_read_again(rooms, grid, path)
-    assert OLD_FILE.split("doors:")[0] in path.read_text()  # its outlines hold
+    assert OLD_FILE.split("doors:", maxsplit=1)[0] in path.read_text()  # its outlines hold

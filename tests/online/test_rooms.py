@@ -305,6 +305,44 @@ def test_rooms_read_from_a_file_keep_their_names_points_and_doors():
     assert list(after.doors) == [5]
 
 
+def test_rooms_of_every_version_can_be_written_and_read(tmp_path):
+    """The outlines of the file hold furniture and walls; rooms are born, die, and come back."""
+    path = tmp_path / "rooms.yaml"
+    outline = "polygon: [[{0}, 0.25], [{1}, 0.25], [{1}, 5], [{0}, 5]]"
+    names = "".join(
+        f"- name: {name}\n  {outline.format(low, high)}\n"
+        for name, low, high in (("kitchen", 0.25, 5), ("hall", 5, 10))
+    )
+    path.write_text(f"rooms:\n{names}")
+    plain = np.zeros((21, 41), np.uint8)
+    plain[1:20, 1:20] = plain[1:20, 21:40] = 1
+    plain[8:11, 20] = 1
+    plain[12:19, 2:9] = 0  # a block of shelves
+    shut, halves = plain.copy(), plain.copy()
+    shut[:, :20] = 0
+    halves[10, 21:40] = 0
+    rooms = OnlineRooms.of(grid_of(plain), hn.load_rooms(path, grid_of(plain)))
+    born = 0
+    for classes in (halves, shut, plain, halves, plain):
+        update = rooms.update(grid_of(classes))
+        rooms, born = update.version, born + len(update.born)
+        free = rooms.grid.measured == hn.CellClass.FREE
+        assert set(rooms.numbers) == set(np.unique(rooms.number_of[free])) - {-1}
+        assert not set(update.died) & set(rooms.numbers)
+        hn.save_rooms(path, rooms.labels, rooms.grid)
+        again = hn.load_rooms(path, rooms.grid)
+        assert again.names == rooms.labels.names
+        assert (again.label_of == rooms.labels.label_of).all()
+        numbers = hn.TopologicalMap(hn.DualGraphPyramid.build(rooms.grid, rooms=again)).rooms
+        assert {d.number: d.position for d in numbers.doors} == {
+            n: door.position for n, door in rooms.doors.items()
+        }
+        rooms = OnlineRooms.of(rooms.grid, again)
+    assert born >= 2
+    with pytest.raises(InvalidValueError, match="give the grid of that version"):
+        hn.save_rooms(path, rooms.labels, grid_of(np.ones((5, 5), np.uint8)))
+
+
 def test_rooms_of_an_office_stay_close_to_those_of_a_build():
     office = hn.load_map(OFFICE, robot_radius_m=0)
     version = OnlineRooms.of(office)

@@ -60,7 +60,8 @@ def save_rooms(
     Raises
     ------
     InvalidValueError
-        When the tolerance is not positive and finite.
+        When the tolerance is not positive and finite, or the rooms are those of a map of another
+        size.
     RoomsError
         When the file cannot be written, or could not be read again: a room has no free cell, a
         named point lies outside the map or in an obstacle, or there are too many rooms.
@@ -76,6 +77,11 @@ def save_rooms(
     if tolerance_m is not None and not 0 < tolerance_m < math.inf:
         raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
     where = f"rooms {printable(path)}"
+    if rooms.label_of.shape != grid.shape:
+        raise InvalidValueError(
+            f"rooms are labels of {rooms.label_of.shape} cells, expected those of the grid, "
+            f"{grid.shape}: after an update give the grid of that version"
+        )
     check_rooms(Read(where, list(rooms.names)), rooms.label_of, grid)
     check_points(rooms.points, where, grid)
     old = OldText.of(path, rooms, grid)

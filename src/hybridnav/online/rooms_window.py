@@ -104,13 +104,16 @@ def renew(
     near = within_radius(differs[inside] | moved, radius_cells=_cells(WALL_REACH_M, grid))
     number_of[inside][near] = reaching(new, part)[near]
     has = set(np.unique(new).tolist())
+    died = tuple(number for number in touched if number not in has)
+    # Outlines that people draw hold walls and furniture far from free cells.
+    number_of[np.isin(number_of, died)] = NO_ROOM
     changed = set(np.unique(np.append(old[moved], new[moved])).tolist()) - {NO_ROOM}
     return Renewed(
         number_of,
         window,
         Events(
             matches.born,
-            tuple(number for number in touched if number not in has),
+            died,
             matches.merged,
             matches.split,
             tuple(sorted((changed & has) - set(matches.born))),
