@@ -18,7 +18,7 @@ from hybridnav.io.rooms_cells import fingerprint, packed
 from hybridnav.io.rooms_entries import LIMITS, Outline, Read, in_cells
 from hybridnav.io.rooms_in import check_points, check_rooms, labels_of
 from hybridnav.io.rooms_paint import apart, by_rule, outlined
-from hybridnav.io.rooms_text import HEADER, OldText
+from hybridnav.io.rooms_text import HEADER, NOTES, OldText, scalar
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,7 +42,8 @@ def save_rooms(
     with none. The doors are written with their numbers, so that lists, pictures and plans of the
     file use the same.
 
-    Where the file exists, outlines that still hold, and all comments, are kept.
+    Where the file exists, outlines that still hold, and all comments, are kept. Of a room whose
+    cells are as before and whose name is another, the name alone is changed.
 
     Parameters
     ----------
@@ -111,11 +112,13 @@ class _Draft:
     """Those of the cells."""
     read: Read
     """What a reader makes of them, before it paints the outlines."""
+    newline: str = "\n"
+    """How they end."""
 
     @property
     def text(self) -> str:
         """The whole text."""
-        return "\n".join([*self.lines, *self.cells]) + "\n"
+        return "".join(f"{line}{self.newline}" for line in [*self.lines, *self.cells])
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +214,8 @@ class _Writer:
             lines += _point_lines(rooms)
         else:
             lines = old.with_entries(entries, _point_lines(rooms))
-        return _Draft(lines, _cell_lines(cells), replace(read, cells=cells))
+        newline = "\n" if old is None else old.newline
+        return _Draft(lines, _cell_lines(cells), replace(read, cells=cells), newline)
 
     def _is_right(self, draft: _Draft) -> bool:
         """Return whether a draft is read as these rooms; outlines of an old file may prevent it."""
@@ -243,7 +247,7 @@ def _point_lines(rooms: RoomLabels) -> list[str]:
 
 
 def _door_lines(doors: Mapping[int, Point], grid: OccupancyGrid) -> list[str]:
-    lines = ["doors:  # their numbers; a point of each"] if doors else []
+    lines = [f"doors:  {NOTES[0]}"] if doors else []
     decimals = decimals_of(grid)
     for number, (x, y) in doors.items():
         lines.append(f"  {number}: {_corner(round(x, decimals), round(y, decimals))}")
@@ -252,11 +256,11 @@ def _door_lines(doors: Mapping[int, Point], grid: OccupancyGrid) -> list[str]:
 
 def _cell_lines(cells: list[str]) -> list[str]:
     """Return the lines of cells, none without rooms."""
-    return ["cells:  # which the outlines miss; hybridnav's own", *(f"- {line}" for line in cells)]
+    return [f"cells:  {NOTES[1]}", *(f"- {line}" for line in cells)]
 
 
 def _name(name: str) -> str:
-    return yaml.safe_dump({"name": name}, allow_unicode=True, width=999).strip()
+    return f"name: {scalar(name)}"
 
 
 def _ring(points: FloatArray) -> str:
