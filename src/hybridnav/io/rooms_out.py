@@ -42,8 +42,8 @@ def save_rooms(
     with none. The doors are written with their numbers, so that lists, pictures and plans of the
     file use the same.
 
-    Where the file exists, outlines that still hold, and all comments, are kept. Of a room whose
-    cells are as before and whose name is another, the name alone is changed.
+    Where the file exists, outlines that still hold, and all comments, are kept. Where
+    a room has the cells that it had and another name, the name alone is changed.
 
     Parameters
     ----------
