@@ -164,3 +164,21 @@ def test_a_floor_with_many_ends_is_prepared_without_all_pairs() -> None:
     few.prepare()
     assert all(np.isnan(known.cost).all() for known in many.known)
     assert not any(np.isnan(known.cost[0, 1:]).any() for known in few.known)
+
+
+@pytest.mark.parametrize("preset", ["shortest", "octile"])
+def test_no_path_on_a_floor_without_links(preset: str) -> None:
+    """Floors 0 and 1 are joined, and floor 2 is by itself."""
+    for seed in range(30):
+        scene = random_building(seed, preset=preset, most_floors=2)
+        alone = random_building(seed + 100, preset=preset, most_floors=2)
+        extra = replace(alone.building.floors[0], name="alone")
+        building = hn.Building((*scene.building.floors, extra), scene.building.links)
+        scene = replace(scene, building=building)
+        cells = [grid.enterable() for grid in scene.grids]
+        at = len(cells) - 1
+        free = np.argwhere(cells[at])
+        points = scene.grids[at].frame.points_of(free[scene.rng.choice(len(free), 2)])
+        start, goal = (at, points[0]), (at, points[1])
+        plan = building.plan(scene.named(start), scene.named(goal))
+        assert plan.solved == math.isfinite(optimum_on_cells(scene, start, goal, [], cells))

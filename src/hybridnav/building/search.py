@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.building.checks import parts_of
 from hybridnav.building.floors import ROUNDED
 from hybridnav.building.network import GOAL, START, ChosenParts
 from hybridnav.planner.drafts import PlanDraft
@@ -20,9 +19,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from hybridnav._typing import FloatArray
+    from hybridnav._typing import FloatArray, IntArray
     from hybridnav.building.floors import FloorTable
     from hybridnav.building.network import LinkNetwork, Part
+    from hybridnav.planner import HybridPlanner
     from hybridnav.planner.closed import ClosedCells
     from hybridnav.planner.named import At
 
@@ -49,6 +49,19 @@ class _Costs:
     def expected(self) -> FloatArray:
         """The costs where they are known, else the bounds."""
         return np.where(np.isnan(self.known), self.lower, self.known)
+
+
+def _parts(planner: HybridPlanner, closed: ClosedCells | None) -> IntArray:
+    """Return the part that each open cell lies in, int32 (rows, cols), 0 for other cells. Cells
+    that touch are in one part, for a point on a corner may lie in both."""
+    from scipy import ndimage  # noqa: PLC0415 - most queries need none
+
+    allowed = planner.preset.planner.allow_unexplored
+    is_open = planner.topology.grid.enterable(allow_unexplored=allowed).copy()
+    if closed is not None:
+        is_open.ravel()[closed.flat] = False
+    labels: IntArray = ndimage.label(is_open, np.ones((3, 3)))[0]
+    return labels
 
 
 class LinkSearch:
@@ -202,17 +215,13 @@ class LinkSearch:
             return
         self._divided.add(floor)
         table, closed = self._tables[floor], self._closed.get(floor)
-        part_of = parts_of(
-            table.floor,
-            allow_unexplored=table.floor.planner.preset.planner.allow_unexplored,
-            closed=None if closed is None else closed.flat,
-        )
+        part_of = _parts(table.floor.planner, closed)
         frame = table.floor.planner.topology.grid.frame
         own = part_of[tuple(frame.cells_of(table.positions_m).T)]
         costs = self._costs_on(floor)
         for known in (costs.lower, table.expected)[: 1 if floor in self._closed else 2]:
             known[own[:, None] != own] = np.inf
-        on_floor = np.array(self._network.on_floor[floor])
+        on_floor = np.array(self._network.on_floor[floor], dtype=np.int64)
         rows = [self._network.ends[number].at for number in on_floor]
         for end, outer in ((self._start, self._first), (self._goal, self._last)):
             if end.floor == floor and not isinstance(end.waypoint, str):
