@@ -38,7 +38,7 @@ HOUSE = (
 )
 
 
-def topology_of(lines, doors=None, **frame):
+def topology_of(lines, doors=None, *, robot_radius_m=0.0, **frame):
     """A map drawn with a letter for each room, y up; `.` is free space without a name."""
     letters = np.array([list(line) for line in reversed(lines)])
     known = [letter for letter in NAMES if (letters == letter).any()]
@@ -47,7 +47,7 @@ def topology_of(lines, doors=None, **frame):
         label_of[letters == letter] = label
     rooms = hn.RoomLabels(tuple(NAMES[one] for one in known), label_of, doors=doors or {})
     grid = hn.OccupancyGrid(
-        (letters == "#").astype(np.float32), hn.Frame(SIDE, **frame), robot_radius_m=0
+        (letters == "#").astype(np.float32), hn.Frame(SIDE, **frame), robot_radius_m=robot_radius_m
     )
     return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
 

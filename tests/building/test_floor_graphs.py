@@ -25,6 +25,8 @@ from hybridnav.building import (
     moved_floor,
     to_networkx,
 )
+from tests.building.scenes import random_building
+from tests.drawn_rooms import topology_of
 from tests.io.drawn_buildings import buildings
 from tests.strategies import examples
 
@@ -184,3 +186,61 @@ def test_stairs_count_where_no_lift_leads_to_the_floor():
     assert aligned.links[1].ends[1].position_m == (7.0, 6.0)
     alone = align_floors(BuildingGraph(name="b", floors=floors, links=(stairs,)))
     assert alone.floor("1").graph.points.tolist() == [[7.0, -1.0]]
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=examples(8), deadline=None)
+def test_nodes_of_a_layout_are_joined_exactly_where_the_building_has_a_route(
+    tmp_path_factory, seed
+):
+    """The file of a building, read again: components of nodes against plans over floors."""
+    building = random_building(seed, most_floors=3).building
+    try:
+        graph = hn.building_graph(building, nodes=30)
+    except hn.InvalidValueError:
+        assume(False)
+    file = tmp_path_factory.mktemp("lif") / "layout.json"
+    hn.export_lif(graph, file, vehicle_types=["Maker.Carrier"])
+    whole = to_networkx(hn.load_building_graph(file))
+    piece_of = {
+        node: number
+        for number, piece in enumerate(nx.strongly_connected_components(whole))
+        for node in piece
+    }
+    nodes = list(whole)
+    rng = np.random.default_rng(seed)
+    for start, goal in rng.integers(len(nodes), size=(20, 2)).tolist():
+        ends = [
+            (nodes[at][0], (whole.nodes[nodes[at]]["x"], whole.nodes[nodes[at]]["y"]))
+            for at in (start, goal)
+        ]
+        plan = building.plan(*ends)
+        assert plan.solved == (piece_of[nodes[start]] == piece_of[nodes[goal]])
+
+
+# The bath has a door as wide as a cell; an archway of the kitchen leads into a nameless nook.
+NOOK = (
+    "####################",
+    "#kkkkkkkkk#aaaaaaaa#",
+    "#kkkkkkkkkaaaaaaaaa#",
+    "#kkkkkkkkkaaaaaaaaa#",
+    "#kkkkkkkkkaaaaaaaaa#",
+    "#kkkkkkkkk#aaaaaaaa#",
+    "####k####.####a#####",
+    "#bbbbbbb#.#ddddddd##",
+    "#bbbbbbb###ddddddd##",
+    "####################",
+)
+
+
+def test_doors_that_no_edge_passes_are_not_in_the_graph_of_a_floor():
+    rooms = topology_of(NOOK)
+    wide = topology_of(NOOK, robot_radius_m=0.6)
+    for topology, expected in ((rooms, 3), (wide, 1)):
+        floor = hn.floor_graph(topology, hn.build_route_graph(topology), name="1")
+        named = {
+            facts["door_name"] for facts in floor.graph.edge_facts.values() if "door_name" in facts
+        }
+        assert {door.name for door in floor.doors if not door.is_opening} == named
+        assert len(named) == expected
+        assert all(None not in door.rooms for door in floor.doors)

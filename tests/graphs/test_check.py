@@ -296,6 +296,45 @@ def test_unexplored_space_and_parts_without_nodes():
     assert found.is_free.tolist() == [True, True, False]
 
 
+# A house with a door, and the free margin of its image, which nothing joins with it.
+WITH_MARGIN = (
+    "o" * 26,
+    *("o" + "#" * 24 + "o",),
+    *("o#" + "k" * 10 + "##" + "a" * 10 + "#o",) * 8,
+    *("o#" + "k" * 11 + "aa" + "a" * 9 + "#o",) * 2,
+    *("o#" + "k" * 10 + "##" + "a" * 10 + "#o",) * 4,
+    *("o" + "#" * 24 + "o",),
+    "o" * 26,
+)
+
+
+def test_free_ground_outside_the_building_gets_no_nodes_and_a_warning():
+    nameless = [line.replace("o", ".") for line in WITH_MARGIN]
+    topology = topology_of(nameless)
+    letters = np.array([list(line) for line in reversed(WITH_MARGIN)])
+    graph = hn.build_route_graph(topology, spacing_m=2.0)
+    cells = topology.grid.frame.cells_of(graph.points)
+    assert set(letters[tuple(cells.T)]) == {"k", "a"}
+    plain = graph.to_networkx()
+    assert nx.is_connected(plain.to_undirected())
+    plain.add_node(9000, x=0.25, y=0.25)
+    found = hn.check_graph(topology, hn.WaypointGraph.from_networkx(plain))
+    (beyond,) = found.findings
+    assert (beyond.kind, beyond.severity, beyond.count) == ("node-beyond", "warning", 1)
+    assert beyond.examples[0].where == "node 9000"
+    assert found.in_sight == 1.0
+    assert hn.judge_route_graph(graph, pairs=200).best.solved == 1.0
+
+
+def test_a_room_outside_is_no_free_ground():
+    topology = topology_of(WITH_MARGIN)
+    graph = hn.build_route_graph(topology, spacing_m=2.0)
+    assert "hall" in graph.rooms
+    assert not hn.check_graph(
+        topology, hn.WaypointGraph.from_networkx(graph.to_networkx())
+    ).findings
+
+
 def test_errors_come_first():
     severities = [Finding(kind, 1, ()).severity for kind in (*KINDS, *BUILDING_KINDS)]
     assert set(severities) == set(SEVERITIES)

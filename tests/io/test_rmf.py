@@ -130,6 +130,23 @@ def test_lifts_that_do_not_line_up_are_refused_and_aligned(house, tmp_path):
     assert read_rmf(tmp_path / "a.yaml").lifts["east"][:2] == (3.0, 4.0)
 
 
+def test_the_ends_of_a_lift_that_lie_apart_on_maps_are_joined_at_their_mean(house, tmp_path):
+    (lift,) = house.links
+    moved = replace(lift, ends=(lift.ends[0], LinkEnd("L2", (3.3, 4.2))))
+    notes = hn.export_rmf(replace(house, links=(moved,)), tmp_path / "a.yaml")
+    assert notes == ("lift east: its own ends, 0.36 m apart: vertices lie at their mean",)
+    found = read_rmf(tmp_path / "a.yaml")
+    stops = [at for at, name in found.lift_of.items() if name == "east"]
+    assert [found.waypoints[at] for at in stops] == [("L1", 3.15, 4.1), ("L2", 3.15, 4.1)]
+    for stop in stops:
+        joined = {lane[0] for lane in found.lanes if lane[1] == stop}
+        (node,) = {at for at in joined if found.waypoints[at][0] == found.waypoints[stop][0]}
+        assert math.dist(found.waypoints[node][1:3], (3.15, 4.1)) < 0.25
+        assert any(lane[:2] == (stop, node) for lane in found.lanes)
+    back = hn.load_building_graph(tmp_path / "a.yaml")
+    assert back.links[0].ends == (LinkEnd("L1", (3.15, 4.1)), LinkEnd("L2", (3.15, 4.1)))
+
+
 def test_what_the_format_has_no_place_for_is_said(house, tmp_path):
     (lift,) = house.links
     stairs = replace(lift, name="steps", kind="stairs")

@@ -14,9 +14,10 @@ from hybridnav.building.checks import parts_of
 from hybridnav.building.graph_match import MatchedGraph
 from hybridnav.building.graph_network import BuildingNetwork
 from hybridnav.errors import InvalidValueError
-from hybridnav.graphs.build import LEAST_AREA_M2
 from hybridnav.graphs.judge import excess_of
+from hybridnav.graphs.space import LEAST_AREA_M2
 from hybridnav.grid.checks import checked_between, checked_type
+from hybridnav.topology.segmentation import outside_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -212,7 +213,8 @@ def drawn_pairs(
         labels = parts_of(floor)
         area_m2 = np.bincount(labels[labels >= 0], minlength=1).astype(np.float64)
         area_m2 *= floor.planner.topology.grid.cell_area_m2
-        large = np.argwhere((labels >= 0) & (area_m2[labels] >= LEAST_AREA_M2))
+        is_inside = (labels >= 0) & ~outside_of(floor.planner.topology.grid)
+        large = np.argwhere(is_inside & (area_m2[labels] >= LEAST_AREA_M2))
         if len(large):
             cells_of[index] = large.astype(np.float64) + 0.5
     if not cells_of:

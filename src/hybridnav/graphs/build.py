@@ -14,7 +14,7 @@ from hybridnav.graphs.edges import SightPairs, missing_bends, sight_edges
 from hybridnav.graphs.facts import described
 from hybridnav.graphs.nodes import Nodes, add_landmarks, bends_of
 from hybridnav.graphs.rounds import bend_paths, bend_round_corners
-from hybridnav.graphs.space import RIM_CELLS, FreeSpace
+from hybridnav.graphs.space import LEAST_AREA_M2, RIM_CELLS, FreeSpace
 from hybridnav.grid.checks import checked_between, checked_type
 from hybridnav.topology import TopologicalMap
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, LongArray
     from hybridnav.graphs.route_graph import RouteGraph
 
-LEAST_AREA_M2 = 1.0
-"""Area in square metres below which a part of free space gets no nodes: scans have many."""
 _PAIRS = 3000
 """Random pairs whose shortest paths determine where nodes lie."""
 _BEND_M = 0.5
@@ -94,7 +92,8 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
     Returns
     -------
     RouteGraph
-        Parts of free space below 1 m² have no nodes.
+        Parts of free space below 1 m² have no nodes, nor has free space outside the building that
+        no door joins with it, as the margin of its image.
 
     Raises
     ------
@@ -129,8 +128,7 @@ def build_route_graph(  # noqa: PLR0913 - all but the first have defaults
     )
     progress(1, _STEPS)
     chosen = Nodes(space, most)
-    sizes = np.bincount(space.component_of[space.free], minlength=1)
-    is_kept = sizes * (cell_m * cell_m) >= LEAST_AREA_M2
+    is_kept = space.kept(topology.pyramid.rooms)
     add_landmarks(chosen, topology, is_kept, min(wanted.bend, wanted.spacing))
     if not len(chosen):
         raise InvalidValueError(
@@ -153,8 +151,7 @@ def _refined(
 ) -> LongArray:
     """Add bends and cover until routes are short; return the edges."""
     space = chosen.space
-    least = int(LEAST_AREA_M2 / space.grid.cell_area_m2)
-    starts, goals = space.random_pairs(_PAIRS, rng, least)
+    starts, goals = space.random_pairs(_PAIRS, rng, is_kept)
     paths = space.paths(starts, goals)
     progress(2, _STEPS)
     bends = space.moved_off(bends_of(paths, range(len(starts))), wanted.off)
@@ -173,7 +170,7 @@ def _refined(
     progress(4, _STEPS)
     n_joined = len(chosen)
     if n_joined < chosen.most:
-        bend_paths(chosen, edges, space.random_pairs(_JUDGES, rng, least))
+        bend_paths(chosen, edges, space.random_pairs(_JUDGES, rng, is_kept))
     return edges if len(chosen) == n_joined else _joined(chosen, known, wanted.stretch)
 
 

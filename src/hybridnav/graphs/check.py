@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.graphs.build import LEAST_AREA_M2
 from hybridnav.graphs.checked_components import add_components
 from hybridnav.graphs.checked_doors import add_rooms_and_doors
 from hybridnav.graphs.findings import MOST_EXAMPLES, Findings
@@ -127,22 +126,22 @@ def check_graph(
     findings.add_all(graph.findings)
     component = np.full(graph.n_nodes, -1, dtype=np.int64)
     component[placed.is_free] = space.component_of[tuple(placed.cells[placed.is_free].T)]
-    _add_nodes(findings, graph, placed, grid, component)
+    rooms = topology.pyramid.rooms
+    _add_nodes(findings, graph, placed, (grid, space.outside(rooms)), component)
     _add_edges(findings, graph, placed, space, is_clear)
-    sizes = np.bincount(space.component_of[space.free], minlength=1)
-    is_large = sizes * grid.cell_area_m2 >= LEAST_AREA_M2
+    is_kept = space.kept(rooms)
     add_components(findings, graph, component)
-    _add_parts(findings, space, is_large, component)
-    doors, rooms = add_rooms_and_doors(findings, topology, placed, is_clear, space, is_large)
+    _add_parts(findings, space, is_kept, component)
+    met = add_rooms_and_doors(findings, topology, placed, is_clear, space, is_kept)
     return GraphCheck(
         grid=grid,
         graph=graph,
         findings=findings.collected(),
         is_free=placed.is_free,
         is_clear=is_clear,
-        doors=doors,
-        rooms=rooms,
-        in_sight=_share_in_sight(space, placed),
+        doors=met[0],
+        rooms=met[1],
+        in_sight=_share_in_sight(space, placed, space.outside(rooms)),
         along_lines=along_lines,
     )
 
@@ -151,9 +150,12 @@ def _add_nodes(
     findings: Findings,
     graph: WaypointGraph,
     placed: PlacedGraph,
-    grid: OccupancyGrid,
+    on: tuple[OccupancyGrid, BoolArray],
     component: LongArray,
 ) -> None:
+    """Add nodes where no robot should go; `on` is the map, and which parts of its free space lie
+    outside the building."""
+    grid, outside = on
     points = graph.points.tolist()
 
     def add(kind: str, nodes: LongArray) -> None:
@@ -165,6 +167,7 @@ def _add_nodes(
     unexplored = grid.classes[tuple(placed.cells[within].T)] == CellClass.UNEXPLORED
     add("node-in-wall", within[~unexplored])
     add("node-unexplored", within[unexplored])
+    add("node-beyond", np.flatnonzero((component >= 0) & outside[component]))
     first = unique_rows(placed.positions).first
     add("same-point", np.delete(np.arange(graph.n_nodes), first))
     has_edge = np.zeros(graph.n_nodes, dtype=np.bool_)
@@ -263,8 +266,9 @@ def _add_parts(
         findings.add("missing-part", f"{area_m2:.1f} m²", point)
 
 
-def _share_in_sight(space: FreeSpace, placed: PlacedGraph) -> float:
+def _share_in_sight(space: FreeSpace, placed: PlacedGraph, outside: BoolArray) -> float:
     cells = np.argwhere(space.free)
+    cells = cells[~outside[space.component_of[space.free]]]
     if not len(cells):
         return 0.0
     chosen = np.random.default_rng(0).integers(len(cells), size=min(_PAIRS, len(cells)))

@@ -28,6 +28,7 @@ KINDS = {
     "node-outside": "nodes outside the map",
     "node-in-wall": "nodes where the robot does not fit",
     "node-unexplored": "nodes in unexplored space",
+    "node-beyond": "nodes on free ground outside the building, which no door joins with it",
     "edge-through-wall": "edges that the robot cannot follow",
     "edge-unexplored": "edges through unexplored space",
     "edge-walk": "edges on which Nav2's walk over cells meets an obstacle, though they are free",
@@ -58,7 +59,14 @@ BUILDING_KINDS = {
 
 _WARNINGS = frozenset(
     {
-        *("line-elsewhere", "node-unexplored", "edge-unexplored", "edge-walk", "loop"),
+        *(
+            "line-elsewhere",
+            "node-unexplored",
+            "node-beyond",
+            "edge-unexplored",
+            "edge-walk",
+            "loop",
+        ),
         *("repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
         *("link-missing", "link-kind", "stop-missing"),
     }

@@ -68,7 +68,8 @@ def judge_route_graph(
     graph
         The graph.
     pairs
-        Number of random pairs of free cells of one part of free space, of 1 m² or more.
+        Number of random pairs of free cells of one part of free space, of 1 m² or more, and
+        inside the building.
     least_m
         Length of the shortest path in metres below which a pair does not count.
     seed
@@ -96,8 +97,7 @@ def judge_route_graph(
     checked_type("graph", graph, RouteGraph)
     checked_between("pairs", pairs, 1, 1e6)
     space = FreeSpace.of(graph.grid)
-    least = int(1.0 / graph.grid.cell_area_m2)
-    starts, goals = space.random_pairs(pairs, np.random.default_rng(seed), least)
+    starts, goals = space.random_pairs(pairs, np.random.default_rng(seed), space.kept())
     optimum = space.paths(starts, goals).length_cells
     counts = optimum * graph.grid.resolution_m >= least_m
     starts, goals, optimum = starts[counts], goals[counts], optimum[counts]

@@ -12,12 +12,15 @@ from hybridnav.grid.lines import cells_of_line, walks_clear
 from hybridnav.mesh import MeshSearch, build_mesh, shortest_paths
 from hybridnav.mesh.search import rounded_into
 from hybridnav.refine import Sight
+from hybridnav.topology.segmentation import outside_of
 
 if TYPE_CHECKING:
     from hybridnav._typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.grid import OccupancyGrid
+    from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.mesh import MeshPaths
 
+LEAST_AREA_M2 = 1.0
+"""Area in square metres below which a part of free space gets no nodes: scans have many."""
 RIM_CELLS = 2.0**-6
 """Least distance of a node from the sides of its cell, in cells: a point on a side belongs to the
 cell above or to the right, which may be blocked, and readers keep 32 bits of a number. On three
@@ -55,6 +58,41 @@ class FreeSpace:
         component_of = np.full(free.shape, -1, dtype=np.int32)
         component_of[free] = mesh.component[mesh.polygon_at[free]]
         return cls(grid, free, component_of, Sight(free), MeshSearch(mesh))
+
+    def outside(self, rooms: RoomLabels | None = None) -> BoolArray:
+        """Return which parts of free space lie outside the building, bool (n_components,).
+
+        No door joins them with it, as the margin of its image; none do where no other part is as
+        large as 1 m².
+
+        Parameters
+        ----------
+        rooms
+            The rooms, if there are some: a part that holds cells of one is inside.
+        """
+        part_of = self.component_of[self.free]
+        is_inside = ~outside_of(self.grid)[self.free]
+        if rooms is not None:
+            is_inside |= rooms.label_of[self.free] >= 0
+        outside: BoolArray = np.bincount(part_of, weights=is_inside, minlength=1) == 0
+        return outside & (self._is_large & ~outside).any()
+
+    def kept(self, rooms: RoomLabels | None = None) -> BoolArray:
+        """Return which parts of free space get nodes, bool (n_components,): those of 1 m² or more
+        that do not lie outside the building.
+
+        Parameters
+        ----------
+        rooms
+            The rooms, if there are some.
+        """
+        return self._is_large & ~self.outside(rooms)
+
+    @property
+    def _is_large(self) -> BoolArray:
+        sizes = np.bincount(self.component_of[self.free], minlength=1)
+        is_large: BoolArray = sizes * self.grid.cell_area_m2 >= LEAST_AREA_M2
+        return is_large
 
     def cells_at(self, positions: FloatArray) -> LongArray:
         """Return the cell that each position lies in, int64 (n, 2)."""
@@ -139,7 +177,7 @@ class FreeSpace:
         return shortest_paths(self.search, cells, (starts, goals))
 
     def random_pairs(
-        self, count: int, rng: np.random.Generator, least_cells: int
+        self, count: int, rng: np.random.Generator, is_kept: BoolArray
     ) -> tuple[FloatArray, FloatArray]:
         """Draw pairs of centres of free cells with a path between them.
 
@@ -149,8 +187,8 @@ class FreeSpace:
             Number of pairs.
         rng
             Source of random numbers.
-        least_cells
-            Parts of free space with fewer cells are left out.
+        is_kept
+            bool (n_components,), the parts of free space that they are drawn in, as of `kept`.
 
         Returns
         -------
@@ -160,7 +198,7 @@ class FreeSpace:
         cells = np.argwhere(self.free)
         component = self.component_of[self.free]
         size = np.bincount(component, minlength=1)
-        large = size[component] >= max(least_cells, 2)
+        large = is_kept[component] & (size[component] > 1)
         cells, component = cells[large], component[large]
         order = np.argsort(component, kind="stable")
         cells, component = cells[order], component[order]

@@ -19,6 +19,7 @@ from hybridnav.graphs.placed import placed_points
 from hybridnav.grid.checks import checked_type
 from hybridnav.refine import Sight
 from hybridnav.topology import TopologicalMap
+from hybridnav.topology.segmentation import outside_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,8 +44,9 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     ----------
     topology
         The map; with rooms, nodes in rooms have the room's name as `name`, edges that pass a door
-        have it as `door_name`, and the floor has areas, and the doors and openings that the map's
-        robot passes. A door is called "FLOOR_doorNUMBER".
+        have it as `door_name`, and the floor has areas, and the listed doors and openings that an
+        edge passes: none that are closed to the robot, or lead nowhere. A door is called
+        "FLOOR_doorNUMBER".
     graph
         Its route graph, as `build_route_graph` and `keep_right` make it.
     name
@@ -86,7 +88,9 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     if not 0 < tolerance_m < math.inf:
         raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
     rooms = topology.rooms if topology.pyramid.rooms is not None else None
-    doors = [] if rooms is None else [door for door in rooms.doors if door.passable]
+    passed = {number for numbers in graph.edge_doors for number in numbers}
+    listed = () if rooms is None else rooms.listed_doors
+    doors = [door for door in listed if door.number in passed]
     plain = _plain(graph, {d.number: _named(d, name) for d in doors if not d.is_opening})
     stubs = _stubs(graph, plain, name, links)
     return FloorGraph(
@@ -217,6 +221,11 @@ def _stubs(
     stubs = []
     for at, (name, (x, y)) in enumerate(ends):
         if offsets[at] == offsets[at + 1]:
+            if outside_of(grid)[grid.frame.cell_of(x, y)]:
+                raise InvalidValueError(
+                    f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} lies on "
+                    "free ground outside the building, which no door joins with it: move it"
+                )
             raise InvalidValueError(
                 f"link {name!r:.60}: its end ({x:g}, {y:g}) on floor {floor!r:.60} sees no node of "
                 "the graph: move it, or build the graph with more nodes"

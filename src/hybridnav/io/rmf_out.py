@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from hybridnav.building import BuildingGraph, join_links
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from hybridnav._typing import PathLike
-    from hybridnav.building import FloorGraph, Link
+    from hybridnav.building import FloorGraph, Link, LinkEnd
 
 ALIGNED_M = 0.1
 """Most metres between the ends of a lift on two floors: Open-RMF refuses more."""
+MOVED_M = 0.5
+"""Most metres between them up to which the lift's vertices lie at the mean of its ends."""
 _FLAGS = ("is_charger", "is_holding_point", "is_parking_spot", "is_passthrough_point")
 """Facts of nodes that Open-RMF reads as true or false."""
 _CABIN_M = 2.0
@@ -61,12 +64,14 @@ def export_rmf(
     Returns
     -------
     tuple of str
-        What Open-RMF has no place for and the file does not hold, one line each.
+        What Open-RMF has no place for and the file does not hold, and lifts whose ends lie 0.1 to
+        0.5 m apart, as on maps of scans: their vertices lie at the mean of the ends, and a lane
+        joins them to the nearest node. One line each.
 
     Raises
     ------
     InvalidValueError
-        When a lift has ends that lie more than 0.1 m apart: `building.align_floors` brings floors
+        When a lift has ends that lie more than 0.5 m apart: `building.align_floors` brings floors
         into one frame. When two lifts end at one node, or no floor has an edge.
     MapError
         When the name ends otherwise, or the file cannot be written.
@@ -90,11 +95,16 @@ def export_rmf(
         raise InvalidValueError(f"cabin_m is {cabin_m}, expected two positive numbers of metres")
     if not any(floor.graph.n_edges for floor in building.floors):
         raise InvalidValueError(f"building {building.name!r:.60} has no edge, expected lanes")
-    for link in building.links:
-        _check_aligned(link)
+    links = tuple(_aligned(link) for link in building.links)
+    moved = [
+        f"lift {link.name}: its own ends, {_apart(link)[0]:.2f} m apart: vertices lie at their mean"
+        for link, kept in zip(building.links, links, strict=True)
+        if kept is not link
+    ]
+    building = replace(building, links=links)
     lines = _Writer(building, cabin_m, doors=doors).lines()
     file.write("".join(f"{line}\n" for line in lines).encode())
-    return tuple(_left_out(building, doors=doors))
+    return (*moved, *_left_out(building, doors=doors))
 
 
 class _Writer:
@@ -250,20 +260,27 @@ def _positions(link: Link) -> list[tuple[float, float]]:
     return [end.position_m for end in link.ends]
 
 
-def _check_aligned(link: Link) -> None:
-    """Refuse a lift as Open-RMF would."""
-    if link.kind != "lift":
-        return
+def _apart(link: Link) -> tuple[float, LinkEnd, LinkEnd]:
+    """Return the two ends of a link that lie farthest apart, and their distance in metres."""
     pairs = itertools.combinations(link.ends, 2)
-    far, one, other = max(
+    return max(
         ((math.dist(a.position_m, b.position_m), a, b) for a, b in pairs), key=lambda each: each[0]
     )
-    if far > ALIGNED_M:
+
+
+def _aligned(link: Link) -> Link:
+    """Return a link; a lift with its ends at their mean if Open-RMF would refuse it otherwise."""
+    far, one, other = _apart(link)
+    if link.kind != "lift" or far <= ALIGNED_M:
+        return link
+    if far > MOVED_M:
         raise InvalidValueError(
             f"lift {link.name!r:.60}: its ends on the floors {one.floor!r:.40} and "
             f"{other.floor!r:.40} lie {far:.2f} m apart, and Open-RMF allows {ALIGNED_M} m, with "
-            "all floors in one frame: move floors by align_floors"
+            f"all floors in one frame: move floors by align_floors, or ends to {MOVED_M} m at most"
         )
+    x, y = (_mean(values) for values in zip(*_positions(link), strict=True))
+    return replace(link, ends=tuple(replace(end, position_m=(x, y)) for end in link.ends))
 
 
 def _left_out(building: BuildingGraph, *, doors: bool) -> Iterator[str]:
