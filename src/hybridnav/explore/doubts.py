@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -57,9 +58,10 @@ def narrow_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
     """Return the cells in reach that are nearest to where only a thinner robot could go on.
 
     A wall may be mapped a cell too thick. So the cells are looked for that a robot could reach in
-    addition if its radius were a cell less, two cells or more off the reach, in connected sets with
-    unexplored cells beside. Each gap through which they are entered has one spot: the cell in reach
-    nearest to it. A set behind two doors has two, for from one door nothing is seen of the other.
+    addition if its radius were a cell less: in connected sets, two cells or more off the reach,
+    that have unexplored cells beside, or nearer and beside more unexplored cells than it covers.
+    Each gap through which they are entered has one spot: the cell in reach nearest to it. A set
+    behind two doors has two, for from one door nothing is seen of the other.
 
     Parameters
     ----------
@@ -78,9 +80,16 @@ def narrow_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
     thin = replace(grid, robot_radius_m=grid.robot_radius_m - grid.resolution_m)
     reach, more = _connected(grid, cell), _connected(thin, cell)
     beside = ndimage.binary_dilation(reach, _SQUARE)
+    unexplored, _ = ndimage.label(thin.classes == CellClass.UNEXPLORED)
     parts, _ = ndimage.label(more & ~beside)
-    leads_on = np.unique(parts[ndimage.binary_dilation(thin.classes == CellClass.UNEXPLORED)])
+    leads_on = np.unique(parts[ndimage.binary_dilation(unexplored > 0)])
     entered = np.isin(parts, leads_on[leads_on > 0]) & ndimage.binary_dilation(beside & more)
+    large = (
+        np.bincount(unexplored.ravel())
+        > math.pi * grid.robot_radius_m * grid.robot_radius_m / grid.cell_area_m2
+    )
+    large[0] = False
+    entered |= more & beside & ~reach & ndimage.binary_dilation(large[unexplored])
     gaps, _ = ndimage.label(entered, _SQUARE)
     if not gaps.any():
         return np.zeros((0, 2), np.int64)
