@@ -170,7 +170,7 @@ QUOTES = (
         "docs/howto/choose-preset.md",
         "{paper_octile} % longer than the octile optimum in the mean, {paper_any} % longer",
     ),
-    Quote("paper/paper.md", "asks all methods on {maps} public maps"),
+    Quote("paper/paper.md", "compares methods on {maps} public maps"),
     Quote("paper/paper.md", "benchmark grids, with {pairs} pairs each"),
     Quote(
         "paper/paper.md", "In {checks} judged answers there were {contradictions} contradictions"

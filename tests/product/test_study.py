@@ -48,6 +48,16 @@ def test_quoted_figures_are_those_of_the_study(quote, published):
     ).groupdict()
 
 
+def test_the_figures_of_rooms_beside_the_peers_are_those_of_their_page():
+    lines = (DOCS / "rooms.md").read_text(encoding="utf-8").splitlines()
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "|" in line]
+    (head,) = [row for row in rows if row[:2] == ["building", "method"]]
+    (means,) = [row for row in rows if row[:2] == ["mean of all", "judged, unseen"]]
+    of = dict(zip(head, means, strict=True))
+    said = f"mean MCC {of['MCC']}, {float(of['doors found']):.0%} of doors".replace("%", " %")
+    assert said in (DOCS / "peers.md").read_text(encoding="utf-8")
+
+
 def test_quotes_are_written_in_place(tmp_path):
     (tmp_path / "page.md").write_text("It loses 0.5 %, or\n1,234 m; it loses nothing.\n")
     quote = Quote("page.md", "It loses {share} %, or {metres} m")
