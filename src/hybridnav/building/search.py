@@ -60,7 +60,7 @@ def _parts(planner: HybridPlanner, closed: ClosedCells | None) -> IntArray:
     is_open = planner.topology.grid.enterable(allow_unexplored=allowed).copy()
     if closed is not None:
         is_open.ravel()[closed.flat] = False
-    labels: IntArray = ndimage.label(is_open, np.ones((3, 3)))[0]
+    labels = ndimage.label(is_open, np.ones((3, 3)))[0].astype(np.int32)
     return labels
 
 
