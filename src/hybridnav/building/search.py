@@ -60,8 +60,8 @@ def _parts(planner: HybridPlanner, closed: ClosedCells | None) -> IntArray:
     is_open = planner.topology.grid.enterable(allow_unexplored=allowed).copy()
     if closed is not None:
         is_open.ravel()[closed.flat] = False
-    labels = ndimage.label(is_open, np.ones((3, 3)))[0].astype(np.int32)
-    return labels
+    labels, _ = ndimage.label(is_open, np.ones((3, 3)))
+    return labels.astype(np.int32, copy=False)
 
 
 class LinkSearch:

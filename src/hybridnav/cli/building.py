@@ -326,12 +326,12 @@ def build_building(source: BuildingSource, out: Path, *, compress: bool) -> None
         building.prepare(progress=advance)
     with stage(f"writing {out}", seconds, "write"):
         hn.save(building, out, compress=compress)
-    names = ", ".join(floor.name for floor in building.floors)
-    links = ", ".join(link.name for link in building.links) or "none"
+    names = ", ".join(printable(floor.name) for floor in building.floors)
+    links = ", ".join(printable(link.name) for link in building.links) or "none"
     lines = [
         f"model      {printable(out)}, {out.stat().st_size / 1e6:.2f} MB",
-        f"floors     {len(building.floors)}: {printable(names)}",
-        f"links      {len(building.links)}: {printable(links)}",
+        f"floors     {len(building.floors)}: {names}",
+        f"links      {len(building.links)}: {links}",
         f"robot      radius {building.robot_radius_m:g} m",
         f"seconds    {timings(seconds)}",
     ]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybridnav as hn
-from hybridnav._files import printable
 from hybridnav.cli.building import BuildingSource
 from hybridnav.cli.common import answer, stage, timings
 from hybridnav.cli.errors import UsageError
@@ -169,14 +168,14 @@ def _summary(
 ) -> list[str]:
     from hybridnav.harness.check_page import building_facts  # noqa: PLC0415 - on demand
 
-    lines = [f"{name:<10} {printable(text)}" for name, text in building_facts(found, report)]
+    lines = [f"{name:<10} {_line(text)}" for name, text in building_facts(found, report)]
     wrong = _wrong(found, ignored)
     lines.append(count_line(_all(wrong)))
     for name, findings in wrong.items():
         lines += found_lines(findings, f" on floor {name}" if name else "")
     cases = () if report is None else report.contradictions
     for number, text in enumerate(cases[:SHOWN]):
-        lines.append(f"{'' if number else 'routes':<10} {printable(text)}")
+        lines.append(f"{'' if number else 'routes':<10} {_line(text)}")
     return lines
 
 
@@ -208,3 +207,8 @@ def _figures(
         else {name: counts.to_dict() for name, counts in report.counts.items()},
         "contradictions": [] if report is None else list(report.contradictions),
     }
+
+
+def _line(text: str) -> str:
+    """Return a text, escaped if names in it would break the line."""
+    return text if text.isprintable() else repr(text)
