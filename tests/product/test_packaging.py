@@ -133,7 +133,7 @@ def test_help_is_complete():
     assert (done.returncode, done.stderr) == (0, "")
     for words in (
         "--start X,Y[,YAW] ",
-        "--goal X,Y ",
+        "--goal X,Y[,YAW] ",
         "--preset NAME|FILE ",
         "--set KEY=VALUE ",
         "--robot-radius R ",

@@ -206,8 +206,11 @@ def _heirs(before: RoomLabels, rooms: RoomLabels) -> tuple[list[int], set[int]]:
 
     A room is the one that has its cells, whatever its name, else the one that has its name.
     """
-    pairs = np.unique(np.stack([before.label_of.ravel(), rooms.label_of.ravel()]), axis=1)
-    one, other = pairs
+    width = len(rooms.names) + 1  # one number a pair: rows would be compared as records
+    pairs = np.unique(
+        (before.label_of.ravel() + 1).astype(np.int64) * width + rooms.label_of.ravel() + 1
+    )
+    one, other = pairs // width - 1, pairs % width - 1
     counts = [np.bincount(side + 1, minlength=2) for side in (one, other)]
     same = (one >= 0) & (other >= 0)
     same &= (counts[0][one + 1] == 1) & (counts[1][other + 1] == 1)
