@@ -40,3 +40,12 @@ def test_an_end_lies_at_two_finite_numbers():
     for position in ((math.nan, 0.0), (0.0, math.inf)):
         with pytest.raises(InvalidValueError, match="two finite numbers"):
             LinkEnd("1", position)
+
+
+def test_a_ride_to_a_floor_where_the_link_does_not_stop_is_refused():
+    lift = Link(name="lift", kind="lift", ends=ENDS)
+    for a, b in (("1", "9"), ("9", "1")):
+        with pytest.raises(InvalidValueError, match="link lift does not stop on floor 9"):
+            lift.seconds(a, b)
+        with pytest.raises(InvalidValueError, match="it stops on 1, 2, 3"):
+            lift.charge_m(a, b, speed_m_s=0.5)

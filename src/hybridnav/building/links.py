@@ -15,6 +15,11 @@ LinkKind = Literal["lift", "stairs", "ramp"]
 class LinkEnd:
     """A point of a floor where robots enter and leave a link.
 
+    Raises
+    ------
+    InvalidValueError
+        When the position is not two finite numbers, or the direction is not finite.
+
     Examples
     --------
     >>> hn.LinkEnd("3", (1.5, 2.0)).floor
@@ -50,6 +55,12 @@ class Link:
 
     A ride costs `wait_s`, and from one end to the next one `ride_s`, in seconds, and `cost_m` in
     metres on top: what a planner charges is `cost_m + speed * seconds`.
+
+    Raises
+    ------
+    InvalidValueError
+        When the kind is not known, there are not two ends on different floors, a time or the cost
+        is negative or not finite, or the greatest radius is not above 0.
 
     Examples
     --------
@@ -128,8 +139,19 @@ class Link:
         ----------
         from_floor, to_floor
             Names of floors that it stops at.
+
+        Raises
+        ------
+        InvalidValueError
+            When it does not stop at one of them.
         """
         floors = [end.floor for end in self.ends]
+        for floor in (from_floor, to_floor):
+            if floor not in floors:
+                raise InvalidValueError(
+                    f"link {self.name} does not stop on floor {floor!s:.80}: it stops on "
+                    f"{', '.join(floors)}"
+                )
         rides = abs(floors.index(from_floor) - floors.index(to_floor))
         return float(self.wait_s + self.ride_s * rides)
 
@@ -142,5 +164,10 @@ class Link:
             Names of floors that it stops at.
         speed_m_s
             Metres per second that the robot drives: seconds are worth so many metres.
+
+        Raises
+        ------
+        InvalidValueError
+            When it does not stop at one of the floors.
         """
         return self.cost_m + speed_m_s * self.seconds(from_floor, to_floor)
