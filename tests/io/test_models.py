@@ -278,6 +278,8 @@ def test_what_is_written_to_arrays_of_a_model_stays_out_of_its_file(tmp_path: Pa
         ("a text", "several planners"),
         ([], "several planners"),
         ([3], "several planners"),
+        (3, "several planners"),
+        (None, "several planners"),
     ],
 )
 def test_other_things_are_no_models(thing: Any, words: str, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,6 @@ from hybridnav.io.models.model import Model, is_model
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from hybridnav._typing import PathLike
     from hybridnav.io.models.container import Part
     from hybridnav.planner import HybridPlanner
@@ -52,7 +51,8 @@ def save(
     Raises
     ------
     InvalidValueError
-        When the path has another ending, or the planners are not on one topological map.
+        When the path has another ending, this is nothing of that, or the planners are not on one
+        topological map.
     ModelError
         When the file cannot be written.
 
@@ -90,7 +90,8 @@ def parts_of(
         return _parts_of_map(thing)
     from hybridnav.planner import HybridPlanner  # noqa: PLC0415 - loads numba
 
-    planners = [thing] if isinstance(thing, HybridPlanner) else list(thing)
+    several = list(thing) if isinstance(thing, Iterable) else []
+    planners = [thing] if isinstance(thing, HybridPlanner) else several
     if not planners or not all(isinstance(planner, HybridPlanner) for planner in planners):
         raise InvalidValueError(
             "a model is saved of a planner, several planners, a topological map or a grid, "
