@@ -40,6 +40,15 @@ def test_many_answers_are_the_answers_one_by_one(
     assert batch.path_start[0] == 0
     assert batch.path_start[-1] == len(batch.points)
     assert len(batch.path_start) == len(singles) + 1
+    arrays = (
+        batch.status,
+        batch.cost,
+        batch.lower_bound,
+        batch.path_start,
+        batch.points,
+        batch.path(0),
+    )
+    assert not any(array.flags.writeable for array in arrays)
     for i, single in enumerate(singles):
         points = np.empty((0, 2)) if single.path is None else single.path.points
         np.testing.assert_array_equal(batch.path(i), points)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._copies import frozen
 from hybridnav.grid import CellClass
 from hybridnav.planner.cell_planner import CellQueries
 from hybridnav.result import PlanBatch, PlanStatus
@@ -74,13 +75,17 @@ def plan_many(
             paths[i] = result.path.points
             if result.path.headings_rad is not None:
                 headings[i] = result.path.headings_rad
+    has_yaw = starts.shape[1] > 2  # noqa: PLR2004
+    turns = frozen(np.concatenate([np.empty(0), *headings])) if has_yaw else None
     return PlanBatch(
-        status=status,
-        cost=cost,
-        lower_bound=bound,
-        path_start=np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64),
-        points=np.concatenate([np.empty((0, 2)), *paths]),
-        headings_rad=np.concatenate([np.empty(0), *headings]) if starts.shape[1] > 2 else None,  # noqa: PLR2004
+        status=frozen(status),
+        cost=frozen(cost),
+        lower_bound=frozen(bound),
+        path_start=frozen(
+            np.concatenate([[0], np.cumsum([len(p) for p in paths])]).astype(np.int64)
+        ),
+        points=frozen(np.concatenate([np.empty((0, 2)), *paths])),
+        headings_rad=turns,
     )
 
 
