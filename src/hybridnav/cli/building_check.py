@@ -66,6 +66,7 @@ PairsOption = Annotated[
     int,
     typer.Option(
         "--pairs",
+        metavar="N",
         min=0,
         max=1_000_000,
         help="For a building: pairs of points whose routes are compared.",

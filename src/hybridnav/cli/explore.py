@@ -22,7 +22,7 @@ from hybridnav.cli.common import (
     timings,
 )
 from hybridnav.cli.errors import UsageError
-from hybridnav.cli.options import JsonOption, MapArgument, MaxCellsOption, RadiusOption
+from hybridnav.cli.options import JsonOption, MapArgument, MaxCellsOption
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.names import read_point
 
@@ -56,6 +56,15 @@ RangeOption = Annotated[
 ]
 NoiseOption = Annotated[
     float, typer.Option("--noise", metavar="S", help="Standard deviation of readings in metres.")
+]
+RadiusOption = Annotated[
+    float | None,
+    typer.Option(
+        "--robot-radius",
+        metavar="R",
+        help="Robot radius in metres; else the model's.",
+        show_default="0.25",
+    ),
 ]
 SeedOption = Annotated[
     int, typer.Option("--seed", metavar="N", min=0, help="Seed of the noise and the pyramid.")

@@ -14,7 +14,7 @@ from hybridnav._files import printable
 from hybridnav.cli.common import answer, check_output, load_numba, progress_bar
 from hybridnav.cli.errors import EXIT_NOT_SOLVED, EXIT_SOLVED, UsageError
 from hybridnav.cli.logs import open_log
-from hybridnav.cli.options import JsonOption, MaxCellsOption, RadiusOption
+from hybridnav.cli.options import JsonOption, MaxCellsOption
 from hybridnav.errors import MapError
 from hybridnav.grid import DEFAULT_MAX_CELLS
 
@@ -37,6 +37,12 @@ ResolutionOption = Annotated[
     float | None,
     typer.Option(
         "--resolution", metavar="R", help="Side of a cell in metres, of a log.", show_default="0.05"
+    ),
+]
+RadiusOption = Annotated[
+    float | None,
+    typer.Option(
+        "--robot-radius", metavar="R", help="Robot radius in metres.", show_default="0.25"
     ),
 ]
 EveryOption = Annotated[
