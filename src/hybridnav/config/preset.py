@@ -144,14 +144,14 @@ class PlannerSettings(_Section):
 
     coarse: Literal["max-distance", "portals", "mesh", "jumps", "overlay", "none"] = "max-distance"
     """Structure to plan on. `max-distance`: the places, by that attribute of their arcs, which
-    chooses the route. `portals`: portals between fields grown for planning alone. `mesh`: convex
-    polygons of free space. `jumps`: the corner cells at which shortest paths of cells turn.
+    chooses the route. `portals`: portals between regions, the level above the places. `mesh`:
+    convex polygons of free space. `jumps`: the corner cells at which shortest paths of cells turn.
     `overlay`: exact costs between the border cells of fields on several levels of the pyramid,
     which `portals` takes too once there are costs. `none`: the cells of the whole map. All but the
     first derive the route from the path."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields in which `grid-astar` and `ompl` begin: those of the coarse route, or also their
-    neighbours. It has no effect with `coarse: portals` and `coarse: none`."""
+    neighbours. It has no effect with `refine: none` and `coarse: none`."""
     refine: Annotated[str, AfterValidator(_known_refiner)] = "grid-astar"
     """Search for the path. `grid-astar`: cell by cell in the corridor. `ompl`: by a sampling-based
     planner. `none`: the coarse search has found it, over portals, on the mesh, the corner cells or

@@ -24,6 +24,11 @@ class Anchor:
     the parallel, on the ellipsoid of WGS 84. Up to 200 m from the anchor, and 60 degrees from the
     equator, that is within 2 cm of the plane that touches the Earth there.
 
+    Raises
+    ------
+    InvalidValueError
+        When a number is out of range.
+
     Examples
     --------
     >>> anchor = hn.Anchor(48.0, 11.0)

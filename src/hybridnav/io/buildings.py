@@ -72,7 +72,9 @@ def load_building(
         When a file does not exist.
     MapError
         When a file cannot be read, or a floor, a room, a door or the place of an end is not as it
-        is written; one line that names the file and the line.
+        is written, or does not suit the robot; one line that names the file and the line.
+    PresetError
+        When the preset does not exist or is not valid.
 
     Examples
     --------

@@ -59,7 +59,7 @@ class Blocked:
         Areas as in `polygons` that the *centre* of the robot does not enter: their cells are those
         of a robot of radius 0.
     doors
-        Numbers of doors as lists show them (gaps are not listed), or `Door` objects of this map: no
+        Numbers of doors, but not those of gaps, or `Door` objects of this map: no
         move crosses their boundaries, which close like those of arcs. Other doors between the same
         rooms stay open. If corners may be cut, all cells on both sides close. A diagonal between
         two cells that were measured as occupied crosses no door.

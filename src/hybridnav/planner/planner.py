@@ -71,7 +71,8 @@ class HybridPlanner:
         When the preset does not exist or is not valid, or names a refiner that cannot be used.
     InvalidValueError
         When the map has the default radius, not chosen by the caller, and the preset names another;
-        when the costs are those of another map, or the preset cannot plan by costs.
+        when the costs are those of another map, or the preset cannot plan by costs; when the map
+        allows corner cutting, and the preset plans on the mesh (`shortest`, `ompl-*`).
 
     Examples
     --------
@@ -155,8 +156,9 @@ class HybridPlanner:
             with it; there named endpoints face along the path.
         smooth
             `"line-of-sight"` shortens the path to an any-angle one, by costs without raising them;
-            `"arcs"` rounds the bends of such a path by costs too; None as in the preset. Without
-            effect for `shortest` and OMPL, whose paths are any-angle ones.
+            `"arcs"`, for planners by costs, rounds the bends of such a path too; None as in the
+            preset. `"line-of-sight"` has no effect with `shortest` and OMPL, whose paths are
+            any-angle ones.
         blocked
             Closures for this query: a `Blocked`, a `Door`, a shapely geometry in metres, or a
             mapping with keys of `Blocked`, such as `{"doors": [39], "rooms": ["kitchen"]}`. If they
@@ -173,8 +175,8 @@ class HybridPlanner:
         Raises
         ------
         InvalidValueError
-            When a point is not two or three finite numbers, a name is not known, or a closed item
-            is not on the map.
+            When a point is not two or three finite numbers, a name is not known, a closed item is
+            not on the map, or `smooth` is `"arcs"` and the planner plans by lengths.
         """
         with self._query():
             return self._queries.plan(start, goal, smooth, blocked, at)

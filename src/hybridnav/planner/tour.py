@@ -112,8 +112,8 @@ class Tour:
         `words` for a person in English.
 
         Points and headings, places and arcs are those of all plans in order, with the place of a
-        stop once; if the robot turns at a waypoint, its point occurs twice. Counts and seconds are
-        sums.
+        waypoint once; if the robot turns at a waypoint, its point occurs twice. Counts and seconds
+        are sums.
         """
         parts = [result.to_dict() for result in self.results]
         points, headings = _joined_points(parts)

@@ -252,7 +252,7 @@ class Rooms:
         return self._numbered(number, self._door_of_number)
 
     def listed_door(self, number: int) -> Door:
-        """Return the door with a number that lists and pictures show: gaps are not among them.
+        """Return the door with a number, unless it is a gap.
 
         Raises
         ------
