@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, Self
 
 import numpy as np
 
+from hybridnav._copies import copies_alike
 from hybridnav.errors import PlanError
 from hybridnav.sentences import sentences
 
@@ -126,6 +127,7 @@ class PlanStats:
     """Wall-clock seconds per stage."""
 
 
+@copies_alike
 @dataclass(frozen=True, eq=False)
 class PlanBatch:
     """Outcomes of many queries, arrays of n.
