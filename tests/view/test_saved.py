@@ -103,3 +103,25 @@ def test_the_file_opens_in_a_browser_without_a_server(cli: Any, folder: Path) ->
         shown.wait("document.getElementById('map').dataset.waiting === '0'")
         assert shown.errors == []
         assert all(url.startswith(("file:", "data:")) for url in shown.requests)
+
+
+@pytest.mark.full
+def test_the_whole_map_stays_in_view_when_the_window_changes(cli: Any, folder: Path) -> None:
+    phone = {"width": 390, "height": 844}
+    with browsing() as browser:
+        _, out = _save(cli, folder)
+        known = _data(out)["map"]["known"]
+        shown = Shown(browser.new_context(viewport={"width": 1280, "height": 800}), out.as_uri())
+        shown.page.set_viewport_size(phone)
+        shown.wait("document.getElementById('map').clientWidth === 390")
+        shown.wait(f"{0.95 * 390} > {known[1] - known[0]} * {_SCALE}")
+        shown.page.click("#zoom-in")  # a person's own view stays
+        scale = float(shown.fact("view").split()[2])
+        shown.page.set_viewport_size({"width": 800, "height": 844})
+        shown.wait("document.getElementById('map').clientWidth < 700")
+        shown.page.wait_for_timeout(100)
+        assert float(shown.fact("view").split()[2]) == scale
+        assert shown.errors == []
+
+
+_SCALE = "Number(document.getElementById('map').dataset.view.split(' ')[2])"

@@ -9,6 +9,7 @@ const MOST_SCALE = 64;
 export class Scene {
   middle = [0, 0];
   scale = 1; // CSS pixels per cell
+  #isWhole = true; // all of the map is shown, and stays so when the window changes
   width = 0;
   height = 0;
   painters = [];
@@ -39,27 +40,33 @@ export class Scene {
     this.height = this.canvas.clientHeight;
     this.canvas.width = Math.round(this.width * ratio);
     this.canvas.height = Math.round(this.height * ratio);
-    this.draw();
+    if (this.#isWhole) this.fit();
+    else this.draw();
   }
 
   get place() {
-    return { middle: this.middle, scale: this.scale };
+    return this.#isWhole ? null : { middle: this.middle, scale: this.scale };
   }
 
   // Show another map, all of it or as it was seen last.
   show(map, place) {
     this.map = map;
     this.version = map.rooms.version;
-    if (place) Object.assign(this, place);
+    if (place) this.#move(place);
     else this.fit();
-    this.draw();
   }
 
   fit() {
     const [left, right, bottom, top] = this.map.known;
     this.middle = [(left + right) / 2, (bottom + top) / 2];
     const room = Math.min(this.width / (right - left), this.height / (top - bottom));
-    this.scale = this.#clamped(0.94 * room);
+    this.#move({ scale: this.#clamped(0.94 * room) });
+    this.#isWhole = true;
+  }
+
+  #move(place) {
+    Object.assign(this, place);
+    this.#isWhole = false;
     this.draw();
   }
 
@@ -105,16 +112,14 @@ export class Scene {
   }
 
   pan(right, down) {
-    this.middle = [this.middle[0] - right / this.scale, this.middle[1] + down / this.scale];
-    this.draw();
+    this.#move({ middle: [this.middle[0] - right / this.scale, this.middle[1] + down / this.scale] });
   }
 
   zoom(factor, at = [this.width / 2, this.height / 2]) {
     const held = this.toGrid(at);
     this.scale = this.#clamped(this.scale * factor);
     const now = this.toGrid(at);
-    this.middle = [this.middle[0] + held[0] - now[0], this.middle[1] + held[1] - now[1]];
-    this.draw();
+    this.#move({ middle: [this.middle[0] + held[0] - now[0], this.middle[1] + held[1] - now[1]] });
   }
 
   draw() {
