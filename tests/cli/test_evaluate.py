@@ -84,6 +84,19 @@ def test_a_counter_example_is_an_exit_code(cli, rooms, tmp_path):
     assert {record["method"] for record in read_records(out)} == {"grid-astar", bad}
 
 
+def test_queries_in_which_a_method_raises_are_counted(cli, rooms, tmp_path):
+    query = ("evaluate", rooms, "--baseline", name_of(faulty.Raises), "--pairs", 12)
+    done = cli(*query, "-o", tmp_path / "run")
+    records = read_records(tmp_path / "run")
+    n_raised = sum(record["status"] == "error" for record in records)
+    assert n_raised > 0
+    assert done.code == 0  # as the pages say: the other answers may be sound
+    words = f"hybridnav: queries without an answer, of {len(records) - 2}: {n_raised}, the first: "
+    assert done.err.startswith(words)
+    assert done.err.endswith("RuntimeError: odd rows are beyond me\n")
+    assert done.err.count("\n") == 1
+
+
 @pytest.mark.usefixtures("here")
 def test_corner_cutting_is_a_counter_example(cli, tmp_path):
     path = write_map(tmp_path, ["...###", "...###", "###...", "###..."])

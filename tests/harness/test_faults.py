@@ -5,6 +5,7 @@ import re
 import shlex
 import sys
 from collections import Counter
+from dataclasses import replace
 from html import unescape
 
 import pytest
@@ -152,6 +153,9 @@ def test_counter_examples_can_be_pasted_and_lead_to_their_pictures(folder, study
     grid = hn.load_map(words[2], robot_radius_m=float(words[5].partition("=")[2]))
     points = [list(map(float, word.partition("=")[2].split(","))) for word in words[3:5]]
     assert grid.frame.cells_of(points).tolist() == [record["start"], record["goal"]]
+    assert words[6:] == ["--preset=grid-astar"]  # a class is no preset: the reference plans
+    of_preset = replace(outcome, preparation=outcome.preparation | {"preset": {"name": "paper"}})
+    assert shlex.split(command_of(of_preset, record))[6:] == ["--preset=paper"]
 
 
 def test_nothing_is_found_that_was_not_planted(study):

@@ -172,7 +172,8 @@ def evaluate(
     """Measure consistency, loss and efficiency of methods on maps, pair by pair.
 
     Records go to DIR/records.jsonl; a run that was stopped goes on where it was. Exits with 1 when
-    a counter-example was found or a method could not be made.
+    a counter-example was found, a method could not be made, or nothing was checked. Queries in which
+    a method raised are counted on stderr, and do not change that.
     """
     if all_pairs is not None and (scen is not None or pairs is not None):
         raise UsageError(
@@ -181,6 +182,7 @@ def evaluate(
     from hybridnav.harness.names import read_methods  # noqa: PLC0415
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
+    from hybridnav.harness.task import TOO_SLOW  # noqa: PLC0415
 
     yardstick = _yardstick(metric)
     if not parsed_costs(costs) and yardstick == "weighted":
@@ -228,7 +230,18 @@ def evaluate(
         for found in study.outcomes
         if found.is_asked and found.preparation["status"] != "ready"
     ]
-    for what, found in (("counter-examples", faults), ("methods without answers", unmade)):
+    raised = [
+        f"{found.map_name}, {found.label}: {record.get('error', record['status'])}"
+        for found in study.outcomes
+        if found.preparation["status"] == "ready"
+        for record in found.unanswered
+        if record["status"] != TOO_SLOW
+    ]
+    for what, found in (
+        ("counter-examples", faults),
+        ("methods without answers", unmade),
+        (f"queries without an answer, of {study.checks + len(raised):,}", raised),
+    ):
         if found:
             complain(f"{what}: {len(found)}, the first: {found[0]}")
     if not study.checks and not unmade:

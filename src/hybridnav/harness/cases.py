@@ -68,8 +68,9 @@ def counter_examples(study: Study, drawn: dict[CaseKey, str]) -> list[CounterExa
 
 
 def command_of(outcome: Outcome, record: Record) -> str:
-    """Return the command that plans the pair of a record, in metres; empty for other records, and
-    for those of older versions, which hold no frame."""
+    """Return the command that plans the pair of a record, in metres, by the preset, or by the
+    reference for other methods; empty for other records, and for those of older versions, which
+    hold no frame."""
     about = outcome.preparation
     if record["type"] != "pair" or "origin" not in about:
         return ""
@@ -81,7 +82,9 @@ def command_of(outcome: Outcome, record: Record) -> str:
         for name, point in (("start", start), ("goal", goal))
     ]
     words = ["hybridnav", "plan", about["file"], *ends]
-    return shlex.join([*words, f"--robot-radius={about['robot_radius_m']:g}"])
+    words.append(f"--robot-radius={about['robot_radius_m']:g}")
+    words.append(f"--preset={(about.get('preset') or {}).get('name', REFERENCE)}")
+    return shlex.join(words)
 
 
 def _pair_text(record: Record) -> str:

@@ -344,9 +344,14 @@ class Outcome:
         return failed[0] if failed else None
 
     @property
+    def unanswered(self) -> list[Record]:
+        """Records of queries without an answer: errors, time-outs, lost workers."""
+        return [record for record in self.records if record["status"] not in (NOT_ASKED, *ANSWERED)]
+
+    @property
     def failures(self) -> int:
-        """Queries without an answer: errors, time-outs, lost workers."""
-        return sum(record["status"] not in (NOT_ASKED, *ANSWERED) for record in self.records)
+        """How many queries have no answer."""
+        return len(self.unanswered)
 
 
 def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:

@@ -49,7 +49,7 @@ class WorstCase:
     picture: str
     """A data URI: drawn at once, so that a report does not hold the cells of all its maps."""
     command: str = ""
-    """A command that plans the same pair, in metres."""
+    """A command that plans the same pair, in metres, by the preset or by the reference."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class CounterExample:
 
     text: str
     command: str = ""
-    """A command that plans the same pair, in metres."""
+    """A command that plans the same pair, in metres, by the preset or by the reference."""
     anchor: str = ""
     """Id of the element with its picture, empty if it is not drawn."""
 
