@@ -166,6 +166,16 @@ def test_what_is_wrong_is_one_line(folder: Path, name: str) -> None:
     assert len(text) < 500 + len(str(folder)) * 2
 
 
+@pytest.mark.parametrize(
+    "settings", [{"robot_radius_m": -1}, {"robot_radius_m": "wide"}, {"max_cells": 0}]
+)
+def test_a_wrong_setting_is_no_fault_of_the_file(folder: Path, settings: Any) -> None:
+    loaded(folder, description())
+    with pytest.raises(hn.InvalidValueError, match="must be a") as refused:
+        hn.load_building(folder / "building.yaml", **settings)
+    assert "line" not in str(refused.value)
+
+
 def test_an_end_that_is_cut_off_is_refused(folder: Path) -> None:
     probability = np.zeros((20, 40), dtype=np.float32)
     probability[10, :] = probability[:, 30] = 1.0

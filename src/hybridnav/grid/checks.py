@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from typing import Any, TypeVar
 
@@ -35,6 +36,45 @@ def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
     raise InvalidValueError(
         f"{name} is {brief(value)} of type {type(value).__name__}, expected {article} "
         f"{kind.__name__}: make one"
+    )
+
+
+def checked_radius(radius_m: Any) -> float:
+    """Return the radius of a robot in metres.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is no finite number >= 0.
+    """
+    try:
+        found = float(radius_m)
+    except (TypeError, ValueError):
+        found = math.nan
+    if math.isfinite(found) and found >= 0:
+        return found
+    raise InvalidValueError(
+        f"robot radius must be a finite length in metres >= 0, got {brief(radius_m)}"
+    )
+
+
+def checked_thresholds(free: Any, occupied: Any) -> tuple[float, float]:
+    """Return the thresholds of free and occupied cells.
+
+    Raises
+    ------
+    InvalidValueError
+        When these are not two ascending numbers from 0 to 1.
+    """
+    try:
+        low, high = float(free), float(occupied)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if 0 <= low < high <= 1:
+        return low, high
+    raise InvalidValueError(
+        "thresholds must satisfy 0 <= free < occupied <= 1, "
+        f"got free {brief(free)} and occupied {brief(occupied)}"
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._copies import copies_alike
 from hybridnav.config import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import checked_radius, checked_thresholds
 from hybridnav.grid.classes import CellClass
 from hybridnav.grid.clearance import within_radius
 from hybridnav.grid.frame import Frame
@@ -122,23 +123,14 @@ class OccupancyGrid:
         given = self.__dict__["robot_radius_m"]
         kept = self.radius_is_default and given == DEFAULT_ROBOT_RADIUS_M
         object.__setattr__(self, "radius_is_default", given is None or kept)
-        for name in (
-            "free_threshold",
-            "occupied_threshold",
-            "robot_radius_m",
-            "least_island_m2",
+        low, high = checked_thresholds(self.free_threshold, self.occupied_threshold)
+        for name, value in (
+            ("free_threshold", low),
+            ("occupied_threshold", high),
+            ("robot_radius_m", checked_radius(self.robot_radius_m)),
+            ("least_island_m2", float(self.least_island_m2)),
         ):
-            object.__setattr__(self, name, float(getattr(self, name)))
-        low, high = self.free_threshold, self.occupied_threshold
-        if not 0 <= low < high <= 1:
-            raise InvalidValueError(
-                "thresholds must satisfy 0 <= free < occupied <= 1, "
-                f"got free {low} and occupied {high}"
-            )
-        if not (math.isfinite(self.robot_radius_m) and self.robot_radius_m >= 0):
-            raise InvalidValueError(
-                f"robot radius must be a finite length in metres >= 0, got {self.robot_radius_m}"
-            )
+            object.__setattr__(self, name, value)
         if not (math.isfinite(self.least_island_m2) and self.least_island_m2 >= 0):
             raise InvalidValueError(
                 "the least area of an island must be a finite number of m² >= 0, "

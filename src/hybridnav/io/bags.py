@@ -11,6 +11,7 @@ import numpy as np
 from hybridnav._trig import atan2, cos
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.grid import OccupancyGrid
+from hybridnav.grid.checks import checked_radius, checked_thresholds
 from hybridnav.io.bag_files import GRID, LASER, ODOMETRY, TRANSFORMS, Bag
 from hybridnav.io.bag_poses import NoPoseError, Transforms, frame_of
 from hybridnav.io.scan_log import ScanLog
@@ -59,6 +60,8 @@ def load_bag_map(
     MapError
         When it is no bag or damaged, holds no such topic or several, its map is wrong, or rosbags
         is not installed.
+    InvalidValueError
+        When the radius or a threshold is out of range.
 
     Examples
     --------
@@ -66,6 +69,9 @@ def load_bag_map(
     >>> hn.load_bag_map("office.bag").shape
     (580, 960)
     """
+    checked_thresholds(free_threshold, occupied_threshold)
+    if robot_radius_m is not None:
+        checked_radius(robot_radius_m)
     bag = Bag(path)
     if topic is None and "/map" in bag.topics_of({GRID}):
         topic = "/map"

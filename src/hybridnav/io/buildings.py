@@ -14,12 +14,14 @@ from hybridnav.building.checks import FloorParts, check_ends, check_reach
 from hybridnav.config import load_preset
 from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, PresetError
 from hybridnav.grid import DEFAULT_MAX_CELLS
+from hybridnav.grid.checks import checked_radius
 from hybridnav.grid.names import place_of_name
 from hybridnav.io.building_entries import read_building_entries
 from hybridnav.io.maps import load
 from hybridnav.io.models import is_model
 from hybridnav.io.models.buildings import open_building
 from hybridnav.io.rooms_in import load_rooms
+from hybridnav.io.size import check_max_cells
 from hybridnav.planner.landmarks import Landmarks
 from hybridnav.topology import find_rooms
 
@@ -75,6 +77,8 @@ def load_building(
         is written, or does not suit the robot; one line that names the file and the line.
     PresetError
         When the preset does not exist or is not valid.
+    InvalidValueError
+        When the radius or the limit is out of range.
 
     Examples
     --------
@@ -89,6 +93,9 @@ def load_building(
     >>> round(building.plan(("1", (1.5, 0.5)), ("2", (0.5, 0.5))).length_m, 3)
     3.0
     """
+    check_max_cells(max_cells)
+    if robot_radius_m is not None:
+        checked_radius(robot_radius_m)
     if is_model(path):
         return open_building(
             path, robot_radius_m=robot_radius_m, preset=preset, max_cells=max_cells
