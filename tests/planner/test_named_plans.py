@@ -92,8 +92,10 @@ def test_names_and_words_that_are_wrong_are_explained(planner):
         planner.plan("kichen", "lab")
     with pytest.raises(hn.InvalidValueError, match="did you mean sink"):
         planner.plan("lab", "sinc")
-    with pytest.raises(hn.InvalidValueError, match="anywhere"):
-        planner.plan("lab", "sink", at="once")
+    for ends in (("lab", "sink"), ((0.75, 0.75), (1.25, 0.75))):
+        for ask in (planner.plan, planner.draft):
+            with pytest.raises(hn.InvalidValueError, match="at must be 'anywhere' or 'point'"):
+                ask(*ends, at="once")
     with pytest.raises(hn.InvalidValueError, match="at least two"):
         hn.plan_tour(planner, ["lab"])
 
@@ -403,6 +405,13 @@ def test_rooms_writes_a_file_once_and_draws(cli, map_file, tmp_path):
     assert 'id="room-0"' in picture.read_text()
     assert cli(*query).refuses(2, "found.yaml exists", "--force")
     assert cli(*query, "--force").code == 0
+
+
+@pytest.mark.parametrize("name", ["rooms.docx", "rooms.geojson", "rooms"])
+def test_rooms_are_written_to_files_of_yaml_only(cli, map_file, tmp_path, name):
+    done = cli("rooms", map_file, "-o", tmp_path / name)
+    assert done.refuses(2, "--out must end in .yaml, .yml", name)
+    assert not (tmp_path / name).exists()
 
 
 def test_rooms_lists_those_of_a_file(cli, map_file):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hybridnav.building.search import Endpoint
-from hybridnav.errors import InvalidValueError, brief
+from hybridnav.errors import InvalidValueError
 from hybridnav.grid.names import did_you_mean, place_of_name
 from hybridnav.planner.endpoints import cells_of_endpoints, read_point
 from hybridnav.planner.named import check_names
@@ -71,8 +71,8 @@ def _floor_of_name(name: str, floors: Sequence[Floor]) -> int:
         raise InvalidValueError(f"no room or point of the building is called {name!r:.80}{hint}")
     on = " and ".join(floors[number].name for number in found[:3])
     raise InvalidValueError(
-        f"{name!r:.80} is a name on floors {on}: give the floor too, as "
-        f"({brief(floors[found[0]].name)}, {name!r:.80})"
+        f"{name!r:.80} is a name on floors {on}: give the floor too, as in "
+        f"{floors[found[0]].name}:{name:.80}, or in Python the pair of floor and name"
     )
 
 

@@ -14,9 +14,9 @@ from hybridnav._files import printable
 from hybridnav.cli.common import (
     Reading,
     answer,
+    check_output,
     check_picture,
     check_room_to_be,
-    check_writable,
     islands_line,
     load_model,
     read_settings,
@@ -116,8 +116,7 @@ def rooms(
     asked = _asked_point(at, out, plot)
     if out is not None and out.exists() and not force:
         raise UsageError(f"{printable(out)} exists: it may hold names given by hand; add --force")
-    if out is not None:
-        check_writable(out, "--out")
+    check_output(out, "--out", (".yaml", ".yml"))
     if tolerance_m is not None and (out is None or not 0 < tolerance_m < math.inf):
         needed = "needs --out" if out is None else "must be positive and finite"
         raise UsageError(f"--tolerance {needed}, got --tolerance {tolerance_m:g}")

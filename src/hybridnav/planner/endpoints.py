@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import CellClass
 from hybridnav.result import PlanStatus
 
@@ -32,6 +32,18 @@ _REFUSED = (
         CellClass.UNEXPLORED: PlanStatus.GOAL_UNEXPLORED,
     },
 )
+
+
+def check_at(at: str) -> None:
+    """Refuse a position in a room that is none of the two.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is another word.
+    """
+    if at not in {"anywhere", "point"}:
+        raise InvalidValueError(f"at must be 'anywhere' or 'point', got {brief(at)}")
 
 
 def cells_of_endpoints(

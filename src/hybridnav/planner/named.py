@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.grid import CellClass
 from hybridnav.grid.clearance import clearance_cells
 from hybridnav.grid.names import did_you_mean
+from hybridnav.planner.endpoints import check_at
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.waypoints import cheapest_waypoints
 
@@ -88,8 +89,7 @@ def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
     InvalidValueError
         When `at` is another word.
     """
-    if at not in get_args(At):
-        raise InvalidValueError(f"at must be 'anywhere' or 'point', got {at!r:.80}")
+    check_at(at)
     enterable = topology.grid.enterable(allow_unexplored=settings.allow_unexplored)
     if closed is not None:
         enterable = enterable.copy()

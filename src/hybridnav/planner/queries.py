@@ -14,7 +14,7 @@ from hybridnav.planner.batch import plan_many
 from hybridnav.planner.cell_planner import CellQuery
 from hybridnav.planner.closed import ClosedCells, Closures
 from hybridnav.planner.drafts import PlanDraft, draft_on_mesh
-from hybridnav.planner.endpoints import cells_of_endpoints, read_end
+from hybridnav.planner.endpoints import cells_of_endpoints, check_at, read_end
 from hybridnav.planner.finish import Finish, Smooth
 from hybridnav.planner.follow import is_stale
 from hybridnav.planner.outcome import Outcomes
@@ -111,6 +111,7 @@ class Queries:
     ) -> PlanResult:
         """Plan a path; see `HybridPlanner.plan`."""
         began = time.perf_counter()
+        check_at(at)
         waypoint = goal
         if isinstance(start, str) or isinstance(goal, str):
             from hybridnav.planner.named import check_names, points_of_waypoints  # noqa: PLC0415 - on demand
@@ -139,6 +140,7 @@ class Queries:
         at: At,
     ) -> PlanDraft:
         """Plan a path, and make its result only if it is wanted; see `HybridPlanner.draft`."""
+        check_at(at)
         named = isinstance(start, str) or isinstance(goal, str)
         if named or self._ompl is not None or self._preset.planner.coarse != "mesh":
             return PlanDraft.of(self.plan(start, goal, None, blocked, at))
