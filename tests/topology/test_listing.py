@@ -11,6 +11,7 @@ from scipy import ndimage
 from scipy.spatial.distance import cdist
 
 import hybridnav as hn
+from hybridnav.errors import InvalidValueError
 from hybridnav.grid import CellClass, RoomLabels
 from hybridnav.io.ros_out import write_ros_map
 from hybridnav.viz import plot_rooms
@@ -76,6 +77,11 @@ def test_doors_to_a_nameless_pocket_are_not_listed_and_those_to_a_nameless_hall_
     assert [door.rooms for door in rooms.doors] == [("room-1", "room-2"), ("room-1", None)]
     assert [door.rooms for door in rooms.listed_doors] == [("room-1", "room-2")]
     assert rooms.counted()[2] == "1 narrow room without a way in, 1 door to what is not listed"
+    (listed,), (hidden,) = rooms.listed_doors, set(rooms.doors) - set(rooms.listed_doors)
+    for ask in (rooms.door, rooms.listed_door):
+        assert ask(hidden.number) is hidden
+        with pytest.raises(InvalidValueError, match=f"999: the doors are {listed.number};"):
+            ask(999)
 
 
 @given(labelled(), st.sampled_from([0.0, 0.3, 0.8]), st.sampled_from([0.25, 0.5, 1.0]))

@@ -183,6 +183,23 @@ def test_all_alternatives_are_drawn_each_in_its_colour(ring):
     assert set(texts(ax, r"door-\d+")) == {f"door-{number}" for number in doors}
 
 
+def test_openings_are_no_doors_in_legend_and_list(tmp_path, cli):
+    free = np.zeros((64, 204), dtype=np.uint8)
+    free[2:22, 2:202] = free[22:62, 60:135] = 1  # a bay, open along its side
+    label_of = np.where(free, 0, -1)
+    label_of[22:] = np.where(free[22:], 1, -1)
+    grid = occupancy_grid(free, resolution_m=0.1)
+    rooms = hn.RoomLabels(("corridor", "bay"), label_of)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=rooms))
+    found = hn.plan_alternatives(hn.HybridPlanner(topology), "corridor", "bay", 2, at="point")
+    assert legend(plot_alternatives(topology, found))[0].endswith(", by opening 1")
+    hn.write_ros_map(grid, tmp_path / "map.yaml")
+    hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
+    query = ("plan", tmp_path / "map.yaml", "--from", "corridor", "--to", "bay")
+    done = cli(*query, "--robot-radius", 0, "--at", "point", "--alternatives", 2)
+    assert "by corridor (opening 1), bay" in done.out
+
+
 def test_twenty_routes_are_all_told_apart(ring):
     (first, *_) = found = hn.plan_alternatives(ring, "west", "east", 2)
     many = hn.Alternatives((first,) * 20, complete=found.complete)

@@ -26,7 +26,7 @@ _PATIENCE_S = 2.0
 SEARCHES = {"mesh": "shortest", "jumps": "octile", "none": "grid-astar", "max-distance": "paper"}
 """A preset for each kind of search that can be compiled without a pyramid."""
 _PACKAGES = Path(__file__).parents[2]
-_FIRST = "compiling kernels, which a new installation does once; the next start is quick"
+_FIRST = "compiling kernels, each once, when a command first needs it; the next start is quick"
 
 
 class _Teller(logging.Handler):

@@ -264,7 +264,8 @@ def _alternatives_figures(found: hn.Alternatives) -> dict[str, Any]:
     by_costs = bool(found) and found[0].result.metric in COST_METRICS
     for number, other in enumerate(found):
         rooms = [
-            (leg.room or f"the {leg.shape}") + (f" (door {leg.door.number})" if leg.door else "")
+            (leg.room or f"the {leg.shape}")
+            + (f" ({leg.door.kind} {leg.door.number})" if leg.door else "")
             for leg in other.tour.legs
         ]
         pair = found[0].tour, other.tour

@@ -247,7 +247,7 @@ class Rooms:
         Raises
         ------
         InvalidValueError
-            When no door has it; the message lists the existing numbers.
+            When no door has it; the message states the numbers in the list of doors.
         """
         return self._numbered(number, self._door_of_number)
 
@@ -264,8 +264,8 @@ class Rooms:
 
     def _numbered(self, number: int, doors: dict[int, Door]) -> Door:
         if number not in doors:
-            listed = [door.number for door in self.doors if not door.is_gap]
-            known = f"the doors are {_in_runs(listed)}" if listed else "the map has no doors"
+            shown = [door.number for door in self.listed_doors]
+            known = f"the doors are {_in_runs(shown)}" if shown else "the map has no doors to list"
             raise InvalidValueError(
                 f"no door has the number {number!r:.80}: {known}; hybridnav rooms MAP lists them"
             )

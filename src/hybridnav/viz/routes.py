@@ -184,7 +184,7 @@ def plot_alternatives(  # noqa: PLR0913 - all but two have defaults
         by_costs = one.result.metric in COST_METRICS
         cost = f", cost {one.result.cost:.2f} m" if by_costs else ""
         length = f"{one.path.length_m:.2f} m{cost}"
-        entries.append((sample, f"route {number + 1}, {length}{_by(one.doors)}"))
+        entries.append((sample, f"route {number + 1}, {length}{_by(one.tour.legs)}"))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
     draw_markers(canvas, markers, lines, labels=labels)
     text = f"{len(paths)} route{'s' if len(paths) > 1 else ''}" if paths else "no path"
@@ -192,14 +192,17 @@ def plot_alternatives(  # noqa: PLR0913 - all but two have defaults
     return finish(canvas, entries + ground, words)
 
 
-def _by(doors: Sequence[int]) -> str:
+def _by(legs: Sequence[Leg]) -> str:
     """Return the doors of a route for the legend, the first and the last of many."""
+    doors = [leg.door for leg in legs if leg.door is not None]
     if not doors:
         return ""
-    shown = [str(door) for door in doors]
+    shown = [str(door.number) for door in doors]
     if len(doors) > _MOST_DOORS:
         shown = [*shown[: _MOST_DOORS - 2], "...", shown[-1]]
-    return f", by door{'s' if len(doors) > 1 else ''} {', '.join(shown)}"
+    ending = "s" if len(doors) > 1 else ""
+    kinds = " and ".join(f"{kind}{ending}" for kind in sorted({door.kind for door in doors}))
+    return f", by {kinds} {', '.join(shown)}"
 
 
 def _route_line(
