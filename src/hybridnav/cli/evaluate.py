@@ -172,8 +172,8 @@ def evaluate(
     """Measure consistency, loss and efficiency of methods on maps, pair by pair.
 
     Records go to DIR/records.jsonl; a run that was stopped goes on where it was. Exits with 1 when
-    a counter-example was found, a method could not be made, or nothing was checked. Queries in which
-    a method raised are counted on stderr, and do not change that.
+    a counter-example was found, a method could not be made, or nothing was checked. Queries in
+    which a method raised are counted on stderr, and do not change that.
     """
     if all_pairs is not None and (scen is not None or pairs is not None):
         raise UsageError(
