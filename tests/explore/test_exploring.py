@@ -150,8 +150,14 @@ def test_a_start_that_is_none_is_refused(start: tuple[float, float], said: str) 
 
 
 def test_wrong_settings_are_refused() -> None:
-    with pytest.raises(hn.InvalidValueError, match="most_goals must be from 1"):
-        explore(flat(), START, most_goals=0)
+    for wrong in (0, 10_001, 1.5, "1"):
+        with pytest.raises(hn.InvalidValueError, match="most_goals must be a whole number from 1"):
+            explore(flat(), START, most_goals=wrong)  # type: ignore[arg-type]
+    for wrong in (-1, 0.5, "a"):
+        with pytest.raises(hn.InvalidValueError, match="seed must be a whole number from 0"):
+            explore(flat(), START, seed=wrong)  # type: ignore[arg-type]
+    with pytest.raises(hn.InvalidValueError, match="the start must be two finite metres"):
+        explore(flat(), "door")  # type: ignore[arg-type]
     full = hn.OccupancyGrid(np.ones((4, 4), np.float32), robot_radius_m=0)
     with pytest.raises(hn.InvalidValueError, match="is not in a free cell"):
         explore(full)

@@ -366,6 +366,8 @@ def test_what_cannot_be_written_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(hn.InvalidValueError, match="expected an OccupancyGrid"):
         hn.save_bag(tmp_path / "a", grid="map")  # type: ignore[arg-type]
     (tmp_path / "taken").mkdir()
+    with pytest.raises(hn.MapError, match="cannot write: File name too long"):
+        hn.save_bag(tmp_path / ("long" * 99), grid=hn.example_map("figure1"))
     with pytest.raises(hn.MapError, match="the name is taken"):
         hn.save_bag(tmp_path / "taken", grid=grid)
     (tmp_path / "file").write_text("")

@@ -247,7 +247,8 @@ def test_buildings_are_told_from_maps(folder: Path, tmp_path: Path) -> None:
     assert is_building(folder / "building.yaml")
     assert is_building(folder / "b.hnm")
     for other in (folder / "two.yaml", folder / "rooms.yaml", folder / "m.hnm", tmp_path,
-                  folder / "two.pgm", folder / "none.yaml"):  # fmt: skip
+                  folder / "two.pgm", folder / "none.yaml",
+                  folder / f"{'long' * 99}.yaml"):  # fmt: skip
         assert not is_building(other)
     with pytest.raises(hn.ModelError, match="it is that of a building, expected one of a map"):
         hn.load(folder / "b.hnm")

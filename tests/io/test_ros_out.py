@@ -119,6 +119,8 @@ def test_the_description_is_yaml_as_map_saver_writes_it(tmp_path: Path) -> None:
 
 def test_a_map_that_cannot_be_written_is_refused_in_one_line(tmp_path: Path) -> None:
     grid = hn.example_map("figure1")
+    with pytest.raises(hn.InvalidValueError, match="expected an OccupancyGrid"):
+        hn.write_ros_map(grid.classes, tmp_path / "map.yaml")  # type: ignore[arg-type]
     with pytest.raises(hn.MapError, match=r"must be named \.yaml"):
         hn.write_ros_map(grid, tmp_path / "map.pgm")
     with pytest.raises(hn.MapError, match="cannot write"):

@@ -248,7 +248,7 @@ def test_a_seed_is_a_whole_number(seed):
 
 @pytest.mark.parametrize("distance", ["4", None, [4.0], 4 + 0j])
 def test_a_merge_distance_is_a_number(distance):
-    with pytest.raises((hn.InvalidValueError, TypeError)):
+    with pytest.raises(hn.InvalidValueError, match="merge distance must be a positive number"):
         built([".."], merge_distance_m=distance)
 
 
@@ -257,6 +257,31 @@ def test_a_merge_distance_is_any_kind_of_number(distance):
     pyramid = built(["......"], merge_distance_m=distance)
     assert pyramid.merge_distance_m == 4.0
     assert type(pyramid.merge_distance_m) is float
+
+
+@pytest.mark.parametrize("most_cells", [np.int64(3), np.uint8(3)])
+def test_regions_take_any_whole_number(most_cells):
+    pyramid = built(["......"], merge_distance_m=2.0)
+    assert pyramid.with_regions(most_cells).region_cells == 3
+    for wrong in (0, -1, 2.0, True, "3", None):
+        with pytest.raises(hn.InvalidValueError, match="expected a whole number >= 1"):
+            pyramid.with_regions(wrong)
+
+
+def test_a_level_above_the_apex_is_an_index_error():
+    pyramid = built(["......"], merge_distance_m=2.0)
+    for ask in (pyramid.parent, pyramid.contraction_kernel, pyramid.removal_kernel):
+        with pytest.raises(IndexError, match="the pyramid has levels 0 to"):
+            ask(-1)
+    with pytest.raises(IndexError, match="the pyramid has levels 0 to"):
+        pyramid.ancestor(0, level=0, to=99)
+
+
+def test_above_the_rooms_fields_of_one_class_merge_and_no_others():
+    lines = ["..??", "..??"]
+    rooms = hn.RoomLabels(("west", "east"), np.tile([0, 1, 0, 1], (2, 1)))
+    pyramid = DualGraphPyramid.build(occupancy_grid(drawn(*lines)), rooms=rooms)
+    assert [pyramid[at].n_vertices for at in (pyramid.room_level, -1)] == [4, 2]
 
 
 @pytest.mark.parametrize("index", [1, -2, 99])

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from hybridnav.view import connections
+from hybridnav.errors import InvalidValueError
+from hybridnav.view import connections, serve
 from tests.view.server import TOKEN, folder_in, served, session_of
 
 if TYPE_CHECKING:
@@ -104,3 +105,9 @@ def test_a_connection_that_asks_twice_slowly_is_kept(client: Client) -> None:
             assert json.loads(kept.getresponse().read())["rooms"]
             time.sleep(0.7)  # longer than a request may take
     assert len(ports) == 1
+
+
+def test_a_port_that_is_none_is_refused(tmp_path: Path) -> None:
+    session = session_of(folder_in(tmp_path) / "four.yaml")
+    with pytest.raises(InvalidValueError, match="port 70000 cannot be used: expected one from 0"):
+        serve(session, tmp_path, port=70_000)

@@ -80,7 +80,7 @@ ToleranceOption = Annotated[
         "--tolerance",
         metavar="D",
         help="How far outlines may lie from the cells, in metres, before they are straightened.",
-        show_default="the least with which the file has 20 kB",
+        show_default="the least with which the file has at most 20 kB",
     ),
 ]
 AllOption = Annotated[

@@ -24,7 +24,8 @@ def doubtful_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
 
     The doubtful occupied cells are taken away. Each connected set of cells that a robot could then
     reach in addition, and from which it could see unexplored cells beside, has one spot: its first
-    neighbour, in the order of rows, among the cells that the robot can reach.
+    neighbour, in the order of rows, among the cells that the robot can reach. A cell beside several
+    sets counts for one of them.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ import numpy as np
 from hybridnav._progress import no_progress
 from hybridnav.errors import InvalidValueError
 from hybridnav.explore.robot import Robot, laser_all_round
+from hybridnav.grid.checks import checked_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 By = Literal["path", "frontier", "room"]
 """How goals are ranked."""
 MOST_GOALS = 10_000
-"""Goals after which an exploration ends, whatever is left."""
+"""Choices after which an exploration ends, whatever is left."""
 _LEAVES_M = 3.0
 """Cost of the nearest goal from which the robot leaves where it is, and first looks round there for
 doors that its map may have closed."""
@@ -77,15 +78,15 @@ class Exploration:
     driven_m: float
     """Metres driven."""
     n_goals: int
-    """Goals that the robot chose."""
+    """Goals that the robot drove to; a look again on the way there is none."""
     n_given_up: int
-    """Unexplored cells that stayed so although the robot stood beside them."""
+    """Unexplored cells given up: they stayed so on three visits, or no path led there."""
     n_looks_again: int
     """Spots from which the robot scanned doubtful cells and narrow gaps again."""
     share_known: float
     """Share of the floor plan's free cells in the robot's reach that its map knows."""
     is_complete: bool
-    """Whether no goal was left; False if the number of goals ended the exploration. A door that is
+    """Whether no goal was left; False where the number of choices ended it. A door that is
     closed in the map may still hide what `share_known` leaves."""
     seconds: dict[str, float] = field(repr=False)
     """Seconds of computing: mapping, pyramid, goals, rooms, planning."""
@@ -108,7 +109,7 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     can drive to are its goals. It plans to the nearest one by the cost of the path (Yamauchi 1997),
     on the places that it knows, by the preset `paper`; scans on the way; and chooses again when it
     is there or the goal has become known from afar. An unexplored cell that stays unexplored
-    although the robot stood beside it is given up.
+    on three visits, or that no path leads to, is given up.
 
     Noise can close a door or a gap in the map. So when no goal is left, the robot drives back the
     way it came if that leads to a part of its map with goals. Else it takes the occupied cells away
@@ -127,14 +128,15 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     sensor
         By default a laser of 360 beams all round with a range of 8 m and a noise of 1 cm.
     seed
-        Seed of the sensor's noise and of the pyramid.
+        Seed of the sensor's noise and of the pyramid, a whole number >= 0.
     by
         How goals are ranked. `"path"`: by the cost of the path alone. `"frontier"`: by the same,
         the robot drives to each goal although it has become known, as Yamauchi's does, and it
         looks again only when no goal is left.
         `"room"`: as `"path"`, but goals in the room that the robot is in come first.
     most_goals
-        Goals after which the exploration ends, from 1.
+        Choices after which the exploration ends, from 1 to 10,000: of goals, and of drives back and
+        looks again, which count alike.
     watch
         Called with a `Step` at each choice, and at the end.
     progress
@@ -148,8 +150,8 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     Raises
     ------
     InvalidValueError
-        When the start is not in a free cell, the number of goals is out of range, or there is no
-        such ranking.
+        When the start is not in a free cell, the number of goals or the seed is out of range, there
+        is no such ranking, or noise leaves no free cell round the robot.
 
     Examples
     --------
@@ -160,8 +162,8 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     >>> explore(plan, most_goals=1).n_goals <= 1
     True
     """
-    if not 1 <= most_goals <= MOST_GOALS:
-        raise InvalidValueError(f"most_goals must be from 1 to {MOST_GOALS}, got {most_goals}")
+    most_goals = checked_whole("most_goals", most_goals, 1, MOST_GOALS)
+    seed = checked_whole("seed", seed, 0, 2**63 - 1)
     if by not in get_args(By):
         raise InvalidValueError(f"by must be one of {', '.join(get_args(By))}, got {by!r:.40}")
     robot = Robot(world, start, laser_all_round() if sensor is None else sensor, seed)

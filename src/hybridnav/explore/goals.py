@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Goals:
-    """The frontiers of a map: each arc from a free place to an unexplored one, seen from the robot.
+    """The unexplored places that a robot can drive up to, each with the free cell to drive to.
 
-    A frontier after Yamauchi (1997) is the boundary between free and unexplored cells; in the
-    topological map it is an arc, and the unexplored place behind it a node, as in the source paper.
+    A frontier after Yamauchi (1997) is the boundary between free and unexplored cells. In the
+    topological map unexplored places are nodes, as in the source paper, and frontiers arcs between
+    them and free places; all frontiers of one unexplored place are one goal.
 
     Examples
     --------
@@ -34,7 +35,7 @@ class Goals:
     """
 
     cells: LongArray = field(repr=False)
-    """int64 (n, 2), the free cell of each frontier that costs least to reach."""
+    """int64 (n, 2), of the free cells beside each place the one that costs least to reach."""
     beyond: LongArray = field(repr=False)
     """int64 (n, 2), the unexplored cell beside it."""
     costs_m: FloatArray = field(repr=False)
@@ -42,7 +43,7 @@ class Goals:
     places: LongArray = field(repr=False)
     """int64 (n,), the unexplored place of each."""
     sizes: LongArray = field(repr=False)
-    """int64 (n,), cell sides of the frontiers."""
+    """int64 (n,), cell sides of the frontiers of each place that the robot can reach."""
 
     @classmethod
     def of(cls, topology: TopologicalMap, cell: tuple[int, int], left_out: BoolArray) -> Goals:

@@ -42,7 +42,10 @@ def cells_in_reach(plan: OccupancyGrid, start: tuple[float, float]) -> BoolArray
     """Return the cells of a walled plan that a robot can reach, bool (rows, cols)."""
     from scipy import ndimage  # noqa: PLC0415 - half a second
 
-    point = np.asarray(start, dtype=np.float64)
+    try:
+        point = np.asarray(start, dtype=np.float64)
+    except (TypeError, ValueError):
+        point = np.empty(0)
     if point.shape != (2,) or not np.isfinite(point).all():
         raise InvalidValueError(f"the start must be two finite metres (x, y), got {start!r:.60}")
     row, col = plan.frame.cells_of(point).tolist()

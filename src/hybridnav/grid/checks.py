@@ -39,6 +39,34 @@ def checked_type(name: str, value: Any, kind: type[_T]) -> _T:
     )
 
 
+def checked_whole(name: str, value: Any, low: int, high: int) -> int:
+    """Return a whole number in a range.
+
+    Parameters
+    ----------
+    name
+        What the caller calls it.
+    value
+        What was given.
+    low, high
+        The least and the greatest number.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is no whole number, or lies outside the range.
+    """
+    try:
+        found = operator.index(value)
+    except TypeError:
+        found = low - 1
+    if low <= found <= high:
+        return found
+    raise InvalidValueError(
+        f"{name} must be a whole number from {low} to {high}, got {brief(value)}"
+    )
+
+
 def checked_radius(radius_m: Any) -> float:
     """Return the radius of a robot in metres.
 

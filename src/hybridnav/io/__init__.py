@@ -1,4 +1,4 @@
-"""Readers of maps, benchmarks, examples, logs, rooms, closed areas; maps and rooms out; models.
+"""Files in and out: maps, rooms, closed areas, masks, logs, bags, graphs, buildings, models.
 
 Names load on first use: rooms need scipy, models and closed areas numba, a map file neither.
 """

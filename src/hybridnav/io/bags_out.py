@@ -43,7 +43,7 @@ def save_bag(  # noqa: PLR0913 - the last five have defaults
     ----------
     path
         A name that ends in .bag makes a file of ROS 1; any other one a folder of ROS 2. Nothing may
-        have that name.
+        have that name; folders that it lacks are made.
     plans
         Results of a planner.
     grid
@@ -81,9 +81,9 @@ def save_bag(  # noqa: PLR0913 - the last five have defaults
     if not messages:
         raise InvalidValueError(f"{where}: nothing to write, expected a plan with a path, or a map")
     check_rosbags(where)
-    if target.exists():
-        raise MapError(f"{where}: the name is taken, expected a new one: bags are not replaced")
     try:
+        if target.exists():
+            raise MapError(f"{where}: the name is taken, expected a new one: bags are not replaced")
         _write(target, messages, storage)
     except OSError as error:
         raise MapError(f"{where}: cannot write: {error.strerror}") from None

@@ -79,8 +79,8 @@ def load_blocked(
     MapNotFoundError
         When the file does not exist.
     MapError
-        When the file cannot be read, closes nothing, an area closes no cell of the map, or a mask
-        is not of the map's size.
+        When the file cannot be read, closes nothing, an area does not meet the map, or an image is
+        not of the map's size.
     InvalidValueError
         When the pose is out of range, or given for a file that is no mask of map_server.
 

@@ -37,7 +37,10 @@ def is_building(path: PathLike) -> bool:
     """
     file = Path(path)
     suffix = file.suffix.lower()
-    if not file.is_file():
+    try:
+        if not file.is_file():
+            return False
+    except OSError:  # a name that is too long
         return False
     if suffix == MODEL_SUFFIX:
         from hybridnav.io.models.buildings import is_building_model  # noqa: PLC0415 - on demand

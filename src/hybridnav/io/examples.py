@@ -22,7 +22,7 @@ def example_map(name: str = "office", *, robot_radius_m: float | None = None) ->
     Parameters
     ----------
     name
-        `"office"`, a floor of 42 x 25 m as in a scan, or `"figure1"`, the small map of the source
+        `"office"`, a floor of 42 x 25 m as in a scan, or `"figure1"`, a small map after the source
         paper's Fig. 1.
     robot_radius_m
         Radius in metres: a cell is blocked when its centre lies within it of the centre of an

@@ -45,8 +45,8 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     topology
         The map; with rooms, nodes in rooms have the room's name as `name`, edges that pass a door
         have it as `door_name`, and the floor has areas, and the listed doors and openings that an
-        edge passes: none that are closed to the robot, or lead nowhere. A door is called
-        "FLOOR_doorNUMBER".
+        edge passes: none that are closed to the robot, or lead nowhere. They are called
+        "FLOOR_doorNUMBER" and "FLOOR_openingNUMBER".
     graph
         Its route graph, as `build_route_graph` and `keep_right` make it.
     name

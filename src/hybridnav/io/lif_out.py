@@ -61,7 +61,7 @@ def export_lif(
     Raises
     ------
     InvalidValueError
-        When no vehicle type is given, or the time has no zone.
+        When this is no building graph, no vehicle type is given, or the time has no zone.
     MapError
         When the name ends otherwise, or the file cannot be written.
 

@@ -30,6 +30,8 @@ def write_movingai_map(grid: OccupancyGrid, path: PathLike) -> None:
 
     Raises
     ------
+    InvalidValueError
+        When the map is none.
     MapError
         When the name does not end so, or the file cannot be written.
 

@@ -43,8 +43,8 @@ def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str
     Raises
     ------
     InvalidValueError
-        When the graph has no edge, which Nav2 refuses, the frame has no name, or a fact contains
-        itself.
+        When this is no graph, the graph has no edge, which Nav2 refuses, or more nodes and edges
+        than Nav2 has ids, the frame has no name, or a fact contains itself.
     MapError
         When the name ends otherwise, or the file cannot be written.
 

@@ -70,7 +70,7 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
     Raises
     ------
     InvalidValueError
-        When the building or the anchor is none.
+        When this is no building graph, or no anchor.
     MapError
         When the name ends otherwise, or the file cannot be written.
 

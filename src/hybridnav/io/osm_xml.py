@@ -13,7 +13,7 @@ from hybridnav.errors import MapError
 from hybridnav.graphs.gather import number_of, shown
 
 MOST_BYTES = 2**25
-"""Most characters of a file: a building of a million edges takes half a gigabyte of memory."""
+"""Most characters of a file: some 100,000 ways, which take 150 MB of memory."""
 _ENCODINGS = ("UTF-8", "UTF8", "US-ASCII", "ASCII")
 """Those that an XML declaration may state: files are read as UTF-8."""
 _HEAD = 4096

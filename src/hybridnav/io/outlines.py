@@ -68,8 +68,8 @@ class Outlines:
         -------
         list
             Rings of each room, outer ones and holes, float64 (n, 2), `(x, y)` in metres, map frame,
-            rounded to centimetres, or finer where cells are below 5 cm. Filled by the even-odd rule
-            they form the room.
+            rounded to centimetres, or finer where cells are below 5 cm or a room is too thin.
+            Filled by the even-odd rule they form the room.
         """
         side_m = self._grid.resolution_m
         simple = _simplified(self._borders.lines, _SLACK * tolerance_m / side_m)

@@ -32,7 +32,7 @@ def check_png(stream: BinaryIO) -> None:
     Parameters
     ----------
     stream
-        The file, seekable; its position is restored.
+        The file, seekable; its position is restored unless it is damaged.
 
     Raises
     ------

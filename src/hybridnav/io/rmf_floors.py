@@ -94,8 +94,8 @@ class RmfLift:
 def building_of(
     floors: Iterable[RmfFloor], lifts: Mapping[str, RmfLift], name: str, where: str
 ) -> BuildingGraph:
-    """Return what was read; floors without vertices, and lifts that stop at fewer than two others,
-    are left out.
+    """Return what was read, without floors that have no vertices, and without lifts that stop at
+    fewer than two of the rest.
 
     Parameters
     ----------

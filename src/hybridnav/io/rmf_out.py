@@ -72,7 +72,8 @@ def export_rmf(
     ------
     InvalidValueError
         When a lift has ends that lie more than 0.5 m apart: `building.align_floors` brings floors
-        into one frame. When two lifts end at one node, or no floor has an edge.
+        into one frame. When this is no building graph, a side of a cabin is not positive and
+        finite, two lifts end at one node, or no floor has an edge.
     MapError
         When the name ends otherwise, or the file cannot be written.
 

@@ -12,7 +12,8 @@ import yaml
 
 from hybridnav._files import printable, replace_file
 from hybridnav.errors import InvalidValueError, RoomsError
-from hybridnav.grid import NO_ROOM, CellClass
+from hybridnav.grid import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
+from hybridnav.grid.checks import checked_type
 from hybridnav.io.outlines import Outlines, decimals_of
 from hybridnav.io.rooms_cells import fingerprint, packed
 from hybridnav.io.rooms_entries import LIMITS, Outline, Read, in_cells
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from hybridnav._typing import BoolArray, FloatArray, IntArray, PathLike
-    from hybridnav.grid import OccupancyGrid, RoomLabels
     from hybridnav.grid.room_labels import Point
 
 _MOST_BYTES = 20_000
@@ -55,14 +55,14 @@ def save_rooms(
         The map.
     tolerance_m
         How far outlines may lie from the steps of the cells, in metres, before they are brought
-        into line with walls; None for the least of 0.05, 0.075, 0.1, 0.15, ... 0.6 m with which the
-        file has 20 kB.
+        into line with walls; None for the least of twelve from 0.05 to 0.6 m with which the file
+        has at most 20 kB, else 0.6.
 
     Raises
     ------
     InvalidValueError
-        When the tolerance is not positive and finite, or the rooms are those of a map of another
-        size.
+        When the tolerance is not positive and finite, these are no rooms or no map, or the rooms
+        are those of a map of another size.
     RoomsError
         When the file cannot be written, or could not be read again: a room has no free cell, a
         named point lies outside the map or in an obstacle, or there are too many rooms.
@@ -77,6 +77,8 @@ def save_rooms(
     """
     if tolerance_m is not None and not 0 < tolerance_m < math.inf:
         raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
+    checked_type("rooms", rooms, RoomLabels)
+    checked_type("grid", grid, OccupancyGrid)
     where = f"rooms {printable(path)}"
     if rooms.label_of.shape != grid.shape:
         raise InvalidValueError(

@@ -11,11 +11,11 @@ import yaml
 
 from hybridnav._files import printable, replace_file
 from hybridnav.errors import MapError
-from hybridnav.grid import CellClass
+from hybridnav.grid import CellClass, OccupancyGrid
+from hybridnav.grid.checks import checked_type
 
 if TYPE_CHECKING:
     from hybridnav._typing import ByteArray, PathLike
-    from hybridnav.grid import OccupancyGrid
 
 _WHITE = 255
 _UNKNOWN_GREY = 205
@@ -28,7 +28,8 @@ def write_ros_map(grid: OccupancyGrid, path: PathLike) -> None:
     A cell of occupancy p becomes a pixel of brightness 255 (1 - p), rounded, but never across a
     threshold: free, occupied and unexplored cells stay what they are. Cells that were never
     measured become grey 205, or the nearest grey that the thresholds call unexplored. A map that
-    was read from an image of 8 bits is written with equal pixels.
+    was read from grey of 8 bits, in the mode trinary or scale and without `negate`, is written with
+    equal pixels.
 
     The robot's radius and dropped islands are no part of such a map: what was measured is written.
 
@@ -42,6 +43,8 @@ def write_ros_map(grid: OccupancyGrid, path: PathLike) -> None:
 
     Raises
     ------
+    InvalidValueError
+        When the map is none.
     MapError
         When the name does not end so, a file cannot be written, or cells are of a class for which
         the thresholds leave no grey.
@@ -52,6 +55,7 @@ def write_ros_map(grid: OccupancyGrid, path: PathLike) -> None:
     >>> hn.load_map("figure1.yaml").class_counts() == hn.example_map("figure1").class_counts()
     True
     """
+    checked_type("grid", grid, OccupancyGrid)
     target = Path(path)
     where = f"map {printable(target)}"
     if target.suffix.lower() not in {".yaml", ".yml"}:

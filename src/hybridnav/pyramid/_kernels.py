@@ -38,7 +38,7 @@ class Vertices(NamedTuple):
     """int32 (n, 4), the field's least row and column and greatest row and column."""
     classes: np.ndarray
     """uint8, uint16 or int32 (n,), the kind of each vertex: only equal ones merge (see
-    `decimation`)."""
+    `start.kinds_of`)."""
     whole_at: np.ndarray
     """uint8 (n,), the level from which the vertex is whole: below it, its block is in pieces."""
 
@@ -315,8 +315,8 @@ def select_stars(
     """Fill in the stars of a maximal matching (MIES): the parent of each vertex and the dart to it.
 
     A matched edge whose endpoints both gained leaves is dropped, so that no tree has diameter
-    three. In a pair without leaves, the vertex with the smaller merged radius survives; the hash
-    breaks ties.
+    three. In a pair without leaves of which either may survive, the one survives from which the
+    corners of the box round both fields lie less far; the hash breaks ties.
 
     Parameters
     ----------

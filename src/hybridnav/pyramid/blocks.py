@@ -1,10 +1,10 @@
 """The lower levels of open ground in closed form: blocks.
 
-A *block* is an aligned square of 2, 4 or 8 cells a side, all of one class, in the middle of more of
-its class. Its cells are contracted along a quadtree, first pairs along rows (levels 1, 3, 5), then
-pairs of those along columns (levels 2, 4, 6), and until it is whole no other vertex joins it: a
-block of side 2^p is one vertex from level 2p on. The place of a cell or edge in its block alone
-decides when and how it goes, so the darts inside a block are never built.
+A *block* is an aligned square of 2, 4 or 8 cells a side, all of one class; those of 4 and 8 lie in
+the middle of more of their class. Its cells are contracted along a quadtree, first pairs along
+rows (levels 1, 3, 5), then pairs of those along columns (levels 2, 4, 6), and until it is whole no
+other vertex joins it: a block of side 2^p is one vertex from level 2p on. The place of a cell or
+edge in its block alone decides when and how it goes, so the darts inside a block are never built.
 """
 
 from __future__ import annotations

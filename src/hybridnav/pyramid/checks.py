@@ -21,9 +21,13 @@ if TYPE_CHECKING:
 
 def checked_settings(merge_distance_m: float, linkage: str, seed: int) -> int:
     """Return the seed if all settings of a pyramid are in range."""
-    if math.isnan(merge_distance_m) or merge_distance_m <= 0:
+    try:
+        is_none = math.isnan(merge_distance_m)
+    except TypeError:
+        is_none = True
+    if is_none or merge_distance_m <= 0:
         raise InvalidValueError(
-            f"merge distance must be a positive number of metres, got {merge_distance_m}"
+            f"merge distance must be a positive number of metres, got {brief(merge_distance_m)}"
         )
     if linkage not in get_args(Linkage):
         raise InvalidValueError(
@@ -33,6 +37,19 @@ def checked_settings(merge_distance_m: float, linkage: str, seed: int) -> int:
         return operator.index(seed)
     except TypeError:
         raise InvalidValueError(f"seed must be a whole number, got {seed!r:.80}") from None
+
+
+def checked_most_cells(most_cells: int) -> int:
+    """Return the most cells of a region."""
+    try:
+        found = 0 if isinstance(most_cells, bool) else operator.index(most_cells)
+    except TypeError:
+        found = 0
+    if found < 1:
+        raise InvalidValueError(
+            f"regions have at most {brief(most_cells)} cells, expected a whole number >= 1"
+        )
+    return found
 
 
 def check_fit(grid: OccupancyGrid, rooms: RoomLabels | None, resistance: Resists | None) -> None:

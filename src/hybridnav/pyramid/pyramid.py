@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid.checks import check_fit, checked_settings, checked_vertices
+from hybridnav.pyramid.checks import (
+    check_fit,
+    checked_most_cells,
+    checked_settings,
+    checked_vertices,
+)
 from hybridnav.pyramid.lazy_islands import LazyIslands
 from hybridnav.pyramid.level import Level
 
@@ -70,18 +75,18 @@ class DualGraphPyramid:
         rooms: RoomLabels | None = None,
         resistance: Resists | None = None,
     ) -> DualGraphPyramid:
-        """Contract the cells of a grid to places and, with rooms, further to rooms and a building.
+        """Contract the cells of a grid to places and, with rooms, further to rooms and the apex.
 
         At each level the stars of a maximal independent edge set are contracted (MIES; Haxhimusa
         and Kropatsch), and edges that have become redundant are removed, so that every arc of a
-        level is exactly one connected boundary between two fields of one class.
+        level is exactly one connected boundary between two fields. A field has cells of one class.
 
         Parameters
         ----------
         grid
             The map; its free and unexplored cells are the vertices of the base.
         merge_distance_m
-            U_d in metres, positive, infinity allowed: how coarse the apex is.
+            U_d in metres, positive, infinity allowed: how coarse the places are.
         linkage
             The distance that stays strictly below U_d, between cell centres, to 1e-9 of its square.
             `"survivor"`: the distance between the two surviving cells when one is contracted into
@@ -93,8 +98,8 @@ class DualGraphPyramid:
         rooms
             The room of each cell. No two rooms ever merge at the levels of the places. Above them,
             all places of a class that are connected inside one room merge whatever U_d is, which
-            makes `room_level`; cells outside rooms count as one room. Above that, all fields that
-            touch merge, up to the apex, the building.
+            makes `room_level`; cells outside rooms count as one room. Above that, all fields of one
+            class that touch merge, up to the apex.
         resistance
             Lets contraction go on above the places, whatever U_d is, until every arc of the apex
             resists; rooms are found so. Not with rooms, which decide themselves what merges.
@@ -104,7 +109,7 @@ class DualGraphPyramid:
         InvalidValueError
             When the merge distance is not positive, the linkage is not known, the seed is no
             whole number, the rooms or the resistance are those of a grid of another shape, or
-            both are given.
+            both are given; or when the map needs more than 126 levels.
         """
         seed = checked_settings(merge_distance_m, linkage, seed)
         check_fit(grid, rooms, resistance)
@@ -135,7 +140,7 @@ class DualGraphPyramid:
         between two fields over the product of their areas, both in cells. Regions are what has
         grown when no two fields may merge without having more than so many cells. From there
         contraction goes on without this limit. With rooms, regions lie inside rooms, and the levels
-        of the rooms and of the building come above them.
+        of the rooms and of the apex come above them.
 
         Parameters
         ----------
@@ -156,10 +161,7 @@ class DualGraphPyramid:
             When the number is not a whole number >= 1; when regions are given to a pyramid with
             rooms, or they are no connected sets of places of one class with so many cells.
         """
-        if isinstance(most_cells, bool) or not isinstance(most_cells, int) or most_cells < 1:
-            raise InvalidValueError(
-                f"regions have at most {most_cells!r:.60} cells, expected a whole number >= 1"
-            )
+        most_cells = checked_most_cells(most_cells)
         if self.region_cells == most_cells and region_of is None:
             return self
         if self._below is not None:
@@ -288,6 +290,8 @@ class DualGraphPyramid:
         ------
         InvalidValueError
             When `to` is below `level`, or there is no such vertex.
+        IndexError
+            When there is no such level.
         """
         lower, upper = self._in_order(level, to)
         rows, cols = np.moveaxis(
@@ -315,18 +319,34 @@ class DualGraphPyramid:
         ------
         InvalidValueError
             When `to` is above `level`, or there is no such vertex.
+        IndexError
+            When there is no such level.
         """
         lower, upper = self._in_order(to, level)
         found = checked_vertices(vertex, upper.index, upper.n_vertices)
         return np.flatnonzero(upper.field_of[tuple(lower.cells.T)] == found)
 
     def parent(self, level: int) -> IntArray:
-        """Return the vertex of the next level above each vertex of `level`, int32 (n_vertices,)."""
+        """Return the vertex of the next level above each vertex of `level`, int32 (n_vertices,).
+
+        Raises
+        ------
+        IndexError
+            When there is no such level, or none above it.
+        """
         below = self[level]
         return self.ancestor(np.arange(below.n_vertices), level=below.index, to=below.index + 1)
 
     def children(self, level: int, vertex: int) -> LongArray:
-        """Return the reduction window of a vertex of `level`, int64: its sons one level down."""
+        """Return the reduction window of a vertex of `level`, int64: its sons one level down.
+
+        Raises
+        ------
+        InvalidValueError
+            When the level is the base, or there is no such vertex.
+        IndexError
+            When there is no such level.
+        """
         above = self[level].index
         if above == 0:
             raise InvalidValueError("nothing lies below level 0, the base")
@@ -336,11 +356,22 @@ class DualGraphPyramid:
         """Return the arcs of `level` that are contracted on the way to the next level, int64.
 
         They form a forest of stars, one for each reduction window.
+
+        Raises
+        ------
+        IndexError
+            When there is no such level, or none above it.
         """
         return self._kernel(level, removed=False)
 
     def removal_kernel(self, level: int) -> LongArray:
-        """Return the arcs of `level` that are removed as redundant below the next level, int64."""
+        """Return the arcs of `level` that are removed as redundant below the next level, int64.
+
+        Raises
+        ------
+        IndexError
+            When there is no such level, or none above it.
+        """
         return self._kernel(level, removed=True)
 
     def _kernel(self, level: int, *, removed: bool) -> LongArray:

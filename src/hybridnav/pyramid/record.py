@@ -62,4 +62,5 @@ class BuildStats:
     sizes: list[LevelSize] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
     tops: list[int] = field(default_factory=list)
-    """Levels at which contraction ended: the places; with rooms, also the rooms and the apex."""
+    """Levels at which contraction ended: the places; then, as far as there are any, the regions and
+    the rooms; and the apex, where contraction went on above the places."""

@@ -95,7 +95,7 @@ def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None =
     Parameters
     ----------
     kinds
-        uint8 or uint16 (rows, cols); see `kinds_of`.
+        uint8, uint16 or int32 (rows, cols); see `kinds_of`.
     limit
         See `squared_limit`; no block is wider than half of it.
     in_blocks
@@ -118,7 +118,7 @@ def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
     record
         The record of its pyramid; it is copied.
     kinds
-        uint8 or uint16 (rows, cols), kinds that no field of the level mixes.
+        uint8, uint16 or int32 (rows, cols), kinds that no field of the level mixes.
     """
     record = record.up_to(level.index)
     cols = kinds.shape[1]

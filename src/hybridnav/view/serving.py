@@ -41,7 +41,7 @@ def serve(
     Raises
     ------
     InvalidValueError
-        When the port is taken, or the extra `view` is not installed.
+        When the port is taken or out of range, or the extra `view` is not installed.
     HybridNavError
         When the map cannot be prepared.
 
@@ -75,8 +75,9 @@ def serve(
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind(("127.0.0.1", port))
-        except OSError as error:
-            raise InvalidValueError(f"port {port} cannot be used: {error.strerror}") from None
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", "expected one from 0 to 65535")
+            raise InvalidValueError(f"port {port} cannot be used: {reason}") from None
         listening.listen(MOST_CONNECTIONS)
         port = listening.getsockname()[1]
         app = make_app(shown, token=token, port=port, folder=folder)

@@ -229,7 +229,15 @@ class Session:
             return self._kept()
 
     def undo(self, version: int) -> dict[str, Any]:
-        """Take the last change back that is not saved."""
+        """Take the last change back that is not saved.
+
+        Raises
+        ------
+        ConflictError
+            As by `edit`.
+        InvalidValueError
+            When there is none.
+        """
         with self._lock:
             self._check_version(version)
             if not self._changes:
@@ -247,6 +255,8 @@ class Session:
         ------
         ConflictError
             When the page shows an older version, or somebody else has changed the file.
+        InvalidValueError
+            When the rooms have no file.
         RoomsError
             When the file cannot be written; the rooms stay on the page.
         """

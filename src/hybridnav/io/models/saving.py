@@ -37,8 +37,9 @@ def save(
     Parameters
     ----------
     thing
-        A planner, with its grid, its topological map, and everything that it has prepared so far:
-        call `HybridPlanner.prepare` first to include all. Or several planners on one topological
+        A planner, with its grid, its topological map, and what it has prepared so far, but the
+        overlay, which changes with the costs: call `HybridPlanner.prepare` first to include all.
+        Or several planners on one topological
         map, such as those of several presets. Or only such a map, a grid or a `Model`. Or a
         `Building`, which `load_building` loads.
     path
