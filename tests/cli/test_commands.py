@@ -561,3 +561,19 @@ def test_a_result_is_not_lost_with_its_picture(cli, rooms, tmp_path):
     assert (done.code, done.answer["status"]) == (2, "solved")
     assert done.err.count("\n") == 1
     assert "a.png" in done.err
+
+
+BUILDING = MAPS / "building" / "building.yaml"
+
+
+@pytest.mark.parametrize("command", ["plan", "build", "view", "export", "check"])
+def test_help_of_what_takes_buildings_says_so(cli, command):
+    assert "building of several floors (.yaml or .hnm)" in " ".join(
+        cli(command, "--help").out.split()
+    )
+
+
+@pytest.mark.parametrize("command", ["show", "rooms", "explore", "replay"])
+def test_a_building_where_a_map_is_meant_is_named(cli, command):
+    assert cli(command, BUILDING).refuses(3, "a building, expected one map: name that of a floor")
+    assert "of several floors" not in cli(command, "--help").out

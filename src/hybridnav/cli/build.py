@@ -36,7 +36,7 @@ from hybridnav.cli.errors import UsageError
 from hybridnav.cli.options import (
     FreeOption,
     LeastIslandOption,
-    MapArgument,
+    MapOrBuildingArgument,
     MaxCellsOption,
     OccupiedOption,
     RadiusOption,
@@ -70,7 +70,7 @@ CompressOption = Annotated[
 
 def build(
     ctx: typer.Context,
-    map_file: MapArgument,
+    map_file: MapOrBuildingArgument,
     out: OutOption,
     preset: PresetsOption = None,
     overrides: SetOption = None,

@@ -49,7 +49,7 @@ from hybridnav.cli.options import (
     GraphFloorOption,
     JsonOption,
     LeastIslandOption,
-    MapArgument,
+    MapOrBuildingArgument,
     MaxCellsOption,
     OccupiedOption,
     PlotOption,
@@ -90,7 +90,7 @@ IgnoreOption = Annotated[
 
 def check(
     ctx: typer.Context,
-    map_file: MapArgument,
+    map_file: MapOrBuildingArgument,
     graph_file: GraphArgument,
     out: PageOption = None,
     floor: GraphFloorOption = None,

@@ -79,7 +79,13 @@ ByOption = Annotated[
     ),
 ]
 GoalsOption = Annotated[
-    int | None, typer.Option("--most-goals", metavar="N", min=1, help="End after N goals.")
+    int | None,
+    typer.Option(
+        "--most-goals",
+        metavar="N",
+        min=1,
+        help="End after N choices: of goals, of drives back, of looks again.",
+    ),
 ]
 AnimationOption = Annotated[
     Path | None,

@@ -40,7 +40,7 @@ from hybridnav.cli.options import (
     FreeOption,
     JsonOption,
     LeastIslandOption,
-    MapArgument,
+    MapOrBuildingArgument,
     MaxCellsOption,
     OccupiedOption,
     PlotOption,
@@ -138,7 +138,7 @@ ReportOption = Annotated[
 
 def export(
     ctx: typer.Context,
-    map_file: MapArgument,
+    map_file: MapOrBuildingArgument,
     out: OutOption,
     kind: FormatOption = "nav2",
     nodes: NodesOption = None,

@@ -9,6 +9,14 @@ MapArgument = Annotated[
     Path,
     typer.Argument(metavar="MAP", help="ROS map (.yaml), MovingAI map (.map) or model (.hnm)."),
 ]
+MapOrBuildingArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="MAP",
+        help="ROS map (.yaml), MovingAI map (.map) or model (.hnm), or a building of several "
+        "floors (.yaml or .hnm).",
+    ),
+]
 PresetOption = Annotated[
     str | None,
     typer.Option(

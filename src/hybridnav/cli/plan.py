@@ -34,7 +34,7 @@ from hybridnav.cli.options import (
     FreeOption,
     JsonOption,
     LeastIslandOption,
-    MapArgument,
+    MapOrBuildingArgument,
     MaxCellsOption,
     OccupiedOption,
     PlotOption,
@@ -87,10 +87,18 @@ GoalOption = Annotated[
     ),
 ]
 FromOption = Annotated[
-    str | None, typer.Option("--from", metavar="ROOM|X,Y", help="Start in a room, or at a point.")
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="ROOM|X,Y",
+        help="Start in a room, or at a point; FLOOR:ROOM in a building.",
+    ),
 ]
 ToOption = Annotated[
-    str | None, typer.Option("--to", metavar="ROOM|X,Y", help="Go to a room, or to a point.")
+    str | None,
+    typer.Option(
+        "--to", metavar="ROOM|X,Y", help="Go to a room, or to a point; FLOOR:ROOM in a building."
+    ),
 ]
 ViaOption = Annotated[
     list[str] | None,
@@ -144,7 +152,7 @@ CompareOption = Annotated[
 
 def plan(
     ctx: typer.Context,
-    map_file: MapArgument,
+    map_file: MapOrBuildingArgument,
     start: StartOption = None,
     goal: GoalOption = None,
     origin: FromOption = None,

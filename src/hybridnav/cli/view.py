@@ -25,7 +25,7 @@ from hybridnav.cli.options import (
     BesideRoomsOption,
     FreeOption,
     LeastIslandOption,
-    MapArgument,
+    MapOrBuildingArgument,
     MaxCellsOption,
     OccupiedOption,
     PresetOption,
@@ -78,7 +78,7 @@ BrowserOption = Annotated[
 
 def view(
     ctx: typer.Context,
-    map_file: MapArgument,
+    map_file: MapOrBuildingArgument,
     save: SaveOption = None,
     routes: RouteOption = None,
     port: PortOption = 0,

@@ -190,6 +190,11 @@ def _read_description(
     values = read_yaml(path, what="map", error=MapError, missing=MapNotFoundError)
     where = f"map {printable(path)}"
     required = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+    if "floors" in values:
+        raise MapError(
+            f"{where}: a building, expected one map: name that of a floor, or load it with "
+            "load_building"
+        )
     absent = [key for key in required if key not in values]
     if absent:
         raise MapError(f"{where}: lacks {', '.join(absent)}")
