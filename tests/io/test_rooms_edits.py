@@ -1,6 +1,7 @@
 """What a person does to a file of rooms with a text editor, and what writing it again keeps."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -144,9 +145,10 @@ def test_the_tolerance_may_be_chosen(tmp_path):
     for wrong in (0, -1, float("nan"), float("inf")):
         with pytest.raises(hn.InvalidValueError, match="tolerance_m must be positive and finite"):
             hn.save_rooms(tmp_path / "x.yaml", rooms, grid, tolerance_m=wrong)
-    for one, other in ((rooms.label_of, grid), (rooms, grid.classes)):
+    given: Any
+    for given in ((rooms.label_of, grid), (rooms, grid.classes)):
         with pytest.raises(hn.InvalidValueError, match=r"expected an? (RoomLabels|OccupancyGrid)"):
-            hn.save_rooms(tmp_path / "x.yaml", one, other)
+            hn.save_rooms(tmp_path / "x.yaml", *given)
 
 
 def test_names_may_be_changed(floor, path):

@@ -503,7 +503,7 @@ def test_arguments_that_make_no_sense_are_refused(rooms, plan):
     for optimum in (-1.0, math.nan):
         with pytest.raises(hn.InvalidValueError, match="optimum must be a length"):
             plot_plan(rooms, plan, optimum_m=optimum)
-    for width in (0.0, math.inf):
+    for width in (0.0, math.inf, math.nan, 1e9):
         with pytest.raises(hn.InvalidValueError, match="width must be"):
             plot_map(rooms.grid, width_in=width)
 

@@ -39,7 +39,7 @@ LevelOption = Annotated[
     typer.Option(
         "--level",
         metavar="N",
-        help="Level to describe and draw: 0 the base, -1 the apex; by default the apex, or the regions.",
+        help="Level to describe and draw: 0 the base, -1 the apex; else the apex, or the regions.",
     ),
 ]
 RegionsOption = Annotated[

@@ -173,9 +173,9 @@ def export_places(topology: TopologicalMap, path: PathLike, *, frame: str = "map
     """Write the places of a topological map, and its arcs.
 
     CSV has a line for each place: its id, x and y of its surviving cell, its class, its area in m²,
-    and its room, if it lies in one. GeoJSON has a `Point` for each place with the same properties,
-    and one in the middle of the boundary of each arc, with its id as `arc`, its `places`,
-    `max_distance_m` and `through_m`.
+    and its room, if the map was grown with rooms and it lies in one. GeoJSON has a `Point` for each
+    place with the same properties, and one in the middle of the boundary of each arc, with its id
+    as `arc`, its `places`, `max_distance_m` and `through_m`.
 
     Parameters
     ----------

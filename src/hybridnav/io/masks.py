@@ -30,7 +30,7 @@ def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
     ----------
     path
         YAML file of map_server beside the image; mode `raw`, `scale` or `trinary`. Dark pixels have
-        high values.
+        high values, unless it says `negate`; in the mode `raw` the number of a pixel is the value.
     grid
         The map. The mask may have another resolution, place and size.
     base, multiplier, unit, full_speed_mps
@@ -99,7 +99,7 @@ def load_keepout_mask(
     Returns
     -------
     CostLayer
-        The factors of the map's cells, and in `keepout` those that are closed.
+        The factors of the map's cells, and in `keepout` those that are closed, None without any.
 
     Raises
     ------

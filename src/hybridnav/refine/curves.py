@@ -109,7 +109,7 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
     Raises
     ------
     InvalidValueError
-        When a number is not finite, a heading a million or more, or the radius not positive.
+        When a number is not finite, a heading beyond a million, or the radius not positive.
 
     Examples
     --------
@@ -124,6 +124,6 @@ def shortest_curve(start: Pose, goal: Pose, *, radius_m: float, reverses: bool) 
     if n == 0:
         raise InvalidValueError(
             f"no curve of radius {radius_m} m goes from {start} to {goal}: poses must be finite, "
-            "headings below a million, and the radius positive"
+            "headings up to a million, and the radius positive"
         )
     return Curve(start, kinds[:n], lengths_m[:n], radius_m)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +28,8 @@ MAX_IMAGE_SIDE = 6000
 MAX_HEIGHT = 1.1
 """Greatest height of the map in a new figure, in figure widths."""
 PAD_IN = 0.04
+_MOST_IN = 500
+"""Widest figure in inches: matplotlib draws up to 65,536 pixels, a hundred to the inch."""
 
 
 def new_figure(width_in: float, height: float) -> Figure:
@@ -44,10 +45,12 @@ def new_figure(width_in: float, height: float) -> Figure:
     Raises
     ------
     InvalidValueError
-        When the width is not a positive number.
+        When the width is not positive, or above 500 inches.
     """
-    if not (math.isfinite(width_in) and width_in > 0):
-        raise InvalidValueError(f"width must be a positive number of inches, got {width_in}")
+    if not 0 < width_in <= _MOST_IN:
+        raise InvalidValueError(
+            f"width must be a positive number of inches, at most {_MOST_IN}, got {width_in}"
+        )
     return Figure(figsize=(width_in, height * width_in))
 
 

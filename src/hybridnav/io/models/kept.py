@@ -72,12 +72,14 @@ def key_of(
     Returns
     -------
     str or None
-        None if a file does not exist, or is not a file.
+        None if the image of a map, a map that has none, or the image of rooms does not exist, or is
+        not a file.
 
     Raises
     ------
     MapError
-        When a file does not state which other files belong to it.
+        When a file that names others, the YAML of a map or of rooms, does not exist or does not
+        state them.
     """
     is_ros = map_file.suffix.lower() in {".yaml", ".yml"}
     files = ros.files_of(map_file) if is_ros else [map_file]
