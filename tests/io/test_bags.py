@@ -278,8 +278,8 @@ def test_the_last_map_of_a_topic_counts_and_topics_are_named(tmp_path: Path) -> 
     path = bag.write(tmp_path)
     assert hn.load_bag_map(path, robot_radius_m=0).classes.tolist() == [[0]]
     assert hn.load_bag_map(path, topic="/costmap", robot_radius_m=0).classes.tolist() == [[2]]
-    wrong: dict[str, Any]
-    for wrong in ({"robot_radius_m": -1.0}, {"free_threshold": 0.9}):  # no fault of the bag
+    out_of_range: list[dict[str, Any]] = [{"robot_radius_m": -1.0}, {"free_threshold": 0.9}]
+    for wrong in out_of_range:  # no fault of the bag
         with pytest.raises(hn.InvalidValueError, match="must") as refused:
             hn.load_bag_map(path, **wrong)
         assert str(path) not in str(refused.value)
