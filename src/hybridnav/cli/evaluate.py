@@ -182,7 +182,6 @@ def evaluate(
     from hybridnav.harness.names import read_methods  # noqa: PLC0415
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
-    from hybridnav.harness.task import TOO_SLOW  # noqa: PLC0415
 
     yardstick = _yardstick(metric)
     if not parsed_costs(costs) and yardstick == "weighted":
@@ -234,13 +233,12 @@ def evaluate(
         f"{found.map_name}, {found.label}: {record.get('error', record['status'])}"
         for found in study.outcomes
         if found.preparation["status"] == "ready"
-        for record in found.unanswered
-        if record["status"] != TOO_SLOW
+        for record in found.failed
     ]
     for what, found in (
         ("counter-examples", faults),
         ("methods without answers", unmade),
-        (f"queries without an answer, of {study.checks + len(raised):,}", raised),
+        ("queries that failed", raised),
     ):
         if found:
             complain(f"{what}: {len(found)}, the first: {found[0]}")

@@ -22,6 +22,8 @@ ANSWERED = ("solved", "no path")
 
 NOT_ASKED = "not asked"
 """Status of all records of a method that cannot take the map, by a limit of its own."""
+TOO_SLOW = "too slow"
+"""Status of a query that is not asked, because the time of its method on the map is spent."""
 
 
 Kind = Literal["regions", "plan to path", "path to plan", "paths", "no path", "bounds"]

@@ -14,6 +14,7 @@ from hybridnav.harness.contradictions import (
     ANY_ANGLE_SLACK,
     NOT_ASKED,
     SLACK,
+    TOO_SLOW,
     contradiction,
     is_any_angle,
     octile_optimum_m,
@@ -344,14 +345,15 @@ class Outcome:
         return failed[0] if failed else None
 
     @property
-    def unanswered(self) -> list[Record]:
-        """Records of queries without an answer: errors, time-outs, lost workers."""
-        return [record for record in self.records if record["status"] not in (NOT_ASKED, *ANSWERED)]
+    def failures(self) -> int:
+        """Queries without an answer: errors, time-outs, lost workers, and those given up."""
+        return sum(record["status"] not in (NOT_ASKED, *ANSWERED) for record in self.records)
 
     @property
-    def failures(self) -> int:
-        """How many queries have no answer."""
-        return len(self.unanswered)
+    def failed(self) -> list[Record]:
+        """Records of queries in which the method raised, fell silent, or ended its process."""
+        told = (NOT_ASKED, TOO_SLOW)
+        return [r for r in self.records if "length_m" not in r and r["status"] not in told]
 
 
 def loss_of(lengths: FloatArray, best: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.graphs import WaypointGraph
 from hybridnav.grid import DEFAULT_MAX_CELLS
 from hybridnav.grid.checks import checked_type
-from hybridnav.harness.contradictions import ANSWERED
+from hybridnav.harness.contradictions import ANSWERED, TOO_SLOW
 from hybridnav.harness.methods import (
     REFERENCE,
     MethodSpec,
@@ -42,7 +42,7 @@ from hybridnav.harness.scenes import (
     read_scene,
     text_of_costs,
 )
-from hybridnav.harness.task import TOO_SLOW, Task
+from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.io import load_graph

@@ -15,7 +15,7 @@ from hybridnav.costs import CostLayer
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
 from hybridnav.grid import CellClass
 from hybridnav.grid.worlds import figure1_world
-from hybridnav.harness.contradictions import NOT_ASKED, Fault
+from hybridnav.harness.contradictions import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare, rival_version
 from hybridnav.harness.names import own_name, own_settings
@@ -31,10 +31,6 @@ if TYPE_CHECKING:
     from hybridnav.harness.pairs import Pair
     from hybridnav.harness.records import Record
     from hybridnav.harness.scenes import MapSpec, Scene
-
-
-TOO_SLOW = "too slow"
-"""Status of a query that is not asked, because the time of its method on the map is spent."""
 
 
 @dataclass(frozen=True)
