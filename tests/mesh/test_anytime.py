@@ -172,12 +172,22 @@ def test_a_search_out_of_time_without_a_path_still_bounds(
 
 
 def test_a_search_prepares_itself_when_that_has_paid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That is when its queries have expanded as many intervals as there are corners; later ones
+    expand less than half of what they would."""
     monkeypatch.setattr("hybridnav.mesh.search._WORTH", 0)
-    search = MeshSearch(build_mesh(scattered()))
-    found = [between(search, (0, 0), (39, 39)) for _ in range(12)]
-    assert found[0].expanded == found[1].expanded > 10 * found[-1].expanded
-    lengths = [path.length_cells for path in found]
-    assert lengths == pytest.approx([lengths[0]] * len(lengths))
+    free = scattered()
+    search, plain = MeshSearch(build_mesh(free)), MeshSearch(build_mesh(free))
+    expanded = {False: [0, 0], True: [0, 0]}
+    for seed in range(150):
+        start, goal = some_cells(free, seed, 2)
+        has_paid = plain.expanded >= len(plain.mesh.corners)
+        found, alone = between(search, start, goal), between(plain, start, goal, budget_s=100.0)
+        assert found.length_cells == pytest.approx(alone.length_cells)
+        assert (search.graph is not None) == has_paid
+        expanded[has_paid][0] += found.expanded
+        expanded[has_paid][1] += alone.expanded
+    assert expanded[False][0] == expanded[False][1] > 0
+    assert 0 < 2 * expanded[True][0] < expanded[True][1]
 
 
 def test_a_search_with_a_budget_does_not_prepare_itself(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from hybridnav.grid import CellClass
-from hybridnav.grid.worlds import office_world
+from hybridnav.grid.worlds import office_world, tiled
 from hybridnav.mesh import (
     ConvexMesh,
     CornerGraph,
@@ -164,21 +164,26 @@ def test_threads_may_share_a_search_while_it_prepares_itself(
     assert shared.graph is not None
 
 
-def test_all_kinds_of_search_agree_on_a_building() -> None:
-    free = office_world().grid(robot_radius_m=0.25).classes == CellClass.FREE
+def test_all_kinds_of_search_agree_on_a_building(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Corners are fewer than intervals, and on a large building those of the hierarchy fewest."""
+    monkeypatch.setattr("hybridnav.mesh.search._WORTH", 10**9)
+    world = tiled(office_world(), rows=2, cols=2)
+    free = world.grid(robot_radius_m=0.25).classes == CellClass.FREE
     cells = np.argwhere(free)[np.random.default_rng(6).integers(int(free.sum()), size=(60, 2))]
     plain, landmarks, hierarchy = searches(build_mesh(free))
     assert isinstance(landmarks.graph, CornerGraph)
     assert isinstance(hierarchy.graph, CornerHierarchy)
-    expanded = 0
+    expanded = np.zeros(3)
     for (a, b), (c, d) in cells.tolist():
         endpoints = ((a, b), (c, d)), ((a + 0.5, b + 0.5), (c + 0.5, d + 0.5))
         found = [search.path(*endpoints) for search in (plain, landmarks, hierarchy)]
         assert found[1].length_cells == pytest.approx(found[0].length_cells, abs=1e-9)
         assert found[2].length_cells == pytest.approx(found[0].length_cells, abs=1e-9)
         assert found[2].lower_bound_cells == found[2].length_cells
-        expanded += found[1].expanded - found[2].expanded
-    assert expanded > 0
+        expanded += [each.expanded for each in found]
+    assert plain.graph is None
+    assert expanded[0] > 3 * expanded[1]
+    assert expanded[1] > 1.5 * expanded[2] > 0
 
 
 @pytest.mark.parametrize("kind", KINDS)
