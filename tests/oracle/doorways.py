@@ -278,7 +278,8 @@ def _is_double(at_door: Instruction | None, passage: Passage, passages: list[Pas
     if at_door.doorway.beside is not None:
         hands.append(1.0 if at_door.doorway.beside == "left" else -1.0)
     is_told_twice = any(a * b > 0 for a in hands for b in _hands_behind(at_door))
-    return is_told_twice and max(abs(passage.into), abs(passage.out)) < TURN_DEGREES
+    is_neither_whole = abs(passage.into) < TURN_DEGREES and abs(passage.out) < TURN_DEGREES
+    return is_told_twice and is_neither_whole
 
 
 def _is_wrongly_behind(at_door: Instruction | None, passage: Passage) -> bool:
@@ -295,6 +296,8 @@ def _is_unsaid_half(
         return False
     if at_door.turn is not None or (at_door.doorway is not None and at_door.doorway.beside):
         return False
+    if at_door is told[1] and (told[0].turn, told[0].landmark, told[0].heading_rad) == (None,) * 3:
+        return False  # who faces anywhere at the start has found the door, and stands in it
     before = any(
         one.turn is not None and one.turn.angle_rad * total > 0
         for one in told
