@@ -222,6 +222,23 @@ def test_a_node_far_outside_an_open_map_is_never_seen() -> None:
         assert kept.tolist() == [0, 1, 2]
 
 
+def test_nodes_are_put_to_corners_and_centres_alone_and_into_no_wall() -> None:
+    blocked = np.zeros((3, 3), dtype=np.float32)
+    blocked[1, 1] = 1
+    grid = hn.OccupancyGrid(blocked, robot_radius_m=0.0)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    building = hn.Building([hn.Floor("1", hn.HybridPlanner(topology))])
+    stay = [(1.3, 0.9995), (0.9995, 0.9995), (0.5004, 2.3), (0.5004, 0.9995)]
+    put = {(2.0004, 1.9996): (2.0, 2.0), (0.5004, 2.4996): (0.5, 2.5)}
+    plain: nx.Graph[int] = nx.Graph()
+    for node, (x, y) in enumerate([*stay, *put]):
+        plain.add_node(node, x=x, y=y)
+    graph = FloorGraph(name="1", graph=hn.WaypointGraph.from_networkx(plain))
+    matched = match_graph(building, BuildingGraph(name="drawn", floors=(graph,)))
+    points = matched.floors["1"].graph.points
+    assert points == pytest.approx(np.array([*stay, *put.values()]), abs=1e-9)
+
+
 def test_every_kind_of_finding_is_planted_here() -> None:
     text = Path(__file__).read_text(encoding="utf-8")
     assert [kind for kind in BUILDING_KINDS if f'"{kind}"' not in text] == []

@@ -15,6 +15,7 @@ from hybridnav.building.fitted import placed_pose
 from hybridnav.building.floor_graphs import BuildingGraph, FloorGraph
 from hybridnav.building.link_nodes import join_links
 from hybridnav.errors import InvalidValueError
+from hybridnav.graphs.placed import placed_points
 from hybridnav.grid.checks import checked_type
 
 if TYPE_CHECKING:
@@ -164,14 +165,17 @@ def _placed(graph: FloorGraph, pose: Pose, floor: Floor) -> FloorGraph:
     """Return the graph of a floor in the frame of its map.
 
     Files round: nodes at a corner or the centre of a cell are put there again, or those at a wall
-    would lie in it by a micrometre.
+    would lie in it by a micrometre. None is put from a free cell into a blocked one.
     """
     moved = moved_floor(graph, pose)
-    frame = floor.planner.topology.grid.frame
-    positions = frame.positions_of(moved.graph.points)
+    grid = floor.planner.topology.grid
+    free, points = grid.enterable(allow_unexplored=False), moved.graph.points
+    positions = grid.frame.positions_of(points)
     halves = np.round(2.0 * positions) / 2.0
-    is_near = np.abs(positions - halves) <= _SNAPPED
-    points = frame.points_of_grid(np.where(is_near, halves, positions))
+    put = grid.frame.points_of_grid(halves)
+    is_near = (np.abs(positions - halves) <= _SNAPPED).all(axis=1) & (halves.sum(axis=1) % 1 == 0)
+    is_near &= placed_points(put, grid, free)[2] | ~placed_points(points, grid, free)[2]
+    points = np.where(is_near[:, None], put, points)
     return replace(moved, name=floor.name, graph=replace(moved.graph, points=frozen(points)))
 
 
