@@ -59,7 +59,7 @@ nojit: setup
 # Four times as many examples as `unit` tries, new ones each time. Bounds checks need a cache of their own: cached code
 # ignores the setting.
 full: setup
-	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest
+	HYBRIDNAV_EXAMPLES=2 $(BIN)/python -m pytest -n auto --dist loadfile
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-bounds $(BIN)/python -m pytest -m "not full" $(NOJIT_TESTS)
 
 setup: $(READY)
