@@ -1,0 +1,178 @@
+"""The size of the house, counted: `python -m tests.product.house` prints the table.
+
+Code is a line that is not blank, no comment and no docstring (a text that stands alone).
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import tokenize
+from collections import Counter
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from statistics import median
+
+ROOT = Path(__file__).parents[2]
+SRC = ROOT / "src" / "hybridnav"
+WING = "ext"
+"""Top-level package that nothing else imports."""
+_NO_CODE = {
+    tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file, read once."""
+
+    path: Path
+    """Relative to the package."""
+    lines: int
+    code: int
+    import_lines: int
+    imports: frozenset[str]
+    """Top-level packages and modules of hybridnav that it imports, also for type checkers."""
+
+    @property
+    def package(self) -> str:
+        """The top-level package or module that it belongs to."""
+        return self.path.parts[0].removesuffix(".pyi").removesuffix(".py")
+
+
+def read(path: Path, root: Path = SRC) -> Source:
+    """Read and count a file."""
+    text = path.read_text()
+    tree = ast.parse(text)
+    prose: set[int] = set()
+    importing: set[int] = set()
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            prose |= _span(node) if isinstance(node.value.value, str) else set()
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            importing |= _span(node)
+            names |= set(_packages(node))
+    code: set[int] = set()
+    for token in tokenize.generate_tokens(StringIO(text).readline):
+        if token.type not in _NO_CODE:
+            code |= set(range(token.start[0], token.end[0] + 1))
+    code -= prose
+    relative = path.relative_to(root)
+    return Source(relative, text.count("\n"), len(code), len(importing & code), frozenset(names))
+
+
+def _span(node: ast.stmt) -> set[int]:
+    return set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+
+
+def _packages(node: ast.Import | ast.ImportFrom):
+    if isinstance(node, ast.Import):
+        modules = [one.name for one in node.names]
+    elif node.module == "hybridnav":
+        modules = [f"hybridnav.{one.name}" for one in node.names]
+    else:
+        modules = [node.module or ""]
+    for module in modules:
+        parts = module.split(".")
+        if parts[0] == "hybridnav" and len(parts) > 1:
+            yield parts[1]
+
+
+def sources(root: Path = SRC) -> list[Source]:
+    """Read all files below a folder."""
+    return [read(path, root) for path in sorted(root.rglob("*.py"))]
+
+
+_VISITED = """
+import json, sys
+from pathlib import Path
+import hybridnav as hn
+files = set()
+def see(frame, event, arg):
+    files.add(frame.f_code.co_filename)
+def plan():
+    grid = hn.load_map(sys.argv[1], robot_radius_m=0.0)
+    topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+    return hn.HybridPlanner(topology, preset="paper").plan((0.5, 0.5), (2.0, 2.5))
+plan().route  # imports
+sys.setprofile(see)
+plan().route
+sys.setprofile(None)
+print(json.dumps(sorted(name for name in files if "hybridnav" in Path(name).parts)))
+"""
+_LOADED = """
+import json, sys
+import hybridnav as hn
+from hybridnav.viz import plot_plan, save_figure
+topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.load_map(sys.argv[1])))
+planner = hn.HybridPlanner(topology)
+save_figure(plot_plan(topology, planner.plan((0.5, 0.5), (2.0, 2.5))), sys.argv[2])
+print(json.dumps(sorted(name for name in sys.modules if name.split(".")[0] == "hybridnav")))
+"""
+FIGURE1 = ROOT / "maps" / "figure1" / "figure1.yaml"
+
+
+def _told(script: str, *arguments: str, **environment: str) -> list[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(FIGURE1), *arguments],
+        check=True, capture_output=True, text=True, env=os.environ | environment,
+    )  # fmt: skip
+    names: list[str] = json.loads(done.stdout.splitlines()[-1])
+    return names
+
+
+def visited_by_paper() -> list[Path]:
+    """Return the files in which a function runs from a map's file to a path by `paper`.
+
+    Kernels run as plain Python for it, so that their files are among them.
+    """
+    return [Path(name) for name in _told(_VISITED, NUMBA_DISABLE_JIT="1")]
+
+
+def loaded_by_a_picture(target: Path) -> list[str]:
+    """Return the modules that one plan and one picture of it import."""
+    return _told(_LOADED, str(target))
+
+
+def figures(target: Path) -> dict[str, float]:
+    """Return the figures of the house by name."""
+    files = sources()
+    names = {one.package for one in files if len(one.path.parts) > 1}
+    arrows = {(one.package, to) for one in files for to in one.imports if to != one.package}
+    between = {(a, b) for a, b in arrows if a in names and b in names}
+    visited = visited_by_paper()
+    code = sum(one.code for one in files)
+    sizes = [one.lines for one in files]
+    by_package: Counter[str] = Counter()
+    for one in files:
+        by_package[one.package] += one.code
+    return {
+        "code": code,
+        "lines": sum(sizes),
+        "files": len(files),
+        "code outside ext": code - by_package[WING],
+        "lines of a file, median": median(sizes),
+        "lines of a file, most": max(sizes),
+        "packages": len(names),
+        "arrows between packages": len(between),
+        "arrows, with single modules": len(arrows),
+        "files visited by paper": len(visited),
+        "lines visited by paper": sum(path.read_text().count("\n") for path in visited),
+        "modules of a plan and a picture": len(loaded_by_a_picture(target)),
+        "imports, % of the code": round(100 * sum(one.import_lines for one in files) / code, 1),
+        "lines of tests": sum(one.lines for one in sources(ROOT / "tests")),
+    }
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        for name, value in figures(Path(folder) / "plan.png").items():
+            print(f"{name:36s} {value:10,}")  # noqa: T201
