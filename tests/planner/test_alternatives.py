@@ -265,7 +265,9 @@ def test_no_shorter_class_that_does_not_wind_is_left_out(resolution_m, least_hol
     """Against all pairs of a cell and a word of rays, and all shortest paths of every class."""
     rng = np.random.default_rng(apart)
     compared = wound = 0
-    for _ in range(250):
+    for number in range(2500):
+        if number >= 250 and wound > 5:  # one class in 40 winds where few holes count
+            break
         classes = crowded_map(rng)
         endpoints: Any = any_two(classes, rng.integers(2**32))
         if endpoints is None:
