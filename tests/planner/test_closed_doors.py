@@ -450,6 +450,18 @@ def test_what_is_closed_again_is_not_searched_for_again(
         return list(cells.flat)
 
     cells = [closed(form) for form in forms]
+    # What is asked for again and again stays, whatever else is closed between.
+    searched, cells_of = [], Blocked.cells_of
+
+    def counted(*given: Any) -> Any:
+        searched.append(given)
+        return cells_of(*given)
+
+    monkeypatch.setattr(Blocked, "cells_of", counted)
+    for col in range(20):
+        assert closed({"cells": [(col % 10, col // 10)]}) == [col % 10 * 15 + col // 10]
+        assert [closed(form) for form in forms] == cells
+    assert len(searched) == 20
     monkeypatch.setattr(Blocked, "cells_of", None)
     assert [closed(form) for form in forms] == cells
     assert closed(shapely.box(1.0, 1.0, 1.4, 1.4)) == cells[2]

@@ -83,10 +83,11 @@ class Closures:
 
         closed = as_blocked(blocked)
         key = closed.key
-        found = self._known.get(key)
+        # Without a lock: two threads may compute the same cells.
+        found = self._known.pop(key, None)
         if found is None:
-            found = self._known[key] = ClosedCells(closed.cells_of(self._topology))
-            # Without a lock: two threads may compute the same cells.
-            for old in list(self._known)[:-_KEPT]:
-                self._known.pop(old, None)
+            found = ClosedCells(closed.cells_of(self._topology))
+        self._known[key] = found  # the last one now
+        for old in list(self._known)[:-_KEPT]:
+            self._known.pop(old, None)
         return found
