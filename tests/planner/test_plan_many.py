@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from tests.plans import (
-    points_in,
-    presets,
-)
+from tests.plans import PRESETS, TWO_ROOMS, grid_of, map_of, points_in, presets
 
 
 @presets
@@ -52,6 +49,17 @@ def test_many_answers_are_the_answers_one_by_one(
     for i, single in enumerate(singles):
         points = np.empty((0, 2)) if single.path is None else single.path.points
         np.testing.assert_array_equal(batch.path(i), points)
+
+
+@pytest.mark.parametrize("preset", [*PRESETS, "shortest", "robot"])
+def test_a_path_from_a_point_to_itself_is_that_point_alone(preset: str) -> None:
+    planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
+    start, goal = planner.topology.grid.frame.points_of([(2, 3), (3, 12)])
+    batch = planner.plan_many([start, start, goal], [start, goal, goal])
+    for query, end in ((0, start), (2, goal)):
+        assert batch.path(query).tolist() == [end.tolist()]
+        assert planner.plan(end, end).path.points.tolist() == [end.tolist()]
+    assert len(batch.path(1)) > 1
 
 
 @presets

@@ -67,7 +67,8 @@ def plan_many(
         bound[done] = np.minimum(found.lower_bound_m[kept], cost[done])
         status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
         for i, k in zip(done.tolist(), np.flatnonzero(kept).tolist(), strict=True):
-            paths[i] = found.points[found.path_start[k] : found.path_start[k + 1]]
+            points = found.points[found.path_start[k] : found.path_start[k + 1]]
+            paths[i] = points if cost[i] > 0 else points[:1]
     for i in np.flatnonzero(left).tolist():
         result = alone(starts[i], goals[i])
         status[i], cost[i], bound[i] = str(result.status), result.cost, result.lower_bound
