@@ -204,21 +204,24 @@ def agree(classes, rng):
     check_level(plane.level(), base)
 
 
+def is_noticed(rule, seed):
+    """Whether the oracle notices on a random map that a redundancy rule is left out."""
+    rng = random.Random(seed)
+    weights = [1, 12, 12 * (seed % 2)]
+    classes = np.array(rng.choices([0, 1, 2], weights, k=144), dtype=np.uint8)
+    plane = PlaneMap(classes.reshape(12, 12), rules=ALL_RULES - {rule})
+    collapse(plane, rng)
+    try:
+        check_level(plane.level(), Base.of(plane.classes))
+    except AssertionError:
+        return True
+    return False
+
+
 @pytest.mark.parametrize("rule", sorted(ALL_RULES))
 def test_every_rule_is_needed(rule):
-    """The oracle notices when a redundancy rule is left out."""
-    noticed = 0
-    for seed in range(20):
-        rng = random.Random(seed)
-        weights = [1, 12, 12 * (seed % 2)]
-        classes = np.array(rng.choices([0, 1, 2], weights, k=144), dtype=np.uint8)
-        plane = PlaneMap(classes.reshape(12, 12), rules=ALL_RULES - {rule})
-        collapse(plane, rng)
-        try:
-            check_level(plane.level(), Base.of(plane.classes))
-        except AssertionError:
-            noticed += 1
-    assert noticed
+    """One map in ten shows the rarest."""
+    assert any(is_noticed(rule, seed) for seed in range(300))
 
 
 def test_replayed_kernels_give_the_same_darts():
