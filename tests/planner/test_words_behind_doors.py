@@ -74,6 +74,28 @@ def test_halves_of_a_right_angle_are_one_turn(into: int, out: int, hand: int) ->
     assert line.count(word) == 1
 
 
+# A door whose jamb recedes: paths turn through it over more than a metre.
+RECEDING = (
+    "##############################",
+    *("#oooooooooooooooooooooooooooo#",) * 12,
+    "################o#############",
+    "################ooo###########",
+    *("#kkkkkkkkkkkkkkkkkkkkkkkkkkkk#",) * 3,
+    "##############################",
+)
+
+
+@pytest.mark.parametrize("x", [7.25, 7.75, 8.25, 8.75])
+def test_a_turn_into_a_door_is_not_told_again_behind_it(x: float) -> None:
+    """The direction behind it is that of somebody who looks out of it."""
+    topology = topology_of(RECEDING)
+    result = hn.HybridPlanner(topology).plan((14.25, 0.75), (x, 7.25))
+    line = result.words()[1]
+    assert "door 1 on the right into the hall" in line
+    assert not line.endswith("right")
+    check([judged(topology, result)], least_turns=0)
+
+
 @pytest.mark.parametrize("preset", ["shortest", "octile"])
 def test_a_route_that_starts_in_a_doorway_has_its_turn(preset: str) -> None:
     """The nearest point of the hall to a goal in the kitchen lies in the door."""

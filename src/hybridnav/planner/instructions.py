@@ -189,7 +189,8 @@ def _doorway(
     """Return a crossing for sentences: its door, and how the path comes and goes.
 
     Where it lies is told to a person who knows the direction of the path before it. A bend to the
-    hand at which the door lies is then told as one who stands in the door sees it.
+    hand at which the door lies may be the turn into it: the way on is then told as one who stands
+    in the door sees it.
     """
     door, (since, until_m) = event.door, known
     doorway = Doorway(following.space, is_first=since.is_first, behind=_turn_of(event.behind))
@@ -223,7 +224,8 @@ def _doorway(
     seen_m = 0.0 if door.number == since.towards else before_m
     beside = _hand(into_rad, seen_m) if is_beside else None
     onward, behind = _hand(out_rad, behind_m), doorway.behind
-    if behind is not None and not (beside and beside == onward == behind.hand):
+    is_told = behind is not None and behind.hand == beside
+    if behind is not None and not (is_told and (onward == beside or _has_direction(behind_m))):
         return replace(doorway, beside=beside)
     return replace(doorway, beside=beside, behind=None, onward=onward)
 
@@ -270,7 +272,12 @@ def _hand(angle_rad: float, length_m: float) -> Hand | None:
 
     A slight turn counts where the part is long enough to have a direction.
     """
-    has_direction = length_m - _CLEAR_M >= _LEAST_M
-    if not abs(angle_rad) >= (LEAST_SLIGHT_RAD if has_direction else LEAST_BEND_RAD):
+    least_rad = LEAST_SLIGHT_RAD if _has_direction(length_m) else LEAST_BEND_RAD
+    if not abs(angle_rad) >= least_rad:
         return None
     return "left" if angle_rad > 0 else "right"
+
+
+def _has_direction(length_m: float) -> bool:
+    """Return whether a part of the path beside a door is long enough to have a direction."""
+    return length_m - _CLEAR_M >= _LEAST_M
