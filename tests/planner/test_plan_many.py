@@ -58,7 +58,9 @@ def test_a_path_from_a_point_to_itself_is_that_point_alone(preset: str) -> None:
     batch = planner.plan_many([start, start, goal], [start, goal, goal])
     for query, end in ((0, start), (2, goal)):
         assert batch.path(query).tolist() == [end.tolist()]
-        assert planner.plan(end, end).path.points.tolist() == [end.tolist()]
+        alone = planner.plan(end, end).path
+        assert alone is not None
+        assert alone.points.tolist() == [end.tolist()]
     assert len(batch.path(1)) > 1
 
 
