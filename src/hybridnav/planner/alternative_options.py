@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import operator
 from numbers import Real
 from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.grid.checks import checked_whole
 from hybridnav.homotopy.search import MOST_STATES, TIME_LIMIT_S, check_limits
 from hybridnav.planner.by_classes import ClassEffort
 from hybridnav.planner.by_doors import RouteLimits
@@ -61,7 +61,9 @@ def limits_of(count: int, max_overlap: float | None, max_stretch: float | None) 
                 f"{name} must be a number from {low:g} {most}, got {value!r:.80}"
             )
     return RouteLimits(
-        _checked_count(count), _or(max_overlap, _MAX_OVERLAP), _or(max_stretch, _MAX_STRETCH)
+        checked_whole("alternatives", count, 1, MOST),
+        _or(max_overlap, _MAX_OVERLAP),
+        _or(max_stretch, _MAX_STRETCH),
     )
 
 
@@ -81,19 +83,6 @@ def effort_of(
             f"got {effort.least_hole_m2!r:.80}"
         )
     return effort
-
-
-def _checked_count(count: int) -> int:
-    """Return the number of alternatives if it is in range."""
-    try:
-        wanted = operator.index(count)
-    except TypeError:
-        wanted = 0
-    if not 1 <= wanted <= MOST:
-        raise InvalidValueError(
-            f"alternatives must be a whole number from 1 to {MOST}, got {count!r:.80}"
-        )
-    return wanted
 
 
 def _or(given: _T | None, default: _T) -> _T:
