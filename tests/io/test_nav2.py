@@ -46,11 +46,49 @@ def test_edges_are_free_and_nodes_connected_exactly_where_free_space_is(folder, 
     for line in graph.lines.values():
         assert segment_faults(here.grid, line) == ()
     part_at, count = ndimage.label(classes == hn.CellClass.FREE)
-    parts = graph.parts()
-    assert len(parts) == count  # each part of 1 m², that is a cell here, has a node
-    for part in parts:
-        touched = [_labels_at(part_at, graph.points[node]) for node in part]
-        assert set.intersection(*touched)
+    touched = [
+        set.intersection(*(_labels_at(part_at, graph.points[node]) for node in part))
+        for part in graph.parts()
+    ]
+    # Each part of 1 m², that is a cell here, has its nodes, but for the margin of the image.
+    expected = set(range(1, count + 1)) - _margin(part_at, count)
+    assert sorted(map(min, touched)) == sorted(expected)
+
+
+def _margin(part_at, count):
+    """The part that reaches all sides of the map, fills half of its border, and surrounds free
+    cells: a tenth of its own at least."""
+    rows, cols = part_at.shape
+    border = [
+        [(row, col) for row in range(rows) for col in range(cols) if side(row, col)]
+        for side in (
+            lambda row, _: row == 0,
+            lambda row, _: row == rows - 1,
+            lambda _, col: col == 0,
+            lambda _, col: col == cols - 1,
+        )
+    ]
+    reached = {
+        n: [sum(part_at[cell] == n for cell in side) for side in border] for n in range(count + 1)
+    }
+    inside = sum(int((part_at == n).sum()) for n in range(1, count + 1) if not any(reached[n]))
+    return {
+        n
+        for n in range(1, count + 1)
+        if all(reached[n])
+        and 2 * sum(reached[n]) >= sum(map(len, border))
+        and 10 * inside >= (part_at == n).sum()
+    }
+
+
+def test_the_margin_of_an_image_gets_no_nodes(folder):
+    classes = np.full((6, 6), hn.CellClass.FREE)
+    classes[1:5, 1:5] = hn.CellClass.UNEXPLORED
+    classes[2:4, 2:4] = hn.CellClass.FREE
+    hn.export_nav2(hn.build_route_graph(topology(classes)), folder / "rim.geojson")
+    points = read_nav2(folder / "rim.geojson").points.values()
+    assert points
+    assert all(2 < x < 4 and 2 < y < 4 for x, y in points)
 
 
 def _labels_at(part_at, point):
