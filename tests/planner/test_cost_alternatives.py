@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -59,6 +59,7 @@ def test_each_is_the_cheapest_path_by_its_doors_and_within_the_limits(seed: int)
 
 @settings(max_examples=examples(30), deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
+@example(seed=1058)  # two legs that rounding to 1 / 80782 of a cell brings below the path
 def test_the_first_route_on_the_graph_of_doors_costs_what_its_legs_do(seed: int) -> None:
     """Legs run from middle to middle of the boundaries, so no route is cheaper than the path."""
     rng = np.random.default_rng(seed)
@@ -77,7 +78,7 @@ def test_the_first_route_on_the_graph_of_doors_costs_what_its_legs_do(seed: int)
     assert bool(routes) == nx.has_path(moves, first, last)
     if routes:
         least = nx.dijkstra_path_length(moves, first, last)
-        assert costs[0] >= least * (1 - 1e-6)
+        assert costs[0] >= least * (1 - 1e-9)
     ones = DoorGraph(topology.rooms, factors=np.ones(topology.grid.shape))
     plain = list(door_graph(topology).routes(first[0] * cols + first[1], last[0] * cols + last[1]))
     same = list(ones.routes(first[0] * cols + first[1], last[0] * cols + last[1]))

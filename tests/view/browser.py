@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WINDOW: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}, "color_scheme": "light"}
@@ -81,16 +81,30 @@ class Shown:
 
     def wait(self, script: str) -> None:
         """Wait until an expression is true; the page itself may not evaluate any."""
-        ends_at = time.monotonic() + _PATIENCE_S
-        while not self.page.evaluate(script):
-            assert time.monotonic() < ends_at, f"still false: {script}"
-            self.page.wait_for_timeout(20)
+        self._wait_until(lambda: self.page.evaluate(script), f"still false: {script}")
 
     def wait_request(self, part: str) -> None:
         """Wait until an address that holds a text has been asked for."""
+        self._wait_until(
+            lambda: any(part in url for url in self.requests), f"never asked for: {part}"
+        )
+
+    def wait_painted(self) -> None:
+        """Wait until what the page knows of is painted, with its tiles."""
+        frame = "new Promise((done) => requestAnimationFrame(done))"
+        # A change of size is noticed at the end of a frame, and painted in the next one.
+        for _ in range(2):
+            self.page.evaluate(frame)
+        self.wait("document.getElementById('map').dataset.waiting === '0'")
+
+    def wait_corner(self, x: float, y: float) -> None:
+        """Wait until the corner of an outline that can be dragged is painted, in white."""
+        self._wait_until(lambda: self.colour(x, y) == (255, 255, 255), f"no corner at {x}, {y}")
+
+    def _wait_until(self, is_so: Callable[[], bool], otherwise: str) -> None:
         ends_at = time.monotonic() + _PATIENCE_S
-        while not any(part in url for url in self.requests):
-            assert time.monotonic() < ends_at, f"never asked for: {part}"
+        while not is_so():
+            assert time.monotonic() < ends_at, otherwise
             self.page.wait_for_timeout(20)
 
     def wait_plan(self, number: int) -> None:

@@ -30,7 +30,7 @@ def shown(browser: Any, building: Client) -> Iterator[Shown]:
 def _to_floor(shown: Shown, number: int, name: str) -> None:
     shown.page.select_option("#floor", str(number))
     shown.wait_text("#facts", f"Floor {name}")
-    shown.wait("document.getElementById('map').dataset.waiting === '0'")
+    shown.wait_painted()
 
 
 def _planned(shown: Shown) -> None:
@@ -79,7 +79,7 @@ def test_the_route_is_drawn_on_each_floor(shown: Shown, building: Client) -> Non
         name = ["ground", "2: upper"][part["floor"]]
         if part["floor"] == 0:
             _to_floor(shown, 0, name)
-        shown.page.wait_for_timeout(200)
+        shown.wait_painted()
         (x, y), (to_x, to_y) = part["line"][:2]
         assert shown.colour((x + to_x) / 2, (y + to_y) / 2) == red
 
@@ -91,10 +91,11 @@ def test_the_floor_is_chosen_by_keys_and_buttons(shown: Shown) -> None:
     shown.page.keyboard.press("PageUp")
     shown.wait_text("#facts", "Floor 2: upper")
     shown.page.keyboard.press("PageUp")  # there is none
-    shown.page.wait_for_timeout(100)
+    shown.wait_painted()
     assert "Floor 2: upper" in shown.text("#facts")
     shown.page.click("#floor-down")
     shown.wait_text("#facts", "Floor ground")
+    shown.wait_painted()
     view = shown.fact("view")
     shown.page.click("#zoom-in")
     shown.wait(f"document.getElementById('map').dataset.view !== '{view}'")

@@ -107,8 +107,7 @@ def test_classes_of_cells_have_their_colours_in_both_themes(shown: Shown, theme:
     shown.page.select_option("#colours", "map")
     shown.page.uncheck("#show-names")
     shown.page.uncheck("#show-doors")
-    shown.wait("document.getElementById('map').dataset.waiting === '0'")
-    shown.page.wait_for_timeout(200)
+    shown.wait_painted()
     colours = palette("dark" if theme == "dark" else "light")[:, :3].tolist()
     assert shown.colour(20.5, 36.5) == tuple(colours[0])
     assert shown.colour(1.5, 25.5) == tuple(colours[3])
@@ -197,6 +196,7 @@ def test_a_corner_of_a_room_is_moved(shown: Shown, client: Client) -> None:
     shown.page.click("#corners")
     ring = client.get("outlines.json").value["rings"][0][0]
     x, y = min(ring)
+    shown.wait_corner(x, y)
     before = client.session.planning.topology.rooms.areas_m2[0]
     left, top = shown.at(x, y)
     shown.page.mouse.move(left, top)

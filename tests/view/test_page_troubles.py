@@ -191,7 +191,7 @@ def test_a_dead_server_is_said_after_a_drag(shown: Shown, client: Client) -> Non
     shown.wait("document.getElementById('room-name').value === 'a'")
     shown.page.click("#corners")
     corner = min(client.get("outlines.json").value["rings"][0][0])
-    shown.page.wait_for_timeout(200)
+    shown.wait_corner(*corner)
     shown.page.route("**/*", lambda route: route.abort())
     x, y = shown.at(*corner)
     shown.page.mouse.move(x, y)
@@ -240,6 +240,8 @@ def test_all_is_done_by_the_keyboard_alone(shown: Shown, client: Client) -> None
     area = client.session.planning.topology.rooms.areas_m2[3]
     ring = client.get("outlines.json").value["rings"][3][0]
     x, y = max(ring)
+    shown.wait_painted()
+    shown.wait_corner(x, y)
     _walk_to(shown, x, y)
     go("Space")
     shown.wait_text("#status", "press space again")
@@ -252,7 +254,7 @@ def test_all_is_done_by_the_keyboard_alone(shown: Shown, client: Client) -> None
 
 def _walk_to(shown: Shown, x: float, y: float) -> None:
     """Move the map by arrow keys until a point lies in its middle, to a few pixels."""
-    shown.page.wait_for_timeout(100)
+    shown.wait_painted()
     for key in (("ArrowRight", "ArrowLeft"), ("ArrowUp", "ArrowDown")):
         middle = [float(part) for part in shown.fact("view").split()]
         at = 0 if "ArrowRight" in key else 1
@@ -260,4 +262,4 @@ def _walk_to(shown: Shown, x: float, y: float) -> None:
         steps = round(pixels / 8)
         for _ in range(abs(steps)):
             shown.page.keyboard.press(f"Shift+{key[steps < 0]}")
-        shown.page.wait_for_timeout(100)
+        shown.wait_painted()

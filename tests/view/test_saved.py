@@ -115,11 +115,14 @@ def test_the_whole_map_stays_in_view_when_the_window_changes(cli: Any, folder: P
         shown.page.set_viewport_size(phone)
         shown.wait("document.getElementById('map').clientWidth === 390")
         shown.wait(f"{0.95 * 390} > {known[1] - known[0]} * {_SCALE}")
+        fitted = float(shown.fact("view").split()[2])
         shown.page.click("#zoom-in")  # a person's own view stays
+        shown.wait(f"{_SCALE} > {fitted}")
         scale = float(shown.fact("view").split()[2])
         shown.page.set_viewport_size({"width": 800, "height": 844})
-        shown.wait("document.getElementById('map').clientWidth < 700")
-        shown.page.wait_for_timeout(100)
+        shown.wait("document.getElementById('map').clientWidth > 390")
+        shown.wait("(map => map.width === map.clientWidth)(document.getElementById('map'))")
+        shown.wait_painted()
         assert float(shown.fact("view").split()[2]) == scale
         assert shown.errors == []
 

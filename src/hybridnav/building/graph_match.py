@@ -146,7 +146,8 @@ def match_graph(
     own_name = _matched_floors(building, joined, floors or {})
     poses = dict.fromkeys(own_name, (0.0, 0.0, 0.0))
     if align:
-        poses |= _poses(building, joined, own_name)
+        # Without the nodes of `joined`: a link drawn elsewhere says nothing about the walls.
+        poses |= _poses(building, graph, own_name)
     by_own = {own: name for name, own in own_name.items()}
     return MatchedGraph(
         building=building,

@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from hybridnav.costs import UNIT_BITS
 from hybridnav.pyramid.cracks import endpoints_of, middle_sides, sides_of
 from hybridnav.route.room_fields import RoomFields
 from hybridnav.search.moves import STRAIGHT, length_in_cells
@@ -73,7 +74,8 @@ class DoorGraph:
 
     A dart is linked to those that leave the room that it enters. The cost is that of the shortest
     path of cells inside the room, or of the cheapest one, between the cells in the middle of both
-    boundaries.
+    boundaries. It is counted in whole numbers, never below that of the path and at most 1e-10 of it
+    above, so that no route costs less than the cheapest path.
 
     Parameters
     ----------
@@ -87,7 +89,8 @@ class DoorGraph:
         The graph without closed cells, whose rooms are taken over where they meet none; None to
         measure all rooms.
     factors
-        float64 (rows, cols), a factor of at least 1 for each cell; None for lengths.
+        float64 (rows, cols), a factor of at least 1 for each cell, rounded down to multiples of
+        2^-14, as those of a layer are; None for lengths.
 
     Examples
     --------
@@ -124,7 +127,11 @@ class DoorGraph:
         lies_first = level.field_of.ravel()[cells[:, 0]] == self.endpoints[self._arc_of, 0]
         self._cells: LongArray = np.where(lies_first[:, None], cells, cells[:, ::-1])
         self._factors = factors
-        self._fields = RoomFields(rooms, closed, factors)
+        units = None
+        if factors is not None:
+            units = np.floor(factors * (1 << UNIT_BITS)).astype(np.int64)
+        self._units = units
+        self._fields = RoomFields(rooms, closed, units)
         self._middle = self._middles(sides_of(edges, rooms.grid.shape[1]), closed)
         self._over = self._costs_over()
         self._tails = self.endpoints.ravel()  # of each dart
@@ -220,7 +227,7 @@ class DoorGraph:
             assert vertices[-1] == last  # noqa: S101 - links lead into the room of the goal
             along = np.append(from_start[coming], total[link] - to_goal[nodes[len(coming) :]])
             legs = np.diff(along)
-            cells = length_in_cells(legs) if self._factors is None else legs / STRAIGHT
+            cells = length_in_cells(legs) if self._units is None else legs / (STRAIGHT * _ONE)
             legs_m = cells * self._rooms.grid.resolution_m
             yield DoorRoute(vertices, tuple(self.arcs[arcs].tolist()), tuple(legs_m.tolist()))
 
@@ -239,9 +246,8 @@ class DoorGraph:
     def _costs_over(self) -> LongArray:
         """Return the integer cost of the step over the boundary with each dart, int64 (2 n,)."""
         costs = np.full(2 * len(self.arcs), STRAIGHT, dtype=np.int64)
-        if self._factors is not None:  # a boundary that is closed is no part of any link
-            factors = self._factors.ravel()[self._middle]
-            costs = np.repeat(np.rint(STRAIGHT * factors.mean(axis=1)), 2).astype(np.int64)
+        if self._units is not None:  # a boundary that is closed is no part of any link
+            costs = np.repeat(STRAIGHT * self._units.ravel()[self._middle].sum(axis=1), 2)
         return costs
 
     def _measured(self, vertex: int) -> _Legs:
@@ -309,6 +315,8 @@ def _chain(before: LongArray, node: int) -> list[int]:
     return nodes
 
 
+_ONE = 2 << UNIT_BITS
+"""Units of both cells of a move over cells with a factor of 1."""
 _MOST_KEPT = 4
 _Kept = WeakKeyDictionary["TopologicalMap", dict[bool, DoorGraph]]
 _KEPT: _Kept = WeakKeyDictionary()

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hybridnav.grid import CellClass
 from hybridnav.search.fields import field_distances
-from hybridnav.search.moves import STRAIGHT
+from hybridnav.search.moves import DIAGONAL, STRAIGHT
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from hybridnav._typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav._typing import BoolArray, ByteArray, IntArray, LongArray
     from hybridnav.topology import Rooms
 
 
@@ -27,18 +26,18 @@ class RoomFields:
         The rooms.
     closed
         int64 (m,), flat cells that may not be entered; None for none.
-    factors
-        float64 (rows, cols), the factor of each cell; None for lengths.
+    units
+        int64 (rows, cols), the factor of each cell in units; None for lengths.
     """
 
     def __init__(
-        self, rooms: Rooms, closed: LongArray | None, factors: FloatArray | None = None
+        self, rooms: Rooms, closed: LongArray | None, units: LongArray | None = None
     ) -> None:
         from scipy import ndimage  # noqa: PLC0415 - most planners need no rooms
 
         self._field_of = rooms.level.field_of
         self._classes = rooms.grid.classes
-        self._closed, self._factors = closed, factors
+        self._closed, self._units = closed, units
         self._windows = ndimage.find_objects(self._field_of + 1)
 
     def vertices_of(self, cells: LongArray) -> LongArray:
@@ -59,8 +58,8 @@ class RoomFields:
             classes[rows[met], cols[met]] = 0
             label[rows[met], cols[met]] = -1
         moves = None
-        if self._factors is not None:
-            moves = _weighted_moves(classes, np.asarray(label == 0), self._factors[spans])
+        if self._units is not None:
+            moves = _weighted_moves(classes, np.asarray(label == 0), self._units[spans])
         return FieldWindow(corner, self._field_of.shape[1], classes, label, moves)
 
 
@@ -76,11 +75,11 @@ class FieldWindow(NamedTuple):
     label: IntArray
     """int32 (rows, cols), 0 in the field and -1 elsewhere."""
     moves: csr_array[np.float64, tuple[int, int]] | None = None
-    """The moves inside the field with their costs; None for lengths."""
+    """The moves inside the field with their costs, whole numbers; None for lengths."""
 
     def costs(self, cell: int, others: LongArray) -> LongArray:
         """Return the integer costs of the shortest paths inside the field from a flat cell of it to
-        others, -1 for no path; those of the cheapest paths are rounded to the unit."""
+        others, -1 for no path."""
         rows, cols = np.divmod(np.append(cell, others), self.cols)
         rows, cols = rows - self.corner[0], cols - self.corner[1]
         inside = (rows >= 0) & (rows < self.label.shape[0]) & (cols >= 0)
@@ -92,17 +91,17 @@ class FieldWindow(NamedTuple):
             from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415 - most planners need no rooms
 
             reached = dijkstra(self.moves, directed=False, indices=at[:1])[0]
-            found = np.where(np.isfinite(reached), np.rint(reached * STRAIGHT), -1.0)
-            found = found.astype(np.int64)
+            found = np.where(np.isfinite(reached), reached, -1.0).astype(np.int64)
         costs: LongArray = np.where(inside, found[at], -1)[1:]
         return costs
 
 
 def _weighted_moves(
-    classes: ByteArray, inside: BoolArray, factors: FloatArray
+    classes: ByteArray, inside: BoolArray, units: LongArray
 ) -> csr_array[np.float64, tuple[int, int]]:
     """Return the legal moves inside a field, each in one direction, with their costs.
 
+    A move costs its length, STRAIGHT or DIAGONAL, times the sum of the units of its two cells.
     Diagonals are judged as in `field_distances`.
     """
     from scipy.sparse import coo_array  # noqa: PLC0415 - most planners need no rooms
@@ -114,15 +113,15 @@ def _weighted_moves(
     every, low, high = slice(None), slice(None, -1), slice(1, None)
     parts = []
     for tail, head, sides, length in (
-        ((every, low), (every, high), (), 1.0),
-        ((low, every), (high, every), (), 1.0),
-        ((low, low), (high, high), ((low, high), (high, low)), math.sqrt(2.0)),
-        ((high, low), (low, high), ((high, high), (low, low)), math.sqrt(2.0)),
+        ((every, low), (every, high), (), STRAIGHT),
+        ((low, every), (high, every), (), STRAIGHT),
+        ((low, low), (high, high), ((low, high), (high, low)), DIAGONAL),
+        ((high, low), (low, high), ((high, high), (low, low)), DIAGONAL),
     ):
         legal = inside[tail] & inside[head]
         for side in sides:
             legal &= may_pass[side]
-        costs = length * (factors[tail] + factors[head]) / 2
+        costs = length * (units[tail] + units[head]).astype(np.float64)
         parts.append((number[tail][legal], number[head][legal], costs[legal]))
     tails, heads, costs = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return coo_array((costs, (tails, heads)), shape=(rows * cols, rows * cols)).tocsr()
