@@ -29,12 +29,12 @@ def cluster():
         patch.setenv(faulty.FATAL_PAIR, "2,2>2,2")
         with (
             # What is asked of a worker that died is asked again soon.
-            dask.config.set({"distributed.comm.timeouts.connect": "2s"}),
+            dask.config.set({"distributed.comm.timeouts.connect": "5s"}),
             distributed.LocalCluster(
                 n_workers=1,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=None,
+                dashboard_address=":0",
                 silence_logs=50,
             ) as running,
         ):
@@ -121,3 +121,12 @@ def test_a_scheduler_that_is_not_there_is_missed_in_a_line(settings, tmp_path, m
         evaluate(replace(settings, scheduler="tcp://127.0.0.1:9"), tmp_path)
     assert "\n" not in str(caught.value)
     assert time.monotonic() - began < 8
+
+
+def test_a_scheduler_without_workers_is_not_waited_for(settings, tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "NO_WORKER_S", 0.5)
+    monkeypatch.setattr(workers, "_LOOK_S", 0.2)
+    with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
+        only = replace(settings, scheduler=empty.scheduler_address)
+        with pytest.raises(InvalidValueError, match=r"has had no worker for 0\.5 s: start workers"):
+            evaluate(only, tmp_path)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from multiprocessing.connection import Connection
 
     from hybridnav.harness.records import Record
@@ -28,6 +28,11 @@ _ATTEMPTS = 2
 
 CONNECT_S = 10.0
 """Seconds within which a scheduler must answer."""
+
+NO_WORKER_S = 120.0
+"""Seconds for which a scheduler may be without a worker."""
+
+_LOOK_S = 5.0
 
 
 def _serve(connection: Connection, turn: Any) -> None:
@@ -206,7 +211,8 @@ def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Reco
     Raises
     ------
     InvalidValueError
-        When dask.distributed is not installed or the scheduler cannot be reached.
+        When dask.distributed is not installed, the scheduler cannot be reached, or it has had no
+        worker for `NO_WORKER_S`.
     """
     try:
         from dask import distributed  # noqa: PLC0415 - an optional extra
@@ -223,17 +229,40 @@ def run_on_cluster(tasks: Sequence[Work], *, address: str) -> Iterator[list[Reco
         futures = client.map(_whole, tasks, retries=_ATTEMPTS, pure=False)
         task_of = {future.key: task for future, task in zip(futures, tasks, strict=True)}
         suspects = []
-        for future in distributed.as_completed(futures):  # type: ignore[no-untyped-call]
+        for future in _as_completed(client, futures):
             try:
                 yield future.result()
             except distributed.KilledWorker:
                 suspects.append(task_of[future.key])
         # dask blames all tasks that waited for a dead worker: run each again, by itself.
         for task in suspects:
+            again = client.submit(_whole, task, pure=False)
             try:
-                yield client.submit(_whole, task, pure=False).result()
+                yield next(_as_completed(client, [again])).result()
             except distributed.KilledWorker:
                 yield [task.failed_record(at, "lost") for at in range(len(task.ids))]
+
+
+def _as_completed(client: Any, futures: Iterable[Any]) -> Iterator[Any]:
+    """Yield futures when they end; a cluster that no worker joins any more is not waited for."""
+    from dask import distributed  # noqa: PLC0415 - an optional extra
+
+    waiting, seen = set(futures), time.monotonic()
+    while waiting:
+        try:
+            done, waiting = distributed.wait(  # type: ignore[no-untyped-call]
+                waiting, timeout=_LOOK_S, return_when="FIRST_COMPLETED"
+            )
+        except TimeoutError:
+            if client.nthreads():
+                seen = time.monotonic()
+            elif time.monotonic() - seen > NO_WORKER_S:
+                raise InvalidValueError(
+                    f"scheduler {client.scheduler.address}: it has had no worker for "
+                    f"{NO_WORKER_S:g} s: start workers and run this again, what is recorded stays"
+                ) from None
+        else:
+            yield from done
 
 
 def _knock(address: str) -> None:
