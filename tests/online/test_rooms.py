@@ -235,6 +235,19 @@ def test_a_door_that_closes_dies_and_rooms_keep_numbers_and_names():
     assert again.doors.born == (max(version.doors) + 1,)
 
 
+def test_a_door_is_as_wide_as_walls_leave_it_that_appear_in_no_room():
+    classes, door, _ = two_rooms()
+    jambs = [door[0].start - 1, door[0].stop], SIDE + 1
+    classes[jambs] = 2
+    version = OnlineRooms.of(grid_of(classes))
+    classes[jambs] = 0
+    update = version.update(grid_of(classes))
+    assert (update.born, update.died, update.changed) == ((), (), ())
+    assert [door.passage_m for door in version.doors.values()] == [1.25]
+    assert [door.passage_m for door in update.version.doors.values()] == [0.75]
+    check_version(update.version)
+
+
 def test_rooms_whose_wall_goes_merge_and_the_lost_name_is_returned():
     classes, _, version = two_rooms()
     version = version.with_name(1, "kitchen").with_name(2, "hall")
