@@ -130,11 +130,14 @@ class OnlineRooms:
 
         Rooms within 0.3 m of a changed cell are found anew, as a build does, in a window that has
         them whole and 10 m of the map around them. All others keep their free cells; one of them
-        may grow by cells of a room that was found anew. Rooms cover what those of a build cover,
-        on scans of single rays but for pockets of a few cells. They may differ: a build looks
-        farther, at the main directions of the map and at whole rooms, and knows nothing of the
-        rooms before, which an update holds on to. Borders that a person drew where the map shows
-        none may go when a room is found anew.
+        may grow by cells of a room that was found anew. Rooms cover what those of a build cover. On
+        scans of single rays, connected free cells below the least area may differ: whether a build
+        joins them to others depends on the whole map. They keep their room when the map is no such
+        scan any more, until it is found anew.
+
+        Where two rooms meet may differ: a build looks farther, at the main directions of the map
+        and at whole rooms, and knows nothing of the rooms before, which an update holds on to.
+        Borders that a person drew where the map shows none may go when a room is found anew.
 
         All cells are compared, the numbers of all cells are copied, and all doors are measured. The
         rest takes as long as a fresh build of the window. That is more than an update of the places
