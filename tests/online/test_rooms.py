@@ -74,7 +74,7 @@ def pockets_of(grid):
     return pockets, pockets & among_rays[joined]
 
 
-def check_version(version, had_rays=False):
+def check_version(version, *, had_rays=False):
     """A version covers the free cells that a build covers, and its doors are those of its rooms.
 
     Pockets among rays may differ; they stay as they are where the map is none of rays any more.
@@ -211,7 +211,7 @@ class Building(RuleBasedStateMachine):
         """Check the newest version."""
         if hasattr(self, "version"):
             self.had_rays |= pockets_of(self.version.grid)[1].any()
-            check_version(self.version, self.had_rays)
+            check_version(self.version, had_rays=self.had_rays)
 
 
 def test_rooms_follow_a_building():
@@ -291,7 +291,7 @@ def test_a_closet_stays_a_room_while_those_round_it_come_and_go():
 
 
 def test_only_pockets_among_rays_may_differ_from_a_build():
-    """Rays too small for a room are such pockets; on the same map without unexplored cells none is."""
+    """Rays too small for a room are such pockets; none is where no cell is unexplored."""
     classes = np.full((30, 40), 2, np.uint8)
     classes[2:12, 2:38] = classes[15:17, 2:9] = classes[20:26, 2:20:2] = 1
     classes[1, 2:14] = 0
