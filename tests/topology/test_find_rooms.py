@@ -135,6 +135,14 @@ def test_walls_that_a_scan_left_unexplored_part_rooms_too(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+def test_closets_that_lie_whole_in_gaps_between_walls_are_rooms(method):
+    closets = np.pad(np.tile(np.pad(np.ones((4, 4), np.uint8), (0, 2)), (3, 3)), (2, 0))
+    found = hn.find_rooms(occupancy_grid(closets, resolution_m=0.25), method=method)
+    assert len(found.names) == 9
+    assert (found.label_of[closets == 1] >= 0).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
 def test_open_ground_without_a_wall_is_one_room(method):
     grid = hn.OccupancyGrid(np.zeros((40, 60), np.float32), hn.Frame(0.1), robot_radius_m=0)
     assert hn.find_rooms(grid, method=method).names == ("room-1",)

@@ -16,16 +16,8 @@ from hybridnav.grid import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.grid.checks import checked_type
 from hybridnav.grid.names import check_names
 from hybridnav.online.rooms_doors import DoorEvents, OnlineDoor, doors_of, follow_doors
-from hybridnav.online.rooms_window import (
-    Renewed,
-    RoomCells,
-    beside_rooms,
-    box_of_rooms,
-    part_of,
-    renew,
-)
+from hybridnav.online.rooms_window import RoomCells, beside_rooms, renew
 from hybridnav.online.shift import placed, shift_of
-from hybridnav.online.tiles import Box
 from hybridnav.topology.segmentation import check_least_area, find_rooms, outside_of
 
 if TYPE_CHECKING:
@@ -36,8 +28,6 @@ if TYPE_CHECKING:
 
 _NUMBERED = re.compile(r"room-([1-9][0-9]{0,8})")
 """Names of rooms that nobody has named."""
-_AROUND = 2
-"""Cells round rooms in which their doors lie."""
 
 
 @copies_alike
@@ -140,15 +130,18 @@ class OnlineRooms:
 
         Rooms within 0.3 m of a changed cell are found anew, as a build does, in a window that has
         them whole and 10 m of the map around them. All others keep their free cells; one of them
-        may grow by cells of a room that was found anew. Rooms cover what those of a build cover,
-        on scans of single rays but for pockets of a few cells. They may differ: a build looks
-        farther, at the main directions of the map and at whole rooms, and knows nothing of the
-        rooms before, which an update holds on to. Borders that a person drew where the map shows
-        none may go when a room is found anew.
+        may grow by cells of a room that was found anew. Rooms cover what those of a build cover. On
+        scans of single rays, connected free cells below the least area may differ: whether a build
+        joins them to others depends on the whole map. They keep their room when the map is no such
+        scan any more, until it is found anew.
 
-        All cells are compared, and the numbers of all cells are copied. The rest takes as long as
-        a fresh build of the window. That is more than an update of the places takes: a robot calls
-        this every few scans, or before rooms are needed.
+        Where two rooms meet may differ: a build looks farther, at the main directions of the map
+        and at whole rooms, and knows nothing of the rooms before, which an update holds on to.
+        Borders that a person drew where the map shows none may go when a room is found anew.
+
+        All cells are compared, the numbers of all cells are copied, and all doors are measured. The
+        rest takes as long as a fresh build of the window. That is more than an update of the places
+        takes: a robot calls this every few scans, or before rooms are needed.
 
         Parameters
         ----------
@@ -188,7 +181,11 @@ class OnlineRooms:
         before = RoomCells(number_of, (measured == CellClass.FREE) & ~was_outside)
         found = renew(before, grid, outside, differs, (self.least_area_m2, self._next[0]))
         events = found.events
-        new_doors, door_events = self._doors_after(found, moved)
+        # How wide a door is, walls decide that lie in no room and at any distance.
+        known = {n: door.position for n, door in self.doors.items()}
+        new_doors, door_events = follow_doors(
+            self.doors, doors_of(found.number_of, grid, low, known), self._next[1]
+        )
         lost = {n: self.names[n] for n in events.died if n in self.names}
         version = replace(
             moved,
@@ -201,32 +198,6 @@ class OnlineRooms:
             ),
         )
         return RoomsUpdate(version, *events, door_events, lost)
-
-    def _doors_after(
-        self, found: Renewed, moved: OnlineRooms
-    ) -> tuple[dict[int, OnlineDoor], DoorEvents]:
-        """Return the doors between rooms that were found, and what became of those before.
-
-        Parameters
-        ----------
-        found
-            The rooms now.
-        moved
-            This version on the grid of the next one.
-        """
-        whole = Box(0, 0, *moved.grid.shape)
-        rooms = {*found.events.born, *found.events.died, *found.events.changed}
-        # Rooms that have only grown may have doors beyond the window.
-        of_rooms, box = box_of_rooms(found.number_of, rooms), found.window
-        box = box if of_rooms is None else box.joined(of_rooms)
-        box = box.widened(_AROUND).common(whole)
-        doors = doors_of(
-            found.number_of[box.inside(whole)],
-            part_of(moved.grid, box),
-            (moved.low[0] + box.low_row, moved.low[1] + box.low_col),
-            {n: door.position for n, door in self.doors.items()},
-        )
-        return follow_doors(self.doors, doors, rooms, self._next[1])
 
     @cached_property
     def numbers(self) -> tuple[int, ...]:

@@ -101,12 +101,12 @@ def doors_of(
     known
         A point of each door that has a number; see `RoomBoundaries.numbers`.
     """
-    rooms, dense = np.unique(number_of, return_inverse=True)
-    first = int(np.searchsorted(rooms, 0))
-    label_of = np.maximum(dense.reshape(number_of.shape) - first, NO_ROOM).astype(np.int32)
-    labels = RoomLabels(tuple(f"room-{room}" for room in rooms[first:].tolist()), label_of)
+    rooms = np.flatnonzero(np.bincount(number_of.ravel() + 1)[1:])
+    dense = np.full(int(rooms.max(initial=NO_ROOM)) + 2, NO_ROOM, np.int32)
+    dense[rooms] = np.arange(len(rooms))
+    labels = RoomLabels(tuple(f"room-{room}" for room in rooms.tolist()), dense[number_of])
     found = RoomBoundaries.of(labels, grid, measured_clearance_m(grid))
-    room_of = np.append(rooms[first:], NO_ROOM)
+    room_of = np.append(rooms, NO_ROOM)
     numbers = found.numbers(known)
     order = np.argsort(found.boundary_of, kind="stable")
     ends = np.cumsum(np.bincount(found.boundary_of, minlength=found.n_boundaries))
@@ -127,10 +127,7 @@ def doors_of(
 
 
 def follow_doors(
-    before: Mapping[int, OnlineDoor],
-    found: Iterable[OnlineDoor],
-    rooms: set[int],
-    first_number: int,
+    before: Mapping[int, OnlineDoor], found: Iterable[OnlineDoor], first_number: int
 ) -> tuple[dict[int, OnlineDoor], DoorEvents]:
     """Return the doors after a change, and what became of those before.
 
@@ -139,29 +136,22 @@ def follow_doors(
     before
         The doors before.
     found
-        The doors of a window that holds all doors of some rooms, those that are none of the old
-        ones with numbers that none of these has.
-    rooms
-        Numbers of these rooms, before and after the change; doors of others stay.
+        The doors now, those that are none of the old ones with numbers that none of these has.
     first_number
         The least number that no door has had.
     """
-    gone = {n: door for n, door in before.items() if not rooms.isdisjoint(door.rooms)}
-    doors = {n: door for n, door in before.items() if n not in gone}
-    new = [door for door in found if not rooms.isdisjoint(door.rooms)]
+    doors: dict[int, OnlineDoor] = {}
     born: list[int] = []
-    for door in sorted(new, key=lambda door: door.number):
+    for door in sorted(found, key=lambda door: door.number):
         number = door.number
-        if number not in gone:
+        if number not in before:
             number = first_number + len(born)
             born.append(number)
         doors[number] = replace(door, number=number)
-    changed = tuple(
-        n for n, door in sorted(gone.items()) if n in doors and not _same(door, doors[n])
-    )
-    died = tuple(n for n in sorted(gone) if n not in doors)
+    changed = tuple(n for n, door in before.items() if n in doors and not _same(door, doors[n]))
+    died = tuple(n for n in before if n not in doors)
     fresh = [doors[n] for n in (*born, *changed)]
-    parts = _parts([gone[n] for n in sorted(gone)], fresh)
+    parts = _parts([before[n] for n in sorted((*died, *changed))], fresh)
     split = {n: tuple(sorted(owners)) for n, owners in parts.items() if len(owners) > 1}
     merged = {n: owners[0] for n, owners in parts.items() if n not in doors and n not in split}
     return dict(sorted(doors.items())), DoorEvents(tuple(born), died, changed, split, merged)

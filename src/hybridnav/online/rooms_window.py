@@ -46,8 +46,6 @@ class Renewed(NamedTuple):
 
     number_of: IntArray
     """int32 (rows, cols), the number of the room of each cell of the map."""
-    window: Box
-    """What was looked at: the rooms found anew are whole in it."""
     events: Events
     """What became of the rooms."""
 
@@ -110,7 +108,6 @@ def renew(
     changed = set(np.unique(np.append(old[moved], new[moved])).tolist()) - {NO_ROOM}
     return Renewed(
         number_of,
-        window,
         Events(
             matches.born,
             died,

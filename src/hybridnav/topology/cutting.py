@@ -110,24 +110,32 @@ def fine_segments(ground: Ground) -> IntArray:
     Returns
     -------
     IntArray
-        int32 (rows, cols), a segment for each free cell, -1 elsewhere.
+        int32 (rows, cols), a segment for each free cell, -1 elsewhere and for specks below 0.1 m2
+        that touch no other free cell.
     """
     free = ground.free
     cut = np.zeros_like(free)
     for angle_rad, within in wall_directions(ground.wall, ground.resolution_m):
         _cut_in(ground, angle_rad, within, cut)
-    parts, _ = ndimage.label(free & ~cut)
-    kept = np.bincount(parts.ravel()) * (ground.resolution_m * ground.resolution_m) >= _LEAST_M2
-    kept[0] = False
-    lines = np.where(kept[parts], parts - 1, -1).astype(np.int32)
+    lines = _large_parts(free & ~cut, ground)
     everywhere = np.where(free, np.int32(0), np.int32(-1))
     _segmentation_kernels.grow_labels(lines, everywhere, free.size)
+    whole = _large_parts(free & (lines < 0), ground)  # gaps have taken all of its cells
+    lines = np.where(whole >= 0, whole + lines.max(initial=-1) + 1, lines)
     basins = _basins(ground)
     inside = (lines >= 0) & (basins >= 0)
     both = lines[inside] * (np.int64(basins.max(initial=0)) + 1) + basins[inside]
     segments = np.full(free.shape, -1, dtype=np.int32)
     segments[inside] = np.unique(both, return_inverse=True)[1]
     return segments
+
+
+def _large_parts(mask: BoolArray, ground: Ground) -> IntArray:
+    """Number the connected parts of a mask that are no specks, int32 (rows, cols), -1 elsewhere."""
+    parts, _ = ndimage.label(mask)
+    kept = np.bincount(parts.ravel()) * (ground.resolution_m * ground.resolution_m) >= _LEAST_M2
+    kept[0] = False
+    return np.where(kept[parts], parts - 1, -1).astype(np.int32)
 
 
 def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, BoolArray]]:
