@@ -63,11 +63,10 @@ class Plan:
 
 
 _ONLY_WHOLE = (
-    "grid-dijkstra", "hpa-star-raw", "hpa-star-lines", "exact-overlay", "ompl-prmstar",
-    "ompl-rrtstar",
+    "grid-dijkstra", "hpa-star-raw", "hpa-star-lines", "ompl-prmstar", "ompl-rrtstar",
 )  # fmt: skip
 """Methods of the whole study alone: another setting of a method that a quarter has, or a slow
-yardstick (exact-overlay takes a third of the time of all preparations)."""
+yardstick."""
 
 PLANS = {
     "quarter": Plan("quarter", 16, ompl_pairs=4, repeat=3, limit_s=60.0, without=_ONLY_WHOLE),

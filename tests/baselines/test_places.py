@@ -1,8 +1,7 @@
-"""Baselines on the places of a topological map: the simple graph and the exact overlay."""
+"""The baseline on the places of a topological map: the simple graph."""
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.baselines import _overlay_kernels, overlay
-from hybridnav.baselines.overlay import ExactOverlay
 from hybridnav.baselines.regions import joined_regions
 from hybridnav.baselines.simple_graph import SimpleGraphPyramid, first_arcs
 from hybridnav.errors import InvalidValueError
@@ -21,17 +18,15 @@ from hybridnav.pyramid.simple import report_of
 from hybridnav.route import MaxDistanceSearch
 from hybridnav.search.arc_search import ArcSearch
 from hybridnav.search.grid_search import GridSearch
-from tests.oracle.grid import assert_legal, components, distances, move_graph, recounted
+from tests.oracle.grid import assert_legal, components, recounted
 from tests.strategies import MAX_SIDE, Scene, drawn, examples, occupancy_grid, scenes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
     from hybridnav.baselines import Method, MethodResult
 
 Cell = tuple[int, int]
-METHODS: list[Callable[[hn.TopologicalMap], Method]] = [ExactOverlay, SimpleGraphPyramid]
 # A room that no path enters.
 SEALED = drawn(
     ".........",
@@ -40,7 +35,6 @@ SEALED = drawn(
     "..####...",
     ".........",
 )
-both = pytest.mark.parametrize("make", METHODS)
 
 
 def map_of(grid: Any, **build: Any) -> hn.TopologicalMap:
@@ -92,74 +86,16 @@ def assert_plan_holds(method: Method, answer: MethodResult, start: Cell, goal: C
     assert np.isin(region_of[answer.cells[:, 0], answer.cells[:, 1]], answer.nodes).all()
 
 
-@settings(max_examples=examples(150))
-@given(scene=scenes(), seed=st.integers(0, 10**6))
-def test_the_overlay_is_as_short_as_the_grid_optimum(scene: Scene, seed: int) -> None:
-    topology = map_of_scene(scene)
-    method = ExactOverlay(topology)
-    free = scene.classes == CellClass.FREE
-    graph = move_graph(free)
-    arcs = {frozenset(pair) for pair in topology.arcs.tolist()}
-    for start, goal in free_pairs(scene.classes, 8, seed):
-        optimum = distances(graph, free.shape, start)[goal]
-        answer = method.solve(start, goal)
-        if np.isinf(optimum):
-            assert answer.cells is None
-            continue
-        assert endpoints_match(answer, start, goal)
-        assert_legal(answer.cells, free)
-        assert recounted(answer.cells) == pytest.approx(optimum, abs=1e-9)
-        assert answer.bound == 1.0
-        assert_plan_holds(method, answer, start, goal)
-        nodes = answer.nodes or ()
-        assert all(frozenset(pair) in arcs for pair in itertools.pairwise(nodes))
-
-
-@pytest.mark.parametrize("merge_distance_m", [2.0, 6.0, 15.0, float("inf")])
-@pytest.mark.parametrize("linkage", ["radius", "survivor"])
-def test_the_overlay_equals_the_grid_search_on_rooms(merge_distance_m: float, linkage: str) -> None:
-    classes = rooms(MAX_SIDE * 3, seed=4)
-    method = ExactOverlay(map_of(classes, merge_distance_m=merge_distance_m, linkage=linkage))
-    search = GridSearch(classes == CellClass.FREE)
-    for start, goal in free_pairs(classes, 60, seed=1):
-        expected = search.search(start, goal).cells
-        answer = method.solve(start, goal)
-        assert (answer.cells is None) == (expected is None)
-        if expected is not None:
-            assert_legal(answer.cells, classes == CellClass.FREE)
-            assert recounted(answer.cells) == pytest.approx(recounted(expected), abs=1e-9)
-
-
-def test_a_path_through_a_corner_where_fields_share_no_arc_makes_no_plan() -> None:
-    answers = []
-    for seed in range(30):
-        topology = map_of(np.ones((9, 9), np.uint8), merge_distance_m=2.5, seed=seed)
-        method = ExactOverlay(topology)
-        arcs = {frozenset(pair) for pair in topology.arcs.tolist()}
-        field_of = topology.level.field_of
-        for row, col in np.ndindex(8, 8):
-            # Every shortest path between the two is the diagonal move.
-            fields = frozenset((int(field_of[row, col]), int(field_of[row + 1, col + 1])))
-            answer = method.solve((row, col), (row + 1, col + 1))
-            assert answer.cells is not None
-            assert len(answer.cells) == 2
-            assert (answer.nodes is None) == (len(fields) == 2 and fields not in arcs)
-            answers.append(answer)
-    assert any(answer.nodes is None for answer in answers)
-
-
-@both
-def test_a_path_inside_one_field_and_one_that_must_leave_it(make: Callable[..., Method]) -> None:
+def test_a_path_inside_one_field_and_one_that_must_leave_it() -> None:
     classes = drawn("...", ".#.", "...")
-    method = make(map_of(classes, merge_distance_m=float("inf")))
+    method = SimpleGraphPyramid(map_of(classes, merge_distance_m=float("inf")))
     answer = method.solve((0, 0), (2, 2))
     assert recounted(answer.cells) == 4
     assert answer.nodes == (0,)
 
 
-@both
-def test_start_equal_to_goal_is_one_cell(make: Callable[..., Method]) -> None:
-    method = make(map_of(SEALED, merge_distance_m=3.0))
+def test_start_equal_to_goal_is_one_cell() -> None:
+    method = SimpleGraphPyramid(map_of(SEALED, merge_distance_m=3.0))
     answer = method.solve((0, 4), (0, 4))
     assert answer.cells is not None
     assert answer.cells.tolist() == [[0, 4]]
@@ -167,24 +103,20 @@ def test_start_equal_to_goal_is_one_cell(make: Callable[..., Method]) -> None:
     assert len(answer.nodes) == 1
 
 
-@both
 @pytest.mark.parametrize("cell", [(-1, 0), (0, 9), (5, 0), (1, 2)])
-def test_a_cell_that_is_not_free_is_named(make: Callable[..., Method], cell: Cell) -> None:
-    method = make(map_of(SEALED, merge_distance_m=3.0))
+def test_a_cell_that_is_not_free_is_named(cell: Cell) -> None:
+    method = SimpleGraphPyramid(map_of(SEALED, merge_distance_m=3.0))
     with pytest.raises(InvalidValueError, match=rf"free cell.* got \({cell[0]}, {cell[1]}\)"):
         method.solve((0, 0), cell)
     with pytest.raises(InvalidValueError, match="free cell"):
         method.solve(cell, (0, 0))
 
 
-@both
 @settings(max_examples=examples(60))
 @given(scene=scenes(), seed=st.integers(0, 10**6))
-def test_solvability_is_that_of_the_grid(
-    make: Callable[..., Method], scene: Scene, seed: int
-) -> None:
+def test_solvability_is_that_of_the_grid(scene: Scene, seed: int) -> None:
     topology = map_of_scene(scene)
-    method, again = make(topology), make(topology)
+    method, again = SimpleGraphPyramid(topology), SimpleGraphPyramid(topology)
     free = scene.classes == CellClass.FREE
     component = components(free)
     assert method.region_of is not None
@@ -201,10 +133,9 @@ def test_solvability_is_that_of_the_grid(
             assert np.array_equal(answer.cells, same.cells)
 
 
-@pytest.mark.parametrize("make", METHODS)
 @pytest.mark.parametrize("line", ["#", "?", "#?"])
-def test_a_map_without_a_free_cell_can_be_prepared(make: Callable[..., Method], line: str) -> None:
-    method = make(map_of(drawn(line)))
+def test_a_map_without_a_free_cell_can_be_prepared(line: str) -> None:
+    method = SimpleGraphPyramid(map_of(drawn(line)))
     assert method.n_nodes == method.n_edges == 0
 
 
@@ -273,74 +204,28 @@ def test_regions_are_joined_by_legal_moves_only() -> None:
     assert {(3, 4), (3, 5)} <= {(u, v) for u, v in cut.tolist()}
 
 
-def test_corner_cutting_reaches_the_overlay() -> None:
+def test_places_that_only_corners_join_are_not_joined() -> None:
     classes = drawn("#.", ".#")
     for corner_cutting in (False, True):
         grid = hn.OccupancyGrid(
             np.where(classes == CellClass.FREE, 0, 1).astype(np.float32),
             corner_cutting=corner_cutting,
         )
-        for make in METHODS:
-            answer = make(map_of(grid)).solve((0, 0), (1, 1))
-            assert (answer.cells is not None) == (corner_cutting and make is ExactOverlay)
+        assert SimpleGraphPyramid(map_of(grid)).solve((0, 0), (1, 1)).cells is None
 
 
-def test_too_many_distances_are_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(overlay, "MAX_CLIQUE_BYTES", 100)
-    with pytest.raises(InvalidValueError, match="boundary cells need") as error:
-        ExactOverlay(map_of(np.ones((12, 12), np.uint8), merge_distance_m=3.0))
-    assert "\n" not in str(error.value)
-
-
-def test_distances_too_long_for_32_bits_take_64(monkeypatch: pytest.MonkeyPatch) -> None:
-    topology = map_of(rooms(MAX_SIDE, seed=2), merge_distance_m=6.0)
-    plain = ExactOverlay(topology)
-    fill = _overlay_kernels.fill_cliques
-
-    def fill_all_but_32_bits(*arrays: Any) -> bool:
-        return bool(fill(*arrays)) and arrays[-1].dtype != np.int32
-
-    monkeypatch.setattr(_overlay_kernels, "fill_cliques", fill_all_but_32_bits)
-    wide = ExactOverlay(topology)
-    assert wide.memory_bytes > plain.memory_bytes
-    for start, goal in free_pairs(topology.grid.classes, 20, seed=0):
-        one, other = plain.solve(start, goal), wide.solve(start, goal)
-        assert (one.cells is None) == (other.cells is None)
-        if one.cells is not None and other.cells is not None:
-            assert np.array_equal(one.cells, other.cells)
-
-
-def test_the_kernel_says_when_distances_do_not_fit() -> None:
-    made = ExactOverlay(map_of(np.ones((3, 40), np.uint8), merge_distance_m=12.0))
-    arrays = (
-        made._labels.ravel(),
-        made._moves,
-        made._cols,
-        made._boxes,
-        made._node_cell,
-        made._node_first,
-        made._clique_first,
-    )
-    size = int(made._clique_first[-1])
-    assert _overlay_kernels.fill_cliques(*arrays, np.empty(size, np.int32))
-    assert not _overlay_kernels.fill_cliques(*arrays, np.empty(size, np.int16))
-
-
-def test_the_depot_is_planned_exactly(data: Path) -> None:
+def test_the_depot_is_planned(data: Path) -> None:
     grid = hn.load_map(
         data / "nav2" / "maps" / "depot.yaml", robot_radius_m=0.25, free_threshold=0.19
     )
     topology = map_of(grid, merge_distance_m=4.0)
-    exact, simple = ExactOverlay(topology), SimpleGraphPyramid(topology)
-    assert exact.n_nodes > 1000
+    simple = SimpleGraphPyramid(topology)
     free = np.asarray(grid.classes == CellClass.FREE)
     search = GridSearch(free)
     for start, goal in free_pairs(grid.classes, 60, seed=3):
         optimum = search.search(start, goal).cells
-        answer = exact.solve(start, goal)
         near = simple.solve(start, goal)
-        assert (answer.cells is None) == (optimum is None) == (near.cells is None)
+        assert (optimum is None) == (near.cells is None)
         if optimum is not None:
-            assert_legal(answer.cells, free)
-            assert recounted(answer.cells) == pytest.approx(recounted(optimum), abs=1e-9)
+            assert_legal(near.cells, free)
             assert recounted(near.cells) >= recounted(optimum) - 1e-9

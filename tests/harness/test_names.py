@@ -60,7 +60,6 @@ def settings(tmp_path, monkeypatch):
         ("weighted A*", "weighted-astar"),
         ("WA*", "weighted-astar"),
         ("Thrun", "thrun"),
-        ("exact overlay", "exact-overlay"),
         *((name, name) for name in BASELINES),
     ],
 )

@@ -13,7 +13,6 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.baselines.grid import GridAstar
 from hybridnav.baselines.hpa import HpaStar
-from hybridnav.baselines.overlay import ExactOverlay
 from hybridnav.baselines.simple_graph import SimpleGraphPyramid
 from hybridnav.baselines.thrun import ThrunMap
 from hybridnav.grid import CellClass
@@ -97,7 +96,6 @@ def test_no_baseline_denies_a_path_that_exists(topology: hn.TopologicalMap, seed
     methods: list[Method] = [
         GridAstar(grid),
         HpaStar(grid, cluster_cells=4),
-        ExactOverlay(topology),
         SimpleGraphPyramid(topology),
         ThrunMap(grid, epsilon_cells=2),
     ]

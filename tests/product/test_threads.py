@@ -15,7 +15,6 @@ import hybridnav
 import hybridnav as hn
 from hybridnav.baselines.grid import GridAstar, GridDijkstra, WeightedAstar
 from hybridnav.baselines.hpa import HpaStar
-from hybridnav.baselines.overlay import ExactOverlay
 from hybridnav.baselines.simple_graph import SimpleGraphPyramid
 from hybridnav.baselines.thrun import ThrunMap
 from hybridnav.config import load_preset
@@ -140,12 +139,12 @@ def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(preset: st
 
 @pytest.mark.parametrize(
     "method",
-    [GridAstar, GridDijkstra, WeightedAstar, HpaStar, ExactOverlay, SimpleGraphPyramid, ThrunMap],
+    [GridAstar, GridDijkstra, WeightedAstar, HpaStar, SimpleGraphPyramid, ThrunMap],
 )
 def test_four_threads_on_one_baseline_get_the_answers_of_one(method: Any) -> None:
     grid = grid_with_rooms(seed=4, side=60)
     made_of: Any = grid
-    if method in {ExactOverlay, SimpleGraphPyramid}:
+    if method is SimpleGraphPyramid:
         made_of = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=1.5))
     planner = method(made_of)
 

@@ -46,7 +46,6 @@ BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
     "hpa-star-raw": ("hybridnav.baselines.hpa:HpaStar", {"smooth": False}),
     "hpa-star-lines": ("hybridnav.baselines.hpa:HpaStar", {"line_cells": 1000}),
     "simple-graph": ("hybridnav.baselines.simple_graph:SimpleGraphPyramid", {}),
-    "exact-overlay": ("hybridnav.baselines.overlay:ExactOverlay", {}),
     "thrun": ("hybridnav.baselines.thrun:ThrunMap", {}),
 }
 """Class of each baseline and its options; those named in `ON_PLACES` are made from a
@@ -71,7 +70,7 @@ RIVALS: dict[str, tuple[str, dict[str, Any]]] = {
 _PACKAGES = {"nano-astar": "nano_astar"}
 """Packages of rivals that have another name than the rival."""
 
-ON_PLACES = frozenset({"simple-graph", "exact-overlay"})
+ON_PLACES = frozenset({"simple-graph"})
 
 
 _KNOWN = BASELINES | RIVALS
