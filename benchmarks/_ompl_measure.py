@@ -116,7 +116,7 @@ class Bench:
             merge_distance_m=MOVINGAI_MERGE_DISTANCE_M if is_movingai else ROS_MERGE_DISTANCE_M,
         )
         topology = hn.TopologicalMap(pyramid)
-        self._coarse = hn.HybridPlanner(topology, preset="portals")
+        self._coarse = hn.HybridPlanner(topology, preset="shortest")
         optimum = AnyAngleOptimum(self.grid)
         self.problems: list[Problem] = []
         for pair in sample_pairs(self.grid, pairs, seed=seed):
@@ -130,9 +130,9 @@ class Bench:
 
     def planner(self, method: Method) -> OmplPlanner:
         """The planner of a method; its process runs until it is dropped."""
-        cells: Any = self._coarse._cells  # noqa: SLF001 - the planner's own fields, built once
         whole = method.scope == "whole map"
-        return OmplPlanner(self.grid, method.settings, None if whole else cells.search.field_of)
+        field_of = None if whole else self._coarse.topology.level.field_of
+        return OmplPlanner(self.grid, method.settings, field_of)
 
     def records(self, method: Method, there: set[str]) -> Iterator[Record]:
         """Records of a method that are not there yet."""

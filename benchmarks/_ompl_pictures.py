@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -29,9 +29,8 @@ def draw(out: Path) -> list[Path]:
     """A picture for each planner: the whole map's run, and the corridor's in both ways."""
     grid = office_world().grid(robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
-    coarse = hn.HybridPlanner(topology, preset="portals")
-    cells: Any = coarse._cells  # noqa: SLF001 - the planner's own fields, built once
-    field_of = cells.search.field_of
+    coarse = hn.HybridPlanner(topology, preset="shortest")
+    field_of = topology.level.field_of
     path = coarse.plan(*ENDS).raise_for_status().path
     assert path is not None  # noqa: S101 - solved
     passed = np.unique(field_of[path.cells[:, 0], path.cells[:, 1]])

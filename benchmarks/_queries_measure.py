@@ -50,7 +50,7 @@ Presets = dict[str, hn.Preset]
 
 def presets_of(names: Iterable[str]) -> Presets:
     """Presets by what they were called: a name, and overrides behind colons, such as
-    `portals:planner.smooth=line-of-sight`; that of grid A* comes first."""
+    `octile:planner.smooth=line-of-sight`; that of grid A* comes first."""
     found = {}
     for text in dict.fromkeys((YARDSTICK, *names)):
         name, *overrides = text.split(":")

@@ -252,7 +252,7 @@ _FINDINGS = tuple(
         (
             "Speed-up over A\\*, median of the ratios, and ratio of the mean times: `octile` "
             "{octile_speed} and {octile_means}, `shortest` {shortest_speed} and {shortest_means}, "
-            "`portals` {portals_speed} and {portals_means}, HPA\\* {hpa_speed} and {hpa_means}."
+            "HPA\\* {hpa_speed} and {hpa_means}."
         ),
         (
             "By cost, over the least cost of paths of cells: `robot`, which is not bound to cells, "

@@ -30,7 +30,7 @@ RUN_FILE = "study-run.json"
 COSTS = ("clearance",)
 """Nav2's inflation with the defaults of its bringup."""
 
-BESIDE_OMPL = "portals"
+BESIDE_OMPL = "octile"
 """Preset whose paths of cells, shortened by line of sight, stand beside those of OMPL."""
 
 GRAPHS = (

@@ -33,7 +33,7 @@ def routes_table(floors: list[Floor]) -> bool:
     print("\n## Routes between every ordered pair of rooms, true rooms\n")
     print(
         "The grid is the preset `grid-astar`, A* on the whole map, between the rooms' points "
-        "and between the endpoints that plans from anywhere to anywhere chose. Plans of `portals` "
+        "and between the endpoints that plans from anywhere to anywhere chose. Plans of `octile` "
         "must be solved exactly when it is, and the levels of places and rooms must agree; "
         "connected free cells, labelled by scipy, say the same of any two rooms.\n"
     )
@@ -77,7 +77,7 @@ class AllPairs:
 
 def _all_pairs(floor: Floor, topology: hn.TopologicalMap) -> AllPairs:
     """Plan between all pairs of rooms, by their points and from anywhere to anywhere."""
-    planner = hn.HybridPlanner(topology, preset="portals")
+    planner = hn.HybridPlanner(topology, preset="octile")
     on_grid = hn.HybridPlanner(topology, preset="grid-astar")
     names = floor.rooms.names
     places, rooms = MaxDistanceSearch(topology), RoomSearch(topology.rooms)

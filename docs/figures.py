@@ -28,7 +28,7 @@ OFFICE = ROOT / "maps" / "office" / "office.yaml"
 BUILDING = ROOT / "maps" / "building" / "building.yaml"
 LEVELS = (6, 8, 10, -1)
 REGION_CELLS = 26_420
-"""A tenth of the free cells, as portals have it."""
+"""A tenth of the free cells."""
 START, GOAL = (1.0, 13.2), (40.6, 19.4)
 
 ROBOT = ("shortest", "robot")

@@ -34,7 +34,7 @@ PARTS = (
         "lengths", ("octile", "paper", "shortest"), ("hpa-star", "networkx"), 6, 3, methods=GRAPHS
     ),
     Part("costs", ("robot", "shortest"), (), 6, 3, ("clearance",)),
-    Part("ompl", (load_preset("portals", overrides=["planner.smooth=line-of-sight"]),), (), 3, 0),
+    Part("ompl", (load_preset("octile", overrides=["planner.smooth=line-of-sight"]),), (), 3, 0),
 )
 KINDS = dict.fromkeys(NAMES, "ROS")
 FIGURES = ("lengths", "costs", "ompl")
@@ -358,11 +358,11 @@ def test_every_method_is_in_a_part_or_said_to_be_left_out(name):
     known = {*BASELINES, *there, *hn.preset_names()} - {REFERENCE}
     assert known - asked == set(PLANS[name].without)
     assert missing.keys() == RIVALS.keys() - set(there)
-    assert {"octile", "paper", "portals", "shortest"} <= set(lengths.presets)
+    assert {"octile", "paper", "shortest"} <= set(lengths.presets)
     assert {"hpa-star", "thrun", "weighted-astar", "networkx"} <= set(lengths.baselines)
     assert REFERENCE in lengths.baselines
     assert {method.name for method in lengths.methods} == {"route graph", "swagger-like"}
-    assert {"robot", "portals", "shortest"} <= set(costs.presets)
+    assert {"robot", "shortest"} <= set(costs.presets)
     assert costs.costs == ("clearance",)
     names = [preset for preset in ompl.presets if isinstance(preset, str)]
     assert {"ompl-rrtconnect", "ompl-bitstar", "shortest"} <= set(names)

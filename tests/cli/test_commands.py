@@ -122,7 +122,7 @@ def test_a_path_equal_to_its_bound_is_called_optimal(cli, rooms):
     done = cli("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--compare")
     assert "bound      0.00 m, the path is optimal" in done.out
     assert "arcs       0\n" in done.out
-    query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--preset", "portals")
+    query = ("plan", rooms, "--start", "1.5,3.5", "--goal", "1.5,3.5", "--preset", "octile")
     assert "loss 0.00 %" in cli(*query, "--compare").out
 
 

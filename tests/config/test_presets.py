@@ -144,7 +144,7 @@ def test_a_preset_is_a_frozen_value(write):
         ("planner: {speed: 3}\n", ["planner.speed: unknown key", "coarse", "allow_unexplored"]),
         ('planner: {"a\\nb": 3}\n', ["a\\nb", "unknown key"]),
         ("planner: {1: 3}\n", ["planner.1"]),
-        ("name: portals\n", ["name: a preset is named after its file"]),
+        ("name: octile\n", ["name: a preset is named after its file"]),
         ("pyramid:\n", ["pyramid: expected a section with keys, got nothing"]),
         ("planner: [coarse]\n", ["planner: expected a section with keys, got ['coarse']"]),
         ("description: 3\n", ["description: should be a valid string, got 3"]),
@@ -168,7 +168,7 @@ def test_a_preset_is_a_frozen_value(write):
             "planner: {coarse: fast}\n",
             [
                 "planner.coarse",
-                "'max-distance', 'portals', 'mesh', 'jumps', 'overlay' or 'none'",
+                "'max-distance', 'mesh', 'jumps', 'overlay' or 'none'",
                 "'fast'",
             ],
         ),
@@ -280,4 +280,29 @@ def test_to_yaml_gives_every_key():
 
 def test_the_old_name_of_a_refinement_is_refused_with_the_new_one() -> None:
     with pytest.raises(hn.PresetError, match=r"planner\.refine: gates is now called none: write"):
-        hn.load_preset("portals", overrides=["planner.refine=gates"])
+        hn.load_preset("octile", overrides=["planner.refine=gates"])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "coarse"),
+    [
+        ((), "jumps"),
+        (("planner.epsilon=0.01",), "jumps"),
+        (("planner.smooth=line-of-sight",), "jumps"),
+        (("planner.smooth=arcs",), "overlay"),
+        (("planner.costs.clearance.multiplier=3",), "overlay"),
+        (("planner.refine=ompl",), "mesh"),
+    ],
+)
+def test_another_method_stands_for_portals_with_a_warning(
+    overrides: tuple[str, ...], coarse: str
+) -> None:
+    with pytest.warns(FutureWarning, match=f"^portals are gone, coarse: {coarse} plans") as told:
+        preset = hn.load_preset("portals", overrides=overrides)
+    assert len(told) == 1
+    assert (preset.name, preset.planner.coarse, preset.planner.epsilon) == ("octile", coarse, None)
+    assert "portals" not in preset.to_yaml()
+    with pytest.warns(FutureWarning, match="^portals are gone"):
+        again = hn.load_preset("octile", overrides=["planner.coarse=portals", *overrides])
+    assert again == preset
+    assert "portals" not in hn.preset_names()

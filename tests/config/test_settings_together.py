@@ -14,27 +14,27 @@ EXACT = "planner.epsilon=0"
 @pytest.mark.parametrize(
     ("preset", "override", "message"),
     [
-        ("paper", "planner.epsilon=0.1", "epsilon needs coarse: portals, mesh or overlay"),
-        ("grid-astar", "planner.epsilon=0", "epsilon needs coarse: portals, mesh or overlay"),
+        ("paper", "planner.epsilon=0.1", "epsilon needs coarse: mesh or overlay"),
+        ("grid-astar", "planner.epsilon=0", "epsilon needs coarse: mesh or overlay"),
         ("paper", "planner.refine=none", "coarse: max-distance goes with refine: grid-astar"),
         ("grid-astar", "planner.refine=none", "coarse: none goes with refine: grid-astar"),
-        ("portals", "planner.refine=stored-paths", "planner.refine: should be 'grid-astar', "),
-        ("octile", "planner.epsilon=0.1", "epsilon needs coarse: portals, mesh or overlay"),
+        ("octile", "planner.refine=stored-paths", "planner.refine: should be 'grid-astar', "),
+        ("octile", "planner.epsilon=0.1", "epsilon needs coarse: mesh or overlay"),
         ("octile", "planner.refine=grid-astar", "coarse: jumps goes with refine: none or ompl"),
-        ("portals", "planner.coarse=none", "coarse: none goes with refine"),
+        ("octile", "planner.coarse=none", "coarse: none goes with refine"),
         ("shortest", "planner.refine=grid-astar", "coarse: mesh goes with refine: none or ompl"),
         (
             "shortest",
             "planner.smooth=line-of-sight",
             "smooth shortens grid paths, with coarse: mesh they are any-angle",
         ),
-        ("portals", "planner.coarse=max-distance", "coarse: max-distance goes with refine"),
-        ("portals", "planner.refine=grid-astar", "coarse: portals goes with refine"),
-        *itertools.product(["paper", "portals"], ["planner.smooth=los"], ["planner.smooth: "]),
-        ("portals", "planner.smooth=true", "planner.smooth: "),
-        ("portals", "planner.smooth=", "planner.smooth: "),
+        ("octile", "planner.coarse=max-distance", "coarse: max-distance goes with refine"),
+        ("robot", "planner.refine=grid-astar", "coarse: overlay goes with refine"),
+        *itertools.product(["paper", "octile"], ["planner.smooth=los"], ["planner.smooth: "]),
+        ("octile", "planner.smooth=true", "planner.smooth: "),
+        ("octile", "planner.smooth=", "planner.smooth: "),
         *(
-            ("portals", f"planner.epsilon={value}", "planner.epsilon: ")
+            ("shortest", f"planner.epsilon={value}", "planner.epsilon: ")
             for value in ("-0.01", ".nan", "2", ".inf", "yes", "small", "[0.1]")
         ),
     ],
@@ -50,6 +50,6 @@ def test_settings_that_do_not_go_together_are_refused(
 
 
 def test_settings_that_do_go_together_are_taken() -> None:
-    assert hn.load_preset("portals").planner.epsilon is None
-    assert hn.load_preset("portals", overrides=[EXACT]).planner.epsilon == 0
-    assert hn.load_preset("portals", overrides=["planner.epsilon=1"]).planner.epsilon == 1
+    assert hn.load_preset("shortest").planner.epsilon is None
+    assert hn.load_preset("shortest", overrides=[EXACT]).planner.epsilon == 0
+    assert hn.load_preset("shortest", overrides=["planner.epsilon=1"]).planner.epsilon == 1

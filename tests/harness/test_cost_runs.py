@@ -41,7 +41,7 @@ FAULTS = {
     faulty.ArcsBoundedByNothing: "nan m is no lower bound on paths of cells",
 }
 SOUND = (faulty.Cheapest, faulty.HonestlyDear, faulty.WithArcs, faulty.ByLength)
-PRESETS = ("shortest", "octile", "portals", "paper")
+PRESETS = ("shortest", "octile", "paper")
 COSTS = ("clearance:inflation_radius_m=3,scaling=0.5,multiplier=6",)
 N_PAIRS = 30
 
@@ -150,7 +150,7 @@ def test_losses_gaps_and_metrics_are_about_costs(study: Any) -> None:
     best = outcome_of(study, "grid-astar")
     assert (best.losses == 0).all()
     assert (best.gaps == 0).all()
-    for label in ("shortest", "octile", "portals", "paper"):
+    for label in ("shortest", "octile", "paper"):
         outcome = outcome_of(study, label)
         assert outcome.losses == pytest.approx(outcome.costs_m / best.costs_m - 1, abs=1e-9)
         # A bound on lengths is one on costs, because no factor is below 1.

@@ -163,7 +163,7 @@ def test_a_file_of_methods_names_and_sets_them(settings, tmp_path):
         "- {name: 'HPA* (20)', baseline: 'HPA*', settings: {cluster_cells: 20}}\n"
         "- {name: heavy, class: 'mine:Mine', settings: {weight: 2}}\n"
         "- {class: 'mine:Mine', settings: {weight: 1}}\n"
-        "- {name: 'near', preset: portals, settings: {planner.epsilon: 0.1}}\n"
+        "- {name: 'near', preset: shortest, settings: {planner.epsilon: 0.1}}\n"
     )
     run = replace(settings, baselines=(), methods=read_methods(file))
     evaluate(run, tmp_path / "run")

@@ -52,7 +52,7 @@ def folder(tmp_path_factory):
         baselines=(f"{__name__}:Narrow",),
         methods=(
             NamedMethod("baseline", "HPA*", "HPA* (20)", {"cluster_cells": 20}),
-            NamedMethod("preset", "portals", "near", {"planner.epsilon": 0.1}),
+            NamedMethod("preset", "octile", "near", {"planner.corridor": "neighbours"}),
         ),
         pairs=N_PAIRS,
         repeat=2,
@@ -108,9 +108,9 @@ def test_the_table_of_methods_has_the_reason(folder, study):
     }
     assert rows["HPA* (20)"]["kind"] == "baseline hpa-star"
     assert rows["HPA* (20)"]["settings"] == "cluster_cells 20"
-    assert rows["near"]["kind"] == "preset portals"
+    assert rows["near"]["kind"] == "preset octile"
     assert (rows["octile"]["kind"], rows["grid-astar"]["kind"]) == ("preset", "baseline")
-    assert "epsilon 0.1" in str(rows["near"]["settings"])
+    assert "corridor neighbours" in str(rows["near"]["settings"])
     assert str(rows["octile"]["version"]).startswith("hybridnav ")
     for text in ((folder / file).read_text() for file in ("report.html", "summary.md")):
         assert LIMIT in text

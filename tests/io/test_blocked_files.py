@@ -305,7 +305,7 @@ def test_a_comparison_closes_the_same_for_the_whole_grid(
     query: Any,
     tmp_path: Any,
 ) -> None:
-    closed = ("--preset", "portals", "--blocked", tmp_path / "mask.png")
+    closed = ("--preset", "octile", "--blocked", tmp_path / "mask.png")
     done = cli(*query, *POINTS, "--compare", *closed, "--json").answer
     assert done["status"] == "solved"
     assert done["optimum_m"] == pytest.approx(done["length_m"])

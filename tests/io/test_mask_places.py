@@ -232,7 +232,7 @@ def test_every_preset_keeps_out(floor: Any, preset: str) -> None:
     assert (shut.classes[tuple(grid.frame.cells_of(poses[:, :2]).T)] == hn.CellClass.FREE).all()
 
 
-@pytest.mark.parametrize("preset", ["robot", "portals", "grid-astar", "paper"])
+@pytest.mark.parametrize("preset", ["robot", "grid-astar", "paper"])
 def test_presets_with_costs_take_the_mask_as_costs(floor: Any, preset: str) -> None:
     grid, topology, path = floor
     layer = hn.load_keepout_mask(path, grid, pose=POSE)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-PRESETS = ("shortest", "octile", "portals")
+PRESETS = ("shortest", "octile")
 START, GOAL = (0.55, 0.55), (2.55, 2.85)
 HEAD = struct.Struct("<8sIIQ")
 
@@ -71,6 +71,15 @@ def refusal(path: Path) -> str:
     assert text.startswith("model ")
     assert len(text) < 500
     return text
+
+
+def test_a_model_with_portals_is_to_be_built_anew(tmp_path: Path) -> None:
+    path = tmp_path / "m.hnm"
+    hn.save(planners(), path)
+    found = [filed.read() for filed in container.read_parts(path)]
+    old = container.Part("portals", 2, {}, {}, {})
+    container.write_parts(path, [*found, old], compress=False)
+    assert "no planner uses portals any more: build the model anew" in refusal(path)
 
 
 def test_the_files_of_these_tests_are_sound(content: bytes, tmp_path: Path) -> None:
@@ -164,7 +173,7 @@ CRAFTED: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "no text": (lambda _: b"\xff\xfe", "no description"),
     "no grid": (lose("grid"), "0 parts grid"),
     "two pyramids": (lambda tree: tree["parts"].append(part(tree, "pyramid")), "overlaps"),
-    "no tables": (lose("portal tables"), "bytes of arrays"),
+    "no jump graph": (lose("jump graph"), "bytes of arrays"),
     "no edges": (lose("corner edges"), "edges are missing"),
     "unknown part": (put("mesh", "kind", to="web"), "newer hybridnav"),
     "newer part": (put("mesh", "version", to=9), "a newer hybridnav"),
@@ -223,9 +232,6 @@ INDICES = [
     ("corner hierarchy", "first"),
     ("jump graph", "index"),
     ("jump graph", "first"),
-    ("portals", "exit_gate"),
-    ("portals", "side_start"),
-    ("portal tables", "source_at"),
     ("rooms", "label_of"),
 ]
 

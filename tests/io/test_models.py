@@ -18,7 +18,6 @@ from hybridnav.io.models import structures
 from hybridnav.jumps import JumpSearch
 from hybridnav.jumps.build import JumpGraph
 from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-from hybridnav.portals import Portals, Tables
 from hybridnav.pyramid.record import Record
 from tests.product.test_copies import assert_alike, kernels
 from tests.strategies import Scene, examples, scenes
@@ -160,13 +159,6 @@ def test_settings_of_a_planner_decide_what_it_takes_from_a_model(tmp_path: Path)
     assert model.planner("shortest").prepared is None
     stopping = hn.load_preset(entering, overrides=["planner.epsilon=0.01"])
     assert model.planner(stopping).prepared is not None
-    portals = hn.HybridPlanner(topology(), preset="portals")
-    portals.prepare()
-    model = loaded(portals, tmp_path / "p.hnm")
-    assert model.planner("portals").prepared is not None
-    other = hn.DualGraphPyramid.build(model.grid, merge_distance_m=2.0)
-    coarser = model.planner("portals", topology=hn.TopologicalMap(other))
-    assert coarser.prepared is None
 
 
 def test_several_planners_share_a_model(tmp_path: Path) -> None:
@@ -310,8 +302,6 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.CORNER_GRAPH, CornerGraph, ()),
         (structures.CORNER_HIERARCHY, CornerHierarchy, ()),
         (structures.JUMP_GRAPH, JumpGraph, ("origin", "shape")),
-        (structures.TABLES, Tables, ("shift",)),
-        (structures.PORTALS, Portals, ()),
         (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors")),
     ],
 )

@@ -209,7 +209,7 @@ def test_regions_that_no_change_touches_keep_places_and_number():
     assert (again.born, again.died, again.changed) == ((), (), ())
 
 
-def test_portals_follow_regions():
+def test_an_overlay_is_made_from_regions_that_followed():
     office = hn.load_map(OFFICE, robot_radius_m=0.25)
     places = OnlinePyramid.of(hn.DualGraphPyramid.build(office))
     regions = OnlineRegions.of(places, 9000)
@@ -217,8 +217,11 @@ def test_portals_follow_regions():
     regions = regions.update(
         places.update(with_classes(office, classes), changed=box).version
     ).version
-    planner = hn.HybridPlanner(hn.TopologicalMap(regions.pyramid), preset="portals")
-    exact = hn.HybridPlanner(hn.TopologicalMap(regions.pyramid), preset="octile")
+    topology = hn.TopologicalMap(regions.pyramid)
+    over = hn.load_preset("octile", overrides=["planner.coarse=overlay"])
+    planner = hn.HybridPlanner(topology, preset=over)
+    planner.prepare()
+    exact = hn.HybridPlanner(topology, preset="octile")
     ends = (2.0, 2.0), (40.0, 20.0)
     assert planner.plan(*ends).cost == pytest.approx(exact.plan(*ends).cost)
 

@@ -63,7 +63,7 @@ def rows_crossed(alternatives):
     ]
 
 
-@pytest.mark.parametrize("preset", ["grid-astar", "shortest", "portals", "paper"])
+@pytest.mark.parametrize("preset", ["grid-astar", "shortest", "octile", "paper"])
 def test_the_second_route_takes_the_other_door(preset):
     found = by_homotopy(planner_of(TWO_DOORS, preset), (1.5, 1.5), (12.5, 2.5), 3)
     assert rows_crossed(found) == [{2}, {6}]
@@ -324,7 +324,7 @@ def test_grids_with_corner_cutting_have_walks_and_no_alternatives():
         AlternativeSearch(topology)
     walks = RouteFinder(topology)
     free = np.argwhere(CORNERS == CellClass.FREE)
-    planner = hn.HybridPlanner(topology, preset="portals")
+    planner = hn.HybridPlanner(topology, preset="octile")
     pinched = 0
     for start in free:
         for goal in free:

@@ -21,7 +21,7 @@ from tests.strategies import MAX_SIDE, drawn, examples
 if TYPE_CHECKING:
     from hybridnav.baselines import Method
 
-PRESETS = ["paper", "portals", "octile", "grid-astar"]
+PRESETS = ["paper", "octile", "grid-astar"]
 # Two free places that only a move between two blocked cells joins.
 PINCHED = drawn("..###", "..###", "##...", "##...")
 

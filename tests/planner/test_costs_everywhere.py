@@ -26,7 +26,7 @@ from tests.layers import grid_of, layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.search.test_weighted import weighted
 
-HONOUR = {"grid-astar": True, "paper": False, "portals": False, "robot": False}
+HONOUR = {"grid-astar": True, "paper": False, "robot": False}
 """Presets that plan by costs, and whether their paths of cells are the cheapest."""
 REFUSE = {"shortest", "octile"} | {
     f"ompl-{name}" for name in ("bitstar", "informed-rrtstar", "prmstar", "rrtconnect", "rrtstar")

@@ -23,7 +23,7 @@ from tests.door_alternatives import (
 from tests.floors import random_floor
 from tests.strategies import examples, occupancy_grid
 
-PRESETS = ["shortest", "portals", "octile", "grid-astar", "paper"]
+PRESETS = ["shortest", "octile", "grid-astar", "paper"]
 
 
 def planner_of(floor, preset="grid-astar"):

@@ -49,7 +49,7 @@ def labels():
     return RoomLabels(NAMES, label_of, {"sink": (0.75, 4.25), "lab": (5.75, 4.25)})
 
 
-@pytest.fixture(scope="module", params=["shortest", "portals", "grid-astar"])
+@pytest.fixture(scope="module", params=["shortest", "octile", "grid-astar"])
 def planner(request):
     grid = occupancy_grid(CLASSES, resolution_m=SIDE)
     pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=2.0, rooms=labels())

@@ -147,10 +147,10 @@ def test_equal_seeds_give_equal_paths_when_iterations_are_counted(planner_of: An
         assert first.shape != other.shape or not np.array_equal(first, other)
 
 
-def test_whole_map_places_and_fields_of_portals_are_corridors_too(
+def test_the_whole_map_and_the_places_are_corridors_too(
     office: hn.TopologicalMap,
 ) -> None:
-    for coarse in ("none", "max-distance", "portals"):
+    for coarse in ("none", "max-distance", "jumps", "overlay"):
         preset = load_preset("ompl-rrtconnect", overrides=[f"planner.coarse={coarse}"])
         result = hn.HybridPlanner(office, preset=preset).plan(*ENDS)
         assert result.solved

@@ -20,7 +20,7 @@ from tests.strategies import Scene, examples, scenes
 if TYPE_CHECKING:
     from pathlib import Path
 
-PLAIN = ("shortest", "octile", "grid-astar", "paper", "portals", "robot")
+PLAIN = ("shortest", "octile", "grid-astar", "paper", "robot")
 OMPL = ("r2", "se2", "dubins", "reeds-shepp", "differential")
 NEEDS_YAW = OMPL[1:]
 SMOOTH: Any = ("none", "line-of-sight", "arcs")

@@ -76,7 +76,7 @@ def things() -> dict[str, Any]:
         "rooms": topo.rooms,
         "labels": topo.rooms.labels,
         "door": topo.rooms.doors[0],
-        "preset": hn.load_preset("portals"),
+        "preset": hn.load_preset("paper"),
         "blocked": hn.Blocked(cells=[[1, 1]], polygons=[box(0, 0, 1, 1)]),
         "tour": hn.plan_tour(planner("shortest"), [START, topo.rooms.names[0], GOAL]),
         "alternatives": hn.plan_alternatives(planner("shortest"), START, GOAL, 2),
@@ -217,7 +217,7 @@ def test_a_copied_planner_answers_alike_without_compiling_anything(
 
 @WAYS
 def test_copied_baselines_answer_alike(copied: Any) -> None:
-    method = SimpleGraphPyramid(topology())
+    method: Any = SimpleGraphPyramid(topology())
     cells = topology().grid.frame.cells_of([START, GOAL]).tolist()
     found = [who.solve(*map(tuple, cells)).cells for who in (method, copied(method))]
     np.testing.assert_array_equal(*found)

@@ -99,7 +99,7 @@ def test_what_is_computed_on_demand_is_whole_or_absent() -> None:
         assert record(topology) == expected
 
 
-@pytest.mark.parametrize("preset", ["shortest", "portals", "paper"])
+@pytest.mark.parametrize("preset", ["shortest", "octile", "paper"])
 def test_a_planner_whose_making_is_interrupted_leaves_its_map_whole(preset: str) -> None:
     # Its file is read before: one that is left half read stays open for a while.
     topology, loaded = grown(), hn.load_preset(preset)
@@ -225,7 +225,7 @@ def test_hundreds_of_signals_inside_the_kernels_of_a_build() -> None:
     assert strike_builds(400) > 0
 
 
-@pytest.mark.parametrize("preset", ["portals", "grid-astar"])
+@pytest.mark.parametrize("preset", ["robot", "grid-astar"])
 def test_an_interrupted_update_leaves_the_costs_before_or_the_new_ones(preset: str) -> None:
     topology = grown()
     factors = np.random.default_rng(1).uniform(1, 5, GRID.shape).astype(np.float32)

@@ -32,7 +32,7 @@ ENDS = (1.0, 13.2), (40.6, 19.4)
 BUDGET_S = 1.0
 START_S = 60.0
 OVER_PLACES = "planner.coarse=max-distance"
-"""For processes of their own, which would prepare portals for seconds."""
+"""For processes of their own, which would prepare a mesh."""
 LATE = "the worker did not answer in time"
 """What a busy machine can make of the first of these."""
 REASONS = {

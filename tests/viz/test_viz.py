@@ -334,7 +334,7 @@ def test_the_title_tells_map_length_loss_and_places(rooms, plan):
     assert _title(plot_plan(rooms, plan, title="")) == ""
 
 
-@pytest.mark.parametrize("preset", ["shortest", "portals", "grid-astar"])
+@pytest.mark.parametrize("preset", ["shortest", "octile", "grid-astar"])
 def test_a_route_that_is_read_off_the_path_is_shown_and_no_corridor(rooms, preset):
     result = _plan(rooms, START, GOAL, preset)
     ax = plot_plan(rooms, result)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import warnings
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
@@ -39,7 +40,6 @@ DEFAULT_ROBOT_RADIUS_M = 0.25
 
 _REFINED_BY = {
     "max-distance": "grid-astar",
-    "portals": "none",
     "mesh": "none",
     "jumps": "none",
     "overlay": "none",
@@ -142,26 +142,25 @@ class PlannerSettings(_Section):
     'jumps'
     """
 
-    coarse: Literal["max-distance", "portals", "mesh", "jumps", "overlay", "none"] = "max-distance"
+    coarse: Literal["max-distance", "mesh", "jumps", "overlay", "none"] = "max-distance"
     """Structure to plan on. `max-distance`: the places, by that attribute of their arcs, which
-    chooses the route. `portals`: portals between regions, the level above the places. `mesh`:
-    convex polygons of free space. `jumps`: the corner cells at which shortest paths of cells turn.
-    `overlay`: exact costs between the border cells of fields on several levels of the pyramid,
-    which `portals` takes too once there are costs. `none`: the cells of the whole map. All but the
-    first derive the route from the path."""
+    chooses the route. `mesh`: convex polygons of free space. `jumps`: the corner cells at which
+    shortest paths of cells turn. `overlay`: exact costs between the border cells of fields on
+    several levels of the pyramid. `none`: the cells of the whole map. All but the first derive the
+    route from the path. For `portals`, which is gone, `jumps` is taken with a warning, and
+    `overlay` with costs."""
     corridor: Literal["route", "neighbours"] = "route"
     """Fields in which `grid-astar` and `ompl` begin: those of the coarse route, or also their
     neighbours. It has no effect with `refine: none` and `coarse: none`."""
     refine: Annotated[str, AfterValidator(_known_refiner)] = "grid-astar"
     """Search for the path. `grid-astar`: cell by cell in the corridor. `ompl`: by a sampling-based
-    planner. `none`: the coarse search has found it, over portals, on the mesh, the corner cells or
-    the overlay.
+    planner. `none`: the coarse search has found it, on the mesh, the corner cells or the overlay.
     In place of `grid-astar`, `module:Class` names a refiner of your own, which is imported when a
     planner is made."""
     ompl: OmplSettings | None = None
     """With `refine: ompl`, a section of its own; otherwise null."""
     epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
-    """With `refine: none`, over portals, on the mesh and the overlay: the search ends once no path
+    """With `refine: none`, on the mesh and the overlay: the search ends once no path
     can be better by more than this part; null or 0 for the optimum."""
     budget_s: Annotated[_Float, Field(ge=0)] | None = None
     """On the mesh: seconds after which a query returns the best path so far, with its proved bound;
@@ -176,12 +175,12 @@ class PlannerSettings(_Section):
     allow_unexplored: bool = False
     """Whether unexplored cells may be entered."""
     costs: CostSettings | None = None
-    """With `refine: grid-astar`, and with `coarse: overlay` or `portals`, factors by which metres
+    """With `refine: grid-astar`, and with `coarse: overlay`, factors by which metres
     cost more; the path is the cheapest one. null makes costs lengths."""
 
     def refusal_of_costs(self) -> str | None:
         """Return why these settings cannot plan by costs, None if they can."""
-        knows = self.refine == "none" and self.coarse in {"overlay", "portals"}
+        knows = self.refine == "none" and self.coarse == "overlay"
         if knows or self.refine == "grid-astar":
             return None
         what = f"coarse: {self.coarse}" if self.refine == "none" else f"refine: {self.refine}"
@@ -189,6 +188,20 @@ class PlannerSettings(_Section):
             f"{what} knows lengths only; costs go with coarse: overlay, as in preset robot, or "
             "refine: grid-astar, as in preset grid-astar"
         )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _portals_are_gone(cls, given: Any) -> Any:
+        """Take a method in place of portals that plans the same or better paths."""
+        if not isinstance(given, dict) or given.get("coarse") != "portals":
+            return given
+        by_costs = given.get("costs") or given.get("smooth") == "arcs"
+        taken = "mesh" if given.get("refine") == "ompl" else "overlay" if by_costs else "jumps"
+        as_in = ", as in preset octile" if taken == "jumps" else ""
+        text = f"portals are gone, coarse: {taken} plans instead{as_in}: write that"
+        warnings.warn(text, FutureWarning, stacklevel=2)
+        # Corner cells need no epsilon: their paths are the shortest.
+        return {**given, "coarse": taken} | ({"epsilon": None} if taken == "jumps" else {})
 
     @model_validator(mode="before")
     @classmethod
@@ -225,10 +238,8 @@ class PlannerSettings(_Section):
             )
         if self.budget_s is not None and (self.coarse, self.refine) != ("mesh", "none"):
             raise PydanticCustomError("mesh_needed", "budget_s needs coarse: mesh, refine: none")
-        if self.epsilon is not None and self.coarse not in {"portals", "mesh", "overlay"}:
-            raise PydanticCustomError(
-                "bounds_needed", "epsilon needs coarse: portals, mesh or overlay"
-            )
+        if self.epsilon is not None and self.coarse not in {"mesh", "overlay"}:
+            raise PydanticCustomError("bounds_needed", "epsilon needs coarse: mesh or overlay")
         return self
 
 
@@ -311,16 +322,20 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
 
     Examples
     --------
-    >>> preset = hn.load_preset("portals", overrides=["planner.epsilon=0.01"])
+    >>> preset = hn.load_preset("robot", overrides=["planner.epsilon=0.02"])
     >>> preset.planner.epsilon
-    0.01
+    0.02
     """
-    preset = source if isinstance(source, Preset) else _read(_find(source))
+    is_gone = not isinstance(source, Preset) and os.fspath(source) == "portals"
+    found = "octile" if is_gone else source
+    preset = found if isinstance(found, Preset) else _read(_find(found))
     tree, given = preset.model_dump(), list(overrides)
+    if is_gone:  # the section takes another one for it, by all of its settings
+        tree["planner"]["coarse"] = "portals"
     for override in given:
         _apply(tree, override)
     # All at once, for some keys go only together.
-    return _checked(tree, where="setting ") if given else preset
+    return _checked(tree, where="setting ") if given or is_gone else preset
 
 
 def _read(path: Path) -> Preset:

@@ -36,7 +36,7 @@ REFERENCE = "grid-astar"
 
 LINE_OF_SIGHT = "line-of-sight"
 """Value of `planner.smooth`; added to the names of presets that have it, as in
-`portals+line-of-sight`."""
+`octile+line-of-sight`."""
 
 BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
     "grid-astar": ("hybridnav.baselines.grid:GridAstar", {}),

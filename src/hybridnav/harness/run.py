@@ -375,7 +375,7 @@ def methods_of(settings: RunSettings, merge_distance_m: float | None) -> list[Me
         raise InvalidValueError(
             f"method {lines[0]}: an any-angle path never passes between two blocked cells that "
             "meet at a corner: leave corner cutting out, or take presets with octile paths, such "
-            "as portals"
+            "as octile"
         )
     return list({spec.digest: spec for spec in specs}.values())
 

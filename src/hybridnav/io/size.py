@@ -8,7 +8,7 @@ from hybridnav.grid import MAX_CELLS
 _READING_BYTES = 50
 """Bytes per cell while a map is read and inflated; measured 42 on 16 million cells."""
 _PLANNING_BYTES = 300
-"""Most bytes per cell with pyramid and portals; measured 285 on 4 million free cells."""
+"""Most bytes per cell with pyramid and overlay; measured 240 on 4 million free cells."""
 _GB = 1e9
 
 

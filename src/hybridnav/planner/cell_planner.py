@@ -21,12 +21,11 @@ if TYPE_CHECKING:
     from hybridnav.jumps import JumpSearch
     from hybridnav.mesh import MeshSearch
     from hybridnav.planner.closed import ClosedCells
-    from hybridnav.portals import BuiltPortals
     from hybridnav.pyramid import Level
     from hybridnav.result import Metric, Route
     from hybridnav.topology import TopologicalMap
 
-    Prepared = MeshSearch | JumpSearch | BuiltPortals
+    Prepared = MeshSearch | JumpSearch
     """What planners of cell paths build of a map."""
 
 Cell = tuple[int, int]

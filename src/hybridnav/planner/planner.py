@@ -63,7 +63,7 @@ class HybridPlanner:
     costs
         A factor for each cell, by which a metre in it costs more, joined with the costs that the
         preset names. The path is the cheapest one, and its result has the metric `weighted`. Only
-        for presets with `refine: grid-astar`, or with `coarse: overlay` or `portals`.
+        for presets with `refine: grid-astar`, or with `coarse: overlay`.
 
     Raises
     ------
@@ -119,9 +119,8 @@ class HybridPlanner:
 
     @property
     def prepared(self) -> Prepared | None:
-        """The structure built for queries: a mesh, a jump-point graph or portals; None before that,
-        and with presets that build none or, as the overlay does, one that changes with the
-        costs."""
+        """The structure built for queries: a mesh or a jump-point graph; None before that, and
+        with presets that build none or, as the overlay does, one that changes with the costs."""
         return self._cells.prepared
 
     @property
@@ -246,7 +245,7 @@ class HybridPlanner:
 
     def prepare(self, *, progress: Progress = no_progress) -> None:
         """Build the structures for queries now: mesh and graph of corners, jump-point graph,
-        portals, or overlay.
+        or overlay.
 
         Structures that exist already are kept; what `update` has made stale is renewed. Threads may
         call this, and plan meanwhile: each structure is built once.
@@ -272,12 +271,12 @@ class HybridPlanner:
         Queries of other threads that run already finish by what was before; the update waits for
         them, and for `prepare`. An interrupt leaves the planner as it was, or changed.
 
-        With an overlay (`coarse: overlay`, or `portals` with costs) the changed fields get their
-        costs at once; searches leave stale tables above these out until `prepare` renews them.
-        `shortest`, `octile` and `grid-astar` follow a changed grid alone. Their results have no
-        route, and names, places and doors are refused, until an update brings the places of the map
-        now. All other presets need these at once. Costs that were given stay with their cells on a
-        changed map; those that the preset computes from the map are computed anew.
+        With `coarse: overlay` the changed fields get their costs at once; searches leave stale
+        tables above these out until `prepare` renews them. `shortest`, `octile` and `grid-astar`
+        follow a changed grid alone. Their results have no route, and names, places and doors are
+        refused, until an update brings the places of the map now. All other presets need these at
+        once. Costs that were given stay with their cells on a changed map; those that the preset
+        computes from the map are computed anew.
 
         Parameters
         ----------

@@ -47,17 +47,11 @@ def cell_planner(
     """
     grid, coarse = topology.grid, settings.coarse
     refiner = GridRefiner(grid, allow_unexplored=settings.allow_unexplored, costs=costs)
-    if coarse == "overlay" or (coarse == "portals" and costs is not None):
+    if coarse == "overlay":
         from hybridnav.planner.overlay_plans import OverOverlay  # noqa: PLC0415
 
-        if coarse == "overlay":
-            _taken(type(None), prepared, coarse)
+        _taken(type(None), prepared, coarse)
         return OverOverlay(topology, refiner, settings)
-    if coarse == "portals":
-        from hybridnav.planner.cell_plans import OverPortals  # noqa: PLC0415
-        from hybridnav.portals import BuiltPortals  # noqa: PLC0415
-
-        return OverPortals(topology, refiner, settings, _taken(BuiltPortals, prepared, coarse))
     if coarse == "mesh":
         from hybridnav.mesh import MeshSearch  # noqa: PLC0415
         from hybridnav.planner.mesh_plans import OverMesh  # noqa: PLC0415

@@ -118,11 +118,11 @@ class PlanStats:
     expanded_places: int = 0
     """Number of places that the coarse search expanded."""
     expanded_border_cells: int = 0
-    """Number of border cells that the search over portals expanded."""
+    """Number of border cells that the search on the overlay expanded."""
     expanded_intervals: int = 0
     """Number of intervals that the search on the mesh expanded."""
     corridor_cells: int = 0
-    """Number of cells in the corridor; 0 for the whole map, or a route over portals."""
+    """Number of cells in the corridor; 0 for the whole map."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall-clock seconds per stage."""
 

@@ -25,7 +25,7 @@ _TERM = re.compile(r"(?:(\d+)\*)?([a-z_]+)([+-]\d+)?")
 _Size = int | str
 
 MOST = "1000*cells+100000000"
-"""Most bytes of a structure: portals, the largest, take 640 a cell, and 16 MB on any map."""
+"""Most bytes of a structure, generously."""
 
 
 @dataclass(frozen=True)

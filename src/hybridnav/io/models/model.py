@@ -14,7 +14,7 @@ from hybridnav.grid import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.io.models import parts
 from hybridnav.io.models.array_specs import refusal
 from hybridnav.io.models.container import read_parts
-from hybridnav.io.models.structures import BUILDING, GRID, KEY, KINDS, PRESET, PYRAMID, ROOMS
+from hybridnav.io.models.structures import BUILDING, GONE, GRID, KEY, KINDS, PRESET, PYRAMID, ROOMS
 from hybridnav.io.size import check_max_cells
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
@@ -172,7 +172,7 @@ class Model:
         topology = self.topology if topology is None else topology
         prepared = None
         if topology.grid is self.grid:
-            key = made_for(preset.planner, topology)
+            key = made_for(preset.planner)
             prepared = search_of(self._filed, preset.planner.coarse, key, self._sizes)
         return HybridPlanner(topology, preset=preset, prepared=prepared, costs=costs)
 
@@ -305,6 +305,8 @@ def model_of(filed: Sequence[FiledPart], where: str, max_cells: int) -> Model:
         When they are not those of one map.
     """
     for part in filed:
+        if part.kind in GONE:
+            raise refusal(part, "no planner uses portals any more")
         if part.kind not in KINDS:
             raise refusal(part, "no such part is known: a newer hybridnav has made it")
     # Meshes and graphs occur once for each kind of planner that they were made for.

@@ -109,7 +109,7 @@ def parts_of(
     found += [parts.preset_part(planner.preset) for planner in planners]
     for planner in planners:
         settings, prepared = planner.preset.planner, planner.prepared
-        key = made_for(settings, topology)
+        key = made_for(settings)
         if prepared is not None and (settings.coarse, key) not in keys:
             keys.append((settings.coarse, key))
             found += search_parts(prepared, key)

@@ -1,4 +1,4 @@
-"""Prepared meshes, graphs and portals of planners as parts of a model, and back."""
+"""Prepared meshes and graphs of planners as parts of a model, and back."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from hybridnav import jumps, portals
+from hybridnav import jumps
 from hybridnav import mesh as meshes
 from hybridnav.io.models.array_specs import refusal
-from hybridnav.io.models.parts import plain, values_of
+from hybridnav.io.models.parts import values_of
 from hybridnav.io.models.structures import (
     CORNER_EDGES,
     CORNER_GRAPH,
     CORNER_HIERARCHY,
     JUMP_GRAPH,
     MESH,
-    PORTALS,
-    TABLES,
 )
 
 if TYPE_CHECKING:
@@ -30,8 +28,6 @@ if TYPE_CHECKING:
     from hybridnav.jumps import JumpSearch
     from hybridnav.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
     from hybridnav.planner.cell_planner import Prepared
-    from hybridnav.portals import BuiltPortals
-    from hybridnav.topology import TopologicalMap
 
 
 _FRAME = 2
@@ -54,21 +50,9 @@ class _JumpValues(_Values):
     shape: tuple[int, int]
 
 
-class _PortalValues(_Values):
-    has_all_gates: bool
-    shift: int
-
-
-def made_for(settings: PlannerSettings, topology: TopologicalMap) -> dict[str, Any]:
+def made_for(settings: PlannerSettings) -> dict[str, Any]:
     """Return the settings, beside the grid, that determine the preparations of a planner."""
-    key: dict[str, Any] = {"allow_unexplored": settings.allow_unexplored}
-    if settings.coarse == "portals":
-        key |= {
-            "merge_distance_m": plain(topology.pyramid.merge_distance_m),
-            "linkage": topology.pyramid.linkage,
-            "seed": topology.pyramid.seed,
-        }
-    return {"made_for": key}
+    return {"made_for": {"allow_unexplored": settings.allow_unexplored}}
 
 
 def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
@@ -83,9 +67,7 @@ def search_parts(prepared: Prepared, key: dict[str, Any]) -> list[Part]:
     """
     if isinstance(prepared, meshes.MeshSearch):
         return _mesh_parts(prepared, key)
-    if isinstance(prepared, jumps.JumpSearch):
-        return _jump_parts(prepared, key)
-    return _portal_parts(prepared, key)
+    return _jump_parts(prepared, key)
 
 
 def search_of(
@@ -114,8 +96,6 @@ def search_of(
         return _mesh_of(fitting, known)
     if coarse == "jumps" and JUMP_GRAPH.kind in fitting:
         return _jumps_of(fitting, known)
-    if coarse == "portals" and PORTALS.kind in fitting:
-        return _portals_of(fitting, known)
     return None
 
 
@@ -266,42 +246,6 @@ def _check_index(filed: FiledPart, index: LongArray) -> None:
     stated = (index[:, 2] == (before[:-1, 0] << 32 | before[:-1, 1])).all()
     if not stated or before[-1].tolist() != [sizes["free"], sizes["corners"]]:
         raise refusal(filed, "index holds other counts than its bits")
-
-
-def _portal_parts(built: BuiltPortals, key: dict[str, Any]) -> list[Part]:
-    layout, tables = built.portals, built.tables
-    sizes = {
-        "fields": layout.n_fields,
-        "positions": len(layout.position),
-        "entered": int(layout.field_start[-1]),
-        "gates": layout.n_gates,
-        "moves": len(layout.first_move),
-        "costs": len(layout.clique),
-        "exits": len(layout.exit_gate),
-        "sides": layout.n_sides,
-        "members": len(layout.side_gates),
-        "side_costs": len(layout.side_cost),
-        "sources": len(layout.source_gate),
-        "portals": len(layout.portal_sides),
-    }
-    values = key | {"has_all_gates": built.has_all_gates, "shift": int(tables.shift)}
-    arrays = {"field_of": built.field_of, **layout._asdict()}
-    of_tables = {name: sizes[name] for name in TABLES.most}
-    return [PORTALS.part(arrays, sizes, values), TABLES.part(tables, of_tables, key)]
-
-
-def _portals_of(fitting: dict[str, FiledPart], known: dict[str, int]) -> BuiltPortals:
-    filed = fitting[PORTALS.kind]
-    values = values_of(_PortalValues, filed)
-    arrays = PORTALS.read(filed, known)
-    tables = fitting.get(TABLES.kind)
-    if tables is None:
-        raise refusal(filed, f"the {TABLES.kind} are missing")
-    for name in TABLES.most:
-        _check_same(tables, name, filed.part.sizes[name])
-    field_of = arrays.pop("field_of")
-    made = portals.Tables(shift=values.shift, **TABLES.read(tables, known))
-    return portals.BuiltPortals(field_of, portals.Portals(**arrays), made, values.has_all_gates)
 
 
 def _check_same(filed: FiledPart, name: str, wanted: int) -> None:

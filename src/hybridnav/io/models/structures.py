@@ -6,10 +6,8 @@ from demanding memory.
 
 from __future__ import annotations
 
-from functools import partial
-
 from hybridnav.grid.limits import MAX_CELLS
-from hybridnav.io.models.array_specs import MOST, ArraySpec, Structure
+from hybridnav.io.models.array_specs import ArraySpec, Structure
 
 GRID = Structure(
     "grid",
@@ -107,62 +105,6 @@ JUMP_GRAPH = Structure(
     },
 )
 
-_Open = partial(ArraySpec, frozen=False)
-
-PORTALS = Structure(
-    "portals",
-    2,
-    (
-        _Open("field_of", "int16 int32", ("rows", "cols"), least=-1, below="fields"),
-        _Open("position", "int32", ("positions",), least=-1, below="cells"),
-        _Open("field_start", "int64", ("fields+1",), below="entered", is_offsets=True),
-        _Open("gate_start", "int64", ("fields+1",), below="gates", is_offsets=True),
-        _Open("gate_cell", "int32", ("gates",), least=0, below="cells"),
-        _Open("first_move_start", "int64", ("gates+1",), below="moves", is_offsets=True),
-        _Open("first_move", "uint8", ("moves",)),
-        _Open("clique_start", "int64", ("fields+1",), below="costs", is_offsets=True),
-        _Open("clique", "int32", ("costs",), least=0),
-        _Open("exit_start", "int64", ("gates+1",), below="exits", is_offsets=True),
-        _Open("exit_gate", "int32", ("exits",), least=0, below="gates"),
-        _Open("exit_cost", "int32", ("exits",), least=1),
-        _Open("side_start", "int64", ("fields+1",), below="sides", is_offsets=True),
-        _Open("side_gates_start", "int64", ("sides+1",), below="members", is_offsets=True),
-        _Open("side_gates", "int32", ("members",), least=0, below="gates"),
-        _Open("side_cost_start", "int64", ("fields+1",), below="side_costs", is_offsets=True),
-        _Open("side_cost_shift", "int64", ("fields",), least=0, below=64),
-        _Open("side_cost", "uint16", ("side_costs",)),
-        _Open("source_gate", "int32", ("sources",), least=0, below="gates"),
-        _Open("portal_sides", "int32", ("portals", 2), least=0, below="sides"),
-        _Open("side_box", "int32", ("sides", 4), least=0, below="cells"),
-    ),
-    {
-        "fields": "cells",
-        "positions": "64*cells",
-        "entered": "cells",
-        "gates": "cells",
-        "moves": MOST,
-        "costs": MOST,
-        "exits": "8*cells",
-        "sides": "8*cells",
-        "members": "64*cells",
-        "side_costs": MOST,
-        "sources": "gates",
-        "portals": "sides",
-    },
-)
-
-TABLES = Structure(
-    "portal tables",
-    2,
-    (
-        _Open("distance", "uint32", ("sources", "gates")),
-        _Open("between", "uint32", ("sides", "sides")),
-        _Open("gate_field", "int32", ("gates",), least=0, below="cells"),
-        _Open("source_at", "int32", ("gates",), least=-1, below="sources"),
-    ),
-    {"gates": "cells", "sources": "gates", "sides": "8*cells"},
-)
-
 PRESET = Structure("preset", 2, (), {})
 
 KEY = Structure("key", 1, (), {})
@@ -192,8 +134,9 @@ KINDS = frozenset(
         CORNER_EDGES,
         CORNER_HIERARCHY,
         JUMP_GRAPH,
-        PORTALS,
-        TABLES,
     )
 )
 """The kinds of all parts of a model."""
+
+GONE = frozenset({"portals", "portal tables"})
+"""Kinds of parts that models of earlier versions have."""
